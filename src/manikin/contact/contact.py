@@ -1,0 +1,241 @@
+"""One contact between an effector and the scene: a sole, a point or a grasp."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.errors import ContactError
+from manikin.spatial import (
+    FloatArray,
+    check_rotation,
+    finite_number,
+    frozen_array,
+    rotation_from_normal,
+    rotation_from_yaw,
+)
+
+
+class ContactKind(StrEnum):
+    """How a contact may push or pull."""
+
+    SOLE = "sole"
+    """Unilateral, frictional, over a rectangle: four corner points carrying forces."""
+    POINT = "point"
+    """Unilateral, frictional, at one point."""
+    GRASP = "grasp"
+    """Bilateral, bounded in force (and moment) along each world axis."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Where and how an effector touches the scene ([Qiu2012]_ 4.2.1).
+
+    Use :func:`sole`, :func:`point` or :func:`grasp` to make one.
+
+    Attributes:
+        effector: Name of the body's effector (``"left_foot"``).
+        kind: Sole, point or grasp.
+        position: (3,) origin of the contact frame in the world [m]; a sole's is its centre.
+        rotation_contact_to_world: (3, 3); its z column is the normal, from the scene into
+            the body; a sole's x column points to the toes.
+        points: (k, 3) points of the contact frame that carry force [m].
+        friction: Coulomb coefficient; 0 for a grasp, which has its own limits.
+        normal_force_cap: Largest normal force of this contact [N], or None.
+        torsion_limit: Largest moment about the normal [N.m], or None when only the
+            friction of the corner points limits it ([Qiu2012]_ 4.21, safe form).
+        max_force: Grasp force limit per world axis [N].
+        max_moment: Grasp moment limit per world axis [N.m].
+    """
+
+    effector: str
+    kind: ContactKind
+    position: FloatArray
+    rotation_contact_to_world: FloatArray
+    points: FloatArray
+    friction: float = 0.0
+    normal_force_cap: float | None = None
+    torsion_limit: float | None = None
+    max_force: float = 0.0
+    max_moment: float = 0.0
+
+    @property
+    def normal(self) -> FloatArray:
+        """(3,) unit normal in the world, from the scene into the body."""
+        return self.rotation_contact_to_world[:, 2]
+
+    @property
+    def points_in_world(self) -> FloatArray:
+        """(k, 3) force-carrying points in the world [m]."""
+        return self.position + self.points @ self.rotation_contact_to_world.T
+
+    @property
+    def yaw(self) -> float:
+        """Heading of the contact's x axis about the world vertical [rad]."""
+        forward = self.rotation_contact_to_world[:, 0]
+        return float(np.arctan2(forward[1], forward[0]))
+
+    @property
+    def length(self) -> float:
+        """Extent of the points along the contact's x axis [m]."""
+        return float(np.ptp(self.points[:, 0]))
+
+    @property
+    def width(self) -> float:
+        """Extent of the points along the contact's y axis [m]."""
+        return float(np.ptp(self.points[:, 1]))
+
+    def same_place(self, other: "Contact", tolerance: float = 1e-9) -> bool:
+        """Whether ``other`` is the same effector at the same pose, whatever its limits."""
+        return (
+            self.effector == other.effector
+            and bool(np.abs(self.position - other.position).max() <= tolerance)
+            and bool(
+                np.abs(self.rotation_contact_to_world - other.rotation_contact_to_world).max() <= tolerance
+            )
+        )
+
+
+def sole(
+    effector: str,
+    position: ArrayLike,
+    yaw: float = 0.0,
+    *,
+    length: float,
+    width: float,
+    friction: float,
+    normal: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    normal_force_cap: float | None = None,
+    torsion_limit: float | None = None,
+) -> Contact:
+    """Make a rectangular sole: four corner points with friction pyramids.
+
+    Args:
+        effector: Name of the effector, such as ``"left_foot"``.
+        position: (3,) centre of the sole in the world [m].
+        yaw: Heading of the toes [rad], counter-clockwise from world x (about ``normal``).
+        length: Along the heading [m].
+        width: Across the heading [m].
+        friction: Coulomb coefficient, > 0.
+        normal: (3,) surface normal; up when omitted.
+        rotation: (3, 3) contact-to-world rotation; replaces ``yaw`` and ``normal``.
+        normal_force_cap: Largest normal force on this sole [N].
+        torsion_limit: Largest moment about the normal [N.m].
+
+    Raises:
+        ContactError: If a value is not finite or out of its range.
+    """
+    where = f"sole '{effector}'"
+    half_length = finite_number(length, f"{where} length", above=0.0, error=ContactError) / 2
+    half_width = finite_number(width, f"{where} width", above=0.0, error=ContactError) / 2
+    corners = [
+        [half_length, half_width, 0.0],
+        [half_length, -half_width, 0.0],
+        [-half_length, -half_width, 0.0],
+        [-half_length, half_width, 0.0],
+    ]
+    return _frictional(
+        where, effector, ContactKind.SOLE, position, corners, yaw, friction, normal, rotation, normal_force_cap,
+        torsion_limit,
+    )  # fmt: skip
+
+
+def point(
+    effector: str,
+    position: ArrayLike,
+    *,
+    friction: float,
+    normal: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    normal_force_cap: float | None = None,
+) -> Contact:
+    """Make a frictional point contact.
+
+    Args:
+        effector: Name of the effector.
+        position: (3,) in the world [m].
+        friction: Coulomb coefficient, > 0.
+        normal: (3,) surface normal; up when omitted.
+        rotation: (3, 3) contact-to-world rotation; replaces ``normal``.
+        normal_force_cap: Largest normal force [N].
+
+    Raises:
+        ContactError: If a value is not finite or out of its range.
+    """
+    where = f"point '{effector}'"
+    return _frictional(
+        where, effector, ContactKind.POINT, position, [[0.0, 0.0, 0.0]], 0.0, friction, normal, rotation,
+        normal_force_cap, None,
+    )  # fmt: skip
+
+
+def grasp(
+    effector: str,
+    position: ArrayLike,
+    *,
+    max_force: float,
+    max_moment: float = 0.0,
+    rotation: ArrayLike | None = None,
+) -> Contact:
+    """Make a grasp: force and moment bounded along each world axis ([Qiu2012]_ 4.22).
+
+    Args:
+        effector: Name of the effector, such as ``"right_hand"``.
+        position: (3,) in the world [m].
+        max_force: Largest force along each world axis [N], > 0.
+        max_moment: Largest moment along each world axis [N.m]; 0 makes a pure point grasp.
+        rotation: (3, 3) contact-to-world rotation, for the hand's placement only.
+
+    Raises:
+        ContactError: If a value is not finite or out of its range.
+    """
+    where = f"grasp '{effector}'"
+    return Contact(
+        effector=effector,
+        kind=ContactKind.GRASP,
+        position=frozen_array(position, f"{where} position", (3,), ContactError),
+        rotation_contact_to_world=check_rotation(
+            np.eye(3) if rotation is None else rotation, f"{where} rotation", ContactError
+        ),
+        points=frozen_array(np.zeros((1, 3)), "points"),
+        max_force=finite_number(max_force, f"{where} max_force [N]", above=0.0, error=ContactError),
+        max_moment=finite_number(max_moment, f"{where} max_moment [N.m]", at_least=0.0, error=ContactError),
+    )
+
+
+def _frictional(
+    where: str,
+    effector: str,
+    kind: ContactKind,
+    position: ArrayLike,
+    points: ArrayLike,
+    yaw: float,
+    friction: float,
+    normal: ArrayLike | None,
+    rotation: ArrayLike | None,
+    normal_force_cap: float | None,
+    torsion_limit: float | None,
+) -> Contact:
+    heading = finite_number(yaw, f"{where} yaw [rad]", error=ContactError)
+    if rotation is not None:
+        frame = check_rotation(rotation, f"{where} rotation", ContactError)
+    elif normal is not None:
+        frame = rotation_from_normal(normal, heading)
+    else:
+        frame = rotation_from_yaw(heading)
+    return Contact(
+        effector=effector,
+        kind=kind,
+        position=frozen_array(position, f"{where} position", (3,), ContactError),
+        rotation_contact_to_world=frozen_array(frame, f"{where} rotation", (3, 3), ContactError),
+        points=frozen_array(points, f"{where} points", (None, 3), ContactError),
+        friction=finite_number(friction, f"{where} friction", above=0.0, error=ContactError),
+        normal_force_cap=_optional_limit(normal_force_cap, f"{where} normal_force_cap [N]"),
+        torsion_limit=_optional_limit(torsion_limit, f"{where} torsion_limit [N.m]"),
+    )
+
+
+def _optional_limit(value: float | None, name: str) -> float | None:
+    return None if value is None else finite_number(value, name, above=0.0, error=ContactError)
