@@ -137,8 +137,8 @@ def sole(
         [-half_length, half_width, 0.0],
     ]
     return _frictional(
-        where, effector, ContactKind.SOLE, position, corners, yaw, friction, normal, rotation, normal_force_cap,
-        torsion_limit,
+        where, effector, ContactKind.SOLE, position, corners, yaw, friction, normal, rotation,
+        normal_force_cap, torsion_limit,
     )  # fmt: skip
 
 

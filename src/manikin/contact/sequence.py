@@ -1,5 +1,6 @@
 """A sequence of stances with the bounds of their durations."""
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -63,13 +64,13 @@ class StanceSequence:
     def __init__(self, phases: Sequence[Phase]) -> None:
         if not phases:
             raise ContactError("stance sequence is empty; valid: at least one phase")
-        for number, (before, after) in enumerate(zip(phases, phases[1:], strict=False)):
+        for number, (before, after) in enumerate(itertools.pairwise(phases)):
             for contact in after.stance:
                 if contact.effector in before.stance and not contact.same_place(
                     before.stance[contact.effector]
                 ):
                     raise ContactError(
-                        f"effector {contact.effector!r} slides between phases {number} and {number + 1}; "
+                        f"effector {name!r} slides between phases {number} and {number + 1}; "
                         "valid: a phase without its contact in between"
                     )
         object.__setattr__(self, "phases", tuple(phases))

@@ -1,0 +1,58 @@
+"""When each stance of a sequence is held."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.contact.sequence import StanceSequence, Swing
+from manikin.contact.stance import Stance
+from manikin.errors import ContactError
+from manikin.spatial import FloatArray, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSchedule:
+    """A stance sequence with its key instants.
+
+    Attributes:
+        sequence: The stances, one per phase.
+        instants: (phases + 1,) start of each phase and end of the last [s], increasing.
+    """
+
+    sequence: StanceSequence
+    instants: FloatArray
+
+    def __init__(self, sequence: StanceSequence, instants: ArrayLike) -> None:
+        times = frozen_array(instants, "schedule instants [s]", (len(sequence) + 1,), ContactError)
+        if not np.all(np.diff(times) > 0):
+            raise ContactError(f"schedule instants are {times.tolist()}; valid: strictly increasing seconds")
+        object.__setattr__(self, "sequence", sequence)
+        object.__setattr__(self, "instants", times)
+
+    @property
+    def durations(self) -> FloatArray:
+        """(phases,) duration of each phase [s]."""
+        return np.diff(self.instants)
+
+    def phase_at(self, time: ArrayLike) -> NDArray[np.int64]:
+        """Index of the phase at each time; the half-open ``[start, end)``, the last one closed.
+
+        Args:
+            time: Scalar or (n,) [s]; times outside are given the first or the last phase.
+        """
+        index = np.searchsorted(self.instants, time, side="right") - 1
+        return np.clip(index, 0, len(self.sequence) - 1)
+
+    def stance_at(self, time: float) -> Stance:
+        """Return the stance held at ``time`` [s]."""
+        return self.sequence[int(self.phase_at(time))].stance
+
+    def support(self, time: ArrayLike, effectors: tuple[str, ...]) -> NDArray[np.bool_]:
+        """(n, effectors) whether each effector is in contact at each time."""
+        table = np.array([[name in phase.stance for name in effectors] for phase in self.sequence])
+        return table[self.phase_at(np.atleast_1d(time))]
+
+    def swing_interval(self, swing: Swing) -> tuple[float, float]:
+        """Lift-off and landing time of a swing [s]."""
+        return float(self.instants[swing.first_phase]), float(self.instants[swing.last_phase + 1])
