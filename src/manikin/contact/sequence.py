@@ -66,9 +66,8 @@ class StanceSequence:
             raise ContactError("stance sequence is empty; valid: at least one phase")
         for number, (before, after) in enumerate(itertools.pairwise(phases)):
             for contact in after.stance:
-                if contact.effector in before.stance and not contact.same_place(
-                    before.stance[contact.effector]
-                ):
+                name = contact.effector
+                if name in before.stance and not contact.same_place(before.stance[name]):
                     raise ContactError(
                         f"effector {name!r} slides between phases {number} and {number + 1}; "
                         "valid: a phase without its contact in between"
