@@ -1,0 +1,1 @@
+"""Whole-body motion: swings, their search, and the motion that joins them."""
