@@ -1,0 +1,112 @@
+"""Assembly and solution of the block-banded normal equations of a spline fit.
+
+A clamped B-spline of degree ``p`` couples each control point with ``p`` neighbours, so the
+normal equations of any sum of per-sample residuals are block-banded: they are assembled with
+one sparse product and solved by a banded Cholesky factorisation in linear time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg import solveh_banded
+from scipy.sparse import csr_matrix
+
+from manikin.spatial import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class SampledBasis:
+    """The non-zero basis functions of a clamped spline at sample times.
+
+    Attributes:
+        first: (n,) index of the first control point that matters at each sample.
+        values: (3, n, degree + 1) basis values and their first two derivatives.
+        size: Number of control points.
+    """
+
+    first: NDArray[np.int64]
+    values: FloatArray
+    size: int
+
+    @classmethod
+    def at(cls, time: FloatArray, knots: FloatArray, degree: int) -> "SampledBasis":
+        """Sample the basis of ``knots`` [s] at ``time`` (n,) [s]."""
+        size = len(knots) - degree - 1
+        first = np.clip(np.searchsorted(knots, time, side="right") - 1, degree, size - 1) - degree
+        identity = BSpline(knots, np.eye(size), degree)
+        rows = np.arange(len(time))[:, None]
+        columns = first[:, None] + np.arange(degree + 1)
+        values = np.stack([identity(time, nu=order)[rows, columns] for order in range(3)])
+        return cls(first, values, size)
+
+    def evaluate(self, control_points: FloatArray, order: int = 0) -> FloatArray:
+        """(n, d) spline values, or derivatives of ``order`` 1 or 2."""
+        columns = self.first[:, None] + np.arange(self.values.shape[2])
+        return np.einsum("ns,nsd->nd", self.values[order], control_points[columns])
+
+
+class BlockBandedSystem:
+    """Normal equations ``A x = b`` over control points of dimension ``dimension``."""
+
+    def __init__(self, basis: SampledBasis, dimension: int) -> None:
+        self._basis = basis
+        self._dimension = dimension
+        self._bandwidth = basis.values.shape[2]
+        self._products = [self._pair_products(order) for order in range(3)]
+        self._rows = [self._row_weights(order) for order in range(3)]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget every term."""
+        size, d = self._basis.size, self._dimension
+        self._blocks = np.zeros((self._bandwidth * size, d * d))
+        self._right = np.zeros((size, d))
+
+    def add(self, hessian: FloatArray | None, gradient: FloatArray, order: int = 0) -> None:
+        """Add per-sample terms on the spline's derivative of ``order``.
+
+        Args:
+            hessian: (n, d, d) Gauss-Newton matrices, or None for none.
+            gradient: (n, d) gradients of half the squared residuals.
+            order: 0 for values, 1 for rates, 2 for accelerations.
+        """
+        if hessian is not None:
+            self._blocks += self._products[order] @ hessian.reshape(len(hessian), -1)
+        self._right -= self._rows[order] @ gradient
+
+    def solve(self, damping: float) -> FloatArray:
+        """Return the step of every control point, (size, d), with Levenberg damping."""
+        size, d = self._basis.size, self._dimension
+        band = np.zeros((self._bandwidth * d, size * d))
+        row, column = np.indices((d, d))
+        for offset in range(self._bandwidth):
+            blocks = self._blocks[offset * size : (offset + 1) * size].reshape(size, d, d)[: size - offset]
+            keep = (row >= column) if offset == 0 else np.ones((d, d), dtype=bool)
+            diagonal = offset * d + (row - column)[keep]
+            columns = np.arange(size - offset)[:, None] * d + column[keep]
+            inside = diagonal >= 0
+            band[diagonal[inside], columns[:, inside]] = blocks[:, keep][:, inside]
+        band[0] += damping
+        return solveh_banded(band, self._right.ravel(), lower=True, check_finite=False).reshape(size, d)
+
+    def _pair_products(self, order: int) -> csr_matrix:
+        values, first, size = self._basis.values[order], self._basis.first, self._basis.size
+        n = len(first)
+        rows, columns, data = [], [], []
+        for b in range(self._bandwidth):
+            for a in range(b, self._bandwidth):
+                rows.append((a - b) * size + first + b)
+                columns.append(np.arange(n))
+                data.append(values[:, a] * values[:, b])
+        shape = (self._bandwidth * size, n)
+        return csr_matrix(
+            (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), shape=shape
+        )
+
+    def _row_weights(self, order: int) -> csr_matrix:
+        values, first, size = self._basis.values[order], self._basis.first, self._basis.size
+        n, width = values.shape
+        rows = (first[:, None] + np.arange(width)).ravel()
+        return csr_matrix((values.ravel(), (rows, np.repeat(np.arange(n), width))), shape=(size, n))
