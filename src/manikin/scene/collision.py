@@ -1,0 +1,199 @@
+"""Obstacles as Coal geometries: exact primitives, convex pieces, triangle pieces."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import coal
+import numpy as np
+import trimesh
+
+from manikin.scene.mesh import IntArray, Mesh, MeshPiece
+from manikin.scene.obstacle import Obstacle
+from manikin.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere, local_bounds
+from manikin.spatial import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionPart:
+    """One Coal geometry of an obstacle.
+
+    A convex mesh piece has a signed distance as exact as a primitive's. A closed piece
+    that is not convex carries ``surface`` so that depth can be told from clearance; an
+    open piece is a surface without inside.
+
+    Attributes:
+        obstacle: Name of the obstacle.
+        geometry: Coal geometry in the part's frame.
+        rotation: (3, 3) part-to-world rotation.
+        translation: (3,) [m].
+        low: (3,) lower corner in the part's frame [m], infinite where endless.
+        high: (3,) upper corner.
+        surface: The closed, non-convex surface, or None.
+    """
+
+    obstacle: str
+    geometry: coal.CollisionGeometry
+    rotation: FloatArray
+    translation: FloatArray
+    low: FloatArray
+    high: FloatArray
+    surface: "ClosedSurface | None" = None
+
+
+def collision_parts(obstacle: Obstacle) -> tuple[CollisionPart, ...]:
+    """Split an obstacle into Coal geometries: one per primitive, one per connected mesh piece."""
+    shape = obstacle.shape
+    if isinstance(shape, Mesh):
+        return tuple(_mesh_part(obstacle, piece) for piece in _merged_open_pieces(shape))
+    if isinstance(shape, (Plane, HalfSpace)):
+        return (_endless_part(obstacle, shape),)
+    low, high = local_bounds(shape)
+    geometry = primitive_geometry(shape)
+    return (CollisionPart(obstacle.name, geometry, obstacle.rotation, obstacle.translation, low, high),)
+
+
+def primitive_geometry(shape: Shape) -> coal.CollisionGeometry:
+    """Coal geometry of a primitive in its own frame.
+
+    Raises:
+        TypeError: If the shape is a mesh, which may need several geometries.
+    """
+    if isinstance(shape, Box):
+        return coal.Box(*shape.size)
+    if isinstance(shape, Sphere):
+        return coal.Sphere(shape.radius)
+    if isinstance(shape, Cylinder):
+        return coal.Cylinder(shape.radius, shape.length)
+    if isinstance(shape, Capsule):
+        return coal.Capsule(shape.radius, shape.length)
+    if isinstance(shape, Plane):
+        return coal.Plane(shape.normal, shape.offset)
+    if isinstance(shape, HalfSpace):
+        return coal.Halfspace(shape.normal, shape.offset)
+    raise TypeError(f"{type(shape).__name__} is no primitive")
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedSurface:
+    """A watertight triangle surface that can tell inside from outside.
+
+    Attributes:
+        vertices: (n, 3) [m].
+        faces: (m, 3).
+        geometry: The same as a Coal triangle mesh.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    geometry: coal.CollisionGeometry
+
+    @cached_property
+    def _corners(self) -> FloatArray:
+        return self.vertices[self.faces]
+
+    def contains(self, points: FloatArray) -> np.ndarray:
+        """(k,) whether each of the (k, 3) points is inside, by the winding number.
+
+        The solid angle sum is exact for any watertight surface and needs no rays.
+        """
+        a, b, c = (self._corners[None, :, i] - points[:, None] for i in range(3))
+        la, lb, lc = (np.linalg.norm(edge, axis=2) for edge in (a, b, c))
+        volume = np.einsum("kmi,kmi->km", a, np.cross(b, c))
+        spread = (
+            la * lb * lc
+            + np.einsum("kmi,kmi->km", a, b) * lc
+            + np.einsum("kmi,kmi->km", b, c) * la
+            + np.einsum("kmi,kmi->km", c, a) * lb
+        )
+        return np.abs(np.arctan2(volume, spread).sum(axis=1)) > np.pi
+
+    def nearest(self, point: FloatArray) -> tuple[float, FloatArray]:
+        """Unsigned distance of a point to the surface [m] and the nearest surface point."""
+        result = coal.DistanceResult()
+        place = coal.Transform3s(np.eye(3), point)
+        coal.distance(_POINT, place, self.geometry, _HERE, coal.DistanceRequest(), result)
+        nearest = result.getNearestPoint2()
+        return float(np.linalg.norm(nearest - point)), nearest
+
+
+_POINT = coal.Sphere(1e-9)
+_HERE = coal.Transform3s.Identity()
+
+
+def triangle_geometry(vertices: FloatArray, faces: IntArray) -> coal.CollisionGeometry:
+    """Coal bounding-volume hierarchy over triangles."""
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(faces), len(vertices))
+    model.addSubModel(_coal_vertices(vertices), _coal_triangles(faces))
+    model.endModel()
+    model.computeLocalAABB()
+    return model
+
+
+def convex_geometry(vertices: FloatArray) -> coal.CollisionGeometry:
+    """Coal convex polytope: the hull of the vertices."""
+    hull = trimesh.convex.convex_hull(vertices)
+    geometry = coal.Convex(_coal_vertices(hull.vertices), _coal_triangles(np.asarray(hull.faces)))
+    geometry.computeLocalAABB()
+    return geometry
+
+
+def _endless_part(obstacle: Obstacle, shape: Plane | HalfSpace) -> CollisionPart:
+    """Part whose frame has z along the normal, so that its bounds are tight."""
+    normal = shape.normal
+    across = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
+    across /= np.linalg.norm(across)
+    turn = np.column_stack([across, np.cross(normal, across), normal])
+    endless = np.full(2, np.inf)
+    up = np.array([0.0, 0.0, 1.0])
+    solid = isinstance(shape, HalfSpace)
+    return CollisionPart(
+        obstacle=obstacle.name,
+        geometry=coal.Halfspace(up, 0.0) if solid else coal.Plane(up, 0.0),
+        rotation=obstacle.rotation @ turn,
+        translation=obstacle.translation + obstacle.rotation @ (normal * shape.offset),
+        low=np.append(-endless, -np.inf if solid else 0.0),
+        high=np.append(endless, 0.0),
+    )
+
+
+def _mesh_part(obstacle: Obstacle, piece: MeshPiece) -> CollisionPart:
+    surface = None
+    if piece.convex:
+        geometry = convex_geometry(piece.vertices)
+    else:
+        geometry = triangle_geometry(piece.vertices, piece.faces)
+        surface = ClosedSurface(piece.vertices, piece.faces, geometry) if piece.closed else None
+    return CollisionPart(
+        obstacle.name,
+        geometry,
+        obstacle.rotation,
+        obstacle.translation,
+        piece.vertices.min(axis=0),
+        piece.vertices.max(axis=0),
+        surface,
+    )
+
+
+def _merged_open_pieces(mesh: Mesh) -> list[MeshPiece]:
+    """All closed pieces, and the open ones as one surface: fewer geometries, same distance."""
+    closed = [piece for piece in mesh.pieces if piece.closed]
+    loose = [piece for piece in mesh.pieces if not piece.closed]
+    if not loose:
+        return closed
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in loose[:-1])])
+    vertices = np.vstack([piece.vertices for piece in loose])
+    faces = np.vstack([piece.faces + start for piece, start in zip(loose, starts, strict=True)])
+    return [*closed, MeshPiece(vertices, faces, closed=False, convex=False)]
+
+
+def _coal_vertices(vertices: FloatArray) -> coal.StdVec_Vec3s:
+    out = coal.StdVec_Vec3s()
+    out.extend([np.asarray(vertex, dtype=np.float64) for vertex in vertices])
+    return out
+
+
+def _coal_triangles(faces: IntArray) -> coal.StdVec_Triangle:
+    out = coal.StdVec_Triangle()
+    out.extend([coal.Triangle(int(a), int(b), int(c)) for a, b, c in faces])
+    return out

@@ -1,0 +1,302 @@
+"""Triangle meshes in metres: checked arrays, and reading STL, OBJ, PLY and DAE files."""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.errors import SceneError
+from manikin.spatial import FloatArray, finite_number, frozen_array
+
+IntArray = NDArray[np.int64]
+Convexity = Literal["no", "hull", "parts"]
+
+FORMATS = ("stl", "obj", "ply", "dae")
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+"""Units a mesh file may be said to be in, in metres."""
+
+MAX_FACES = 50_000
+"""Meshes with more triangles are refused unless they are replaced by convex hulls."""
+LARGEST_EXTENT = 1000.0
+"""Meshes larger than this [m] are taken for a mistaken unit."""
+SMALLEST_EXTENT = 1e-3
+"""Meshes smaller than this [m] are taken for a mistaken unit."""
+_DEGENERATE_HEIGHT = 1e-9  # [m]; a triangle flatter than this has no usable normal
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A triangle mesh in its own frame.
+
+    Vertices at the same place are merged and degenerate triangles dropped on
+    construction, so that connected pieces and closed surfaces can be recognised.
+
+    Attributes:
+        vertices: (n, 3) [m].
+        faces: (m, 3) vertex indices, counter-clockwise seen from outside.
+        source: Where it came from, for messages (a path or a name).
+        dropped_faces: How many degenerate triangles were dropped.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    source: str
+    dropped_faces: int
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        source: str = "mesh",
+        *,
+        convex: Convexity = "no",
+        max_faces: int = MAX_FACES,
+    ) -> None:
+        """Check and clean a mesh.
+
+        Args:
+            vertices: (n, 3) [m].
+            faces: (m, 3) vertex indices.
+            source: Name for messages.
+            convex: ``"hull"`` replaces the mesh by its convex hull, ``"parts"`` each
+                connected piece by its own hull; both are larger than the mesh, hence safe.
+            max_faces: More triangles than this (after hulls) are refused.
+
+        Raises:
+            SceneError: If the mesh is empty, not finite, badly indexed, of a suspicious
+                size or too large.
+        """
+        points = frozen_array(vertices, f"mesh {source!r} vertices", (None, 3), SceneError)
+        triangles = _checked_faces(faces, len(points), source)
+        points, triangles, dropped = _cleaned(points, triangles)
+        if not len(triangles):
+            raise SceneError(f"mesh {source!r} has no triangle with an area; valid: at least one")
+        _check_extent(points, source)
+        if convex != "no":
+            points, triangles = _hulls(points, triangles, convex, source)
+        if len(triangles) > max_faces:
+            raise SceneError(
+                f"mesh {source!r} has {len(triangles)} triangles; valid: at most {max_faces}, "
+                "so decimate it (trimesh simplify_quadric_decimation) or set convex to 'parts' or 'hull'"
+            )
+        triangles.setflags(write=False)
+        object.__setattr__(self, "vertices", frozen_array(points, f"mesh {source!r} vertices"))
+        object.__setattr__(self, "faces", triangles)
+        object.__setattr__(self, "source", source)
+        object.__setattr__(self, "dropped_faces", dropped)
+
+    @cached_property
+    def pieces(self) -> "tuple[MeshPiece, ...]":
+        """Connected pieces, each with its own frame-free vertices."""
+        whole = as_trimesh(self.vertices, self.faces)
+        groups = trimesh.graph.connected_components(
+            whole.face_adjacency, nodes=np.arange(len(self.faces)), min_len=1
+        )
+        ordered = sorted((np.sort(group) for group in groups), key=lambda group: int(group[0]))
+        return tuple(_piece(self.vertices, self.faces[group]) for group in ordered)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPiece:
+    """A connected piece of a mesh.
+
+    Attributes:
+        vertices: (n, 3) [m].
+        faces: (m, 3) vertex indices, outward when ``closed``.
+        closed: Whether the surface is watertight, so that it has an inside.
+        convex: Whether it is closed and convex.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    closed: bool
+    convex: bool
+
+
+def load_mesh(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    scale: float = 1.0,
+    convex: Convexity = "no",
+    max_faces: int = MAX_FACES,
+) -> Mesh:
+    """Read an STL, OBJ, PLY or DAE file into metres.
+
+    Args:
+        path: File whose extension says the format.
+        unit: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``. When omitted, a DAE file's own unit
+            is used, and metres otherwise. A DAE file is turned so that its up axis is z.
+        scale: Further factor on every coordinate, > 0.
+        convex: As for :class:`Mesh`.
+        max_faces: As for :class:`Mesh`.
+
+    Raises:
+        SceneError: If the file is missing, of another format, unreadable, or no usable mesh.
+    """
+    file = Path(path)
+    extension = file.suffix.lower().lstrip(".")
+    if extension not in FORMATS:
+        raise SceneError(f"mesh file '{file}' has the extension '{file.suffix}'; valid: {_formats_text()}")
+    if not file.is_file():
+        raise SceneError(f"mesh file '{file}' does not exist; valid: an existing {_formats_text()} file")
+    if unit is not None and unit not in UNITS:
+        raise SceneError(f"mesh file '{file}' unit is {unit!r}; valid: {', '.join(UNITS)}")
+    factor = finite_number(scale, f"mesh file '{file}' scale", above=0.0, error=SceneError)
+    loaded = _read(file, extension)
+    vertices = np.asarray(loaded.vertices, dtype=np.float64)
+    metres = UNITS[unit] if unit is not None else 1.0
+    if extension == "dae":
+        rotation, own_unit = _collada_frame(file)
+        vertices = vertices @ rotation.T
+        metres = own_unit if unit is None else metres
+    return Mesh(vertices * (metres * factor), loaded.faces, str(file), convex=convex, max_faces=max_faces)
+
+
+def as_trimesh(vertices: FloatArray, faces: IntArray) -> trimesh.Trimesh:
+    """Wrap arrays in a trimesh without touching them."""
+    return trimesh.Trimesh(vertices=vertices, faces=faces, process=False, validate=False)
+
+
+def _formats_text() -> str:
+    return ", ".join(f".{name}" for name in FORMATS)
+
+
+def _read(file: Path, extension: str) -> trimesh.Trimesh:
+    try:
+        scene: Any = trimesh.load_scene(str(file), file_type=extension)
+        mesh = scene.to_mesh() if scene.geometry else None
+    except Exception as error:  # a reader may raise anything on a broken file
+        reason = " ".join(str(error).split())[:120]
+        raise SceneError(
+            f"mesh file '{file}' cannot be read ({type(error).__name__}: {reason}); "
+            f"valid: a well-formed {_formats_text()} file"
+        ) from None
+    if mesh is None or not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise SceneError(f"mesh file '{file}' holds no triangles; valid: at least one")
+    return mesh
+
+
+def _collada_frame(file: Path) -> tuple[FloatArray, float]:
+    """Rotation to z up and unit [m] of a COLLADA file, from its asset element."""
+    head = file.read_text(encoding="utf-8", errors="replace")
+    unit = re.search(r"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']+)[\"']", head)
+    up = re.search(r"<up_axis>\s*([XYZ])_UP\s*</up_axis>", head)
+    rotations = {
+        "X": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
+        "Y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+        "Z": np.eye(3),
+    }
+    # COLLADA's defaults are metres and Y up; files without the tag are, in robotics, z up.
+    rotation = rotations[up.group(1)] if up else np.eye(3)
+    try:
+        metres = float(unit.group(1)) if unit else 1.0
+    except ValueError:
+        metres = np.nan
+    return rotation, finite_number(metres, f"mesh file '{file}' unit [m]", above=0.0, error=SceneError)
+
+
+def _checked_faces(faces: ArrayLike, vertex_count: int, source: str) -> IntArray:
+    try:
+        triangles = np.array(faces, dtype=np.int64).reshape(-1, 3)
+    except (TypeError, ValueError):
+        raise SceneError(f"mesh {source!r} faces are not (m, 3) integers; valid: vertex indices") from None
+    if not vertex_count or not len(triangles):
+        raise SceneError(f"mesh {source!r} is empty; valid: at least one triangle")
+    if triangles.min() < 0 or triangles.max() >= vertex_count:
+        raise SceneError(
+            f"mesh {source!r} faces name vertex {triangles.max()}; valid: 0 to {vertex_count - 1}"
+        )
+    return triangles
+
+
+def _cleaned(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, int]:
+    """Merge vertices closer than a millionth of the size; drop degenerate and repeated triangles."""
+    grid = max(float(np.ptp(points, axis=0).max()) * 1e-6, 1e-12)
+    _, first, inverse = np.unique(
+        np.round((points - points.min(axis=0)) / grid).astype(np.int64),
+        axis=0,
+        return_index=True,
+        return_inverse=True,
+    )
+    merged = points[first]
+    faces = inverse.reshape(-1)[triangles]
+    corners = merged[faces]
+    edges = corners[:, [1, 2, 0]] - corners
+    doubled_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    good = doubled_area > _DEGENERATE_HEIGHT * np.maximum(longest, 1e-12)
+    _, kept = np.unique(np.sort(faces[good], axis=1), axis=0, return_index=True)
+    clean = faces[good][np.sort(kept)]
+    used, renumbered = np.unique(clean, return_inverse=True)
+    return merged[used], renumbered.reshape(-1, 3).astype(np.int64), len(triangles) - len(clean)
+
+
+def _check_extent(points: FloatArray, source: str) -> None:
+    extent = float(np.ptp(points, axis=0).max())
+    if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
+        raise SceneError(
+            f"mesh {source!r} extends over {extent:.4g} m, which suggests a mistaken unit; "
+            f"valid: {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m, so set unit ({', '.join(UNITS)}) or scale"
+        )
+
+
+def _hulls(points: FloatArray, triangles: IntArray, convex: str, source: str) -> tuple[FloatArray, IntArray]:
+    if convex not in ("hull", "parts"):
+        raise SceneError(f"mesh {source!r} convex is {convex!r}; valid: no, hull, parts")
+    whole = as_trimesh(points, triangles)
+    groups = [np.arange(len(triangles))]
+    if convex == "parts":
+        groups = trimesh.graph.connected_components(
+            whole.face_adjacency, nodes=np.arange(len(triangles)), min_len=1
+        )
+    vertices, faces, start = [], [], 0
+    for group in sorted(groups, key=lambda item: int(np.min(item))):
+        hull = _hull(points[np.unique(triangles[group])], source)
+        vertices.append(np.asarray(hull.vertices))
+        faces.append(np.asarray(hull.faces, dtype=np.int64) + start)
+        start += len(hull.vertices)
+    return np.vstack(vertices), np.vstack(faces)
+
+
+def _hull(points: FloatArray, source: str) -> trimesh.Trimesh:
+    try:
+        return trimesh.convex.convex_hull(points)
+    except Exception:  # Qhull raises its own error on flat input
+        raise SceneError(
+            f"mesh {source!r} has a flat piece, which has no convex hull; valid: convex 'no', or a solid"
+        ) from None
+
+
+def _piece(vertices: FloatArray, faces: IntArray) -> MeshPiece:
+    used, renumbered = np.unique(faces, return_inverse=True)
+    local = as_trimesh(vertices[used], renumbered.reshape(-1, 3).astype(np.int64))
+    closed = bool(local.is_watertight)
+    if closed:
+        trimesh.repair.fix_normals(local, multibody=False)
+    corners = frozen_array(local.vertices, "vertices")
+    triangles = np.array(local.faces, dtype=np.int64)
+    triangles.setflags(write=False)
+    return MeshPiece(corners, triangles, closed, closed and _is_convex(corners, triangles))
+
+
+def _is_convex(vertices: FloatArray, faces: IntArray) -> bool:
+    """Whether every vertex lies behind every face (to a hundred-thousandth of the size)."""
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    offsets = np.einsum("ij,ij->i", normals, corners[:, 0])
+    tolerance = 1e-5 * float(np.ptp(vertices, axis=0).max())
+    chunk = max(1, 2_000_000 // len(vertices))
+    return all(
+        bool(
+            (normals[start : start + chunk] @ vertices.T - offsets[start : start + chunk, None]).max()
+            <= tolerance
+        )
+        for start in range(0, len(faces), chunk)
+    )

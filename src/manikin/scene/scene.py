@@ -1,0 +1,155 @@
+"""A scene: named obstacles and a floor."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from manikin.contact import Contact, ContactKind
+from manikin.errors import ContactError, SceneError
+from manikin.scene.mesh import Mesh
+from manikin.scene.obstacle import Obstacle
+from manikin.scene.shapes import HalfSpace
+from manikin.scene.surface import Surface, surfaces_of
+from manikin.spatial import FloatArray, finite_number
+
+FLOOR = "floor"
+"""Name of the floor obstacle."""
+_ALIGNED = float(np.cos(np.deg2rad(2.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Obstacles with unique names, the floor being one of them.
+
+    Attributes:
+        obstacles: All obstacles; the floor, if any, comes first.
+        floor_height: Height of the floor [m], or None without one.
+    """
+
+    obstacles: tuple[Obstacle, ...]
+    floor_height: float | None
+
+    def __init__(self, obstacles: Sequence[Obstacle] = (), floor_height: float | None = 0.0) -> None:
+        for item in obstacles:
+            if not isinstance(item, Obstacle):
+                raise SceneError(f"scene contains {item!r}; valid: Obstacle values")
+        everything = list(obstacles)
+        if floor_height is not None:
+            floor_height = finite_number(floor_height, "scene floor_height [m]", error=SceneError)
+            everything.insert(0, Obstacle(FLOOR, HalfSpace((0.0, 0.0, 1.0), floor_height)))
+        names = [item.name for item in everything]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise SceneError(
+                f"scene has obstacle {twice[0]!r} twice; valid: one obstacle per name"
+                + (f" ({FLOOR!r} is the scene's own floor)" if twice[0] == FLOOR else "")
+            )
+        object.__setattr__(self, "obstacles", tuple(everything))
+        object.__setattr__(self, "floor_height", floor_height)
+
+    def __len__(self) -> int:
+        return len(self.obstacles)
+
+    def __iter__(self) -> Iterator[Obstacle]:
+        return iter(self.obstacles)
+
+    def __contains__(self, name: object) -> bool:
+        return any(item.name == name for item in self.obstacles)
+
+    def __getitem__(self, name: str) -> Obstacle:
+        for item in self.obstacles:
+            if item.name == name:
+                return item
+        raise KeyError(f"no obstacle {name!r}; this scene has {list(self.names)}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the obstacles, in order."""
+        return tuple(item.name for item in self.obstacles)
+
+    @cached_property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """Every flat face of every obstacle, in order."""
+        return tuple(surface for item in self.obstacles for surface in surfaces_of(item))
+
+    def surfaces_facing(self, direction: Sequence[float], max_angle: float) -> tuple[Surface, ...]:
+        """Surfaces whose normal is within ``max_angle`` [rad] of ``direction`` (3,)."""
+        unit = np.asarray(direction, dtype=np.float64)
+        unit = unit / np.linalg.norm(unit)
+        limit = np.cos(max_angle)
+        return tuple(surface for surface in self.surfaces if surface.normal @ unit >= limit)
+
+    @cached_property
+    def signature(self) -> str:
+        """Digest of every name, shape and placement; equal scenes have equal signatures."""
+        digest = hashlib.sha256()
+        for item in self.obstacles:
+            digest.update(f"{item.name}|{type(item.shape).__name__}|".encode())
+            for value in (item.rotation, item.translation, *_shape_values(item)):
+                digest.update(np.ascontiguousarray(value).tobytes())
+        return digest.hexdigest()
+
+    def supporting_surface(
+        self, contact: Contact, tolerance: float = 0.005, max_angle: float | None = None
+    ) -> Surface:
+        """Find the surface on which every point of a contact rests.
+
+        Each point must be within ``tolerance`` of the surface, above or below it, and at
+        most ``tolerance`` beyond its edge; normals may differ by ``max_angle`` (2 degrees
+        when omitted). A grasp needs only a surface near its point, whatever its normal.
+
+        Args:
+            contact: The contact.
+            tolerance: [m].
+            max_angle: [rad].
+
+        Returns:
+            The closest such surface.
+
+        Raises:
+            ContactError: If there is none; the message says how far the nearest one is.
+        """
+        aligned = self._aligned(contact, _ALIGNED if max_angle is None else float(np.cos(max_angle)))
+        points = contact.points_in_world
+        worst = [_misfit(surface, points) for surface in aligned]
+        if worst and min(worst) <= tolerance:
+            return aligned[int(np.argmin(worst))]
+        raise ContactError(self._off_surface(contact, aligned, tolerance))
+
+    def _aligned(self, contact: Contact, limit: float) -> list[Surface]:
+        if contact.kind is ContactKind.GRASP:
+            return list(self.surfaces)
+        return [surface for surface in self.surfaces if surface.normal @ contact.normal >= limit]
+
+    def _off_surface(self, contact: Contact, aligned: list[Surface], tolerance: float) -> str:
+        where = f"contact '{contact.effector}' at {np.round(contact.position, 4).tolist()} m"
+        remedy = f"valid: every contact point within {tolerance * 1000:g} mm of one surface"
+        if not aligned:
+            facing = np.round(contact.normal, 3).tolist()
+            return f"{where} lies on no surface: none faces its normal {facing}; {remedy}"
+        points = contact.points_in_world
+        nearest = min(aligned, key=lambda surface: _misfit(surface, points))
+        height = nearest.height(points)
+        over = float(nearest.outside(points).max())
+        worst = float(height[np.argmax(np.abs(height))])
+        side = "above" if worst >= 0 else "below"
+        beside = f" and {over * 1000:.1f} mm beyond its edge" if over > tolerance else ""
+        return (
+            f"{where} lies on no surface: the nearest, of '{nearest.obstacle}', has a contact point "
+            f"{abs(worst) * 1000:.1f} mm {side} it{beside}; {remedy}"
+        )
+
+
+def _misfit(surface: Surface, points: FloatArray) -> float:
+    """Larger of the worst height and the worst overhang of the points [m]."""
+    return float(max(np.abs(surface.height(points)).max(), surface.outside(points).max()))
+
+
+def _shape_values(item: Obstacle) -> list[FloatArray]:
+    shape = item.shape
+    if isinstance(shape, Mesh):
+        return [shape.vertices, shape.faces.astype(np.float64)]
+    return [np.atleast_1d(np.asarray(value, dtype=np.float64)) for value in vars(shape).values()]
