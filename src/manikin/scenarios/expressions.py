@@ -1,0 +1,137 @@
+"""Arithmetic expressions of scenario files, read without ever running code.
+
+An expression such as ``"0.91 - 0.08*atan(10*(x-0.2))/pi"`` is parsed once; every node
+of its syntax tree must be on a short list (numbers, ``x y z pi e``, ``+ - * / **`` and
+the functions below), else it is refused.  What comes out is a callable that works on
+floats, numpy arrays and CasADi symbols alike.
+"""
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from manikin.errors import ScenarioError
+
+MAX_LENGTH = 1000
+"""Longest expression that is parsed [characters]."""
+
+CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
+
+_NUMPY_NAMES: Mapping[str, str] = {
+    "sin": "sin", "cos": "cos", "tan": "tan", "asin": "arcsin", "acos": "arccos", "atan": "arctan",
+    "arcsin": "arcsin", "arccos": "arccos", "arctan": "arctan", "atan2": "arctan2", "arctan2": "arctan2",
+    "sinh": "sinh", "cosh": "cosh", "tanh": "tanh", "sqrt": "sqrt", "exp": "exp", "log": "log",
+    "abs": "fabs", "min": "fmin", "max": "fmax",
+}  # fmt: skip
+"""Functions of the language and what numpy calls them; CasADi has every one of these names."""
+
+_TWO_ARGUMENTS = frozenset({"atan2", "arctan2", "min", "max"})
+
+FUNCTIONS: tuple[str, ...] = tuple(_NUMPY_NAMES)
+
+_OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: operator.pow, ast.UAdd: operator.pos, ast.USub: operator.neg,
+}  # fmt: skip
+
+_Evaluator = Callable[[Mapping[str, Any], ModuleType], Any]
+
+
+class Expression:
+    """A parsed expression in named variables.
+
+    Attributes:
+        text: The source, as written.
+        variables: Names it may use, in the order of the call's arguments.
+    """
+
+    def __init__(self, text: str, variables: tuple[str, ...] = ("x", "y", "z")) -> None:
+        """Parse ``text``.
+
+        Raises:
+            ScenarioError: If it is not an arithmetic expression in ``variables``.
+        """
+        self.text = text
+        self.variables = variables
+        self._evaluate = _parse(text, variables)
+
+    def __call__(self, *values: Any) -> Any:
+        """Evaluate at one value per variable: floats, arrays or CasADi expressions."""
+        if len(values) != len(self.variables):
+            raise ScenarioError(
+                f"expression {self.text!r} got {len(values)} values; valid: one for each of {self.variables}"
+            )
+        environment = dict(zip(self.variables, values, strict=True))
+        return self._evaluate(environment, functions_for(*values))
+
+    def __repr__(self) -> str:
+        return f"Expression({self.text!r})"
+
+
+def functions_for(*values: Any) -> ModuleType:
+    """Return the module whose functions take ``values``: CasADi when one is symbolic, else numpy."""
+    if any(type(value).__module__.partition(".")[0] == "casadi" for value in values):
+        import casadi  # noqa: PLC0415 - half a second that most callers need not wait for
+
+        return casadi
+    return np
+
+
+def _parse(text: str, variables: tuple[str, ...]) -> _Evaluator:
+    if len(text) > MAX_LENGTH:
+        raise ScenarioError(f"expression has {len(text)} characters; valid: at most {MAX_LENGTH}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+        return _build(tree.body, text, variables)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ScenarioError(f"expression {text!r} cannot be read; {_valid(variables)}") from None
+
+
+def _build(node: ast.AST, text: str, variables: tuple[str, ...]) -> _Evaluator:
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        # A numpy float: overflow and division by zero give inf, which the caller can refuse with a place.
+        number = np.float64(node.value)
+        return lambda _values, _functions: number
+    if isinstance(node, ast.Name) and node.id in CONSTANTS and node.id not in variables:
+        constant = np.float64(CONSTANTS[node.id])
+        return lambda _values, _functions: constant
+    if isinstance(node, ast.Name) and node.id in variables:
+        name = node.id
+        return lambda values, _functions: values[name]
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        apply = _OPERATORS[type(node.op)]
+        left, right = _build(node.left, text, variables), _build(node.right, text, variables)
+        return lambda values, functions: apply(left(values, functions), right(values, functions))
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _OPERATORS:
+        apply = _OPERATORS[type(node.op)]
+        operand = _build(node.operand, text, variables)
+        return lambda values, functions: apply(operand(values, functions))
+    if isinstance(node, ast.Call):
+        return _build_call(node, text, variables)
+    shown = ast.get_source_segment(text.strip(), node) if isinstance(node, ast.expr) else None
+    raise ScenarioError(f"expression {text!r} uses {shown or type(node).__name__!r}; {_valid(variables)}")
+
+
+def _build_call(node: ast.Call, text: str, variables: tuple[str, ...]) -> _Evaluator:
+    name = node.func.id if isinstance(node.func, ast.Name) else None
+    if name not in _NUMPY_NAMES:
+        shown = ast.get_source_segment(text.strip(), node.func)
+        raise ScenarioError(f"expression {text!r} calls {shown!r}; valid functions: {', '.join(FUNCTIONS)}")
+    wanted = 2 if name in _TWO_ARGUMENTS else 1
+    if len(node.args) != wanted or node.keywords:
+        raise ScenarioError(f"expression {text!r} gives {name} {len(node.args)} arguments; valid: {wanted}")
+    numpy_name = _NUMPY_NAMES[name]
+    arguments = [_build(argument, text, variables) for argument in node.args]
+    return lambda values, functions: getattr(functions, numpy_name)(
+        *(argument(values, functions) for argument in arguments)
+    )
+
+
+def _valid(variables: tuple[str, ...]) -> str:
+    names = ", ".join((*variables, *(c for c in CONSTANTS if c not in variables)))
+    return f"valid: numbers, {names}, + - * / ** and functions such as sin, atan, sqrt"

@@ -1,0 +1,343 @@
+"""A scenario: the checked file, and the builders that turn it into the library's values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import yaml
+
+from manikin.contact import Contact, Phase, Stance, StanceSequence, grasp, point, sole
+from manikin.errors import InputError, ScenarioError
+from manikin.scenarios.expressions import Expression
+from manikin.scenarios.heights import HeightBand, SupportLevel
+from manikin.scenarios.schema import (
+    ComConstraintSection,
+    ContactSection,
+    PlanningSection,
+    PushSection,
+    ScenarioFile,
+    SoleSection,
+    SupportsSection,
+)
+from manikin.scenarios.validation import Path as KeyPath
+from manikin.scenarios.validation import place, validate
+from manikin.spatial import GRAVITY, FloatArray, frozen_array, rotation_from_rpy
+
+if TYPE_CHECKING:
+    from manikin.body import BodyModel
+    from manikin.scene import Scene
+
+BODY_WEIGHTS_CAP = 3.0
+"""Cap on the sum of normal forces when the file gives none [body weights]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """One job for the pipeline.
+
+    Attributes:
+        file: The checked content of the scenario file.
+        source: Name of the file, for messages.
+        folder: Folder that relative mesh paths start from.
+        lines: Line of each key of the file, for messages.
+    """
+
+    file: ScenarioFile
+    source: str = "scenario"
+    folder: Path = Path()
+    lines: Mapping[KeyPath, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._check_numbers_of_band()
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+        return self.file.name
+
+    @property
+    def description(self) -> str:
+        """One line about it."""
+        return self.file.description
+
+    @property
+    def seed(self) -> int:
+        """Seed of every random choice, unless the caller gives another."""
+        return self.file.seed
+
+    @property
+    def mass(self) -> float:
+        """Body mass [kg]."""
+        return self.file.body.mass_kg
+
+    @property
+    def planning(self) -> PlanningSection:
+        """Options of the centre-of-mass planner."""
+        return self.file.planning
+
+    @property
+    def push(self) -> PushSection | None:
+        """Disturbance during the execution, or None."""
+        return self.file.push
+
+    @property
+    def stature_scale(self) -> float:
+        """Stature over the reference stature of the task's heights."""
+        reference = self.file.reference_stature_m
+        return 1.0 if reference is None else self.file.body.stature_m / reference
+
+    @property
+    def start_com(self) -> FloatArray:
+        """(3,) centre of mass at the start, scaled to the body [m].
+
+        Raises:
+            ScenarioError: If the file gives no CoM.
+        """
+        return self._scaled_com("start")
+
+    @property
+    def goal_com(self) -> FloatArray:
+        """(3,) centre of mass at the goal, scaled to the body [m].
+
+        Raises:
+            ScenarioError: If the file gives no CoM.
+        """
+        return self._scaled_com("goal")
+
+    @property
+    def height_band(self) -> HeightBand | None:
+        """Bounds of the CoM's height, scaled to the body, or None."""
+        constraint = self._constraint("height_band")
+        if constraint is None or constraint.height_band is None:
+            return None
+        band = constraint.height_band
+        return HeightBand(
+            Expression(band.lower), Expression(band.upper), self.support_level(), self.stature_scale
+        )
+
+    @property
+    def max_support_distance(self) -> float | None:
+        """Largest distance from the CoM to every foot in contact, scaled to the body [m], or None."""
+        constraint = self._constraint("max_support_distance_m")
+        if constraint is None or constraint.max_support_distance_m is None:
+            return None
+        return self.stature_scale * constraint.max_support_distance_m
+
+    def with_body(
+        self, stature_m: float | None = None, mass_kg: float | None = None, sex: str | None = None
+    ) -> Scenario:
+        """Return the same scenario for another body; what is None stays.
+
+        Raises:
+            ScenarioError: If a value is out of its range.
+        """
+        given = {"stature_m": stature_m, "mass_kg": mass_kg, "sex": sex}
+        return self._changed(body={k: v for k, v in given.items() if v is not None})
+
+    def with_seed(self, seed: int) -> Scenario:
+        """Return the same scenario with another seed.
+
+        Raises:
+            ScenarioError: If the seed is negative.
+        """
+        return self._changed(seed=seed)
+
+    def build_body(self) -> BodyModel:
+        """Build the body; its soles have the size that the supports give.
+
+        Raises:
+            ScenarioError: If the body's data are out of range.
+        """
+        from manikin.body import human  # noqa: PLC0415 - heavy; reading a scenario does not need it
+
+        data, supports = self.file.body, self.file.supports
+        soles = (
+            {"sole_length": supports.sole.length_m, "sole_width": supports.sole.width_m} if supports else {}
+        )
+        try:
+            return human(data.stature_m, data.mass_kg, data.sex, **soles)
+        except InputError as error:
+            raise self._error(("body",), str(error)) from None
+
+    def build_scene(self) -> Scene:
+        """Build the obstacles and the floor.
+
+        Raises:
+            ScenarioError: If a mesh cannot be read or a shape is degenerate.
+        """
+        from manikin.scenarios.obstacles import build_obstacle  # noqa: PLC0415
+        from manikin.scene import Scene  # noqa: PLC0415
+
+        obstacles = []
+        for index, entry in enumerate(self.file.scene):
+            try:
+                obstacles.append(build_obstacle(entry, self.folder))
+            except InputError as error:
+                raise self._error(("scene", index), str(error)) from None
+        return Scene(obstacles, floor_height=self.file.floor_height_m)
+
+    def build_sequence(self, *, planning: bool = False) -> StanceSequence:
+        """Build the stances of the explicit supports.
+
+        Args:
+            planning: With the smaller soles that planning balances on, where given.
+
+        Raises:
+            ScenarioError: If there are no supports, or a contact slides between phases.
+        """
+        supports = self._supports()
+        default_sole = supports.planning_sole if planning and supports.planning_sole else supports.sole
+        cap = supports.normal_force_cap_N or BODY_WEIGHTS_CAP * self.mass * GRAVITY
+        phases = []
+        try:
+            for section, contacts in zip(supports.phases, supports.resolved_phases(), strict=True):
+                stance = Stance(
+                    [
+                        build_contact(effector, entry, supports.friction, default_sole, planning=planning)
+                        for effector, entry in contacts.items()
+                    ],
+                    cap,
+                )
+                phases.append(Phase(stance, section.min_duration_s, section.max_duration_s))
+            return StanceSequence(phases)
+        except InputError as error:
+            raise self._error(("supports", "phases"), str(error)) from None
+
+    def support_level(self) -> SupportLevel:
+        """Height of the supports below the CoM, from the start to the goal."""
+        ends = [np.array(self._com(end)[:2]) for end in ("start", "goal")]
+        if self.file.supports is None:
+            floor = self.file.floor_height_m or 0.0
+            return SupportLevel(ends[0], ends[1], floor, floor)
+        phases = self._supports().resolved_phases()
+        return SupportLevel(ends[0], ends[1], _level(phases[0]), _level(phases[-1]))
+
+    def to_yaml(self) -> str:
+        """Return the scenario with every default and override written out, ready to run again.
+
+        Mesh paths become absolute, so that the file can be kept elsewhere.
+        """
+        data = self.file.model_dump(mode="json", exclude_none=True)
+        if self.file.floor_height_m is None:
+            data["floor_height_m"] = None
+        for obstacle in data["scene"]:
+            if "mesh" in obstacle:
+                obstacle["mesh"] = str((self.folder / obstacle["mesh"]).resolve())
+        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100, default_flow_style=None)
+
+    def _changed(self, **changes: Any) -> Scenario:
+        data = self.file.model_dump(exclude_none=True)
+        if self.file.floor_height_m is None:
+            data["floor_height_m"] = None
+        for key, change in changes.items():
+            data[key] = {**data[key], **change} if isinstance(change, dict) else change
+        file = validate(ScenarioFile, data, self.source)
+        return Scenario(file, self.source, self.folder, self.lines)
+
+    def _supports(self) -> SupportsSection:
+        if self.file.supports is None:
+            raise self._error(("supports",), "is missing; valid: an explicit sequence of phases")
+        return self.file.supports
+
+    def _constraint(self, key: str) -> ComConstraintSection | None:
+        return next((c for c in self.file.com_constraints if getattr(c, key) is not None), None)
+
+    def _com(self, end: str) -> tuple[float, float, float]:
+        com = getattr(self.file.task, end).com
+        if com is None:
+            raise self._error(("task", end, "com"), "is missing; valid: [x, y, z] in metres")
+        return com
+
+    def _scaled_com(self, end: str) -> FloatArray:
+        x, y, z = self._com(end)
+        level = self.support_level()
+        base = level.start_level if end == "start" else level.goal_level
+        if self.stature_scale != 1.0:
+            z = base + self.stature_scale * (z - base)
+        return frozen_array([x, y, z], f"{end} com [m]", (3,))
+
+    def _check_numbers_of_band(self) -> None:
+        index = next((i for i, c in enumerate(self.file.com_constraints) if c.height_band is not None), None)
+        band = self.height_band
+        if band is None or index is None:
+            return
+        path: KeyPath = ("com_constraints", index, "height_band")
+        for end in ("start", "goal"):
+            x, y, z = (np.float64(value) for value in self._scaled_com(end))
+            with np.errstate(all="ignore"):
+                low, high = float(band.lower(x, y, z)), float(band.upper(x, y, z))
+            for key, value in (("lower", low), ("upper", high)):
+                if not math.isfinite(value):
+                    raise self._error(
+                        (*path, key), f"is {value} at the {end} CoM; valid: a finite height [m]"
+                    )
+            if low > high:
+                raise self._error(
+                    path,
+                    f"has lower {low:.4g} above upper {high:.4g} at the {end} CoM; valid: lower <= upper",
+                )
+
+    def _error(self, path: KeyPath, text: str) -> ScenarioError:
+        return ScenarioError(f"{place(self.source, path, self.lines)} {text}")
+
+
+def build_contact(
+    effector: str,
+    entry: ContactSection,
+    friction: float,
+    default_sole: SoleSection,
+    *,
+    planning: bool = False,
+) -> Contact:
+    """Build one contact from its section and the defaults around it.
+
+    Args:
+        effector: Name of the effector.
+        entry: The contact's section.
+        friction: Coulomb coefficient where the contact gives none.
+        default_sole: Sole size where the contact gives none.
+        planning: Let ``default_sole`` shrink a sole the contact gives itself.
+
+    Raises:
+        ContactError: If a value is out of its range.
+    """
+    kind = entry.kind_for(effector)
+    if kind == "grasp":
+        rpy = None if entry.rpy_deg is None else np.radians(entry.rpy_deg)
+        rotation = rotation_from_rpy(0.0, 0.0, math.radians(entry.yaw_deg)) if rpy is None else None
+        return grasp(
+            effector,
+            entry.position,
+            max_force=entry.max_force_N or 0.0,
+            max_moment=entry.max_moment_Nm or 0.0,
+            rotation=rotation_from_rpy(*rpy) if rpy is not None else rotation,
+        )
+    friction = entry.friction or friction
+    if kind == "point":
+        return point(
+            effector, entry.position, friction=friction, normal=entry.normal,
+            normal_force_cap=entry.normal_force_cap_N,
+        )  # fmt: skip
+    own = entry.sole or default_sole
+    shrink = planning and entry.sole is not None
+    return sole(
+        effector,
+        entry.position,
+        math.radians(entry.yaw_deg),
+        length=min(own.length_m, default_sole.length_m) if shrink else own.length_m,
+        width=min(own.width_m, default_sole.width_m) if shrink else own.width_m,
+        friction=friction,
+        normal=entry.normal,
+        normal_force_cap=entry.normal_force_cap_N,
+        torsion_limit=entry.torsion_limit_Nm,
+    )
+
+
+def _level(contacts: Mapping[str, ContactSection]) -> float:
+    feet = [c.position[2] for name, c in contacts.items() if "foot" in name]
+    return float(np.mean(feet or [c.position[2] for c in contacts.values()]))

@@ -1,0 +1,350 @@
+"""What a scenario file may hold: one pydantic model per section.
+
+Lengths are metres and angles degrees, as the keys say; the builders of
+:class:`~manikin.scenarios.scenario.Scenario` turn them into the library's own values.
+"""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+
+from manikin.errors import ScenarioError
+from manikin.scenarios.expressions import Expression
+from manikin.scenarios.validation import (
+    NonNegative,
+    Number,
+    Positive,
+    Section,
+    Size3,
+    Text,
+    Vector2,
+    Vector3,
+    refuse,
+    rule_error,
+)
+
+EFFECTORS = ("left_foot", "right_foot", "left_hand", "right_hand")
+"""Effectors that a phase may put in contact, in the order of the contact tables."""
+
+OBSTACLE_SHAPES = ("box", "cylinder", "capsule", "sphere", "plane", "half_space", "mesh")
+
+_KIND_KEYS: dict[str, tuple[str, ...]] = {
+    "sole": ("normal", "sole", "friction", "normal_force_cap_N", "torsion_limit_Nm"),
+    "point": ("normal", "friction", "normal_force_cap_N"),
+    "grasp": ("max_force_N", "max_moment_Nm", "rpy_deg"),
+}
+"""Keys of a contact that only some kinds have."""
+
+
+class BodySection(Section):
+    """Whose motion it is."""
+
+    model: Literal["human"] = Field("human", description="built-in body")
+    stature_m: Positive = Field(1.75, description="standing height [m]")
+    mass_kg: Positive = Field(79.0, description="body mass [kg]")
+    sex: Literal["male", "female"] = Field("male", description="which anthropometric table")
+
+
+class RoundSection(Section):
+    """A cylinder or capsule along its z axis."""
+
+    radius_m: Positive = Field(description="radius [m]")
+    length_m: Positive = Field(description="length [m]; of a capsule, without its round ends")
+
+
+class SphereSection(Section):
+    """A sphere."""
+
+    radius_m: Positive = Field(description="radius [m]")
+
+
+class ObstacleSection(Section):
+    """One thing in the scene: a name, one shape and a pose."""
+
+    name: Text = Field(description="unique name")
+    box: Size3 | None = Field(None, description="sizes along x, y, z [m]")
+    cylinder: RoundSection | None = Field(None, description="cylinder along z")
+    capsule: RoundSection | None = Field(None, description="capsule along z")
+    sphere: SphereSection | None = Field(None, description="sphere")
+    plane: Vector3 | None = Field(None, description="normal of an infinite two-sided plane through position")
+    half_space: Vector3 | None = Field(None, description="outward normal of a solid half-space at position")
+    mesh: Text | None = Field(None, description="STL, OBJ, PLY or DAE file, relative to this file's folder")
+    scale: Positive | None = Field(None, description="factor on the mesh's coordinates (default 1)")
+    unit: Literal["m", "cm", "mm", "in", "ft"] | None = Field(
+        None, description="unit of the mesh (default m)"
+    )
+    position: Vector3 = Field((0.0, 0.0, 0.0), description="origin in the world [m]")
+    rpy_deg: Vector3 = Field((0.0, 0.0, 0.0), description="fixed-axis roll, pitch, yaw [deg]")
+
+    @property
+    def shape(self) -> str:
+        """Key of the shape that is given."""
+        return next(name for name in OBSTACLE_SHAPES if getattr(self, name) is not None)
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        given = [name for name in OBSTACLE_SHAPES if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = f"has {' and '.join(given)}" if given else "has no shape"
+            raise refuse("", f"{found}; valid: exactly one of {', '.join(OBSTACLE_SHAPES)}")
+        for key in ("scale", "unit"):
+            if getattr(self, key) is not None and given[0] != "mesh":
+                raise refuse(key, f"is given for a {given[0]}; valid: only with mesh")
+        for key in ("plane", "half_space"):
+            normal = getattr(self, key)
+            if normal is not None and not any(normal):
+                raise refuse(key, f"is {list(normal)}; valid: a normal that is not zero")
+        return self
+
+
+class SoleSection(Section):
+    """A rectangular sole."""
+
+    length_m: Positive = Field(description="along the toes' direction [m]")
+    width_m: Positive = Field(description="across it [m]")
+
+
+class ContactSection(Section):
+    """One contact; what it leaves out comes from the section around it."""
+
+    kind: Literal["sole", "point", "grasp"] | None = Field(
+        None, description="default: sole for a foot, grasp for a hand"
+    )
+    position: Vector3 = Field(description="of the contact (centre of a sole) in the world [m]")
+    yaw_deg: Number = Field(0.0, description="heading of the toes, counter-clockwise from world x [deg]")
+    normal: Vector3 | None = Field(None, description="surface normal, into the body (default up)")
+    rpy_deg: Vector3 | None = Field(None, description="orientation of a grasping hand [deg]")
+    sole: SoleSection | None = Field(None, description="size of this sole")
+    friction: Positive | None = Field(None, description="Coulomb coefficient")
+    normal_force_cap_N: Positive | None = Field(None, description="largest normal force of this contact [N]")
+    torsion_limit_Nm: Positive | None = Field(None, description="largest moment about the normal [N.m]")
+    max_force_N: Positive | None = Field(None, description="grasp: largest force along each world axis [N]")
+    max_moment_Nm: NonNegative | None = Field(None, description="grasp: largest moment per axis [N.m]")
+
+    @field_validator("normal")
+    @classmethod
+    def _nonzero(cls, normal: Any) -> Any:
+        if normal is not None and not any(normal):
+            raise rule_error("a direction that is not zero")
+        return normal
+
+    def kind_for(self, effector: str) -> str:
+        """Kind of the contact when ``effector`` makes it."""
+        return self.kind or ("grasp" if "hand" in effector else "sole")
+
+    def check_for(self, effector: str, path: str = "") -> None:
+        """Refuse keys that the contact's kind does not have.
+
+        Raises:
+            PydanticCustomError: Naming the key under ``path``.
+        """
+        kind = self.kind_for(effector)
+        for key in sorted({key for keys in _KIND_KEYS.values() for key in keys} - {*_KIND_KEYS[kind]}):
+            if getattr(self, key) is not None:
+                valid = ", ".join(("kind", "position", "yaw_deg", *_KIND_KEYS[kind]))
+                raise refuse(f"{path}{key}", f"does not belong to a {kind}; valid: {valid}")
+        if kind == "grasp" and self.max_force_N is None:
+            raise refuse(f"{path}max_force_N", "is missing; valid: a number > 0 [N] for a grasp")
+
+
+def _contact_tag(value: Any) -> str:
+    return "same" if isinstance(value, str) else "contact"
+
+
+ContactEntry = Annotated[
+    Annotated[Literal["same"], Tag("same")] | Annotated[ContactSection, Tag("contact")],
+    Discriminator(_contact_tag),
+]
+"""A contact, or the word ``same`` for the one of the phase before."""
+
+
+class PhaseSection(Section):
+    """The contacts of one phase and how long it may last; an effector left out is in the air."""
+
+    left_foot: ContactEntry | None = Field(None, description="contact of the left foot, or 'same'")
+    right_foot: ContactEntry | None = Field(None, description="contact of the right foot, or 'same'")
+    left_hand: ContactEntry | None = Field(None, description="contact of the left hand, or 'same'")
+    right_hand: ContactEntry | None = Field(None, description="contact of the right hand, or 'same'")
+    min_duration_s: Positive = Field(0.1, description="shortest duration [s]")
+    max_duration_s: Positive | None = Field(None, description="longest duration [s]")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.max_duration_s is not None and self.max_duration_s < self.min_duration_s:
+            raise refuse(
+                "max_duration_s", f"is {self.max_duration_s:g}; valid: at least min_duration_s = "
+                f"{self.min_duration_s:g}"
+            )  # fmt: skip
+        if not self.entries():
+            raise refuse("", f"has no contact; valid: at least one of {', '.join(EFFECTORS)}")
+        for effector, entry in self.entries().items():
+            if not isinstance(entry, str):
+                entry.check_for(effector, f"{effector}.")
+        return self
+
+    def entries(self) -> dict[str, "ContactSection | Literal['same']"]:
+        """Contacts by effector, those in the air left out."""
+        found = {name: getattr(self, name) for name in EFFECTORS}
+        return {name: entry for name, entry in found.items() if entry is not None}
+
+
+class SupportsSection(Section):
+    """An explicit sequence of supports, with the defaults of its contacts."""
+
+    friction: Positive = Field(0.7, description="Coulomb coefficient of soles and points")
+    sole: SoleSection = Field(SoleSection(length_m=0.28, width_m=0.12), description="size of the real soles")
+    planning_sole: SoleSection | None = Field(
+        None, description="smaller soles that planning balances on, for robustness (default: the real ones)"
+    )
+    normal_force_cap_N: Positive | None = Field(
+        None, description="largest sum of the normal forces of a stance [N] (default: 3 body weights)"
+    )
+    phases: Annotated[list[PhaseSection], Field(min_length=1)] = Field(description="phases in order")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.planning_sole is not None:
+            for key in ("length_m", "width_m"):
+                ours, real = getattr(self.planning_sole, key), getattr(self.sole, key)
+                if ours > real:
+                    raise refuse(f"planning_sole.{key}", f"is {ours:g}; valid: at most sole.{key} = {real:g}")
+        for number, phase in enumerate(self.phases):
+            before = self.phases[number - 1].entries() if number else {}
+            for effector, entry in phase.entries().items():
+                if entry == "same" and effector not in before:
+                    raise refuse(
+                        f"phases[{number}].{effector}", "is 'same' but the phase before has no such contact; "
+                        "valid: a contact with a position"
+                    )  # fmt: skip
+        return self
+
+    def resolved_phases(self) -> list[dict[str, ContactSection]]:
+        """Contacts of each phase with every ``same`` replaced by what it stands for."""
+        phases: list[dict[str, ContactSection]] = []
+        for phase in self.phases:
+            contacts: dict[str, ContactSection] = {}
+            for effector, entry in phase.entries().items():
+                contacts[effector] = phases[-1][effector] if isinstance(entry, str) else entry
+            phases.append(contacts)
+        return phases
+
+
+class StateSection(Section):
+    """Where the body starts or ends."""
+
+    com: Vector3 | None = Field(None, description="centre of mass [m]")
+    at: Vector2 | None = Field(None, description="where to stand, x and y [m]")
+    heading_deg: Number | None = Field(None, description="where to face [deg]")
+    posture: Text | None = Field(None, description="standing, seated, crouched, lying or a posture file")
+
+    @model_validator(mode="after")
+    def _placed(self) -> Self:
+        if self.com is None and self.at is None:
+            raise refuse("com", "is missing; valid: three numbers [x, y, z] in metres, or at: [x, y]")
+        return self
+
+
+class TaskSection(Section):
+    """From where to where."""
+
+    start: StateSection = Field(description="state at the beginning, at rest")
+    goal: StateSection = Field(description="state at the end, at rest")
+
+
+class HeightBandSection(Section):
+    """Lower and upper bound of the CoM's height."""
+
+    lower: Text = Field(description="expression of the lowest height [m] in x, y, z of the CoM")
+    upper: Text = Field(description="expression of the greatest height [m] in x, y, z of the CoM")
+
+    @field_validator("lower", "upper")
+    @classmethod
+    def _parses(cls, text: str) -> str:
+        try:
+            Expression(text)
+        except ScenarioError as error:
+            raise refuse("", str(error)) from None
+        return text
+
+
+class ComConstraintSection(Section):
+    """One constraint on the centre of mass: exactly one of the keys."""
+
+    height_band: HeightBandSection | None = Field(None, description="bounds of the CoM's height")
+    max_support_distance_m: Positive | None = Field(
+        None, description="largest distance from the CoM to every foot in contact [m]"
+    )
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        keys = type(self)._keys()
+        if sum(getattr(self, key) is not None for key in keys) != 1:
+            raise refuse("", f"holds none or several; valid: exactly one of {', '.join(keys)}")
+        return self
+
+
+class PlanningSection(Section):
+    """Options of the centre-of-mass planner."""
+
+    degree: Annotated[int, Field(strict=True, ge=3, le=9)] = Field(5, description="of the B-spline")
+    min_margin_Nm: NonNegative = Field(20.0, description="smallest stability margin wanted [N.m]")
+    max_duration_s: Positive | None = Field(None, description="longest duration of the whole motion [s]")
+    weights: dict[Text, NonNegative] = Field(
+        default_factory=dict, description="weights of the planner's objectives by name"
+    )
+
+
+class PushSection(Section):
+    """A push on the trunk during the execution."""
+
+    force_N: Positive = Field(description="size [N]")
+    direction_deg: Number = Field(
+        description="of the force, counter-clockwise from the body's forward axis [deg]"
+    )
+    duration_s: Positive = Field(description="how long [s]")
+    at_s: NonNegative = Field(description="when it begins [s]")
+
+
+class ScenarioFile(Section):
+    """A whole scenario file."""
+
+    name: Text = Field(description="short name")
+    description: str = Field("", description="one line for the list of scenarios")
+    body: BodySection = Field(BodySection(), description="whose motion it is")
+    reference_stature_m: Positive | None = Field(
+        None, description="stature that the task's heights and distances were measured for [m] "
+        "(default: the body's own); they are scaled to the actual body"
+    )  # fmt: skip
+    floor_height_m: Number | None = Field(0.0, description="height of the floor [m], null for none")
+    scene: list[ObstacleSection] = Field(default_factory=list, description="obstacles")
+    supports: SupportsSection | None = Field(None, description="explicit sequence of supports")
+    task: TaskSection = Field(description="start and goal")
+    com_constraints: list[ComConstraintSection] = Field(
+        default_factory=list, description="constraints on the centre of mass"
+    )
+    planning: PlanningSection = Field(PlanningSection(), description="options of the planner")
+    push: PushSection | None = Field(None, description="disturbance during the execution")
+    seed: Annotated[int, Field(strict=True, ge=0)] = Field(0, description="seed of every random choice")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        names = [obstacle.name for obstacle in self.scene]
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise refuse(f"scene[{index}].name", f"is {name!r} again; valid: a unique name")
+        for key in type(self.com_constraints[0])._keys() if self.com_constraints else ():
+            if sum(getattr(c, key) is not None for c in self.com_constraints) > 1:
+                raise refuse("com_constraints", f"holds {key} twice; valid: at most once")
+        if self.supports is not None:
+            for end in ("start", "goal"):
+                if getattr(self.task, end).com is None:
+                    raise refuse(
+                        f"task.{end}.com", "is missing; valid: [x, y, z] in metres when supports are given"
+                    )
+        return self
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON schema of a scenario file, for editors and the documentation."""
+    schema = ScenarioFile.model_json_schema(by_alias=True)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

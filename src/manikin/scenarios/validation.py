@@ -1,0 +1,180 @@
+"""Checked building blocks of the file formats, and their one-line error messages."""
+
+import difflib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from manikin.errors import ScenarioError
+
+Path = tuple[str | int, ...]
+
+
+class Section(BaseModel):
+    """A mapping of a file: read-only, and every key must be known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_keys(cls, data: Any) -> Any:
+        keys = cls._keys()
+        if not isinstance(data, Mapping):
+            raise PydanticCustomError("section", "{rule}", {"rule": f"a mapping with {_listed(keys)}"})
+        for key in data:
+            if key not in keys:
+                raise PydanticCustomError("unknown_key", "{rule}", _unknown_key(key, keys))
+        return data
+
+    @classmethod
+    def _keys(cls) -> list[str]:
+        return [field.alias or name for name, field in cls.model_fields.items()]
+
+
+def _unknown_key(key: Any, keys: Sequence[str]) -> dict[str, Any]:
+    close = difflib.get_close_matches(str(key), keys, n=1, cutoff=0.6)
+    if not close:  # "mass" for "mass_kg": too short for the ratio, yet plainly meant.
+        close = [known for known in keys if known.startswith(str(key)) or str(key).startswith(known)][:1]
+    hint = f"did you mean {close[0]!r}? " if close else ""
+    return {"key": str(key), "rule": f"{hint}valid: {', '.join(keys)}"}
+
+
+def _listed(keys: Sequence[str]) -> str:
+    return ("the keys " if len(keys) > 1 else "the key ") + ", ".join(keys)
+
+
+def _vector(length: int, meaning: str) -> Callable[[Any], Any]:
+    def check(value: Any) -> Any:
+        good = (
+            isinstance(value, (list, tuple))
+            and len(value) == length
+            and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
+        )
+        if not good:
+            raise PydanticCustomError("vector", "{rule}", {"rule": meaning})
+        return value
+
+    return check
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+Text = Annotated[str, Field(strict=True, min_length=1)]
+Vector2 = Annotated[tuple[Number, Number], BeforeValidator(_vector(2, "two numbers [x, y]"))]
+Vector3 = Annotated[tuple[Number, Number, Number], BeforeValidator(_vector(3, "three numbers [x, y, z]"))]
+Size3 = Annotated[
+    tuple[Positive, Positive, Positive], BeforeValidator(_vector(3, "three numbers > 0 [x, y, z]"))
+]
+
+
+def rule_error(rule: str) -> PydanticCustomError:
+    """Make the error of a rule that pydantic does not know; ``rule`` says what is valid."""
+    return PydanticCustomError("rule", "{rule}", {"rule": rule})
+
+
+def refuse(key: str, problem: str) -> PydanticCustomError:
+    """Make the error of one key of a section; ``problem`` says what is wrong and what is valid."""
+    return PydanticCustomError("refused", "{problem}", {"key": key, "problem": problem})
+
+
+_Section = TypeVar("_Section", bound=Section)
+
+
+def validate(
+    model: type[_Section], data: Any, source: str, lines: Mapping[Path, int] | None = None
+) -> _Section:
+    """Check ``data`` against ``model``.
+
+    Args:
+        model: The section at the root of the file.
+        data: What the YAML reader returned.
+        source: Name of the file for messages.
+        lines: Line of each key, from the YAML reader.
+
+    Raises:
+        ScenarioError: One line: file, key path, what was wrong, what is valid.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError(_first_problem(error, data, source, lines or {})) from None
+
+
+def _first_problem(error: ValidationError, data: Any, source: str, lines: Mapping[Path, int]) -> str:
+    problems = error.errors(include_url=False)
+    path, text = _describe(problems[0], data)
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return f"{place(source, path, lines)} {text}{more}".replace("\n", " ")
+
+
+def place(source: str, path: Path, lines: Mapping[Path, int]) -> str:
+    """Text ``file:line: key.path`` of a place in a file; the line of the nearest known parent."""
+    known = next((path[:n] for n in range(len(path), -1, -1) if path[:n] in lines), None)
+    line = f":{lines[known]}" if known is not None else ""
+    return f"{source}{line}: {path_text(path)}" if path else f"{source}:"
+
+
+def path_text(path: Path) -> str:
+    """Text of a key path, such as ``supports.phases[2].left_foot``."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def _describe(problem: ErrorDetails, data: Any) -> tuple[Path, str]:
+    path, context, kind = _real_path(problem["loc"], data), problem.get("ctx", {}), problem["type"]
+    value = _shown(problem["input"])
+    if kind == "unknown_key":
+        return (*path, context["key"]), f"is not a known key; {context['rule']}"
+    if kind == "missing":
+        return (*path, str(problem["loc"][-1])), "is missing"
+    if kind == "refused":
+        return ((*path, context["key"]) if context["key"] else path), context["problem"]
+    if kind in ("rule", "section", "vector"):
+        return path, f"is {value}; valid: {context['rule']}"
+    return path, f"is {value}; valid: {_rule(kind, context, problem['msg'])}"
+
+
+def _real_path(location: tuple[str | int, ...], data: Any) -> Path:
+    """Keep the parts of pydantic's location that are in the file; it adds names of union members."""
+    path: list[str | int] = []
+    for part in location:
+        if isinstance(data, Mapping) and part in data:
+            data = data[part]
+        elif isinstance(data, (list, tuple)) and isinstance(part, int) and part < len(data):
+            data = data[part]
+        else:
+            continue
+        path.append(part)
+    return tuple(path)
+
+
+def _rule(kind: str, context: Mapping[str, Any], message: str) -> str:
+    bounds = {
+        "greater_than": "a number > {gt:g}",
+        "greater_than_equal": "a number >= {ge:g}",
+        "less_than": "a number < {lt:g}",
+        "less_than_equal": "a number <= {le:g}",
+        "literal_error": "{expected}",
+        "too_short": "at least {min_length} entries",
+        "string_too_short": "a text that is not empty",
+        "finite_number": "a finite number",
+        "float_type": "a number",
+        "int_type": "a whole number",
+        "int_from_float": "a whole number",
+        "string_type": "a text",
+        "bool_type": "true or false",
+        "list_type": "a list",
+        "tuple_type": "a list",
+        "dict_type": "a mapping",
+    }
+    return bounds[kind].format(**context) if kind in bounds else message
+
+
+def _shown(value: Any) -> str:
+    text = "empty" if value is None else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

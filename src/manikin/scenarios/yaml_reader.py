@@ -1,0 +1,124 @@
+"""YAML with line numbers, without YAML 1.1's traps.
+
+``1e-3`` is a number (PyYAML reads a text), ``010`` is ten, ``no`` and ``on`` are texts, and
+a key given twice is an error instead of silently replacing the first.
+"""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from manikin.errors import ScenarioError
+
+MAX_BYTES = 10_000_000
+"""Largest file that is read; scenarios are a few kilobytes."""
+
+MAX_ENTRIES = 100_000
+"""Most keys and list entries of a file, counted after its aliases are written out."""
+
+KeyPath = tuple[str | int, ...]
+
+_REPLACED = tuple(f":{kind}" for kind in ("int", "float", "bool", "timestamp"))
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe loader with YAML 1.2's floats and booleans."""
+
+
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, pattern) for tag, pattern in resolvers if not tag.endswith(_REPLACED)]
+    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:int", re.compile(r"^[-+]?(0|[1-9][0-9]*)$"), list("-+0123456789")
+)
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(
+        r"^[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$"
+        r"|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$"
+    ),
+    list("-+0123456789."),
+)
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:bool", re.compile(r"^(true|True|TRUE|false|False|FALSE)$"), list("tTfF")
+)
+
+
+def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, int]]:
+    """Read one YAML document.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its content in plain Python values, and the line (from 1) of every key and list entry.
+
+    Raises:
+        ScenarioError: If the file cannot be read, is not YAML or is empty.
+    """
+    return parse_yaml(_read_text(path), str(path))
+
+
+def parse_yaml(text: str, source: str) -> tuple[Any, dict[KeyPath, int]]:
+    """Parse YAML ``text``; ``source`` names it in messages.  See :func:`read_yaml`."""
+    try:
+        loader = _Loader(text)
+        try:
+            node = loader.get_single_node()
+            lines: dict[KeyPath, int] = {}
+            if node is not None:
+                _walk(node, (), lines, source, set())
+            data = None if node is None else loader.construct_document(node)
+        finally:
+            loader.dispose()
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = f":{mark.line + 1}" if mark is not None else ""
+        problem = " ".join(str(error.problem or error.context).split())
+        raise ScenarioError(
+            f"{source}{line}: is not valid YAML ({problem}); valid: key: value lines"
+        ) from None
+    except (yaml.YAMLError, ValueError, TypeError) as error:
+        problem = " ".join(str(error).split())[:120]
+        raise ScenarioError(f"{source}: is not valid YAML ({problem}); valid: key: value lines") from None
+    except RecursionError:
+        raise ScenarioError(f"{source}: is nested too deeply; valid: a few levels") from None
+    if data is None:
+        raise ScenarioError(f"{source}: is empty; valid: a YAML mapping, see 'manikin scenarios'")
+    return data, lines
+
+
+def _read_text(path: Path) -> str:
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise ScenarioError(f"{path}: has {size} bytes; valid: at most {MAX_BYTES}")
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"{path}: byte {error.start} is not UTF-8; valid: a text file in UTF-8") from None
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read ({error.strerror}); valid: a readable file") from None
+
+
+def _walk(node: yaml.Node, path: KeyPath, lines: dict[KeyPath, int], source: str, above: set[int]) -> None:
+    lines.setdefault(path, node.start_mark.line + 1)
+    if len(lines) > MAX_ENTRIES:
+        raise ScenarioError(f"{source}: has more than {MAX_ENTRIES} entries; valid: fewer")
+    if id(node) in above:
+        raise ScenarioError(f"{source}:{lines[path]}: contains itself through an alias; valid: plain values")
+    if isinstance(node, yaml.MappingNode):
+        seen: set[str] = set()
+        for key, value in node.value:
+            name = str(key.value)
+            line = key.start_mark.line + 1
+            if name in seen and name != "<<":
+                raise ScenarioError(f"{source}:{line}: key {name!r} is given twice; valid: once")
+            seen.add(name)
+            lines[(*path, name)] = line
+            _walk(value, (*path, name), lines, source, above | {id(node)})
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            _walk(item, (*path, index), lines, source, above | {id(node)})
