@@ -76,7 +76,7 @@ class Expression:
 def functions_for(*values: Any) -> ModuleType:
     """Return the module whose functions take ``values``: CasADi when one is symbolic, else numpy."""
     if any(type(value).__module__.partition(".")[0] == "casadi" for value in values):
-        import casadi  # noqa: PLC0415 - half a second that most callers need not wait for
+        import casadi
 
         return casadi
     return np
@@ -95,7 +95,7 @@ def _parse(text: str, variables: tuple[str, ...]) -> _Evaluator:
 def _build(node: ast.AST, text: str, variables: tuple[str, ...]) -> _Evaluator:
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
         # A numpy float: overflow and division by zero give inf, which the caller can refuse with a place.
-        number = np.float64(node.value)
+        number = np.float64(str(node.value))
         return lambda _values, _functions: number
     if isinstance(node, ast.Name) and node.id in CONSTANTS and node.id not in variables:
         constant = np.float64(CONSTANTS[node.id])
@@ -118,7 +118,7 @@ def _build(node: ast.AST, text: str, variables: tuple[str, ...]) -> _Evaluator:
 
 
 def _build_call(node: ast.Call, text: str, variables: tuple[str, ...]) -> _Evaluator:
-    name = node.func.id if isinstance(node.func, ast.Name) else None
+    name = node.func.id if isinstance(node.func, ast.Name) else ""
     if name not in _NUMPY_NAMES:
         shown = ast.get_source_segment(text.strip(), node.func)
         raise ScenarioError(f"expression {text!r} calls {shown!r}; valid functions: {', '.join(FUNCTIONS)}")

@@ -153,7 +153,7 @@ class Scenario:
         Raises:
             ScenarioError: If the body's data are out of range.
         """
-        from manikin.body import human  # noqa: PLC0415 - heavy; reading a scenario does not need it
+        from manikin.body import human
 
         data, supports = self.file.body, self.file.supports
         soles = (
@@ -170,8 +170,8 @@ class Scenario:
         Raises:
             ScenarioError: If a mesh cannot be read or a shape is degenerate.
         """
-        from manikin.scenarios.obstacles import build_obstacle  # noqa: PLC0415
-        from manikin.scene import Scene  # noqa: PLC0415
+        from manikin.scenarios.obstacles import build_obstacle
+        from manikin.scene import Scene
 
         obstacles = []
         for index, entry in enumerate(self.file.scene):
@@ -207,6 +207,24 @@ class Scenario:
             return StanceSequence(phases)
         except InputError as error:
             raise self._error(("supports", "phases"), str(error)) from None
+
+    def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
+        """Check that every contact of the supports lies on a surface of the scene.
+
+        Args:
+            scene: The built scene.
+            tolerance: Largest gap and overhang of a contact point [m].
+
+        Raises:
+            ScenarioError: For the first contact that is off every surface.
+        """
+        for number, stance in enumerate(phase.stance for phase in self.build_sequence()):
+            for contact in stance:
+                try:
+                    scene.supporting_surface(contact, tolerance)
+                except InputError as error:
+                    path: KeyPath = ("supports", "phases", number, contact.effector)
+                    raise self._error(path, str(error)) from None
 
     def support_level(self) -> SupportLevel:
         """Height of the supports below the CoM, from the start to the goal."""

@@ -70,8 +70,11 @@ class ObstacleSection(Section):
     half_space: Vector3 | None = Field(None, description="outward normal of a solid half-space at position")
     mesh: Text | None = Field(None, description="STL, OBJ, PLY or DAE file, relative to this file's folder")
     scale: Positive | None = Field(None, description="factor on the mesh's coordinates (default 1)")
-    unit: Literal["m", "cm", "mm", "in", "ft"] | None = Field(
-        None, description="unit of the mesh (default m)"
+    unit: Literal["m", "cm", "mm", "in"] | None = Field(
+        None, description="unit of the mesh (default: a DAE file's own, else m)"
+    )
+    convex: Literal["no", "hull", "parts"] | None = Field(
+        None, description="replace the mesh, or each connected part, by its convex hull"
     )
     position: Vector3 = Field((0.0, 0.0, 0.0), description="origin in the world [m]")
     rpy_deg: Vector3 = Field((0.0, 0.0, 0.0), description="fixed-axis roll, pitch, yaw [deg]")
@@ -87,7 +90,7 @@ class ObstacleSection(Section):
         if len(given) != 1:
             found = f"has {' and '.join(given)}" if given else "has no shape"
             raise refuse("", f"{found}; valid: exactly one of {', '.join(OBSTACLE_SHAPES)}")
-        for key in ("scale", "unit"):
+        for key in ("scale", "unit", "convex"):
             if getattr(self, key) is not None and given[0] != "mesh":
                 raise refuse(key, f"is given for a {given[0]}; valid: only with mesh")
         for key in ("plane", "half_space"):
@@ -310,7 +313,7 @@ class ScenarioFile(Section):
 
     name: Text = Field(description="short name")
     description: str = Field("", description="one line for the list of scenarios")
-    body: BodySection = Field(BodySection(), description="whose motion it is")
+    body: BodySection = Field(default_factory=BodySection, description="whose motion it is")
     reference_stature_m: Positive | None = Field(
         None, description="stature that the task's heights and distances were measured for [m] "
         "(default: the body's own); they are scaled to the actual body"
@@ -322,7 +325,7 @@ class ScenarioFile(Section):
     com_constraints: list[ComConstraintSection] = Field(
         default_factory=list, description="constraints on the centre of mass"
     )
-    planning: PlanningSection = Field(PlanningSection(), description="options of the planner")
+    planning: PlanningSection = Field(default_factory=PlanningSection, description="options of the planner")
     push: PushSection | None = Field(None, description="disturbance during the execution")
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(0, description="seed of every random choice")
 

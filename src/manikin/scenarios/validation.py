@@ -143,14 +143,16 @@ def _real_path(location: tuple[str | int, ...], data: Any) -> Path:
     """Keep the parts of pydantic's location that are in the file; it adds names of union members."""
     path: list[str | int] = []
     for part in location:
-        if isinstance(data, Mapping) and part in data:
+        if _holds(data, part):
             data = data[part]
-        elif isinstance(data, (list, tuple)) and isinstance(part, int) and part < len(data):
-            data = data[part]
-        else:
-            continue
-        path.append(part)
+            path.append(part)
     return tuple(path)
+
+
+def _holds(data: Any, part: str | int) -> bool:
+    if isinstance(data, Mapping):
+        return part in data
+    return isinstance(data, (list, tuple)) and isinstance(part, int) and part < len(data)
 
 
 def _rule(kind: str, context: Mapping[str, Any], message: str) -> str:
