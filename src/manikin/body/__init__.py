@@ -1,0 +1,30 @@
+"""The body: neutral description, human anthropometry, configurations."""
+
+from manikin.body.anthropometry import Anthropometry, Sex
+from manikin.body.configuration import (
+    Configuration,
+    difference,
+    integrate,
+    interpolate,
+    random_configuration,
+)
+from manikin.body.human import human
+from manikin.body.model import BodyModel
+from manikin.body.segments import Effector, Hinge, Segment, Shape, ShapeKind
+
+__all__ = [
+    "Anthropometry",
+    "BodyModel",
+    "Configuration",
+    "Effector",
+    "Hinge",
+    "Segment",
+    "Sex",
+    "Shape",
+    "ShapeKind",
+    "difference",
+    "human",
+    "integrate",
+    "interpolate",
+    "random_configuration",
+]

@@ -1,0 +1,257 @@
+"""One configuration of a body and what follows from it: frames, Jacobians, dynamics."""
+
+from collections.abc import Callable
+from typing import Any, Self
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from manikin.body.model import BodyModel
+from manikin.errors import BodyError
+from manikin.spatial import FloatArray
+
+_WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+class Configuration:
+    """The state ``(q, v)`` of a body, with everything computed at most once per update.
+
+    Velocities of points and frames, Jacobians and momenta are in world axes; ``v`` itself has
+    the root's linear and angular velocity in the root segment's axes. Returned arrays are
+    read-only and stay valid after the next update.
+    """
+
+    def __init__(self, body: BodyModel, q: ArrayLike | None = None, v: ArrayLike | None = None) -> None:
+        self.body = body
+        model = body.pinocchio
+        # Separate data: Pinocchio's algorithms overwrite each other's intermediate results.
+        self._frames = model.createData()
+        self._dynamics = model.createData()
+        self._second_order = model.createData()
+        self._results: dict[Any, Any] = {}
+        self._zero = np.zeros(body.nv)
+        self.update(body.standing_posture() if q is None else q, v)
+
+    def update(self, q: ArrayLike, v: ArrayLike | None = None) -> Self:
+        """Move to another state.
+
+        Args:
+            q: (nq,) configuration.
+            v: (nv,) velocity; zero when left out.
+
+        Raises:
+            BodyError: If a vector has another length.
+        """
+        self.q = _vector(q, self.body.nq, "q")
+        self.v = _vector(self._zero if v is None else v, self.body.nv, "v")
+        self._results.clear()
+        pin.framesForwardKinematics(self.body.pinocchio, self._frames, self.q)
+        return self
+
+    def _once(self, key: Any, compute: Callable[[], Any]) -> Any:
+        try:
+            return self._results[key]
+        except KeyError:
+            result = compute()
+            if isinstance(result, np.ndarray):
+                result = np.array(result)
+                result.setflags(write=False)
+            self._results[key] = result
+            return result
+
+    # --- centre of mass and momentum -------------------------------------------------------
+
+    @property
+    def com(self) -> FloatArray:
+        """(3,) centre of mass [m]."""
+        return self._once("com", lambda: pin.centerOfMass(self.body.pinocchio, self._frames, self.q, False))
+
+    @property
+    def com_velocity(self) -> FloatArray:
+        """(3,) velocity of the centre of mass [m/s]."""
+        return self._once("com_velocity", lambda: self.com_jacobian @ self.v)
+
+    @property
+    def com_jacobian(self) -> FloatArray:
+        """(3, nv) with ``com_velocity = com_jacobian @ v``."""
+        return self._once("com_jacobian", lambda: self.centroidal_map[:3] / self.body.mass)
+
+    @property
+    def com_bias(self) -> FloatArray:
+        """(3,) acceleration of the centre of mass when ``a = 0``: ``Jdot v`` [m/s^2]."""
+        return self._once("com_bias", lambda: self.centroidal_bias[:3] / self.body.mass)
+
+    @property
+    def centroidal_map(self) -> FloatArray:
+        """(6, nv): linear momentum and angular momentum about the centre of mass, per ``v``."""
+        model = self.body.pinocchio
+        return self._once("centroidal_map", lambda: pin.computeCentroidalMap(model, self._dynamics, self.q))
+
+    @property
+    def linear_momentum(self) -> FloatArray:
+        """(3,) [kg.m/s]."""
+        return self._once("linear_momentum", lambda: self.centroidal_map[:3] @ self.v)
+
+    @property
+    def angular_momentum(self) -> FloatArray:
+        """(3,) about the centre of mass [kg.m^2/s]."""
+        return self._once("angular_momentum", lambda: self.centroidal_map[3:] @ self.v)
+
+    @property
+    def centroidal_bias(self) -> FloatArray:
+        """(6,) rate of the centroidal momentum when ``a = 0``: ``d(map)/dt v`` [N, N.m]."""
+        return self._once("centroidal_bias", self._compute_centroidal_bias)
+
+    def _compute_centroidal_bias(self) -> FloatArray:
+        model, data = self.body.pinocchio, self._second_order
+        pin.computeCentroidalMomentumTimeVariation(model, data, self.q, self.v, self._zero)
+        return np.array(data.dhg.vector)
+
+    # --- frames ------------------------------------------------------------------------------
+
+    def effector_placement(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Rotation (3, 3) from the effector's axes to the world's, and position (3,) [m]."""
+        return self._placement(self.body.effector_frame(name))
+
+    def segment_placement(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Rotation (3, 3) from the segment's axes to the world's, and position (3,) [m]."""
+        return self._placement(self.body.segment_frame(name))
+
+    def effector_jacobian(self, name: str) -> FloatArray:
+        """(6, nv) linear, then angular velocity of the effector in world axes, per ``v``."""
+        return self._jacobian(self.body.effector_frame(name))
+
+    def segment_jacobian(self, name: str) -> FloatArray:
+        """(6, nv) linear, then angular velocity of the segment frame in world axes, per ``v``."""
+        return self._jacobian(self.body.segment_frame(name))
+
+    def effector_velocity(self, name: str) -> FloatArray:
+        """(6,) linear, then angular velocity of the effector in world axes [m/s, rad/s]."""
+        return self.effector_jacobian(name) @ self.v
+
+    def effector_bias(self, name: str) -> FloatArray:
+        """(6,) ``Jdot v``: acceleration of the effector in world axes when ``a = 0``."""
+        return self._bias(self.body.effector_frame(name))
+
+    def segment_bias(self, name: str) -> FloatArray:
+        """(6,) ``Jdot v``: acceleration of the segment frame in world axes when ``a = 0``."""
+        return self._bias(self.body.segment_frame(name))
+
+    def point(self, segment: str, offset: ArrayLike) -> FloatArray:
+        """(3,) world position of a point fixed to a segment at ``offset`` (3,) in its axes [m]."""
+        rotation, position = self.segment_placement(segment)
+        return position + rotation @ np.asarray(offset, dtype=np.float64)
+
+    def point_jacobian(self, segment: str, offset: ArrayLike) -> FloatArray:
+        """(3, nv) velocity of a point fixed to a segment at ``offset`` (3,) in its axes, per ``v``."""
+        rotation, _ = self.segment_placement(segment)
+        jacobian = self.segment_jacobian(segment)
+        arm = rotation @ np.asarray(offset, dtype=np.float64)
+        return jacobian[:3] + np.cross(jacobian[3:], arm, axisa=0, axisb=0, axisc=0)
+
+    def _placement(self, frame: int) -> tuple[FloatArray, FloatArray]:
+        return self._once(("placement", frame), lambda: _read_only_placement(self._frames.oMf[frame]))
+
+    def _jacobian(self, frame: int) -> FloatArray:
+        model = self.body.pinocchio
+        self._once("joint_jacobians", lambda: pin.computeJointJacobians(model, self._frames))
+        return self._once(
+            ("jacobian", frame), lambda: pin.getFrameJacobian(model, self._frames, frame, _WORLD_ALIGNED)
+        )
+
+    def _bias(self, frame: int) -> FloatArray:
+        self._once("second_order", self._second_order_kinematics)
+        return self._once(("bias", frame), lambda: self._frame_acceleration(frame))
+
+    def _second_order_kinematics(self) -> bool:
+        pin.forwardKinematics(self.body.pinocchio, self._second_order, self.q, self.v, self._zero)
+        return True
+
+    def _frame_acceleration(self, frame: int) -> FloatArray:
+        model = self.body.pinocchio
+        acceleration = pin.getFrameClassicalAcceleration(model, self._second_order, frame, _WORLD_ALIGNED)
+        return np.array(acceleration.vector)
+
+    # --- dynamics ----------------------------------------------------------------------------
+
+    @property
+    def mass_matrix(self) -> FloatArray:
+        """(nv, nv) symmetric inertia matrix ``M`` of ``M a + h = tau + J^T f``."""
+        return self._once("mass_matrix", self._compute_mass_matrix)
+
+    def _compute_mass_matrix(self) -> FloatArray:
+        model, data = self.body.pinocchio, self._dynamics
+        upper = np.triu(pin.crba(model, data, self.q, pin.Convention.WORLD))
+        return upper + np.triu(upper, 1).T
+
+    @property
+    def nonlinear_effects(self) -> FloatArray:
+        """(nv,) ``h``: Coriolis, centrifugal and gravity forces [N, N.m]."""
+        model = self.body.pinocchio
+        return self._once(
+            "nonlinear_effects", lambda: pin.nonLinearEffects(model, self._dynamics, self.q, self.v)
+        )
+
+    def inverse_dynamics(self, acceleration: ArrayLike) -> FloatArray:
+        """(nv,) generalised forces that give ``acceleration`` (nv,) without contacts [N, N.m]."""
+        a = _vector(acceleration, self.body.nv, "acceleration")
+        return np.array(pin.rnea(self.body.pinocchio, self._dynamics, self.q, self.v, a))
+
+    @property
+    def kinetic_energy(self) -> float:
+        """[J]."""
+        return 0.5 * float(self.v @ self.mass_matrix @ self.v)
+
+    @property
+    def potential_energy(self) -> float:
+        """[J], zero at height 0."""
+        return -float(self.body.mass * self.body.pinocchio.gravity.linear @ self.com)
+
+
+# --- the manifold of configurations ----------------------------------------------------------
+
+
+def integrate(body: BodyModel, q: ArrayLike, v: ArrayLike, dt: float = 1.0) -> FloatArray:
+    """(nq,) configuration reached from ``q`` with the constant velocity ``v`` during ``dt`` [s]."""
+    step = dt * _vector(v, body.nv, "v")
+    return pin.integrate(body.pinocchio, _vector(q, body.nq, "q"), step)
+
+
+def difference(body: BodyModel, start: ArrayLike, end: ArrayLike) -> FloatArray:
+    """(nv,) velocity that leads from ``start`` to ``end`` in unit time."""
+    return pin.difference(body.pinocchio, _vector(start, body.nq, "start"), _vector(end, body.nq, "end"))
+
+
+def interpolate(body: BodyModel, start: ArrayLike, end: ArrayLike, share: float) -> FloatArray:
+    """(nq,) configuration on the geodesic, ``start`` at ``share`` 0 and ``end`` at 1."""
+    first, last = _vector(start, body.nq, "start"), _vector(end, body.nq, "end")
+    return pin.interpolate(body.pinocchio, first, last, float(share))
+
+
+def random_configuration(body: BodyModel, rng: np.random.Generator, spread: float = 1.0) -> FloatArray:
+    """(nq,) random configuration: hinges uniform within their ranges, root anyhow.
+
+    Args:
+        body: The body.
+        rng: Source of randomness.
+        spread: Half-width of the box for the root's position [m].
+    """
+    quaternion = rng.standard_normal(4)
+    angles = rng.uniform(body.lower, body.upper)
+    position = rng.uniform(-spread, spread, 3)
+    return np.concatenate([position, quaternion / np.linalg.norm(quaternion), angles])
+
+
+def _vector(value: ArrayLike, size: int, name: str) -> FloatArray:
+    array = np.array(value, dtype=np.float64)
+    if array.shape != (size,):
+        raise BodyError(f"configuration {name} has shape {array.shape}; valid: ({size},)")
+    return array
+
+
+def _read_only_placement(placement: Any) -> tuple[FloatArray, FloatArray]:
+    rotation, position = np.array(placement.rotation), np.array(placement.translation)
+    rotation.setflags(write=False)
+    position.setflags(write=False)
+    return rotation, position

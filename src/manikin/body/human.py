@@ -1,0 +1,374 @@
+"""A human scaled from stature, mass and sex: 19 segments, 45 degrees of freedom."""
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.body.anthropometry import (
+    ANKLE_FROM_HEEL,
+    NECK_LENGTH_SHARE,
+    NECK_MASS_SHARE,
+    NECK_RADIUS,
+    TOE_HINGE_FROM_HEEL,
+    TOES_MASS_SHARE,
+    Anthropometry,
+)
+from manikin.body.model import BodyModel
+from manikin.body.range_of_motion import HUMAN_HINGES, human_hinges
+from manikin.body.segments import Effector, Segment, Shape, ShapeKind
+from manikin.spatial import FloatArray, skew
+
+_ALONG_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""Turns a capsule's own z axis into the segment's y axis."""
+_ALONG_X = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""Turns a capsule's own z axis into the segment's x axis."""
+
+_SOFT_PAIRS = (
+    # One short link apart: the shapes overlap in ordinary postures.
+    ("pelvis", "thorax"), ("lumbar", "neck"), ("thorax", "head"), ("leg", "toes"),
+    # Belly and thigh are soft and press against each other in every deep crouch.
+    ("lumbar", "thigh"),
+)  # fmt: skip
+
+_ARM_SPREAD = np.deg2rad(12.0)
+
+_STANDING_DEG = MappingProxyType(
+    {"hip_flexion": 2.0, "knee_flexion": 10.0, "ankle_dorsiflexion": 8.0, "elbow_flexion": 15.0}
+)
+"""Upright trunk over slightly bent knees, the centre of mass over the middle of the foot."""
+
+
+def human(
+    stature: float = 1.75,
+    mass: float = 79.0,
+    sex: str = "male",
+    *,
+    sole_length: float | None = None,
+    sole_width: float | None = None,
+) -> BodyModel:
+    """Make a human body of 19 segments and 45 degrees of freedom ([Qiu2012]_ Table 2.1, B.1).
+
+    The free pelvis carries the legs and the spine (lumbar, thorax, neck, 3 hinges each; the
+    head is rigid on the neck). Shoulders and hips have 3 hinges, elbows, wrists, knees and
+    ankles 2, toes 1. Proportions and inertias: :mod:`manikin.body.anthropometry`; axes, ranges
+    and strengths: :mod:`manikin.body.range_of_motion`.
+
+    In the zero posture the body stands upright with hanging arms, palms inward, and all
+    segment frames parallel to the world. A segment's frame lies in its proximal joint, the
+    pelvis' midway between the hip joints, the lumbar's and thorax' at the height of navel and
+    xiphoid (the borders of de Leva's trunk parts), the neck's at C7.
+
+    Effectors: ``left_foot``, ``right_foot`` (sole centre, x to the toes, z up),
+    ``left_hand``, ``right_hand`` (palm centre, x along the fingers, z out of the back of the
+    hand: parallel to the world when the palm lies on a table, fingers forward),
+    ``head`` (vertex) and ``pelvis`` (its segment frame).
+
+    Collision shapes are the flesh made slim: breadths and girths are our choice, rounded from
+    Winter's and military surveys' means, scaled with stature and (within 12 %) with the square root
+    of the body mass index, so that limbs standing side by side stay 2 cm apart.
+
+    Args:
+        stature: Sole to vertex [m], 1.40 to 2.10.
+        mass: Body mass [kg], 35 to 160, with a body mass index of 10 to 60 kg/m^2.
+        sex: ``"male"`` or ``"female"``.
+        sole_length: Length of the sole [m], 0.15 to 0.40; None for 0.16 of the stature.
+        sole_width: Width of the sole [m], 0.05 to 0.16; None for 0.12/1.75 of the stature.
+
+    Raises:
+        BodyError: If a value is out of its range.
+    """
+    size = Anthropometry(stature, mass, sex, sole_length=sole_length, sole_width=sole_width)
+    builder = _HumanBuilder(size)
+    return BodyModel(
+        name="human",
+        segments=builder.segments(),
+        effectors={effector.name: effector for effector in builder.effectors()},
+        standing_angles=_standing_angles(),
+        soft_pairs=_soft_pairs(),
+        stature=size.stature,
+        sex=str(size.sex),
+        sole_length=size.sole_length,
+        sole_width=size.sole_width,
+        nominal_mass=size.mass,
+    )
+
+
+def _standing_angles() -> dict[str, float]:
+    """Angles [rad]; the arms hang 12 degrees away from the trunk, straight to the side."""
+    angles = {name: float(np.deg2rad(value)) for name, value in _STANDING_DEG.items()}
+    # Direction of the arm on the oblique shoulder axes of range_of_motion.
+    arm = np.array([0.0, np.sin(_ARM_SPREAD), -np.cos(_ARM_SPREAD)])
+    lift, spread = (np.array(entry.axis) for entry in HUMAN_HINGES["upper_arm"][:2])
+    angles["shoulder_flexion"] = float(np.arctan2(arm @ spread, -arm[2]))
+    angles["shoulder_abduction"] = float(np.arcsin(arm @ -lift))
+    return {f"{side}_{name}": angle for side in ("left", "right") for name, angle in angles.items()}
+
+
+def _soft_pairs() -> frozenset[frozenset[str]]:
+    sided = {name for name in HUMAN_HINGES if name not in ("lumbar", "thorax", "neck")}
+    return frozenset(
+        frozenset(f"{side}_{name}" if name in sided else name for name in pair)
+        for pair in _SOFT_PAIRS
+        for side in ("left", "right")
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Inertia:
+    """Mass, centre and rotational inertia about the centre, in one frame."""
+
+    mass: float
+    com: FloatArray
+    moments: FloatArray
+
+    def without(self, part: "_Inertia") -> "_Inertia":
+        """What is left when ``part`` is cut away, both in this frame."""
+        mass = self.mass - part.mass
+        com = (self.mass * self.com - part.mass * part.com) / mass
+        return _Inertia(mass, com, self.about(com) - part.about(com))
+
+    def about(self, place: FloatArray) -> FloatArray:
+        """Inertia about another point (parallel axes), (3, 3)."""
+        arm = skew(self.com - place)
+        return self.moments - self.mass * arm @ arm
+
+
+class _HumanBuilder:
+    """Turns dimensions into segments; the only state is the dimensions."""
+
+    def __init__(self, size: Anthropometry) -> None:
+        self.size = size
+        self.stature = size.stature
+        self.girth = size.girth
+
+    def segments(self) -> tuple[Segment, ...]:
+        trunk = [self._pelvis(), self._lumbar(), self._thorax(), *self._neck_and_head()]
+        arms = [part for side in ("left", "right") for part in self._arm(side)]
+        legs = [part for side in ("left", "right") for part in self._leg(side)]
+        return (*trunk, *arms, *legs)
+
+    def effectors(self) -> list[Effector]:
+        size = self.size
+        head_length = (1.0 - NECK_LENGTH_SHARE) * size.length("head_and_neck")
+        found = [
+            Effector("pelvis", "pelvis", np.zeros(3)),
+            Effector("head", "head", np.array([0.0, 0.0, head_length])),
+        ]
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            sole = np.array([(0.5 - ANKLE_FROM_HEEL) * size.sole_length, 0.0, -size.ankle_height])
+            found.append(Effector(f"{side}_foot", f"{side}_foot", sole))
+            palm = np.array([0.0, -sign * 0.5 * self._hand_thickness, -0.8 * size.knuckle_distance])
+            found.append(Effector(f"{side}_hand", f"{side}_hand", palm, _palm_rotation(sign)))
+        return found
+
+    # --- trunk -----------------------------------------------------------------------------
+
+    def _pelvis(self) -> Segment:
+        length = self.size.length("lower_trunk")
+        across = _across("hips", 0.060 * self.stature, 0.191 * self.stature * self.girth, 0.35 * length)
+        return self._trunk_segment("pelvis", None, "lower_trunk", 0.0, (across,))
+
+    def _lumbar(self) -> Segment:
+        length = self.size.length("middle_trunk")
+        across = _across("waist", 0.058 * self.stature, 0.162 * self.stature * self.girth, 0.5 * length)
+        return self._trunk_segment(
+            "lumbar", "pelvis", "middle_trunk", self.size.length("lower_trunk"), (across,)
+        )
+
+    def _thorax(self) -> Segment:
+        size, length = self.size, self.size.length("upper_trunk")
+        shoulder = size.shoulder_height - size.length("lower_trunk") - size.length("middle_trunk")
+        chest = _across("chest", 0.062 * self.stature, 0.168 * self.stature * self.girth, 0.4 * length)
+        girdle = _across("shoulders", 0.035 * self.stature, size.shoulder_distance, shoulder)
+        return self._trunk_segment(
+            "thorax", "lumbar", "upper_trunk", size.length("middle_trunk"), (chest, girdle)
+        )
+
+    def _trunk_segment(
+        self, name: str, parent: str | None, row: str, height: float, shapes: tuple[Shape, ...]
+    ) -> Segment:
+        """Trunk part whose origin is its lower border; the table measures from the upper one."""
+        size = self.size
+        com = np.array([0.0, 0.0, size.length(row) - size.com_from_start(row)])
+        hinges = human_hinges(name, "", size.mass * size.stature) if parent else ()
+        origin = np.array([0.0, 0.0, height])
+        return Segment(
+            name, parent, origin, hinges, size.segment_mass(row), com, np.diag(size.moments(row)), shapes
+        )
+
+    def _neck_and_head(self) -> tuple[Segment, Segment]:
+        size, length = self.size, self.size.length("head_and_neck")
+        neck_length = NECK_LENGTH_SHARE * length
+        both = _Inertia(
+            size.segment_mass("head_and_neck"),
+            np.array([0.0, 0.0, length - size.com_from_start("head_and_neck")]),
+            np.diag(size.moments("head_and_neck")),
+        )
+        neck_mass = NECK_MASS_SHARE * both.mass
+        neck_moments = _cylinder(neck_mass, NECK_RADIUS * self.stature, neck_length)
+        neck = _Inertia(neck_mass, np.array([0.0, 0.0, 0.5 * neck_length]), neck_moments)
+        head = both.without(neck)
+        hinges = human_hinges("neck", "", size.mass * size.stature)
+        base = np.array([0.0, 0.0, size.length("upper_trunk")])
+        top = np.array([0.0, 0.0, neck_length])
+        radius = 0.034 * self.stature
+        shape = _capsule("neck", radius, (0.0, 0.0, 0.0), (0.0, 0.0, neck_length))
+        return (
+            Segment("neck", "thorax", base, hinges, neck.mass, neck.com, neck.moments, (shape,)),
+            Segment(
+                "head", "neck", top, (), head.mass, head.com - top, head.moments,
+                self._head_shapes(length - neck_length),
+            ),
+        )  # fmt: skip
+
+    def _head_shapes(self, vertex: float) -> tuple[Shape, ...]:
+        """Skull reaching up to the vertex and jaw below it; head breadth and length, bare."""
+        radius = 0.044 * self.stature
+        half = 0.0125 * self.stature
+        skull = Shape("skull", ShapeKind.CAPSULE, (radius, 2 * half), (half, 0.0, vertex - radius), _ALONG_X)
+        jaw_radius = 0.036 * self.stature
+        jaw = Shape("jaw", ShapeKind.SPHERE, (jaw_radius,), (0.75 * jaw_radius, 0.0, 0.45 * jaw_radius))
+        return skull, jaw
+
+    # --- arms ------------------------------------------------------------------------------
+
+    @property
+    def _hand_thickness(self) -> float:
+        return 0.016 * self.stature
+
+    def _arm(self, side: str) -> list[Segment]:
+        size = self.size
+        sign = 1.0 if side == "left" else -1.0
+        shoulder = (0.0, 0.5 * sign * size.shoulder_distance, self._shoulder_in_thorax)
+        upper, lower, hand = (size.length(row) for row in ("upper_arm", "forearm", "hand"))
+        radius = 0.025 * self.stature * self.girth
+        return [
+            self._limb(
+                side, "upper_arm", "thorax", "upper_arm", shoulder,
+                (_capsule("arm", radius, (0.0, 0.0, 0.0), (0.0, 0.0, -upper)),),
+            ),
+            self._limb(
+                side, "forearm", f"{side}_upper_arm", "forearm", (0.0, 0.0, -upper),
+                (_capsule("arm", 0.8 * radius, (0.0, 0.0, 0.0), (0.0, 0.0, -lower)),), sideways=True,
+            ),
+            self._limb(
+                side, "hand", f"{side}_forearm", "hand", (0.0, 0.0, -lower),
+                (Shape("palm", ShapeKind.BOX, (0.048 * self.stature, self._hand_thickness, hand),
+                       (0.0, 0.0, -0.5 * hand)),),
+                sideways=True,
+            ),
+        ]  # fmt: skip
+
+    # --- legs ------------------------------------------------------------------------------
+
+    def _leg(self, side: str) -> list[Segment]:
+        size = self.size
+        sign = 1.0 if side == "left" else -1.0
+        thigh, shank = size.length("thigh"), size.length("shank")
+        hip = (0.0, 0.5 * sign * size.hip_distance, 0.0)
+        thigh_shape = _capsule(
+            "thigh", 0.038 * self.stature * self.girth, (0.0, 0.0, 0.0), (0.0, 0.0, -thigh)
+        )
+        ankle_end = 0.012 * self.stature - shank
+        shank_shape = _capsule(
+            "shank", 0.029 * self.stature * self.girth, (0.0, 0.0, 0.0), (0.0, 0.0, ankle_end)
+        )
+        return [
+            self._limb(side, "thigh", "pelvis", "thigh", hip, (thigh_shape,)),
+            self._limb(side, "leg", f"{side}_thigh", "shank", (0.0, 0.0, -thigh), (shank_shape,)),
+            *self._foot_and_toes(side, (0.0, 0.0, -shank)),
+        ]
+
+    def _foot_and_toes(self, side: str, ankle: tuple[float, float, float]) -> list[Segment]:
+        """Foot and toes share de Leva's foot; their soles make one flat rectangle."""
+        size = self.size
+        heel, tip = -ANKLE_FROM_HEEL * size.sole_length, (1.0 - ANKLE_FROM_HEEL) * size.sole_length
+        hinge_x = heel + TOE_HINGE_FROM_HEEL * size.sole_length
+        toe_height, foot_height = 0.022 * self.stature, 0.034 * self.stature
+        hinge = np.array([hinge_x, 0.0, 0.5 * toe_height - size.ankle_height])
+
+        bare_length = size.length("foot")
+        bare_heel = heel + 0.5 * (size.sole_length - bare_length)
+        com = np.array([bare_heel + size.com_from_start("foot"), 0.0, -0.6 * size.ankle_height])
+        vertical, transverse, longitudinal = size.moments("foot")
+        both = _Inertia(size.segment_mass("foot"), com, np.diag([longitudinal, transverse, vertical]))
+        bare_toes = (1.0 - TOE_HINGE_FROM_HEEL) * bare_length
+        toe_mass = TOES_MASS_SHARE * both.mass
+        toe_com = np.array([bare_heel + bare_length - 0.5 * bare_toes, 0.0, hinge[2]])
+        toes = _Inertia(
+            toe_mass, toe_com, _cuboid(toe_mass, np.array([bare_toes, 0.05 * self.stature, toe_height]))
+        )
+        foot = both.without(toes)
+
+        toe_box = np.array([tip - hinge_x, size.sole_width, toe_height])
+        toe_centre = (0.5 * (tip - hinge_x), 0.0, 0.0)
+        foot_box = np.array([hinge_x - heel, size.sole_width, foot_height])
+        foot_centre = (0.5 * (heel + hinge_x), 0.0, 0.5 * foot_height - size.ankle_height)
+        strength = size.mass * size.stature
+        return [
+            Segment(
+                f"{side}_foot", f"{side}_leg", np.array(ankle), human_hinges("foot", side, strength),
+                foot.mass, foot.com, foot.moments, (Shape("sole", ShapeKind.BOX, foot_box, foot_centre),),
+            ),
+            Segment(
+                f"{side}_toes", f"{side}_foot", hinge, human_hinges("toes", side, strength),
+                toes.mass, toe_com - hinge, toes.moments,
+                (Shape("sole", ShapeKind.BOX, toe_box, toe_centre),),
+            ),
+        ]  # fmt: skip
+
+    def _limb(
+        self,
+        side: str,
+        name: str,
+        parent: str,
+        row: str,
+        origin: ArrayLike,
+        shapes: tuple[Shape, ...],
+        sideways: bool = False,
+    ) -> Segment:
+        """Limb part hanging down from its joint.
+
+        Args:
+            sideways: Palms inward instead of forward: the table's fore-aft axis is our y.
+        """
+        size = self.size
+        sagittal, transverse, longitudinal = size.moments(row)
+        x, y = (transverse, sagittal) if sideways else (sagittal, transverse)
+        return Segment(
+            f"{side}_{name}", parent, np.array(origin), human_hinges(name, side, size.mass * size.stature),
+            size.segment_mass(row), np.array([0.0, 0.0, -size.com_from_start(row)]),
+            np.diag([x, y, longitudinal]), shapes,
+        )  # fmt: skip
+
+
+def _palm_rotation(sign: float) -> FloatArray:
+    """Axes of the palm in the hanging hand: x to the fingers, z out of the back of the hand."""
+    x, z = np.array([0.0, 0.0, -1.0]), np.array([0.0, sign, 0.0])
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def _across(name: str, radius: float, breadth: float, height: float) -> Shape:
+    """Capsule from left to right."""
+    length = max(breadth - 2.0 * radius, 1e-3)
+    return Shape(name, ShapeKind.CAPSULE, (radius, length), (0.0, 0.0, height), _ALONG_Y)
+
+
+def _capsule(name: str, radius: float, start: ArrayLike, end: ArrayLike) -> Shape:
+    """Upright capsule between two points on one vertical."""
+    first, last = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+    return Shape(name, ShapeKind.CAPSULE, (radius, abs(last[2] - first[2])), 0.5 * (first + last))
+
+
+def _cylinder(mass: float, radius: float, length: float) -> FloatArray:
+    """Inertia of an upright solid cylinder about its centre."""
+    across = mass * (3.0 * radius**2 + length**2) / 12.0
+    return np.diag([across, across, 0.5 * mass * radius**2])
+
+
+def _cuboid(mass: float, extents: FloatArray) -> FloatArray:
+    """Inertia of a solid cuboid about its centre."""
+    squares = extents**2
+    return np.diag(mass / 12.0 * (squares.sum() - squares))

@@ -1,0 +1,353 @@
+"""The body: one neutral description and the engine models built from it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations
+from math import fsum
+from types import MappingProxyType
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from manikin.body.segments import Effector, Hinge, Segment, Shape, ShapeKind, hinges_of, segments_by_name
+from manikin.errors import BodyError
+from manikin.spatial import FloatArray, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class BodyModel:
+    """A floating tree of rigid segments on hinges.
+
+    The configuration vector is ``q = [root position (3), root quaternion xyzw (4), hinge
+    angles]`` and the velocity ``v = [root linear (3), root angular (3), hinge rates]`` with the
+    root's parts in the *root segment's* axes, as in Pinocchio. Make a human with
+    :func:`manikin.body.human`.
+
+    Attributes:
+        name: What the body is.
+        segments: The segments, parents first; the first is the free root.
+        effectors: Effectors by name.
+        standing_angles: Hinge angles of the standing posture [rad]; hinges left out are 0.
+        soft_pairs: Pairs of segments that are not adjacent and yet are not checked for
+            collision, because a short link or soft flesh lies between them.
+        stature: Sole to vertex [m], or None for another creature.
+        sex: ``"male"``, ``"female"`` or None.
+        sole_length: Length of the sole rectangles [m], or None.
+        sole_width: Width of the sole rectangles [m], or None.
+        nominal_mass: The mass that was asked for [kg]; the segments must add up to it.
+    """
+
+    name: str
+    segments: tuple[Segment, ...]
+    effectors: Mapping[str, Effector]
+    standing_angles: Mapping[str, float] = field(default_factory=dict)
+    soft_pairs: frozenset[frozenset[str]] = frozenset()
+    stature: float | None = None
+    sex: str | None = None
+    sole_length: float | None = None
+    sole_width: float | None = None
+    nominal_mass: float | None = None
+
+    def __post_init__(self) -> None:
+        index = segments_by_name(self.segments)
+        for effector in self.effectors.values():
+            if effector.segment not in index:
+                raise BodyError(
+                    f"effector {effector.name!r} is on {effector.segment!r}; valid: one of {list(index)}"
+                )
+        unknown = set(self.standing_angles) - set(self.joint_names)
+        if unknown:
+            raise BodyError(f"standing angle of {min(unknown)!r}; valid: one of {list(self.joint_names)}")
+        total = fsum(segment.mass for segment in self.segments)
+        if self.nominal_mass is not None and abs(total - self.nominal_mass) > 1e-12 * total:
+            raise BodyError(f"segments weigh {total!r} kg; valid: {self.nominal_mass!r} kg")
+        object.__setattr__(self, "effectors", MappingProxyType(dict(self.effectors)))
+        object.__setattr__(self, "standing_angles", MappingProxyType(dict(self.standing_angles)))
+
+    # --- description ---------------------------------------------------------------------
+
+    @cached_property
+    def mass(self) -> float:
+        """Total mass [kg]."""
+        if self.nominal_mass is not None:
+            return self.nominal_mass
+        return fsum(segment.mass for segment in self.segments)
+
+    @cached_property
+    def hinges(self) -> tuple[Hinge, ...]:
+        """Every hinge, in the order of ``q[7:]``."""
+        return hinges_of(self.segments)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """(nv - 6) hinge names, in the order of ``q[7:]``."""
+        return tuple(hinge.name for hinge in self.hinges)
+
+    @property
+    def nv(self) -> int:
+        """Size of the velocity vector."""
+        return 6 + len(self.hinges)
+
+    @property
+    def nq(self) -> int:
+        """Size of the configuration vector."""
+        return 7 + len(self.hinges)
+
+    @cached_property
+    def lower(self) -> FloatArray:
+        """(nv - 6,) smallest hinge angles [rad]."""
+        return frozen_array([hinge.lower for hinge in self.hinges], "lower")
+
+    @cached_property
+    def upper(self) -> FloatArray:
+        """(nv - 6,) largest hinge angles [rad]."""
+        return frozen_array([hinge.upper for hinge in self.hinges], "upper")
+
+    @cached_property
+    def velocity_limit(self) -> FloatArray:
+        """(nv - 6,) largest hinge speeds [rad/s]."""
+        return frozen_array([hinge.velocity_limit for hinge in self.hinges], "velocity_limit")
+
+    @cached_property
+    def torque_limit(self) -> FloatArray:
+        """(nv - 6,) largest hinge torques [N.m]."""
+        return frozen_array([hinge.torque_limit for hinge in self.hinges], "torque_limit")
+
+    @cached_property
+    def _segment_index(self) -> Mapping[str, Segment]:
+        return segments_by_name(self.segments)
+
+    def segment(self, name: str) -> Segment:
+        """Segment by name.
+
+        Raises:
+            BodyError: If there is none.
+        """
+        return _look_up(self._segment_index, name, "segment")
+
+    def effector(self, name: str) -> Effector:
+        """Effector by name.
+
+        Raises:
+            BodyError: If there is none.
+        """
+        return _look_up(self.effectors, name, "effector")
+
+    def joint_index(self, name: str) -> int:
+        """Position of a hinge among the ``nv - 6`` hinges; add 7 for ``q`` and 6 for ``v``.
+
+        Raises:
+            BodyError: If there is none.
+        """
+        return _look_up(self._joint_index, name, "hinge")
+
+    @cached_property
+    def _joint_index(self) -> Mapping[str, int]:
+        return {name: number for number, name in enumerate(self.joint_names)}
+
+    # --- Pinocchio and Coal ----------------------------------------------------------------
+
+    @cached_property
+    def pinocchio(self) -> Any:
+        """The ``pin.Model``; shared by everyone, so never change it.
+
+        Joint ``"root"`` is the free flyer, then one revolute joint per hinge with the hinge's
+        name. Frames ``"segment/<name>"`` and ``"effector/<name>"`` exist for every segment and
+        effector (a segment and an effector may have the same name).
+        """
+        return _build_pinocchio(self)
+
+    @cached_property
+    def geometry(self) -> Any:
+        """The ``pin.GeometryModel`` of Coal shapes named ``"segment/shape"``; never change it.
+
+        Its collision pairs are :attr:`collision_pairs`.
+        """
+        return _build_geometry(self)
+
+    @cached_property
+    def _effector_frames(self) -> Mapping[str, int]:
+        return {name: self.pinocchio.getFrameId(f"effector/{name}") for name in self.effectors}
+
+    @cached_property
+    def _segment_frames(self) -> Mapping[str, int]:
+        return {s.name: self.pinocchio.getFrameId(f"segment/{s.name}") for s in self.segments}
+
+    def effector_frame(self, name: str) -> int:
+        """Pinocchio frame id of an effector.
+
+        Raises:
+            BodyError: If there is none.
+        """
+        return _look_up(self._effector_frames, name, "effector")
+
+    def segment_frame(self, name: str) -> int:
+        """Pinocchio frame id of a segment.
+
+        Raises:
+            BodyError: If there is none.
+        """
+        return _look_up(self._segment_frames, name, "segment")
+
+    # --- self-collision --------------------------------------------------------------------
+
+    @cached_property
+    def segment_pairs(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of segments that must not touch.
+
+        All pairs but a segment and its parent, which overlap at their joint, and
+        :attr:`soft_pairs`.
+        """
+        names = [segment.name for segment in self.segments]
+        parents = {frozenset((s.name, s.parent)) for s in self.segments if s.parent is not None}
+        skipped = parents | self.soft_pairs
+        return tuple((a, b) for a, b in combinations(names, 2) if frozenset((a, b)) not in skipped)
+
+    @cached_property
+    def collision_pairs(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of shapes ``("segment/shape", "segment/shape")`` that must not touch."""
+        return tuple(
+            (f"{a}/{first.name}", f"{b}/{second.name}")
+            for a, b in self.segment_pairs
+            for first in self.segment(a).shapes
+            for second in self.segment(b).shapes
+        )
+
+    # --- configurations --------------------------------------------------------------------
+
+    def zero_posture(self) -> FloatArray:
+        """(nq,) root at the world's origin, every hinge at 0."""
+        q = np.zeros(self.nq)
+        q[6] = 1.0
+        return q
+
+    def posture(self, angles: Mapping[str, float]) -> FloatArray:
+        """(nq,) root at the world's origin, the named hinges at the given angles [rad], others 0.
+
+        Raises:
+            BodyError: If a hinge is unknown.
+        """
+        q = self.zero_posture()
+        for name, angle in angles.items():
+            q[7 + self.joint_index(name)] = angle
+        return q
+
+    def standing_posture(self) -> FloatArray:
+        """(nq,) standing upright: soles flat on z = 0, root at x = y = 0, heading along x."""
+        q = self.posture(self.standing_angles)
+        soles = [name for name in ("left_foot", "right_foot") if name in self.effectors]
+        if soles:
+            data = self.pinocchio.createData()
+            pin.framesForwardKinematics(self.pinocchio, data, q)
+            q[2] -= float(np.mean([data.oMf[self.effector_frame(name)].translation[2] for name in soles]))
+        return q
+
+    # --- as plain values -------------------------------------------------------------------
+
+    def signature(self) -> dict[str, str | float]:
+        """What a file must keep to build this body again: name, stature, mass, sex, sole."""
+        values = {
+            "model": self.name, "stature": self.stature, "mass": self.mass, "sex": self.sex,
+            "sole_length": self.sole_length, "sole_width": self.sole_width,
+        }  # fmt: skip
+        return {key: value for key, value in values.items() if value is not None}
+
+
+def _look_up(index: Mapping[str, Any], name: str, kind: str) -> Any:
+    try:
+        return index[name]
+    except KeyError:
+        raise BodyError(f"no {kind} {name!r}; valid: {', '.join(index)}") from None
+
+
+def _build_pinocchio(body: BodyModel) -> Any:
+    model = pin.Model()
+    model.name = body.name
+    joint_of: dict[str, int] = {}
+    frame_of: dict[str, int] = {}
+    for segment in body.segments:
+        attachment = _attachment(model, segment, frame_of)
+        joint, placement = _add_joints(model, segment, attachment, joint_of)
+        inertia = pin.Inertia(segment.mass, np.array(segment.com), np.array(segment.inertia))
+        model.appendBodyToJoint(joint, inertia, placement)
+        joint_of[segment.name] = joint
+        parent_frame = frame_of.get(segment.parent or "", 0)
+        frame = pin.Frame(f"segment/{segment.name}", joint, parent_frame, placement, pin.FrameType.BODY)
+        frame_of[segment.name] = model.addFrame(frame, False)
+    for effector in body.effectors.values():
+        carrier = model.frames[frame_of[effector.segment]]
+        placement = carrier.placement * pin.SE3(np.array(effector.rotation), np.array(effector.translation))
+        model.addFrame(
+            pin.Frame(
+                f"effector/{effector.name}", carrier.parentJoint, frame_of[effector.segment], placement,
+                pin.FrameType.OP_FRAME,
+            )
+        )  # fmt: skip
+    model.lowerPositionLimit[:7], model.upperPositionLimit[:7] = -np.inf, np.inf
+    return model
+
+
+def _attachment(model: Any, segment: Segment, frame_of: Mapping[str, int]) -> Any:
+    """Placement of the segment's origin in the joint that carries its parent."""
+    origin = pin.SE3(np.eye(3), np.array(segment.origin))
+    if segment.parent is None:
+        return origin
+    return model.frames[frame_of[segment.parent]].placement * origin
+
+
+def _add_joints(
+    model: Any, segment: Segment, attachment: Any, joint_of: Mapping[str, int]
+) -> tuple[int, Any]:
+    """Add the segment's hinges as a chain of massless links.
+
+    Returns:
+        The joint that carries the segment and the segment's placement in it.
+    """
+    if segment.parent is None:
+        return model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root"), pin.SE3.Identity()
+    joint = joint_of[segment.parent]
+    for hinge in segment.hinges:
+        joint = model.addJoint(
+            joint, _revolute(hinge.axis), attachment, hinge.name, np.array([hinge.torque_limit]),
+            np.array([hinge.velocity_limit]), np.array([hinge.lower]), np.array([hinge.upper]),
+        )  # fmt: skip
+        attachment = pin.SE3.Identity()
+    return joint, attachment
+
+
+def _revolute(axis: FloatArray) -> Any:
+    aligned = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+    for direction, joint in zip(np.eye(3), aligned, strict=True):
+        if np.array_equal(axis, direction):
+            return joint()
+    return pin.JointModelRevoluteUnaligned(np.array(axis))
+
+
+def _build_geometry(body: BodyModel) -> Any:
+    geometry = pin.GeometryModel()
+    for segment in body.segments:
+        frame_id = body.segment_frame(segment.name)
+        frame = body.pinocchio.frames[frame_id]
+        for shape in segment.shapes:
+            placement = frame.placement * pin.SE3(np.array(shape.rotation), np.array(shape.translation))
+            geometry.addGeometryObject(
+                pin.GeometryObject(
+                    f"{segment.name}/{shape.name}", frame.parentJoint, frame_id, placement, coal_shape(shape)
+                )
+            )
+    for first, second in body.collision_pairs:
+        pair = pin.CollisionPair(geometry.getGeometryId(first), geometry.getGeometryId(second))
+        geometry.addCollisionPair(pair)
+    return geometry
+
+
+def coal_shape(shape: Shape) -> Any:
+    """The Coal shape of a neutral one; capsules lie along their local z axis."""
+    if shape.kind == ShapeKind.SPHERE:
+        return coal.Sphere(float(shape.size[0]))
+    if shape.kind == ShapeKind.CAPSULE:
+        return coal.Capsule(float(shape.size[0]), float(shape.size[1]))
+    return coal.Box(*(float(side) for side in shape.size))

@@ -1,0 +1,212 @@
+"""Neutral description of a body: segments, hinges, shapes and effectors.
+
+Every engine model (Pinocchio, Coal, MuJoCo) is built from these values and from
+nothing else, so that the engines cannot disagree about what the body is.
+
+In the zero posture all segment frames are parallel to the world: x forward, y to
+the left, z up.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.errors import BodyError
+from manikin.spatial import FloatArray, check_rotation, finite_number, frozen_array
+
+
+class ShapeKind(StrEnum):
+    """Kinds of collision shape and what their ``size`` holds [m]."""
+
+    SPHERE = "sphere"
+    """``(radius,)``."""
+    CAPSULE = "capsule"
+    """``(radius, length)``: a cylinder of ``length`` along the local z axis with a half
+    sphere on each end; the centres of the half spheres are ``length`` apart."""
+    BOX = "box"
+    """``(x, y, z)`` full extents."""
+
+
+_SIZE_COUNT = {ShapeKind.SPHERE: 1, ShapeKind.CAPSULE: 2, ShapeKind.BOX: 3}
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A collision shape fixed to a segment.
+
+    Attributes:
+        name: Unique within its segment.
+        kind: Sphere, capsule or box.
+        size: (1,), (2,) or (3,) dimensions [m], see :class:`ShapeKind`.
+        translation: (3,) centre of the shape in the segment frame [m].
+        rotation: (3, 3) rotation from the shape's axes to the segment's.
+    """
+
+    name: str
+    kind: ShapeKind
+    size: FloatArray
+    translation: FloatArray
+    rotation: FloatArray
+
+    def __init__(
+        self,
+        name: str,
+        kind: ShapeKind | str,
+        size: ArrayLike,
+        translation: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+    ) -> None:
+        where = f"shape {name!r}"
+        if kind not in list(ShapeKind):
+            raise BodyError(f"{where} kind is {kind!r}; valid: {', '.join(ShapeKind)}")
+        shape_kind = ShapeKind(kind)
+        dimensions = frozen_array(size, f"{where} size [m]", (_SIZE_COUNT[shape_kind],), BodyError)
+        if np.any(dimensions <= 0.0):
+            raise BodyError(f"{where} size is {dimensions.tolist()}; valid: metres > 0")
+        turn = np.eye(3) if rotation is None else rotation
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "kind", shape_kind)
+        object.__setattr__(self, "size", dimensions)
+        object.__setattr__(self, "translation", frozen_array(translation, f"{where} translation", (3,)))
+        object.__setattr__(self, "rotation", check_rotation(turn, f"{where} rotation", BodyError))
+
+
+@dataclass(frozen=True, eq=False)
+class Hinge:
+    """One revolute degree of freedom between a segment and its parent.
+
+    Attributes:
+        name: Unique in the body.
+        axis: (3,) unit axis in the segment frame; a positive angle turns right-handed about it.
+        lower: Smallest angle [rad].
+        upper: Largest angle [rad].
+        velocity_limit: Largest speed in either direction [rad/s].
+        torque_limit: Largest torque in either direction [N.m].
+    """
+
+    name: str
+    axis: FloatArray
+    lower: float
+    upper: float
+    velocity_limit: float
+    torque_limit: float
+
+    def __post_init__(self) -> None:
+        where = f"hinge {self.name!r}"
+        axis = frozen_array(self.axis, f"{where} axis", (3,), BodyError)
+        length = float(np.linalg.norm(axis))
+        if length < 1e-9:
+            raise BodyError(f"{where} axis is {axis.tolist()}; valid: a direction that is not zero")
+        object.__setattr__(self, "axis", frozen_array(axis / length, "axis"))
+        lower = finite_number(self.lower, f"{where} lower [rad]", error=BodyError)
+        finite_number(self.upper, f"{where} upper [rad]", above=lower, error=BodyError)
+        finite_number(self.velocity_limit, f"{where} velocity_limit [rad/s]", above=0.0, error=BodyError)
+        finite_number(self.torque_limit, f"{where} torque_limit [N.m]", above=0.0, error=BodyError)
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A rigid segment, the hinges to its parent and its inertia.
+
+    The hinges share the segment's origin and are applied in order: the first is fixed in
+    the parent, the last is fixed in the segment. A segment without hinges is rigid on its
+    parent; the root has no parent and moves freely.
+
+    Attributes:
+        name: Unique in the body.
+        parent: Name of the parent, or None for the root.
+        origin: (3,) origin in the parent's frame [m].
+        hinges: Zero to three hinges.
+        mass: [kg], > 0.
+        com: (3,) centre of mass in the segment frame [m].
+        inertia: (3, 3) rotational inertia about the centre of mass, segment axes [kg.m^2].
+        shapes: Collision shapes.
+    """
+
+    name: str
+    parent: str | None
+    origin: FloatArray
+    hinges: tuple[Hinge, ...]
+    mass: float
+    com: FloatArray
+    inertia: FloatArray
+    shapes: tuple[Shape, ...] = ()
+
+    def __post_init__(self) -> None:
+        where = f"segment {self.name!r}"
+        finite_number(self.mass, f"{where} mass [kg]", above=0.0, error=BodyError)
+        object.__setattr__(self, "origin", frozen_array(self.origin, f"{where} origin", (3,), BodyError))
+        object.__setattr__(self, "com", frozen_array(self.com, f"{where} com", (3,), BodyError))
+        inertia = frozen_array(self.inertia, f"{where} inertia", (3, 3), BodyError)
+        _check_inertia(inertia, where)
+        object.__setattr__(self, "inertia", inertia)
+
+
+def _check_inertia(inertia: FloatArray, where: str) -> None:
+    """Refuse a matrix that no distribution of mass can have."""
+    symmetric = np.abs(inertia - inertia.T).max() <= 1e-12 * np.abs(inertia).max()
+    moments = np.sort(np.linalg.eigvalsh(inertia))
+    if not symmetric or moments[0] <= 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - 1e-9):
+        raise BodyError(
+            f"{where} inertia has principal moments {moments.tolist()}; "
+            "valid: symmetric, positive, none larger than the sum of the other two"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Effector:
+    """A named frame fixed to a segment, to be placed by tasks and contacts.
+
+    Attributes:
+        name: Unique among effectors.
+        segment: Name of the segment that carries it.
+        translation: (3,) origin in the segment frame [m].
+        rotation: (3, 3) rotation from the effector's axes to the segment's.
+    """
+
+    name: str
+    segment: str
+    translation: FloatArray
+    rotation: FloatArray = field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        where = f"effector {self.name!r}"
+        object.__setattr__(self, "translation", frozen_array(self.translation, f"{where} translation", (3,)))
+        object.__setattr__(self, "rotation", check_rotation(self.rotation, f"{where} rotation", BodyError))
+
+
+def hinges_of(segments: tuple[Segment, ...]) -> tuple[Hinge, ...]:
+    """Every hinge of the segments, in the order of the configuration vector."""
+    return tuple(hinge for segment in segments for hinge in segment.hinges)
+
+
+def segments_by_name(segments: tuple[Segment, ...]) -> Mapping[str, Segment]:
+    """Index segments by name after checking that they form one tree in topological order.
+
+    Raises:
+        BodyError: If a name occurs twice, a parent is missing or comes later, or there is
+            not exactly one root at the front.
+    """
+    index: dict[str, Any] = {}
+    for number, segment in enumerate(segments):
+        if segment.name in index:
+            raise BodyError(f"segment {segment.name!r} occurs twice; valid: unique names")
+        if (segment.parent is None) != (number == 0):
+            raise BodyError(f"segment {segment.name!r} is root {number}; valid: one root, listed first")
+        if segment.parent is not None and segment.parent not in index:
+            raise BodyError(
+                f"segment {segment.name!r} has parent {segment.parent!r}; "
+                f"valid: an earlier one of {list(index)}"
+            )
+        index[segment.name] = segment
+    if not index:
+        raise BodyError("body has no segments; valid: at least a root")
+    names = [hinge.name for hinge in hinges_of(segments)]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise BodyError(f"hinge {twice[0]!r} occurs twice; valid: unique names")
+    return index
