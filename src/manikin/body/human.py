@@ -171,20 +171,24 @@ class _HumanBuilder:
         return self._trunk_segment("pelvis", None, "lower_trunk", 0.0, (across,))
 
     def _lumbar(self) -> Segment:
-        length = self.size.length("middle_trunk")
-        across = _across("waist", 0.058 * self.stature, 0.162 * self.stature * self.girth, 0.5 * length)
-        return self._trunk_segment(
-            "lumbar", "pelvis", "middle_trunk", self.size.length("lower_trunk"), (across,)
-        )
+        length, border = self.size.length("middle_trunk"), self.size.length("lower_trunk")
+        breadth = 0.77 * self.size.shoulder_distance * self.girth
+        across = _across("waist", 0.058 * self.stature, breadth, 0.5 * length)
+        return self._trunk_segment("lumbar", "pelvis", "middle_trunk", border, (across,))
 
     def _thorax(self) -> Segment:
-        size, length = self.size, self.size.length("upper_trunk")
-        shoulder = size.shoulder_height - size.length("lower_trunk") - size.length("middle_trunk")
-        chest = _across("chest", 0.062 * self.stature, 0.168 * self.stature * self.girth, 0.4 * length)
-        girdle = _across("shoulders", 0.035 * self.stature, size.shoulder_distance, shoulder)
-        return self._trunk_segment(
-            "thorax", "lumbar", "upper_trunk", size.length("middle_trunk"), (chest, girdle)
-        )
+        size = self.size
+        length, border = size.length("upper_trunk"), size.length("middle_trunk")
+        breadth = 0.80 * size.shoulder_distance * self.girth
+        chest = _across("chest", 0.062 * self.stature, breadth, 0.4 * length)
+        girdle = _across("shoulders", 0.035 * self.stature, size.shoulder_distance, self._shoulder_in_thorax)
+        return self._trunk_segment("thorax", "lumbar", "upper_trunk", border, (chest, girdle))
+
+    @property
+    def _shoulder_in_thorax(self) -> float:
+        """Height of the shoulder joints above the thorax' origin [m]."""
+        size = self.size
+        return size.shoulder_height - size.length("lower_trunk") - size.length("middle_trunk")
 
     def _trunk_segment(
         self, name: str, parent: str | None, row: str, height: float, shapes: tuple[Shape, ...]
