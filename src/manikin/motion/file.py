@@ -1,0 +1,220 @@
+"""The motion file: planned and executed motion, body, scene and schedule in one HDF5 file.
+
+Layout (format version 1)::
+
+    /                    attributes: format, format_version, created_by
+    /planned, /executed  one group per motion; attributes: joint_names, contact_names
+        time (n,) q (n, nq) v (n, nv) a (n, nv) tau (n, nv) com (n, 3)
+        angular_momentum (n, 3) margin (n,) support (n, c) contact_force (n, c, 6)
+                         each with the attributes: unit, description
+    /body, /scene, /schedule   JSON texts, see manikin.motion.description
+
+Every group and text may be missing.  The same data always gives the same bytes.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import h5py
+import numpy as np
+
+from manikin import __version__
+from manikin.atomic import atomic_path
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule
+from manikin.errors import InputError, MotionFileError
+from manikin.motion.description import (
+    body_from,
+    describe_body,
+    describe_scene,
+    describe_schedule,
+    scene_from,
+    schedule_from,
+)
+from manikin.motion.motion import Motion
+from manikin.scene import Scene
+
+FORMAT = "manikin-motion"
+FORMAT_VERSION = 1
+GROUPS = ("planned", "executed")
+
+DATASETS: Mapping[str, tuple[str, str]] = {
+    "time": ("s", "sample times, increasing"),
+    "q": ("m, -, rad", "pelvis position, pelvis quaternion xyzw, hinge angles"),
+    "v": ("m/s, rad/s", "pelvis linear and angular velocity in the pelvis frame, hinge rates"),
+    "a": ("m/s^2, rad/s^2", "derivative of v"),
+    "tau": ("N, N.m", "generalised forces; the first six, of the pelvis, are zero"),
+    "com": ("m", "centre of mass in the world"),
+    "angular_momentum": ("kg.m^2/s", "about the centre of mass, world axes"),
+    "margin": ("N.m", "distance of the pseudo-wrench to the faces of the wrench polytope, negative outside"),
+    "support": ("-", "1 where the contact is active, in the order of contact_names"),
+    "contact_force": ("N, N.m", "force and moment of the scene on the body, world axes, about the contact"),
+}
+"""Unit and meaning of each dataset of a motion."""
+
+_Value = TypeVar("_Value")
+
+
+@dataclass(frozen=True, eq=False)
+class MotionFile:
+    """Content of a motion file; what it does not hold is None.
+
+    Attributes:
+        planned: Motion as planned.
+        executed: Motion as simulated.
+        body: Who moved.
+        scene: Where.
+        schedule: With which contacts, when.
+    """
+
+    planned: Motion | None = None
+    executed: Motion | None = None
+    body: BodyModel | None = None
+    scene: Scene | None = None
+    schedule: ContactSchedule | None = None
+
+    @property
+    def motions(self) -> dict[str, Motion]:
+        """The motions there are, by name, the planned one first."""
+        found = {name: getattr(self, name) for name in GROUPS}
+        return {name: motion for name, motion in found.items() if motion is not None}
+
+
+def write_motions(path: str | Path, content: MotionFile) -> None:
+    """Write a motion file; an interruption leaves the old file or none.
+
+    Args:
+        path: Where to; its folder must exist.
+        content: At least one motion.
+
+    Raises:
+        MotionFileError: If there is no motion, or the file cannot be written.
+    """
+    if not content.motions:
+        raise MotionFileError(f"{path}: no motion to write; valid: planned, executed or both")
+    try:
+        with atomic_path(path) as temporary, h5py.File(temporary, "w-", libver="v110") as file:
+            _fill(file, content)
+    except OSError as error:
+        raise MotionFileError(
+            f"{path}: cannot be written ({_reason(error)}); valid: a writable folder"
+        ) from None
+
+
+def read_motions(path: str | Path) -> MotionFile:
+    """Read a motion file.
+
+    Args:
+        path: The file, or a run directory that holds a ``motion.h5``.
+
+    Raises:
+        MotionFileError: If it is missing, damaged, of another kind or of a later version.
+    """
+    file_path = Path(path)
+    if file_path.is_dir():
+        file_path = file_path / "motion.h5"
+    if not file_path.is_file():
+        raise MotionFileError(
+            f"{file_path}: there is no such file; valid: a motion file (.h5) or a run directory"
+        )
+    try:
+        with h5py.File(file_path, "r") as file:
+            return _content(file, str(file_path))
+    except OSError as error:
+        raise MotionFileError(
+            f"{file_path}: cannot be read as HDF5 ({_reason(error)}); valid: a motion file written by manikin"
+        ) from None
+
+
+def _fill(file: h5py.File, content: MotionFile) -> None:
+    file.attrs.update(format=FORMAT, format_version=FORMAT_VERSION, created_by=f"manikin {__version__}")
+    for name, motion in content.motions.items():
+        _write_motion(file.create_group(name), motion)
+    if content.body is not None:
+        _write_json(file, "body", describe_body(content.body))
+    if content.scene is not None:
+        _write_json(file, "scene", describe_scene(content.scene))
+    if content.schedule is not None:
+        _write_json(file, "schedule", describe_schedule(content.schedule))
+
+
+def _write_motion(group: h5py.Group, motion: Motion) -> None:
+    text = h5py.string_dtype()
+    group.attrs.create("joint_names", np.array(motion.joint_names, dtype=object), dtype=text)
+    group.attrs.create("contact_names", np.array(motion.contact_names, dtype=object), dtype=text)
+    for name, array in motion.arrays().items():
+        unit, meaning = DATASETS[name]
+        data = array.astype(np.uint8) if array.dtype == np.bool_ else array
+        dataset = group.create_dataset(name, data=data, track_times=False)
+        dataset.attrs.update(unit=unit, description=meaning)
+
+
+def _write_json(file: h5py.File, name: str, value: Mapping[str, Any]) -> None:
+    # A dataset, not an attribute: attributes end at 64 kB and a mesh is larger.
+    file.create_dataset(name, data=json.dumps(value), dtype=h5py.string_dtype(), track_times=False)
+
+
+def _content(file: h5py.File, source: str) -> MotionFile:
+    if file.attrs.get("format") != FORMAT:
+        raise MotionFileError(f"{source}: is not a motion file; valid: an HDF5 file with format = {FORMAT!r}")
+    version = file.attrs.get("format_version")
+    if version != FORMAT_VERSION:
+        raise MotionFileError(f"{source}: has format version {version}; valid: {FORMAT_VERSION}")
+    content = MotionFile(
+        planned=_read_motion(file, "planned", source),
+        executed=_read_motion(file, "executed", source),
+        body=_read_json(file, "body", body_from, source),
+        scene=_read_json(file, "scene", scene_from, source),
+        schedule=_read_json(file, "schedule", schedule_from, source),
+    )
+    if not content.motions:
+        raise MotionFileError(f"{source}: holds no motion; valid: a group {' or '.join(GROUPS)}")
+    for name, motion in content.motions.items():
+        if content.body is not None and motion.joint_names != content.body.joint_names:
+            raise MotionFileError(
+                f"{source}: {name} has other joints than the body; valid: the body's joint_names"
+            )
+    return content
+
+
+def _read_motion(file: h5py.File, name: str, source: str) -> Motion | None:
+    if name not in file:
+        return None
+    group = file[name]
+    if not isinstance(group, h5py.Group):
+        raise MotionFileError(f"{source}: {name} is not a group; valid: a group with {', '.join(DATASETS)}")
+    missing = [key for key in DATASETS if not isinstance(group.get(key), h5py.Dataset)]
+    missing += [key for key in ("joint_names", "contact_names") if key not in group.attrs]
+    if missing:
+        raise MotionFileError(f"{source}: {name}/{missing[0]} is missing; valid: {', '.join(DATASETS)}")
+    try:
+        values: Any = group  # h5py's stubs cannot say that these are datasets
+        arrays: dict[str, Any] = {key: values[key][()] for key in DATASETS}
+        joints, contacts = (
+            tuple(str(text) for text in values.attrs[key]) for key in ("joint_names", "contact_names")
+        )
+        return Motion(**arrays, joint_names=joints, contact_names=contacts)
+    except (ValueError, TypeError, MotionFileError) as error:
+        raise MotionFileError(f"{source}: {name}: {error}") from None
+
+
+def _read_json(
+    file: h5py.File, name: str, build: Callable[[Mapping[str, Any]], _Value], source: str
+) -> _Value | None:
+    if name not in file:
+        return None
+    text: Any = file[name]
+    try:
+        return build(json.loads(text.asstr()[()]))
+    except (KeyError, ValueError, TypeError, AttributeError, InputError) as error:
+        problem = " ".join(str(error).split())[:120]
+        raise MotionFileError(
+            f"{source}: {name} is damaged ({type(error).__name__}: {problem}); valid: as written by manikin"
+        ) from None
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or " ".join(str(error).split())[:120]
