@@ -1,0 +1,29 @@
+"""Control: weighted multi-task inverse dynamics that follows a planned motion."""
+
+from manikin.control.build_qp import ControlProblem, QuadraticProgram, build_qp
+from manikin.control.controller import Controller, ControlOutput
+from manikin.control.settings import (
+    ControlSettings,
+    Impedance,
+    Impedances,
+    SupportSettings,
+    TaskWeights,
+)
+from manikin.control.supports import SupportMode, SupportState
+from manikin.control.tasks import AccelerationTask
+
+__all__ = [
+    "AccelerationTask",
+    "ControlOutput",
+    "ControlProblem",
+    "ControlSettings",
+    "Controller",
+    "Impedance",
+    "Impedances",
+    "QuadraticProgram",
+    "SupportMode",
+    "SupportSettings",
+    "SupportState",
+    "TaskWeights",
+    "build_qp",
+]

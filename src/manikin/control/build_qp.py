@@ -1,0 +1,252 @@
+"""The inverse-dynamics quadratic program of one control step ([Qiu2012]_ 6.3).
+
+Unknowns are the generalised acceleration and the contact forces; the joint torques follow
+from them by the equation of motion, which splits into six equalities (nobody pushes the
+pelvis) and the torque limits.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manikin.control.contact_forces import ContactForceBasis
+from manikin.control.dynamics import DynamicsState
+from manikin.control.tasks import AccelerationTask
+from manikin.spatial import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class QuadraticProgram:
+    """Minimise ``x' hessian x / 2 + gradient' x`` under two-sided rows and bounds.
+
+    Attributes:
+        hessian: (n, n) symmetric, positive definite.
+        gradient: (n,).
+        rows: (m, n).
+        rows_lower: (m,).
+        rows_upper: (m,); equal to ``rows_lower`` in the first ``equalities`` rows.
+        lower: (n,).
+        upper: (n,).
+        equalities: Number of leading rows that are equalities.
+    """
+
+    hessian: FloatArray
+    gradient: FloatArray
+    rows: FloatArray
+    rows_lower: FloatArray
+    rows_upper: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    equalities: int
+
+    def violation(self, x: FloatArray) -> float:
+        """Largest violation of a row or bound at ``x`` (n,)."""
+        image = self.rows @ x
+        gaps = (self.rows_lower - image, image - self.rows_upper, self.lower - x, x - self.upper)
+        return float(max(0.0, *(gap.max() for gap in gaps if gap.size)))
+
+    def without_bounds(self, start: int, end: int) -> "QuadraticProgram":
+        """Return the same program with the variables ``start`` to ``end`` (exclusive) unbounded."""
+        lower, upper = self.lower.copy(), self.upper.copy()
+        lower[start:end], upper[start:end] = -np.inf, np.inf
+        return replace(self, lower=lower, upper=upper)
+
+
+@dataclass(frozen=True, eq=False)
+class JointBounds:
+    """Limits of the joints at one control step.
+
+    Attributes:
+        torque: (nv - 6,) largest torque of the muscles either way [N.m].
+        damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; the muscles overcome it.
+        acceleration_lower: (nv - 6,) [rad/s^2].
+        acceleration_upper: (nv - 6,) [rad/s^2].
+    """
+
+    torque: FloatArray
+    damping: FloatArray
+    acceleration_lower: FloatArray
+    acceleration_upper: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedContact:
+    """A contact's force map with the limits that hold now.
+
+    Attributes:
+        basis: The force map.
+        load_share: Share of its limits that it may use, in [0, 1].
+        cap: Largest normal force at full load [N].
+    """
+
+    basis: ContactForceBasis
+    load_share: float
+    cap: float
+
+
+@dataclass(frozen=True, eq=False)
+class ControlProblem:
+    """The quadratic program of one control step with the meaning of its variables.
+
+    Attributes:
+        program: The program on ``x = [acceleration (nv,), forces of each contact]``.
+        state: Dynamics it was built from.
+        tasks: The tasks of its cost.
+        contacts: The contacts whose forces are unknowns, in order.
+        joint_map: (nv - 6, n) and ...
+        joint_offset: (nv - 6,) ... give ``torque = joint_map @ x + joint_offset`` [N.m].
+    """
+
+    program: QuadraticProgram
+    state: DynamicsState
+    tasks: tuple[AccelerationTask, ...]
+    contacts: tuple[LoadedContact, ...]
+    joint_map: FloatArray
+    joint_offset: FloatArray
+
+    def acceleration(self, x: FloatArray) -> FloatArray:
+        """(nv,) generalised acceleration in the solution ``x``."""
+        return x[: len(self.state.v)]
+
+    def torque(self, x: FloatArray) -> FloatArray:
+        """(nv - 6,) joint torques in the solution ``x`` [N.m]."""
+        return self.joint_map @ x + self.joint_offset
+
+    def wrenches(self, x: FloatArray) -> dict[str, FloatArray]:
+        """Force and moment about the effector frame of each contact in ``x``, by effector."""
+        found: dict[str, FloatArray] = {}
+        start = len(self.state.v)
+        for loaded in self.contacts:
+            end = start + loaded.basis.wrench.shape[1]
+            found[loaded.basis.contact.effector] = loaded.basis.wrench @ x[start:end]
+            start = end
+        return found
+
+
+def build_qp(
+    state: DynamicsState,
+    tasks: Sequence[AccelerationTask],
+    contacts: Sequence[LoadedContact],
+    bounds: JointBounds,
+    *,
+    period: float,
+    acceleration_weight: float,
+    force_weight: float,
+    sum_cap: float | None = None,
+) -> ControlProblem:
+    """Build the program of one control step.
+
+    The torques that muscles must give against the passive damping of the joints are taken
+    at the middle of the hold, ``damping * (v + a period / 2)``.
+
+    Args:
+        state: Current dynamics.
+        tasks: Weighted tasks on the acceleration.
+        contacts: Contacts that may carry load; those with ``load_share`` 0 keep their
+            variables, at zero, so that the size of the program does not change.
+        bounds: Joint limits.
+        period: Time over which the torques will be held [s].
+        acceleration_weight: Regularisation of the accelerations.
+        force_weight: Regularisation of the force variables.
+        sum_cap: Largest sum of the normal forces [N], or None.
+    """
+    nv = len(state.v)
+    bases = [loaded.basis for loaded in contacts]
+    generalised = np.concatenate([b.generalised for b in bases], axis=1) if bases else np.zeros((nv, 0))
+    size = nv + generalised.shape[1]
+    equation = np.concatenate((state.mass_matrix, -generalised), axis=1)
+    joint_map = equation[6:].copy()
+    joint_map[:, 6:nv] += np.diag(0.5 * period * bounds.damping)
+    joint_offset = state.bias[6:] + bounds.damping * state.v[6:]
+    caps, cap_limits = _normal_force_rows(contacts, nv, size, sum_cap)
+    rows = np.concatenate((equation[:6], joint_map, caps))
+    free = np.full(len(cap_limits), -np.inf)
+    rows_lower = np.concatenate((-state.bias[:6], -bounds.torque - joint_offset, free))
+    rows_upper = np.concatenate((-state.bias[:6], bounds.torque - joint_offset, cap_limits))
+    lower, upper = _variable_bounds(contacts, bounds)
+    hessian, gradient = _cost(tasks, nv, size, acceleration_weight, force_weight)
+    program = QuadraticProgram(hessian, gradient, rows, rows_lower, rows_upper, lower, upper, 6)
+    return ControlProblem(program, state, tuple(tasks), tuple(contacts), joint_map, joint_offset)
+
+
+def joint_acceleration_bounds(
+    angle: FloatArray,
+    speed: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    speed_limit: FloatArray,
+    horizon: float,
+    largest: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Accelerations that keep angles and speeds admissible over ``horizon``.
+
+    ``q + v T + a T^2 / 2`` must stay within the range and ``v + a T`` within the speed
+    limit; near the end of its range a joint meets a stiff, damped stop. All arrays (n,).
+
+    Args:
+        angle: [rad].
+        speed: [rad/s].
+        lower: Least angles [rad].
+        upper: Greatest angles [rad].
+        speed_limit: [rad/s].
+        horizon: ``T`` [s].
+        largest: Bounds are cut to this [rad/s^2].
+    """
+    coasting = angle + horizon * speed
+    half_square = 0.5 * horizon**2
+    least = np.maximum((lower - coasting) / half_square, (-speed_limit - speed) / horizon)
+    greatest = np.minimum((upper - coasting) / half_square, (speed_limit - speed) / horizon)
+    least = np.clip(least, -largest, 0.9 * largest)
+    return least, np.maximum(np.clip(greatest, -0.9 * largest, largest), least)
+
+
+def _cost(
+    tasks: Sequence[AccelerationTask], nv: int, size: int, acceleration_weight: float, force_weight: float
+) -> tuple[FloatArray, FloatArray]:
+    matrix = np.concatenate([task.matrix for task in tasks])
+    target = np.concatenate([task.target for task in tasks])
+    weighted = matrix * np.concatenate([task.weight for task in tasks])[:, None]
+    hessian = np.zeros((size, size))
+    hessian[:nv, :nv] = weighted.T @ matrix
+    diagonal = np.full(size, force_weight)
+    diagonal[:nv] = acceleration_weight
+    hessian[np.diag_indices(size)] += diagonal
+    gradient = np.zeros(size)
+    gradient[:nv] = -target @ weighted
+    return hessian, gradient
+
+
+def _normal_force_rows(
+    contacts: Sequence[LoadedContact], nv: int, size: int, sum_cap: float | None
+) -> tuple[FloatArray, FloatArray]:
+    rows, limits = [], []
+    start = nv
+    for loaded in contacts:
+        end = start + len(loaded.basis.normal)
+        if loaded.basis.normal.any():
+            row = np.zeros(size)
+            row[start:end] = loaded.basis.normal
+            rows.append(row)
+            limits.append(loaded.cap * loaded.load_share)
+        start = end
+    if sum_cap is not None and rows:
+        rows.append(np.sum(rows, axis=0))
+        limits.append(sum_cap)
+    return np.array(rows).reshape(-1, size), np.array(limits)
+
+
+def _variable_bounds(contacts: Sequence[LoadedContact], bounds: JointBounds) -> tuple[FloatArray, FloatArray]:
+    unbounded = np.full(6, np.inf)
+    lower = [-unbounded, bounds.acceleration_lower]
+    upper = [unbounded, bounds.acceleration_upper]
+    for loaded in contacts:
+        if loaded.load_share > 0:
+            grasp = ~loaded.basis.normal.astype(bool)
+            share = np.where(grasp, loaded.load_share, 1.0)
+            lower.append(loaded.basis.lower * share)
+            upper.append(loaded.basis.upper * share)
+        else:
+            lower.append(np.zeros_like(loaded.basis.lower))
+            upper.append(np.zeros_like(loaded.basis.upper))
+    return np.concatenate(lower), np.concatenate(upper)

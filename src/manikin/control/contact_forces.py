@@ -1,0 +1,178 @@
+"""Contact forces as non-negative combinations of the edges of friction pyramids."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.body import BodyModel, Segment
+from manikin.contact import Contact, ContactKind
+from manikin.control.dynamics import DynamicsState
+from manikin.spatial import FloatArray, skew
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPatch:
+    """Points of one segment that carry force.
+
+    Attributes:
+        segment: Name of the segment.
+        points: (k, 3) in the segment's frame [m].
+    """
+
+    segment: str
+    points: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ContactGeometry:
+    """Force-carrying points of one effector, on its segment and on what hangs from it.
+
+    A foot carries force at its heel corners and at the two ends of the line of its toe
+    hinge; the tips belong to the toes, so that a load there is paid for by the toe hinge.
+
+    Attributes:
+        effector: Name of the effector.
+        patches: The effector's own segment first.
+    """
+
+    effector: str
+    patches: tuple[ContactPatch, ...]
+
+    @property
+    def segments(self) -> tuple[str, ...]:
+        """Names of the segments that carry force."""
+        return tuple(patch.segment for patch in self.patches)
+
+    @property
+    def point_count(self) -> int:
+        """Number of points of all patches."""
+        return sum(len(patch.points) for patch in self.patches)
+
+
+def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> ContactGeometry:
+    """Find the points of the body that carry the forces of a contact.
+
+    Args:
+        body: The body.
+        contact: A contact of one of its effectors.
+        inset: Distance kept from the edge of the sole [m].
+
+    Raises:
+        BodyError: If the body has no such effector.
+    """
+    effector = body.effector(contact.effector)
+    if contact.kind is not ContactKind.SOLE:
+        local = effector.translation + contact.points @ effector.rotation.T
+        return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
+    half_length = 0.5 * contact.length - inset
+    half_width = 0.5 * contact.width - inset
+    toes = hanging_segment(body, effector.segment)
+    if toes is None:
+        corners = _rectangle((-half_length, half_length), half_width)
+        local = effector.translation + corners @ effector.rotation.T
+        return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
+    line = float((effector.rotation.T @ (toes.origin - effector.translation))[0])
+    line = float(np.clip(line, -half_length + 0.01, half_length - 0.01))
+    heel = effector.translation + _rectangle((-half_length, line), half_width) @ effector.rotation.T
+    tips = effector.translation + _rectangle((half_length,), half_width) @ effector.rotation.T
+    return ContactGeometry(
+        contact.effector,
+        (ContactPatch(effector.segment, heel), ContactPatch(toes.name, tips - toes.origin)),
+    )
+
+
+def segment_key(segment: str) -> str:
+    """Name of a segment among the frames of a :class:`DynamicsState`, apart from effectors."""
+    return f"segment/{segment}"
+
+
+def hanging_segment(body: BodyModel, segment: str) -> Segment | None:
+    """Return the segment that hangs on ``segment`` by hinges, such as the toes, or None."""
+    for candidate in body.segments:
+        if candidate.parent == segment and candidate.hinges:
+            return candidate
+    return None
+
+
+def _rectangle(lengths: tuple[float, ...], half_width: float) -> FloatArray:
+    return np.array([[x, y, 0.0] for x in lengths for y in (half_width, -half_width)])
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForceBasis:
+    """Linear map from the force variables of one effector to forces on the body.
+
+    A sole or a point has four variables per point, the edges of the inner friction
+    pyramid, none of which may be negative, each with unit normal force. A grasp has three
+    forces along the world axes and, where it can hold one, three moments.
+
+    Attributes:
+        contact: The contact.
+        generalised: (nv, m) forces on the generalised coordinates per variable.
+        wrench: (6, m) force and moment about the effector frame's origin per variable.
+        normal: (m,) normal force per variable; zero for a grasp.
+        lower: (m,) bound of each variable at full load [N, N.m].
+        upper: (m,) bound of each variable at full load [N, N.m].
+    """
+
+    contact: Contact
+    generalised: FloatArray
+    wrench: FloatArray
+    normal: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+
+def contact_force_basis(
+    contact: Contact, geometry: ContactGeometry, state: DynamicsState
+) -> ContactForceBasis:
+    """Build the force map of a contact at the current state.
+
+    Args:
+        contact: The contact; its planned rotation gives the normal and the friction its slope.
+        geometry: Points of the body, from :func:`contact_geometry`.
+        state: Current dynamics with a frame for each segment of the geometry and the effector.
+    """
+    if contact.kind is ContactKind.GRASP:
+        return _grasp_basis(contact, state)
+    edges = pyramid_edges(contact)
+    origin = state.frames[contact.effector].position
+    generalised, wrench = [], []
+    for patch in geometry.patches:
+        frame = state.frames[segment_key(patch.segment)]
+        arms = patch.points @ frame.rotation.T
+        forces = np.tile(edges.T, (1, len(arms)))
+        moments = np.concatenate([skew(arm) @ edges.T for arm in arms], axis=1)
+        about_frame = np.vstack((forces, moments))
+        generalised.append(frame.jacobian.T @ about_frame)
+        about_effector = about_frame.copy()
+        about_effector[3:] += skew(frame.position - origin) @ forces
+        wrench.append(about_effector)
+    count = 4 * geometry.point_count
+    return ContactForceBasis(
+        contact,
+        np.concatenate(generalised, axis=1),
+        np.concatenate(wrench, axis=1),
+        np.ones(count),
+        np.zeros(count),
+        np.full(count, np.inf),
+    )
+
+
+def pyramid_edges(contact: Contact) -> FloatArray:
+    """(4, 3) edges of the inner friction pyramid in the world, each with unit normal force.
+
+    The edges lie on the friction cone: their tangential part is ``mu`` long.
+    """
+    slope = contact.friction / np.sqrt(2.0)
+    signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    local = np.column_stack((slope * signs, np.ones(4)))
+    return local @ contact.rotation_contact_to_world.T
+
+
+def _grasp_basis(contact: Contact, state: DynamicsState) -> ContactForceBasis:
+    size = 6 if contact.max_moment > 0 else 3
+    wrench = np.eye(6)[:, :size]
+    limit = np.array([contact.max_force] * 3 + [contact.max_moment] * (size - 3))
+    jacobian = state.frames[contact.effector].jacobian
+    return ContactForceBasis(contact, jacobian.T @ wrench, wrench, np.zeros(size), -limit, limit)

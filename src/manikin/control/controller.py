@@ -1,0 +1,244 @@
+"""Weighted multi-task control of a planned motion ([Qiu2012]_ 6.3)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.body import BodyModel
+from manikin.contact import Contact, ContactSchedule
+from manikin.control.build_qp import (
+    ControlProblem,
+    JointBounds,
+    LoadedContact,
+    build_qp,
+    joint_acceleration_bounds,
+)
+from manikin.control.contact_forces import (
+    ContactGeometry,
+    contact_force_basis,
+    contact_geometry,
+    hanging_segment,
+    segment_key,
+)
+from manikin.control.dynamics import Dynamics, DynamicsState
+from manikin.control.reference import Reference, ReferenceSample
+from manikin.control.settings import ControlSettings
+from manikin.control.solver import QPSolution, make_solver
+from manikin.control.supports import SupportMode, SupportState, SupportSwitch
+from manikin.control.tasks import (
+    AccelerationTask,
+    angular_momentum_task,
+    com_task,
+    landing_reference,
+    orientation_task,
+    posture_task,
+    stance_task,
+    swing_task,
+)
+from manikin.motion import Motion
+from manikin.spatial import GRAVITY, FloatArray, frozen_array
+
+_PELVIS = "pelvis"
+
+
+@dataclass(frozen=True, eq=False)
+class ControlOutput:
+    """What one control step decided.
+
+    Attributes:
+        tau: (nv - 6,) joint torques to hold until the next step [N.m].
+        acceleration: (nv,) generalised acceleration expected from them.
+        wrenches: Expected force [N] and moment [N.m] (6,) of each effector of the schedule,
+            about the effector frame's origin, in world axes.
+        supports: State of each effector of the schedule.
+        fallback: Empty when the program was solved; otherwise which fallback was taken and
+            why: ``"without joint bounds: ..."`` or ``"previous torques: ..."``.
+        problem: The program that was solved (or not).
+        iterations: Iterations of the solver.
+    """
+
+    tau: FloatArray
+    acceleration: FloatArray
+    wrenches: dict[str, FloatArray]
+    supports: dict[str, SupportState]
+    fallback: str
+    problem: ControlProblem
+    iterations: int
+
+
+class Controller:
+    """Follows a planned motion by one quadratic program per control step.
+
+    Keeps two things between steps: the state of the supports and the solver's starting
+    point. Both are functions of the steps made so far, so that equal runs give equal bits.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        motion: Motion,
+        schedule: ContactSchedule,
+        settings: ControlSettings | None = None,
+        *,
+        joint_damping: ArrayLike | None = None,
+    ) -> None:
+        """Prepare the controller.
+
+        Args:
+            body: The body.
+            motion: Planned motion of this body.
+            schedule: Its contacts in time.
+            settings: Weights, gains and limits; the defaults when omitted.
+            joint_damping: (nv - 6,) passive damping of the controlled body's joints
+                [N.m.s/rad]; none when omitted.
+
+        Raises:
+            InputError: If the motion or the schedule does not belong to the body.
+        """
+        self.body = body
+        self.schedule = schedule
+        self.settings = settings or ControlSettings()
+        joints = body.nv - 6
+        damping = np.zeros(joints) if joint_damping is None else joint_damping
+        self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
+        self._switch = SupportSwitch(schedule, self.settings.supports)
+        self._geometry = _geometries(body, schedule, self.settings.supports.sole_inset)
+        self._hanging = {name: _hanging_joints(body, name) for name in self._switch.effectors}
+        frames = {name: body.effector_frame(name) for name in (*self._switch.effectors, _PELVIS)}
+        segments = {
+            segment_key(segment): body.segment_frame(segment)
+            for geometry in self._geometry.values()
+            for segment in geometry.segments
+        }
+        self._dynamics = Dynamics(body, {**segments, **frames})
+        self.reference = Reference(body, motion, frames)
+        self._solver = make_solver(self.settings.solver)
+        self._spare_solver = make_solver(self.settings.solver)
+        self._previous = np.zeros(joints)
+
+    def step(
+        self, time: float, q: FloatArray, v: FloatArray, touching: Mapping[str, bool] | None = None
+    ) -> ControlOutput:
+        """Decide the joint torques of the next period.
+
+        Args:
+            time: Current time of the motion [s].
+            q: (nq,) measured configuration.
+            v: (nv,) measured velocity.
+            touching: Whether each effector is felt to touch its support; the schedule is
+                trusted where it says nothing.
+        """
+        supports = self._switch.update(time, touching)
+        state = self._dynamics.evaluate(q, v)
+        problem = self.problem(state, self.reference.sample(time), supports)
+        solution, fallback = self._solve(problem)
+        tau = self._previous if solution is None else problem.torque(solution.x)
+        self._previous = tau
+        x = np.zeros(len(problem.program.gradient)) if solution is None else solution.x
+        return ControlOutput(
+            tau=tau,
+            acceleration=problem.acceleration(x).copy(),
+            wrenches=problem.wrenches(x),
+            supports=supports,
+            fallback=fallback,
+            problem=problem,
+            iterations=0 if solution is None else solution.iterations,
+        )
+
+    def problem(
+        self, state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState]
+    ) -> ControlProblem:
+        """Build the program of one step, without solving it."""
+        return build_qp(
+            state,
+            self.tasks(state, reference, supports),
+            [
+                self._loaded(support, support.contact, state)
+                for support in supports.values()
+                if support.mode is SupportMode.STANCE and support.contact is not None
+            ],
+            self._bounds(state),
+            period=self.settings.period,
+            acceleration_weight=self.settings.weights.acceleration,
+            force_weight=self.settings.weights.force,
+        )
+
+    def tasks(
+        self, state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState]
+    ) -> list[AccelerationTask]:
+        """List the weighted tasks of one step."""
+        gains, weights = self.settings.impedances, self.settings.weights
+        pelvis = orientation_task(
+            _PELVIS, state.frames[_PELVIS], reference.effectors[_PELVIS], gains.pelvis, weights.pelvis
+        )
+        tasks = [com_task(state, reference, gains.com, weights.com), pelvis]
+        tasks += [self._effector_task(support, state, reference) for support in supports.values()]
+        posture_weight = self._posture_weight(supports)
+        tasks.append(posture_task(state, reference, gains.posture, posture_weight))
+        if weights.angular_momentum > 0:
+            tasks.append(
+                angular_momentum_task(state, reference, gains.angular_momentum, weights.angular_momentum)
+            )
+        return tasks
+
+    def _effector_task(
+        self, support: SupportState, state: DynamicsState, reference: ReferenceSample
+    ) -> AccelerationTask:
+        name, weight, gains = support.effector, self.settings.weights.effectors, self.settings.impedances
+        frame = state.frames[name]
+        if support.mode is SupportMode.STANCE:
+            return stance_task(name, frame, support, gains.stance, weight)
+        if support.mode is SupportMode.LANDING:
+            target = landing_reference(support, self.settings.supports.press_speed)
+            return swing_task(name, frame, target, gains.swing, weight)
+        return swing_task(name, frame, reference.effectors[name], gains.swing, weight)
+
+    def _posture_weight(self, supports: Mapping[str, SupportState]) -> FloatArray:
+        weight = np.full(self.body.nv - 6, self.settings.weights.posture)
+        for name, support in supports.items():
+            if support.mode is SupportMode.STANCE:
+                weight[self._hanging[name]] = self.settings.weights.effectors
+        return weight
+
+    def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
+        basis = contact_force_basis(contact, self._geometry[support.effector], state)
+        cap = contact.normal_force_cap or self.settings.supports.default_cap * state.mass * GRAVITY
+        return LoadedContact(basis, support.load_share, cap)
+
+    def _bounds(self, state: DynamicsState) -> JointBounds:
+        body, settings = self.body, self.settings
+        lower, upper = joint_acceleration_bounds(
+            state.q[7:],
+            state.v[6:],
+            body.lower,
+            body.upper,
+            body.velocity_limit,
+            settings.joint_limit_horizon,
+            settings.max_joint_acceleration,
+        )
+        return JointBounds(body.torque_limit, self._damping, lower, upper)
+
+    def _solve(self, problem: ControlProblem) -> tuple[QPSolution | None, str]:
+        solution = self._solver.solve(problem.program)
+        if solution.found:
+            return solution, ""
+        relaxed = self._spare_solver.solve(problem.program.without_bounds(6, self.body.nv))
+        if relaxed.found:
+            return relaxed, f"without joint bounds: {solution.status}"
+        return None, f"previous torques: {solution.status}, then {relaxed.status}"
+
+
+def _geometries(body: BodyModel, schedule: ContactSchedule, inset: float) -> dict[str, ContactGeometry]:
+    found: dict[str, ContactGeometry] = {}
+    for phase in schedule.sequence:
+        for contact in phase.stance:
+            if contact.effector not in found:
+                found[contact.effector] = contact_geometry(body, contact, inset)
+    return found
+
+
+def _hanging_joints(body: BodyModel, effector: str) -> list[int]:
+    toes = hanging_segment(body, body.effector(effector).segment)
+    return [] if toes is None else [body.joint_index(hinge.name) for hinge in toes.hinges]

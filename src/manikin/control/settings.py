@@ -1,0 +1,127 @@
+"""Weights, gains and limits of the controller."""
+
+from dataclasses import dataclass, field
+
+from manikin.errors import InputError
+from manikin.spatial import finite_number
+
+
+@dataclass(frozen=True)
+class TaskWeights:
+    """Weights of squared acceleration errors ([Qiu2012]_ Table 6.1).
+
+    Attributes:
+        com: Centre of mass [1/(m/s^2)^2].
+        effectors: Placement of feet and of grasping hands, in flight and in contact; also the
+            hinges of a segment hanging on an effector in contact (toes).
+        pelvis: Orientation of the pelvis.
+        posture: Each joint angle.
+        angular_momentum: Rate of the angular momentum about the centre of mass [1/(N.m)^2];
+            0 (the thesis has no such task) leaves it free.
+        acceleration: Regularisation of every generalised acceleration.
+        force: Regularisation of every edge force of the friction pyramids [1/N^2].
+    """
+
+    com: float = 2e4
+    effectors: float = 5e4
+    pelvis: float = 1e4
+    posture: float = 10.0
+    angular_momentum: float = 0.0
+    acceleration: float = 1e-3
+    force: float = 1e-3
+
+    def __post_init__(self) -> None:
+        for name in ("com", "effectors", "pelvis", "posture", "angular_momentum"):
+            finite_number(getattr(self, name), f"task weight {name!r}", at_least=0.0)
+        for name in ("acceleration", "force"):
+            finite_number(getattr(self, name), f"task weight {name!r}", above=0.0)
+
+
+@dataclass(frozen=True)
+class Impedance:
+    """Feedback ``stiffness * error + damping * error_rate`` as an acceleration.
+
+    Attributes:
+        stiffness: [1/s^2].
+        damping: [1/s]; critical is ``2 sqrt(stiffness)``.
+    """
+
+    stiffness: float
+    damping: float
+
+    def __post_init__(self) -> None:
+        finite_number(self.stiffness, "impedance stiffness [1/s^2]", at_least=0.0)
+        finite_number(self.damping, "impedance damping [1/s]", at_least=0.0)
+
+
+@dataclass(frozen=True)
+class Impedances:
+    """Feedback gains of each task; the thesis tuned its own by hand and prints none (6.4.2)."""
+
+    com: Impedance = Impedance(100.0, 20.0)
+    swing: Impedance = Impedance(400.0, 40.0)
+    stance: Impedance = Impedance(100.0, 40.0)
+    pelvis: Impedance = Impedance(100.0, 20.0)
+    posture: Impedance = Impedance(100.0, 20.0)
+    angular_momentum: Impedance = Impedance(0.0, 10.0)
+
+
+@dataclass(frozen=True)
+class SupportSettings:
+    """How supports are switched on and off.
+
+    Attributes:
+        unload_time: The normal force's limit falls to zero over this time before lift-off [s].
+        load_time: It rises from zero over this time after touch-down [s].
+        early_window: A touch this long before the planned landing counts as the landing [s].
+        release_time: A support that has not touched for this long is landed anew [s].
+        press_speed: A foot that misses the ground at its landing time goes on down at this
+            speed [m/s] ...
+        press_depth: ... until it is this far below the planned support [m].
+        default_cap: Normal force limit of a contact that states none [body weights].
+        sole_inset: The controller keeps its forces this far inside the edge of the sole [m].
+    """
+
+    unload_time: float = 0.05
+    load_time: float = 0.04
+    early_window: float = 0.1
+    release_time: float = 0.03
+    press_speed: float = 0.1
+    press_depth: float = 0.03
+    default_cap: float = 3.0
+    sole_inset: float = 0.005
+
+    def __post_init__(self) -> None:
+        for name in ("unload_time", "load_time", "press_speed", "default_cap"):
+            finite_number(getattr(self, name), f"support setting {name!r}", above=0.0)
+        for name in ("early_window", "release_time", "press_depth", "sole_inset"):
+            finite_number(getattr(self, name), f"support setting {name!r}", at_least=0.0)
+
+
+@dataclass(frozen=True)
+class ControlSettings:
+    """Everything about the controller that can be tuned.
+
+    Attributes:
+        period: Time between two steps [s]; torques are held in between ([Qiu2012]_ 6.4.2).
+        weights: Weights of the tasks.
+        impedances: Feedback gains of the tasks.
+        supports: How supports are switched.
+        joint_limit_horizon: Joint angles and speeds must stay admissible over this time [s].
+        max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
+        solver: ``"daqp"``, ``"proxqp"`` or ``"piqp"``.
+    """
+
+    period: float = 0.005
+    weights: TaskWeights = field(default_factory=TaskWeights)
+    impedances: Impedances = field(default_factory=Impedances)
+    supports: SupportSettings = field(default_factory=SupportSettings)
+    joint_limit_horizon: float = 0.05
+    max_joint_acceleration: float = 500.0
+    solver: str = "daqp"
+
+    def __post_init__(self) -> None:
+        for name in ("period", "joint_limit_horizon", "max_joint_acceleration"):
+            finite_number(getattr(self, name), f"control setting {name!r}", above=0.0)
+        if self.solver not in ("daqp", "proxqp", "piqp"):
+            raise InputError(f"control solver is {self.solver!r}; valid: 'daqp', 'proxqp', 'piqp'")

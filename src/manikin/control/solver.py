@@ -1,0 +1,162 @@
+"""Solvers of the control step's quadratic program, behind one interface.
+
+DAQP (dual active set) is the default: from the previous active set it needs one or two
+iterations on most steps. Recipe for another solver: subclass :class:`QPSolver`, import the
+package inside ``__init__``, and add the class to ``_SOLVERS``.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.control.build_qp import QuadraticProgram
+from manikin.errors import InputError
+from manikin.spatial import FloatArray
+
+_INFINITY = 1e30
+
+
+@dataclass(frozen=True, eq=False)
+class QPSolution:
+    """What a solver found.
+
+    Attributes:
+        x: (n,) the minimiser, or the last iterate when it was not found.
+        found: Whether the solver claims success and the point keeps the constraints.
+        status: The solver's own word.
+        iterations: Its iterations.
+    """
+
+    x: FloatArray
+    found: bool
+    status: str
+    iterations: int
+
+
+class QPSolver(ABC):
+    """Solves a series of similar programs, starting from the previous solution."""
+
+    tolerance = 1e-3
+    """Largest violation of a constraint (N, N.m, rad/s^2) in an accepted solution."""
+
+    def solve(self, program: QuadraticProgram) -> QPSolution:
+        """Solve one program; the answer is checked whatever the solver says."""
+        x, claimed, status, iterations = self._solve(program)
+        found = claimed and bool(np.all(np.isfinite(x))) and program.violation(x) <= self.tolerance
+        return QPSolution(x, found, status, iterations)
+
+    @abstractmethod
+    def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
+        """Return the point, whether it is claimed optimal, the status and the iterations."""
+
+
+def make_solver(name: str) -> QPSolver:
+    """Make the solver called ``name``.
+
+    Raises:
+        InputError: If there is none.
+    """
+    if name not in _SOLVERS:
+        raise InputError(f"QP solver is {name!r}; valid: {sorted(_SOLVERS)}")
+    return _SOLVERS[name]()
+
+
+class DaqpSolver(QPSolver):
+    """DAQP, a dual active-set method that keeps its working set between solves."""
+
+    def __init__(self) -> None:
+        import daqp
+
+        self._module = daqp
+        self._model = None
+        self._shape = (-1, -1)
+
+    def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
+        upper = np.minimum(np.concatenate((program.upper, program.rows_upper)), _INFINITY)
+        lower = np.maximum(np.concatenate((program.lower, program.rows_lower)), -_INFINITY)
+        if self._model is None or self._shape != program.rows.shape:
+            flag = self._set_up(program, lower, upper)
+        else:
+            flag = self._model.update(
+                H=program.hessian, f=program.gradient, A=program.rows, bupper=upper, blower=lower
+            )
+        if flag < 0:
+            self._model = None
+            return np.zeros(len(program.gradient)), False, f"daqp set-up {flag}", 0
+        x, _, flag, info = self._model.solve()
+        if flag <= 0:
+            self._model = None
+        return np.array(x), flag > 0, f"daqp {flag}", int(info["iterations"])
+
+    def _set_up(self, program: QuadraticProgram, lower: FloatArray, upper: FloatArray) -> int:
+        size = len(program.gradient)
+        sense = np.zeros(len(upper), dtype=np.int32)
+        sense[size : size + program.equalities] = 5
+        self._model = self._module.Model()
+        self._shape = program.rows.shape
+        flag, _ = self._model.setup(program.hessian, program.gradient, program.rows, upper, lower, sense)
+        return flag
+
+
+class ProxqpSolver(QPSolver):
+    """ProxQP, an augmented Lagrangian method, dense backend."""
+
+    def __init__(self) -> None:
+        import proxsuite
+
+        self._module = proxsuite.proxqp
+        self._qp = None
+        self._shape = (-1, -1)
+
+    def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
+        split = program.equalities
+        values = (
+            program.hessian, program.gradient, program.rows[:split], program.rows_lower[:split],
+            program.rows[split:], program.rows_lower[split:], program.rows_upper[split:],
+            program.lower, program.upper,
+        )  # fmt: skip
+        if self._qp is None or self._shape != program.rows.shape:
+            size, rows = len(program.gradient), len(program.rows)
+            self._qp = self._module.dense.QP(size, split, rows - split, True)
+            self._qp.settings.eps_abs = 1e-5
+            self._qp.settings.initial_guess = self._module.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
+            self._shape = program.rows.shape
+            self._qp.init(*values)
+        else:
+            self._qp.update(*values)
+        self._qp.solve()
+        results = self._qp.results
+        solved = results.info.status == self._module.QPSolverOutput.PROXQP_SOLVED
+        return np.array(results.x), solved, str(results.info.status), int(results.info.iter)
+
+
+class PiqpSolver(QPSolver):
+    """PIQP, a proximal interior-point method, dense backend; does not warm-start."""
+
+    def __init__(self) -> None:
+        import piqp
+
+        self._module = piqp
+        self._qp = None
+        self._shape = (-1, -1)
+
+    def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
+        split = program.equalities
+        values = (
+            program.hessian, program.gradient, program.rows[:split], program.rows_lower[:split],
+            program.rows[split:], program.rows_lower[split:], program.rows_upper[split:],
+            program.lower, program.upper,
+        )  # fmt: skip
+        if self._qp is None or self._shape != program.rows.shape:
+            self._qp = self._module.DenseSolver()
+            self._shape = program.rows.shape
+            self._qp.setup(*values)
+        else:
+            self._qp.update(*values)
+        status = self._qp.solve()
+        solved = status == self._module.PIQP_SOLVED
+        return np.array(self._qp.result.x), solved, str(status), int(self._qp.result.info.iter)
+
+
+_SOLVERS: dict[str, type[QPSolver]] = {"daqp": DaqpSolver, "proxqp": ProxqpSolver, "piqp": PiqpSolver}

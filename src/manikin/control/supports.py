@@ -1,0 +1,167 @@
+"""Which supports carry load at a time: planned switching, late and early touch-downs."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from manikin.contact import Contact, ContactSchedule
+from manikin.control.settings import SupportSettings
+
+_FIRST_SHARE = 0.1
+"""Load share at the very touch-down, so that the QP may react to the impact."""
+
+
+class SupportMode(StrEnum):
+    """What an effector is doing."""
+
+    SWING = "swing"
+    """It flies, on its planned path."""
+    LANDING = "landing"
+    """Its support is planned but it does not touch yet; it carries nothing."""
+    STANCE = "stance"
+    """It touches and carries load."""
+
+
+@dataclass(frozen=True, eq=False)
+class SupportState:
+    """State of one effector at one control step.
+
+    Attributes:
+        effector: Its name.
+        mode: Swing, landing or stance.
+        contact: The planned contact in landing and stance; None in flight.
+        load_share: Share of the normal-force limit (grasp: of the force limits) that it
+            may use now, in [0, 1]; ramps after touch-down and before lift-off.
+        press: How far below the planned contact a landing effector is sent [m].
+    """
+
+    effector: str
+    mode: SupportMode
+    contact: Contact | None
+    load_share: float = 0.0
+    press: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class SupportInterval:
+    """One planned support of one effector.
+
+    Attributes:
+        contact: The contact held.
+        start: Planned touch-down [s]; -inf when held from the beginning.
+        end: Planned lift-off [s]; inf when held to the end.
+        early: First time at which a touch counts as this touch-down [s].
+    """
+
+    contact: Contact
+    start: float
+    end: float
+    early: float
+
+
+def support_intervals(
+    schedule: ContactSchedule, effector: str, early_window: float
+) -> tuple[SupportInterval, ...]:
+    """Collect the planned supports of one effector in order of time.
+
+    Args:
+        schedule: Stances and their instants.
+        effector: Name of the effector.
+        early_window: Largest advance of a touch-down [s]; at most the last third of the flight.
+    """
+    found: list[SupportInterval] = []
+    phases = list(schedule.sequence)
+    previous_end = -math.inf
+    index = 0
+    while index < len(phases):
+        if effector not in phases[index].stance:
+            index += 1
+            continue
+        first = index
+        while index < len(phases) and effector in phases[index].stance:
+            index += 1
+        start = -math.inf if first == 0 else float(schedule.instants[first])
+        end = math.inf if index == len(phases) else float(schedule.instants[index])
+        early = max(start - early_window, start - (start - previous_end) / 3) if first else start
+        found.append(SupportInterval(phases[first].stance[effector], start, end, early))
+        previous_end = end
+    return tuple(found)
+
+
+@dataclass
+class _Memory:
+    """What is remembered of one effector: its interval, its landing, its last touch [s]."""
+
+    number: int = -1
+    landed: float | None = None
+    touched: float = -math.inf
+
+
+class SupportSwitch:
+    """State machine that turns the schedule and the felt touches into support states."""
+
+    def __init__(self, schedule: ContactSchedule, settings: SupportSettings) -> None:
+        """Start with every support of the first phase fully loaded.
+
+        Args:
+            schedule: Planned stances.
+            settings: Ramps and windows.
+        """
+        self.effectors = schedule.sequence.effectors
+        self._settings = settings
+        self._intervals = {
+            name: support_intervals(schedule, name, settings.early_window) for name in self.effectors
+        }
+        self._memory = {name: _Memory() for name in self.effectors}
+
+    def update(self, time: float, touching: Mapping[str, bool] | None = None) -> dict[str, SupportState]:
+        """Advance to ``time`` and return the state of every effector of the schedule.
+
+        Args:
+            time: Current time [s], not decreasing from call to call.
+            touching: Whether each effector is felt to touch; None (or a missing name)
+                trusts the schedule.
+        """
+        return {name: self._update(name, time, (touching or {}).get(name)) for name in self.effectors}
+
+    def _update(self, name: str, time: float, touching: bool | None) -> SupportState:
+        number, interval = self._interval(name, time)
+        memory = self._memory[name]
+        if number != memory.number:
+            memory = self._memory[name] = _Memory(number)
+            if interval is not None and math.isinf(interval.start):
+                memory.landed, memory.touched = interval.start, time
+        if interval is None:
+            return SupportState(name, SupportMode.SWING, None)
+        planned = time >= interval.start - 1e-9
+        self._remember_touch(memory, time, planned if touching is None else touching)
+        if memory.landed is not None:
+            share = self._load_share(time, memory.landed, interval.end)
+            return SupportState(name, SupportMode.STANCE, interval.contact, share)
+        if not planned:
+            return SupportState(name, SupportMode.SWING, None)
+        late = time - max(interval.start, memory.touched)
+        press = min(self._settings.press_depth, self._settings.press_speed * late)
+        return SupportState(name, SupportMode.LANDING, interval.contact, 0.0, press)
+
+    def _interval(self, name: str, time: float) -> tuple[int, SupportInterval | None]:
+        for number, interval in enumerate(self._intervals[name]):
+            if interval.early - 1e-9 <= time < interval.end - 1e-9:
+                return number, interval
+        return -1, None
+
+    def _remember_touch(self, memory: _Memory, time: float, felt: bool) -> None:
+        if felt:
+            memory.touched = time
+            if memory.landed is None:
+                memory.landed = time
+        elif memory.landed is not None and time - memory.touched > self._settings.release_time + 1e-9:
+            memory.landed = None
+
+    def _load_share(self, time: float, landed: float, end: float) -> float:
+        rising = (time - landed) / self._settings.load_time
+        falling = (end - time) / self._settings.unload_time
+        return float(np.clip(min(max(rising, _FIRST_SHARE), falling), 0.0, 1.0))

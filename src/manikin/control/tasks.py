@@ -1,0 +1,151 @@
+"""Tasks: wanted accelerations, linear in the generalised acceleration ([Qiu2012]_ 6.3).
+
+Each function turns a reference and the current state into an :class:`AccelerationTask`
+by the impedance law ``reference acceleration + stiffness * error + damping * error rate``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.control.dynamics import DynamicsState, FrameState
+from manikin.control.reference import EffectorReference, ReferenceSample
+from manikin.control.settings import Impedance
+from manikin.control.supports import SupportMode, SupportState
+from manikin.spatial import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class AccelerationTask:
+    """Cost ``weight * |matrix @ a - target|^2`` on the generalised acceleration ``a``.
+
+    Attributes:
+        name: What it does, such as ``"com"`` or ``"left_foot"``.
+        matrix: (k, nv).
+        target: (k,) wanted value of ``matrix @ a``.
+        weight: (k,) not negative.
+    """
+
+    name: str
+    matrix: FloatArray
+    target: FloatArray
+    weight: FloatArray
+
+    def residual(self, acceleration: FloatArray) -> FloatArray:
+        """(k,) error ``matrix @ a - target`` at the acceleration (nv,)."""
+        return self.matrix @ acceleration - self.target
+
+
+def com_task(
+    state: DynamicsState, reference: ReferenceSample, gains: Impedance, weight: float
+) -> AccelerationTask:
+    """Follow the centre of mass in position, velocity and acceleration."""
+    velocity = state.momentum[:3] / state.mass
+    wanted = (
+        reference.com_acceleration
+        + gains.stiffness * (reference.com - state.com)
+        + gains.damping * (reference.com_velocity - velocity)
+    )
+    matrix = state.centroidal_map[:3] / state.mass
+    return AccelerationTask("com", matrix, wanted - state.momentum_drift[:3] / state.mass, np.full(3, weight))
+
+
+def angular_momentum_task(
+    state: DynamicsState, reference: ReferenceSample, gains: Impedance, weight: float
+) -> AccelerationTask:
+    """Follow the angular momentum about the centre of mass; only ``gains.damping`` acts."""
+    error = reference.angular_momentum - state.momentum[3:]
+    wanted = reference.angular_momentum_rate + gains.damping * error
+    return AccelerationTask(
+        "angular_momentum",
+        state.centroidal_map[3:],
+        wanted - state.momentum_drift[3:],
+        np.full(3, weight),
+    )
+
+
+def orientation_task(
+    name: str, frame: FrameState, reference: EffectorReference, gains: Impedance, weight: float
+) -> AccelerationTask:
+    """Follow the orientation of a frame ("Basin" of [Qiu2012]_ Table 6.1)."""
+    wanted = (
+        reference.acceleration[3:]
+        + gains.stiffness * orientation_error(reference.rotation, frame.rotation)
+        + gains.damping * (reference.twist[3:] - frame.twist[3:])
+    )
+    return AccelerationTask(name, frame.jacobian[3:], wanted - frame.drift[3:], np.full(3, weight))
+
+
+def swing_task(
+    name: str, frame: FrameState, reference: EffectorReference, gains: Impedance, weight: float
+) -> AccelerationTask:
+    """Follow placement, twist and acceleration of a flying effector."""
+    error = np.concatenate(
+        (
+            reference.position - frame.position,
+            orientation_error(reference.rotation, frame.rotation),
+        )
+    )
+    wanted = (
+        reference.acceleration + gains.stiffness * error + gains.damping * (reference.twist - frame.twist)
+    )
+    return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
+
+
+def landing_reference(support: SupportState, press_speed: float) -> EffectorReference:
+    """Reference of an effector that is due to touch and does not: go on along the normal."""
+    contact = support.contact
+    if contact is None or support.mode is not SupportMode.LANDING:
+        raise ValueError(f"{support.effector} is in {support.mode}; valid: a landing effector")
+    twist = np.zeros(6)
+    twist[:3] = -press_speed * contact.normal
+    return EffectorReference(
+        contact.rotation_contact_to_world,
+        contact.position - support.press * contact.normal,
+        twist,
+        np.zeros(6),
+    )
+
+
+def stance_task(
+    name: str, frame: FrameState, support: SupportState, gains: Impedance, weight: float
+) -> AccelerationTask:
+    """Keep an effector in contact where it landed, turning its sole into the surface.
+
+    The velocity is damped to zero. Of the placement only the tilt of the sole against the
+    surface is fed back: a foot that landed a little beside its planned place or heading
+    cannot be moved there while it carries load.
+    """
+    wanted = -gains.damping * frame.twist
+    if support.contact is not None:
+        tilt = np.cross(frame.rotation[:, 2], support.contact.normal)
+        wanted[3:] += gains.stiffness * tilt
+    return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
+
+
+def posture_task(
+    state: DynamicsState, reference: ReferenceSample, gains: Impedance, weight: FloatArray
+) -> AccelerationTask:
+    """Follow the planned joint angles.
+
+    Args:
+        state: Current state.
+        reference: Planned state.
+        gains: Stiffness and damping.
+        weight: (nv - 6,) one per joint.
+    """
+    nv = len(state.v)
+    matrix = np.zeros((nv - 6, nv))
+    matrix[:, 6:] = np.eye(nv - 6)
+    wanted = (
+        reference.a[6:]
+        + gains.stiffness * (reference.q[7:] - state.q[7:])
+        + gains.damping * (reference.v[6:] - state.v[6:])
+    )
+    return AccelerationTask("posture", matrix, wanted, weight)
+
+
+def orientation_error(wanted: FloatArray, actual: FloatArray) -> FloatArray:
+    """(3,) rotation vector in world axes that turns ``actual`` into ``wanted`` [rad]."""
+    return pin.log3(wanted @ actual.T)
