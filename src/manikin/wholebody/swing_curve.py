@@ -165,7 +165,7 @@ class SwingCurve:
         )  # fmt: skip
 
     @classmethod
-    def along(cls, path: EffectorPath, controls: int = 20) -> "SwingCurve":
+    def along(cls, path: EffectorPath, controls: int = 20, sharpening: int = 0) -> "SwingCurve":
         """Curve that follows a polyline of timed poses, rounding its corners.
 
         The control poses are taken from the path (Schoenberg's variation-diminishing
@@ -175,13 +175,20 @@ class SwingCurve:
         Args:
             path: Timed poses, as found by the Bi-RRT.
             controls: Number of control poses; fewer are smoother, more are closer.
+            sharpening: How often the remaining offset from the path is added to the control
+                points; the curve then passes ever closer to the corners, swinging around
+                them on the outside rather than cutting them.
         """
         if controls < MIN_CONTROLS:
             raise InputError(f"swing has {controls} control poses; valid: at least {MIN_CONTROLS}")
         places = _greville(controls)
         first, last = places[RESTING - 1], places[-RESTING]
         shares = np.clip((places - first) / (last - first), 0.0, 1.0)
-        position, rotation = path.sample(path.time[0] + shares * path.duration)
+        target, rotation = path.sample(path.time[0] + shares * path.duration)
+        inner, weights = slice(RESTING, controls - RESTING), basis(places, controls)
+        position = target.copy()
+        for _ in range(sharpening):
+            position[inner] += (target - weights @ position)[inner]
         return cls(float(path.time[0]), float(path.time[-1]), position, rotation)
 
     @property
