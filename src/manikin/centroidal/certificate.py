@@ -1,0 +1,174 @@
+"""Every requirement of a trajectory measured afresh, every millisecond, without the solver."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.balance import WrenchPolytope
+from manikin.centroidal.feasibility import row_slopes
+from manikin.centroidal.problem import CentroidalProblem
+from manikin.centroidal.trajectory import CentroidalTrajectory
+from manikin.spatial import FloatArray
+
+STEP = 1e-3
+"""Distance of the instants at which a trajectory is measured [s]."""
+
+TOLERANCE = 1e-6
+"""Violation up to which a requirement counts as met [SI unit of the requirement]."""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """How far one requirement is violated at worst.
+
+    Attributes:
+        requirement: ``"balance margin"``, ``"support distance"``, ``"phase duration"``,
+            ``"total duration"``, ``"start position"``, ... or the name of a geometric constraint.
+        value: Largest violation; negative is what is left to spare.
+        unit: Of the value.
+        phase: Where it happens, or None for the whole motion.
+        time: When it happens [s], or None.
+    """
+
+    requirement: str
+    value: float
+    unit: str
+    phase: int | None = None
+    time: float | None = None
+
+    def __str__(self) -> str:
+        place = "" if self.phase is None else f" in phase {self.phase}"
+        instant = "" if self.time is None else f" at {self.time:.3f} s"
+        return f"{self.requirement} violated by {self.value:.3g} {self.unit}{place}{instant}"
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Violations of all requirements and the smallest margin.
+
+    Attributes:
+        items: One entry per requirement.
+        min_margin: Smallest margin [N.m] or [N].
+        limiting_phase: Phase in which it occurs.
+        limiting_time: Instant at which it occurs [s].
+    """
+
+    items: tuple[Residual, ...]
+    min_margin: float
+    limiting_phase: int
+    limiting_time: float
+
+    def __getitem__(self, requirement: str) -> Residual:
+        for item in self.items:
+            if item.requirement == requirement:
+                return item
+        raise KeyError(f"no residual {requirement!r}; valid: {[item.requirement for item in self.items]}")
+
+    @property
+    def largest(self) -> Residual:
+        """The most violated requirement (numbers of different units compared as they are)."""
+        return max(self.items, key=lambda item: item.value)
+
+    def within(self, tolerance: float = TOLERANCE) -> bool:
+        """Whether every requirement is met."""
+        return self.largest.value <= tolerance
+
+
+def phase_times(trajectory: CentroidalTrajectory, step: float = STEP) -> list[FloatArray]:
+    """Instants of each phase: both its ends and every multiple of ``step`` between them [s]."""
+    times = []
+    for start, end in zip(trajectory.schedule.instants[:-1], trajectory.schedule.instants[1:], strict=True):
+        grid = step * np.arange(np.floor(start / step) + 1, np.ceil(end / step))
+        times.append(np.concatenate([[start], grid[(grid > start) & (grid < end)], [end]]))
+    return times
+
+
+def phase_margins(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
+) -> list[FloatArray]:
+    """Margin at the instants of :func:`phase_times`; at key instants in both polytopes [N.m] or [N]."""
+    margins = []
+    for polytope, times in zip(polytopes, phase_times(trajectory), strict=True):
+        distances = polytope.distances(trajectory.pseudo_wrench(times))
+        if problem.margin_space == "force":
+            distances = distances / row_slopes(polytope, problem, trajectory.position(times))
+        margins.append(distances.min(axis=-1))
+    return margins
+
+
+def measure(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
+) -> Residuals:
+    """Measure every requirement of ``problem`` on a trajectory.
+
+    Args:
+        problem: The requirements.
+        trajectory: Any trajectory through the same number of phases.
+        polytopes: W_i of the phases about the world origin.
+    """
+    times = phase_times(trajectory)
+    margins = phase_margins(problem, trajectory, polytopes)
+    lowest = [float(values.min()) for values in margins]
+    phase = int(np.argmin(lowest))
+    time = float(times[phase][np.argmin(margins[phase])])
+    shortfall = Residual(
+        "balance margin", problem.required_margin - lowest[phase], problem.margin_unit, phase, time
+    )
+    items = (
+        shortfall,
+        *_end_residuals(problem, trajectory),
+        *_position_residuals(problem, trajectory, times),
+        *_duration_residuals(problem, trajectory),
+    )
+    return Residuals(items, lowest[phase], phase, time)
+
+
+def _end_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
+    wanted = {
+        "start": (problem.start_com, problem.start_velocity, problem.start_acceleration),
+        "goal": (problem.goal_com, problem.goal_velocity, problem.goal_acceleration),
+    }
+    measured = (
+        ("position", "m", trajectory.position),
+        ("velocity", "m/s", trajectory.velocity),
+        ("acceleration", "m/s^2", trajectory.acceleration),
+    )
+    for end, values in wanted.items():
+        time, phase = (0.0, 0) if end == "start" else (trajectory.duration, len(problem.sequence) - 1)
+        for (name, unit, evaluate), value in zip(measured, values, strict=True):
+            if value is not None:
+                error = float(np.abs(evaluate(time) - value).max())
+                yield Residual(f"{end} {name}", error, unit, phase, time)
+
+
+def _position_residuals(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: list[FloatArray]
+) -> Iterator[Residual]:
+    positions = [trajectory.position(instants) for instants in times]
+    if problem.support_distance is not None:
+        excess = [
+            np.max(
+                [np.linalg.norm(p - c.position, axis=1) for c in phase.stance] or [np.zeros(len(p))], axis=0
+            )
+            - problem.support_distance
+            for p, phase in zip(positions, problem.sequence, strict=True)
+        ]
+        yield _worst("support distance", excess, times)
+    for constraint in problem.geometric:
+        yield _worst(constraint.name, [constraint.violation(p) for p in positions], times)
+
+
+def _worst(requirement: str, values: list[FloatArray], times: list[FloatArray]) -> Residual:
+    phase = int(np.argmax([value.max() for value in values]))
+    index = int(np.argmax(values[phase]))
+    return Residual(requirement, float(values[phase][index]), "m", phase, float(times[phase][index]))
+
+
+def _duration_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
+    durations, instants = trajectory.schedule.durations, trajectory.schedule.instants
+    excess = np.maximum(problem.min_durations - durations, durations - problem.max_durations)
+    phase = int(np.argmax(excess))
+    yield Residual("phase duration", float(excess[phase]), "s", phase, float(instants[phase]))
+    if problem.max_duration is not None:
+        yield Residual("total duration", trajectory.duration - problem.max_duration, "s")

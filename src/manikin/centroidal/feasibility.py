@@ -1,0 +1,206 @@
+"""What can be said before solving: Propositions 1 and 2 and the ends of the motion ([Qiu2012]_ 5.4.3)."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linprog
+
+from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytope
+from manikin.centroidal.problem import CentroidalProblem
+from manikin.polytope import Polytope
+from manikin.spatial import FloatArray, skew
+
+ROUNDING = 1e-9
+"""Slack given to comparisons of given lengths and times [m], [s]."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no trajectory.
+
+    Attributes:
+        requirement: Short name of what cannot be met: ``"durations"``, ``"intersection"``,
+            ``"start balance"``, ``"goal balance"``, ``"support distance"``, ``"balance margin"``
+            or the name of a geometric constraint.
+        reason: One sentence with the numbers.
+        phase: Index of the phase, or None when it concerns the whole motion.
+        time: Instant in the last attempt [s], or None when nothing was attempted.
+        where: Contacts or place concerned.
+    """
+
+    requirement: str
+    reason: str
+    phase: int | None = None
+    time: float | None = None
+    where: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Feasibility:
+    """Intersections of consecutive polytopes and the first thing that cannot work.
+
+    Attributes:
+        radii: (phases - 1,) radius of the largest ball inside each intersection [N.m];
+            negative when the intersection is empty.
+        failure: Why the problem has no solution, or None when that cannot be excluded.
+    """
+
+    radii: FloatArray
+    failure: Failure | None
+
+    @property
+    def radius(self) -> float:
+        """Difficulty of the problem and upper bound of d_min [N.m] (Proposition 2); inf for one phase."""
+        return float(self.radii.min(initial=np.inf))
+
+
+def polytopes_of(problem: CentroidalProblem) -> tuple[WrenchPolytope, ...]:
+    """W_i of every phase about the world origin ([Qiu2012]_ 5.4.1; n_t polytopes for n_t phases)."""
+    return tuple(
+        wrench_polytope(phase.stance, friction_model=problem.friction_model) for phase in problem.sequence
+    )
+
+
+def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
+    """Radius of the largest ball inside each consecutive intersection ([Qiu2012]_ 2.25, Propositions 1-2).
+
+    The thesis calls it the radius of the Chebyshev ball; the *inscribed* one is meant. An
+    empty intersection has the (negative) radius by which the facets would have to move out.
+
+    Args:
+        polytopes: W_i of n phases.
+
+    Returns:
+        (n - 1,).
+    """
+    return np.array([_signed_radius(a.intersection(b)) for a, b in itertools.pairwise(polytopes)])
+
+
+def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Feasibility:
+    """Test everything that needs no optimisation, in order of cost.
+
+    Durations and end points against their bounds, then emptiness of the intersections
+    (Proposition 1) and their radius against the required margin (Proposition 2), then whether
+    any acceleration balances the CoM at the start and at the goal.
+    """
+    radii = intersection_radii(polytopes)
+    failure = (
+        _duration_failure(problem)
+        or _end_failure(problem)
+        or _intersection_failure(problem, radii)
+        or _end_balance_failure(problem, polytopes)
+    )
+    return Feasibility(radii, failure)
+
+
+def _signed_radius(polytope: Polytope) -> float:
+    cost = np.zeros(polytope.dimension + 1)
+    cost[-1] = -1.0
+    rows = np.column_stack([polytope.H, np.ones(len(polytope.h))])
+    found = linprog(cost, rows, polytope.h, bounds=(None, None), method="highs")
+    return float(found.x[-1]) if found.success else np.inf
+
+
+def _duration_failure(problem: CentroidalProblem) -> Failure | None:
+    shortest = float(problem.min_durations.sum())
+    if problem.max_duration is None or shortest <= problem.max_duration + ROUNDING:
+        return None
+    return Failure(
+        "durations",
+        f"the phases last at least {shortest:.3f} s together, longer than max_duration "
+        f"{problem.max_duration:.3f} s",
+    )
+
+
+def _end_failure(problem: CentroidalProblem) -> Failure | None:
+    last = len(problem.sequence) - 1
+    for name, phase, com in (("start", 0, problem.start_com), ("goal", last, problem.goal_com)):
+        limit = problem.support_distance
+        for contact in problem.sequence[phase].stance if limit is not None else ():
+            distance = float(np.linalg.norm(com - contact.position))
+            if limit is not None and distance > limit + ROUNDING:
+                return Failure(
+                    "support distance",
+                    f"{name} CoM is {distance:.3f} m from {contact.effector}, out of reach: "
+                    f"the limit is {limit:.3f} m",
+                    phase, where=contact.effector,
+                )  # fmt: skip
+        for constraint in problem.geometric:
+            violation = float(constraint.violation(com))
+            if violation > ROUNDING:
+                return Failure(
+                    constraint.name, f"{name} CoM violates '{constraint.name}' by {violation:.4f} m", phase
+                )
+    return None
+
+
+def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Failure | None:
+    for index, radius in enumerate(radii):
+        where = f"phases {index} and {index + 1}"
+        if radius < 0:
+            return Failure(
+                "intersection",
+                f"no wrench is admissible in both of {where}: their polytopes do not meet (Proposition 1)",
+                index, where=where,
+            )  # fmt: skip
+        if problem.margin_space == "wrench" and radius < problem.required_margin:
+            return Failure(
+                "intersection",
+                f"the margin between {where} is at most {radius:.2f} N.m, the radius of the largest ball "
+                f"in both polytopes (Proposition 2); required {problem.required_margin:.2f} N.m",
+                index, where=where,
+            )  # fmt: skip
+    return None
+
+
+def _end_balance_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Failure | None:
+    last = len(problem.sequence) - 1
+    ends = (
+        ("start", 0, problem.start_com, problem.start_acceleration),
+        ("goal", last, problem.goal_com, problem.goal_acceleration),
+    )
+    for name, phase, com, acceleration in ends:
+        margin = best_margin_at(polytopes[phase], problem, com, acceleration)
+        if margin < problem.required_margin:
+            held = ", ".join(problem.sequence[phase].stance.effectors)
+            return Failure(
+                f"{name} balance",
+                f"{name} CoM {np.round(com, 3).tolist()} reaches a margin of at most {margin:.2f} "
+                f"{problem.margin_unit} on {held or 'no contact'}; required {problem.required_margin:.2f}",
+                phase, where=held,
+            )  # fmt: skip
+    return None
+
+
+def best_margin_at(
+    polytope: Polytope, problem: CentroidalProblem, com: FloatArray, acceleration: FloatArray | None
+) -> float:
+    """Largest margin at a CoM position over all accelerations, or with the given one.
+
+    At a fixed position the pseudo-wrench is linear in the acceleration, so this is a linear
+    programme.
+    """
+    slopes = row_slopes(polytope, problem, com)
+    still = polytope.distances(pseudo_wrench(problem.mass, com, np.zeros(3)))
+    if acceleration is not None:
+        gain = problem.mass * np.vstack([np.eye(3), skew(com)])
+        return float(np.min((still - polytope.H @ gain @ acceleration) / slopes))
+    gain = problem.mass * np.vstack([np.eye(3), skew(com)])
+    found = linprog(
+        [0.0, 0.0, 0.0, -1.0],
+        np.column_stack([polytope.H @ gain, slopes]),
+        still,
+        bounds=(None, None),
+        method="highs",
+    )
+    return float(found.x[-1]) if found.success else np.inf
+
+
+def row_slopes(polytope: Polytope, problem: CentroidalProblem, com: FloatArray) -> FloatArray:
+    """(..., m) change of each row per unit of margin: 1 for wrenches, ``|H1 + H2 p^|`` for forces."""
+    if problem.margin_space == "wrench":
+        return np.ones((*np.shape(com)[:-1], len(polytope.h)))
+    slope = polytope.H[:, :3] + np.cross(polytope.H[:, 3:], np.asarray(com)[..., None, :])
+    return np.maximum(np.linalg.norm(slope, axis=-1), 1e-12)

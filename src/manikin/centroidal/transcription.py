@@ -1,0 +1,320 @@
+"""The nonlinear programme of the timing-free method, written in Bezier pieces.
+
+A spline of degree k whose simple internal knots are the key instants is the same thing as one
+polynomial of degree k per phase with k - 1 continuous derivatives across the key instants.
+The programme is written in the Bezier points of the pieces and the durations: every
+expression is then a low-order polynomial of few unknowns, its derivatives are cheap, and the
+symbolic knots appear only as ratios of consecutive durations. :func:`spline_from_bezier`
+turns the solution into the control points and knots of [Qiu2012]_ 5.20. The published
+formulation has the control points themselves as unknowns; the set of trajectories is the same.
+"""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from math import comb
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from manikin.centroidal.problem import MarginSpace
+from manikin.spatial import GRAVITY, FloatArray
+from manikin.spline import BSpline, bernstein_matrix, clamped_knots, end_control_points, start_control_points
+
+MARGIN_SCALE = {"wrench": 10.0, "force": 100.0}
+"""Unit of the unknown d_min and of the balance rows in the programme [N.m] or [N]."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What the programme's expressions depend on; numbers are its parameters.
+
+    Attributes:
+        degree: Degree of the spline.
+        samples: n_s.
+        rows: Number of facets of each phase's polytope.
+        contacts: Number of contacts of each phase.
+        margin_space: ``"wrench"`` or ``"force"``.
+        geometric: Functions of the geometric constraints.
+        limited_distance: Whether the CoM-support distance is limited.
+    """
+
+    degree: int
+    samples: int
+    rows: tuple[int, ...]
+    contacts: tuple[int, ...]
+    margin_space: MarginSpace
+    geometric: tuple[Callable[[Any, Any, Any], Any], ...]
+    limited_distance: bool
+
+    @property
+    def phases(self) -> int:
+        """Number of phases."""
+        return len(self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Programme:
+    """The compiled programme and the order of its rows.
+
+    Attributes:
+        structure: What it was built for.
+        solver: CasADi function made by ``nlpsol``; unknowns are the Bezier points of each
+            phase (column by column), the durations [s] and d_min / MARGIN_SCALE.
+        groups: Names of the row groups with their number of rows, in order. ``end`` rows are
+            start velocity, start acceleration, goal velocity, goal acceleration.
+        parameters: Names and shapes of the parameters, in order.
+    """
+
+    structure: Structure
+    solver: ca.Function
+    groups: tuple[tuple[str, int], ...]
+    parameters: tuple[tuple[str, tuple[int, int]], ...]
+
+    @property
+    def point_count(self) -> int:
+        """Number of unknowns that are coordinates of Bezier points."""
+        return 3 * (self.structure.degree + 1) * self.structure.phases
+
+    def pack_parameters(self, values: dict[str, Any]) -> FloatArray:
+        """Parameter vector from arrays by name."""
+        packed = []
+        for name, shape in self.parameters:
+            array = np.asarray(values[name], dtype=np.float64).reshape(shape)
+            packed.append(array.ravel(order="F"))
+        return np.concatenate(packed)
+
+    def pack_unknowns(self, bezier: FloatArray, durations: FloatArray, margin: float) -> FloatArray:
+        """Vector of unknowns from (phases, k + 1, 3) points, (phases,) durations and d_min."""
+        scale = MARGIN_SCALE[self.structure.margin_space]
+        return np.concatenate([bezier.transpose(0, 2, 1).ravel(), durations, [margin / scale]])
+
+    def unpack_unknowns(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        """Inverse of :meth:`pack_unknowns`."""
+        phases, k = self.structure.phases, self.structure.degree
+        bezier = unknowns[: self.point_count].reshape(phases, 3, k + 1).transpose(0, 2, 1)
+        durations = unknowns[self.point_count : self.point_count + phases]
+        return bezier, durations, float(unknowns[-1]) * MARGIN_SCALE[self.structure.margin_space]
+
+
+class _Builder:
+    """Collects unknowns, parameters and rows while the programme is written."""
+
+    def __init__(self, structure: Structure) -> None:
+        self.structure = structure
+        self.parameters: dict[str, ca.SX] = {}
+        self.rows: list[ca.SX] = []
+        self.groups: list[tuple[str, int]] = []
+        size = structure.degree + 1
+        self.bezier = [ca.SX.sym(f"b{i}", size, 3) for i in range(structure.phases)]
+        self.durations = ca.SX.sym("h", structure.phases)
+        self.margin = ca.SX.sym("d")
+
+    def parameter(self, name: str, rows: int, columns: int = 1) -> ca.SX:
+        self.parameters[name] = ca.SX.sym(name, rows, columns)
+        return self.parameters[name]
+
+    def add(self, group: str, expression: ca.SX) -> None:
+        column = ca.vec(expression)
+        self.rows.append(column)
+        self.groups.append((group, column.numel()))
+
+
+@lru_cache(maxsize=32)
+def transcribe(structure: Structure) -> Programme:
+    """Write and compile the programme of [Qiu2012]_ 5.4.1-5.4.2; cached by structure."""
+    builder = _Builder(structure)
+    mass = builder.parameter("mass", 1)
+    for phase in range(structure.phases):
+        _add_samples(builder, phase, mass)
+        if phase + 1 < structure.phases:
+            _add_continuity(builder, phase)
+    _add_end_conditions(builder)
+    builder.add("total_duration", ca.sum1(builder.durations))
+    objective = _objective(builder)
+    unknowns = ca.vertcat(*[ca.vec(b) for b in builder.bezier], builder.durations, builder.margin)
+    problem = {
+        "x": unknowns,
+        "p": ca.vertcat(*[ca.vec(p) for p in builder.parameters.values()]),
+        "f": objective,
+        "g": ca.vertcat(*builder.rows),
+    }
+    shapes = tuple((name, p.shape) for name, p in builder.parameters.items())
+    return Programme(structure, _compile(problem), tuple(builder.groups), shapes)
+
+
+def _compile(problem: dict[str, ca.SX]) -> ca.Function:
+    options = {
+        "print_time": False,
+        "error_on_fail": False,
+        "ipopt": {
+            "print_level": 0,
+            "sb": "yes",
+            "mu_strategy": "adaptive",
+            "max_iter": 250,
+            "tol": 1e-5,
+            "constr_viol_tol": 1e-8,
+            "bound_relax_factor": 0.0,
+            "linear_solver": "mumps",
+        },
+    }
+    return ca.nlpsol("timing_free", "ipopt", problem, options)
+
+
+def _add_samples(builder: _Builder, phase: int, mass: ca.SX) -> None:
+    structure, k = builder.structure, builder.structure.degree
+    s = np.linspace(0.0, 1.0, structure.samples + 1)
+    points, duration = builder.bezier[phase], builder.durations[phase]
+    position = ca.DM(bernstein_matrix(k, s)) @ points
+    second = ca.DM(k * (k - 1) * bernstein_matrix(k - 2, s)) @ _differences(points, 2)
+    acceleration = second / duration**2
+    _add_balance(builder, phase, mass, position, acceleration)
+    if structure.limited_distance:
+        centres = builder.parameter(f"contacts{phase}", structure.contacts[phase], 3)
+        for index in range(structure.contacts[phase]):
+            offset = position - ca.repmat(centres[index, :], len(s), 1)
+            builder.add("distance", ca.sum2(offset * offset))
+    inner = slice(1 if phase == 0 else 0, len(s) - 1 if phase == structure.phases - 1 else len(s))
+    for index, function in enumerate(structure.geometric):
+        values = _symbolic(function, position[inner, :])
+        builder.add(f"geometric{index}", values)
+
+
+def _symbolic(function: Callable[[Any, Any, Any], Any], position: ca.SX) -> ca.SX:
+    """Values of a geometric constraint at (n, 3) symbolic positions, one per position."""
+    with warnings.catch_warnings():
+        # CasADi announces that numpy's functions on its symbols may change; what it returns is right.
+        warnings.simplefilter("ignore", FutureWarning)
+        values = function(position[:, 0], position[:, 1], position[:, 2])
+    return values + ca.SX.zeros(position.shape[0])
+
+
+def _add_balance(builder: _Builder, phase: int, mass: ca.SX, position: ca.SX, acceleration: ca.SX) -> None:
+    """Rows ``h - H w_p >= d_min`` ([Qiu2012]_ 5.4.2); in force space, each over its slope in f."""
+    structure = builder.structure
+    facets, count = builder.structure.rows[phase], position.shape[0]
+    H = builder.parameter(f"H{phase}", facets, 6)
+    h = builder.parameter(f"h{phase}", facets)
+    force = mass * (acceleration - ca.repmat(ca.DM([[0.0, 0.0, -GRAVITY]]), count, 1))
+    wrench = ca.horzcat(force, _cross(position, force))
+    slack = ca.repmat(h.T, count, 1) - wrench @ H.T
+    scale = MARGIN_SCALE[structure.margin_space]
+    wanted = builder.margin * ca.SX.ones(count, facets)
+    if structure.margin_space == "force":
+        wanted = builder.margin * _force_slopes(H, position)
+    builder.add("balance", slack / scale - wanted)
+
+
+def _force_slopes(H: ca.SX, position: ca.SX) -> ca.SX:
+    """(samples, facets) ``|H1 + H2 p^|``: change of a row per newton at the CoM in its direction."""
+    columns = []
+    for row in range(H.shape[0]):
+        moment = ca.repmat(H[row, 3:], position.shape[0], 1)
+        slope = ca.repmat(H[row, :3], position.shape[0], 1) + _cross(moment, position)
+        columns.append(ca.sqrt(ca.sum2(slope * slope) + 1e-12))
+    return ca.horzcat(*columns)
+
+
+def _add_continuity(builder: _Builder, phase: int) -> None:
+    """Equal derivatives 0 ... k - 1 at the key instant after ``phase``, in units of position."""
+    before, after = builder.bezier[phase], builder.bezier[phase + 1]
+    ratio = builder.durations[phase] / builder.durations[phase + 1]
+    for order in range(builder.structure.degree):
+        left = _differences(before, order)[-1, :]
+        right = _differences(after, order)[0, :]
+        builder.add("continuity", left - ratio**order * right)
+
+
+def _add_end_conditions(builder: _Builder) -> None:
+    """Velocities and accelerations at both ends ([Qiu2012]_ 5.24-5.25), in units of position."""
+    k, last = builder.structure.degree, builder.structure.phases - 1
+    for name, phase, row in (("start", 0, 0), ("goal", last, -1)):
+        points, duration = builder.bezier[phase], builder.durations[phase]
+        velocity = builder.parameter(f"{name}_velocity", 1, 3)
+        acceleration = builder.parameter(f"{name}_acceleration", 1, 3)
+        builder.add("end", _differences(points, 1)[row, :] - velocity * duration / k)
+        builder.add("end", _differences(points, 2)[row, :] - acceleration * duration**2 / (k * (k - 1)))
+
+
+def _objective(builder: _Builder) -> ca.SX:
+    """Weighted objectives ([Qiu2012]_ 5.27-5.28), the sums exactly integrated."""
+    weights = builder.parameter("weights", 3)
+    diagonals = [builder.parameter(name, 1, 3) for name in ("velocity", "acceleration", "jerk")]
+    total = ca.sum1(builder.durations)
+    scale = MARGIN_SCALE[builder.structure.margin_space]
+    smoothness = ca.SX(0)
+    for points, duration in zip(builder.bezier, ca.vertsplit(builder.durations), strict=True):
+        for order, diagonal in enumerate(diagonals, start=1):
+            smoothness += _squared_integral(points, duration, order, diagonal)
+    return -weights[0] * scale * builder.margin + weights[1] * smoothness / total + weights[2] * total
+
+
+def _squared_integral(points: ca.SX, duration: ca.SX, order: int, diagonal: ca.SX) -> ca.SX:
+    """Integral over one phase of ``sum_c q_c (p_c^(order))^2`` from products of Bernstein polynomials."""
+    degree = points.shape[0] - 1 - order
+    if degree < 0:
+        return ca.SX(0)
+    factor = np.prod(np.arange(degree + 1, degree + order + 1))
+    derivative = factor * _differences(points, order)
+    gram = ca.DM(bernstein_gram(degree))
+    return ca.sum2(diagonal * ca.sum1((gram @ derivative) * derivative)) / duration ** (2 * order - 1)
+
+
+def bernstein_gram(degree: int) -> FloatArray:
+    """(k + 1, k + 1) integrals over [0, 1] of the products of Bernstein polynomials."""
+    index = range(degree + 1)
+    return np.array(
+        [
+            [comb(degree, i) * comb(degree, j) / comb(2 * degree, i + j) / (2 * degree + 1) for j in index]
+            for i in index
+        ]
+    )
+
+
+def spline_from_bezier(
+    bezier: FloatArray,
+    durations: FloatArray,
+    *,
+    start: tuple[FloatArray, ...],
+    goal: tuple[FloatArray, ...],
+) -> BSpline:
+    """B-spline on normalised time with the key instants as internal knots ([Qiu2012]_ 5.4.3).
+
+    Args:
+        bezier: (phases, k + 1, 3) Bezier points of the phases [m].
+        durations: (phases,) [s].
+        start: Position and, where imposed, velocity and acceleration at the start, met exactly.
+        goal: The same at the end.
+    """
+    k = bezier.shape[1] - 1
+    instants = np.concatenate([[0.0], np.cumsum(durations)])
+    total = float(instants[-1])
+    knots = clamped_knots(k, instants / total)
+    knots[len(knots) - k - 1 :] = 1.0
+    s = (1.0 - np.cos(np.linspace(0.0, np.pi, 2 * k))) / 2.0
+    times = (instants[:-1, None] + durations[:, None] * s).ravel() / total
+    values = (bernstein_matrix(k, s) @ bezier).reshape(-1, 3)
+    first = start_control_points(k, knots, *_per_normalised_time(start, total))
+    last = end_control_points(k, knots, *_per_normalised_time(goal, total))
+    return BSpline.fit(k, knots, np.minimum(times, 1.0), values, first=first, last=last)
+
+
+def _per_normalised_time(derivatives: tuple[FloatArray, ...], total: float) -> list[FloatArray]:
+    return [value * total**order for order, value in enumerate(derivatives)]
+
+
+def _differences(points: ca.SX, order: int) -> ca.SX:
+    for _ in range(order):
+        points = points[1:, :] - points[:-1, :]
+    return points
+
+
+def _cross(a: ca.SX, b: ca.SX) -> ca.SX:
+    """Row-wise cross product of (n, 3) matrices."""
+    return ca.horzcat(
+        a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
+        a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
+        a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
+    )
