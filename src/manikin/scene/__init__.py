@@ -1,5 +1,7 @@
 """Obstacles, support surfaces, and distances between the body and the scene."""
 
+from manikin.scene.covering import SphereCover, cover
+from manikin.scene.distance import Clearance, Proximity, ProximityResult, segment_of
 from manikin.scene.mesh import Mesh, load_mesh
 from manikin.scene.obstacle import Obstacle
 from manikin.scene.scene import Scene
@@ -9,13 +11,19 @@ from manikin.scene.surface import Surface
 __all__ = [
     "Box",
     "Capsule",
+    "Clearance",
     "Cylinder",
     "HalfSpace",
     "Mesh",
     "Obstacle",
     "Plane",
+    "Proximity",
+    "ProximityResult",
     "Scene",
     "Sphere",
+    "SphereCover",
     "Surface",
+    "cover",
     "load_mesh",
+    "segment_of",
 ]

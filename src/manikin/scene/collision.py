@@ -7,6 +7,7 @@ import coal
 import numpy as np
 import trimesh
 
+from manikin.scene.covering import winding_inside
 from manikin.scene.mesh import IntArray, Mesh, MeshPiece
 from manikin.scene.obstacle import Obstacle
 from manikin.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere, local_bounds
@@ -92,20 +93,8 @@ class ClosedSurface:
         return self.vertices[self.faces]
 
     def contains(self, points: FloatArray) -> np.ndarray:
-        """(k,) whether each of the (k, 3) points is inside, by the winding number.
-
-        The solid angle sum is exact for any watertight surface and needs no rays.
-        """
-        a, b, c = (self._corners[None, :, i] - points[:, None] for i in range(3))
-        la, lb, lc = (np.linalg.norm(edge, axis=2) for edge in (a, b, c))
-        volume = np.einsum("kmi,kmi->km", a, np.cross(b, c))
-        spread = (
-            la * lb * lc
-            + np.einsum("kmi,kmi->km", a, b) * lc
-            + np.einsum("kmi,kmi->km", b, c) * la
-            + np.einsum("kmi,kmi->km", c, a) * lb
-        )
-        return np.abs(np.arctan2(volume, spread).sum(axis=1)) > np.pi
+        """(k,) whether each of the (k, 3) points is inside."""
+        return winding_inside(self._corners, points)
 
     def nearest(self, point: FloatArray) -> tuple[float, FloatArray]:
         """Unsigned distance of a point to the surface [m] and the nearest surface point."""

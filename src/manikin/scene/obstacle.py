@@ -91,13 +91,12 @@ class Obstacle:
         if isinstance(self.shape, Mesh):
             placed = self.to_world(self.shape.vertices)
             return placed.min(axis=0), placed.max(axis=0)
-        low, high = local_bounds(self.shape)
-        if not np.all(np.isfinite(low)):
-            return low, high
+        if isinstance(self.shape, (Plane, HalfSpace)):
+            return local_bounds(self.shape)
         if isinstance(self.shape, Sphere):
             reach = np.full(3, self.shape.radius)
         elif isinstance(self.shape, Box):
-            reach = np.abs(self.rotation) @ high
+            reach = np.abs(self.rotation) @ (self.shape.size / 2)
         else:
             reach = self._round_reach(self.shape)
         return self.translation - reach, self.translation + reach

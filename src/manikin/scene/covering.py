@@ -1,0 +1,273 @@
+"""Spheres that together contain a shape ([Qiu2012]_ 6.2.2, automatic sampling)."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import trimesh
+
+from manikin.errors import SceneError
+from manikin.scene.mesh import Mesh, MeshPiece, as_trimesh
+from manikin.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere
+from manikin.spatial import FloatArray, finite_number, frozen_array
+
+_DEFAULT_COUNT = 8
+_LARGEST_COUNT = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class SphereCover:
+    """Spheres in the frame of the shape they contain ([Qiu2012]_ eq. 6.3).
+
+    Attributes:
+        centres: (k, 3) [m].
+        radii: (k,) [m].
+        overshoot: How far, at most, a sphere reaches beyond the shape [m] (an upper bound).
+    """
+
+    centres: FloatArray
+    radii: FloatArray
+    overshoot: float
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+
+def cover(shape: Shape, *, count: int | None = None, radius: float | None = None) -> SphereCover:
+    """Cover a shape with spheres.
+
+    Args:
+        shape: Any shape with an end; planes and half-spaces need no spheres.
+        count: Largest number of spheres; 8 when neither is given.
+        radius: Largest sphere radius [m]; as many spheres as it takes are used.
+
+    Returns:
+        Spheres whose union contains the shape; of a mesh that is not closed, its surface.
+
+    Raises:
+        SceneError: If the shape is endless, both or neither limit is usable, or the radius
+            is too small for the shape.
+    """
+    if isinstance(shape, (Plane, HalfSpace)):
+        raise SceneError(f"a {type(shape).__name__} cannot be covered by spheres; valid: a shape with an end")
+    if count is not None and radius is not None:
+        raise SceneError(f"cover was given count {count} and radius {radius:g} m; valid: one of them")
+    if radius is not None:
+        return _cover_to_radius(shape, finite_number(radius, "cover radius [m]", above=0.0, error=SceneError))
+    if count is None:
+        count = _DEFAULT_COUNT
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
+        raise SceneError(f"cover count is {count!r}; valid: a whole number >= 1")
+    return _cover_with(shape, int(count))
+
+
+def _cover_to_radius(shape: Shape, radius: float) -> SphereCover:
+    """Double the count until the spheres are small enough, then bisect."""
+    low, high = 0, 1
+    while (found := _cover_with(shape, high)).radii.max() > radius:
+        low, high = high, 2 * high
+        if high > _LARGEST_COUNT:
+            raise SceneError(
+                f"cover radius is {radius:g} m, which needs more than {_LARGEST_COUNT} spheres for this "
+                f"{type(shape).__name__}; valid: about {found.radii.max():.3g} m or more"
+            )
+    while high - low > 1:
+        middle = (low + high) // 2
+        trial = _cover_with(shape, middle)
+        if trial.radii.max() <= radius:
+            found, high = trial, middle
+        else:
+            low = middle
+    return found
+
+
+def _cover_with(shape: Shape, count: int) -> SphereCover:
+    if isinstance(shape, Sphere):
+        return _made(np.zeros((1, 3)), np.array([shape.radius]), 0.0)
+    if isinstance(shape, Capsule):
+        return _capsule_cover(shape, count)
+    if isinstance(shape, Box):
+        return _box_cover(shape, count)
+    if isinstance(shape, Cylinder):
+        return _cylinder_cover(shape, count)
+    if isinstance(shape, Mesh):
+        return _mesh_cover(shape, count)
+    raise SceneError(f"a {type(shape).__name__} cannot be covered by spheres; valid: a shape with an end")
+
+
+def _made(centres: FloatArray, radii: FloatArray, overshoot: float) -> SphereCover:
+    return SphereCover(frozen_array(centres, "centres"), frozen_array(radii, "radii"), overshoot)
+
+
+def _capsule_cover(capsule: Capsule, count: int) -> SphereCover:
+    """Equal spheres along the axis, the outer two at its ends: R^2 = r^2 + (spacing/2)^2."""
+    if count == 1:
+        reach = capsule.radius + capsule.length / 2
+        return _made(np.zeros((1, 3)), np.array([reach]), reach - capsule.radius)
+    heights = np.linspace(-0.5, 0.5, count) * capsule.length
+    radius = float(np.hypot(capsule.radius, (heights[1] - heights[0]) / 2))
+    centres = np.column_stack([np.zeros(count), np.zeros(count), heights])
+    return _made(centres, np.full(count, radius), radius - capsule.radius)
+
+
+def _box_cover(box: Box, count: int) -> SphereCover:
+    """Equal cells, one circumscribed sphere each, divided where it shrinks the spheres most."""
+    cells = _divisions(box.size, count)
+    centres = np.array(
+        [_cell_centres(size, n) for size, n in zip(box.size, cells, strict=True)], dtype=object
+    )
+    grid = np.array(list(product(*centres)), dtype=np.float64)
+    side = box.size / cells
+    radius = float(np.linalg.norm(side) / 2)
+    return _made(grid, np.full(len(grid), radius), radius - float(side.min()) / 2)
+
+
+def _divisions(size: FloatArray, count: int) -> np.ndarray:
+    """Numbers of cells along each axis, product at most ``count``, with the smallest diagonal."""
+    best, shortest = np.ones(3, dtype=np.int64), float(np.linalg.norm(size))
+    for first in range(1, count + 1):
+        for second in range(1, count // first + 1):
+            cells = np.array([first, second, count // (first * second)])
+            diagonal = float(np.linalg.norm(size / cells))
+            if diagonal < shortest - 1e-12:
+                best, shortest = cells, diagonal
+    return best
+
+
+def _cell_centres(size: float, number: int) -> FloatArray:
+    return ((np.arange(number) + 0.5) / number - 0.5) * size
+
+
+def _cylinder_cover(cylinder: Cylinder, count: int) -> SphereCover:
+    """The better of slabs along the axis and the cells of the box around it that touch it."""
+    slab = cylinder.length / count
+    radius = float(np.hypot(cylinder.radius, slab / 2))
+    heights = _cell_centres(cylinder.length, count)
+    stack = _made(
+        np.column_stack([np.zeros((count, 2)), heights]),
+        np.full(count, radius),
+        radius - min(cylinder.radius, slab / 2),
+    )
+    around = Box((2 * cylinder.radius, 2 * cylinder.radius, cylinder.length))
+    best = stack
+    for number in range(count, 2 * count + 1):  # culled corner cells make room for finer cells
+        cells = _box_cover(around, number)
+        divisions = _divisions(around.size, number)
+        half = around.size[:2] / divisions[:2] / 2
+        nearest = np.maximum(np.abs(cells.centres[:, :2]) - half, 0.0)
+        touching = np.hypot(nearest[:, 0], nearest[:, 1]) <= cylinder.radius
+        if touching.sum() <= count and cells.radii[0] < best.radii[0]:
+            best = _made(cells.centres[touching], cells.radii[touching], float(cells.radii[0]))
+    return best
+
+
+def _mesh_cover(mesh: Mesh, count: int) -> SphereCover:
+    """Clusters of small triangles (and of inner cells where closed), one sphere around each."""
+    items = np.concatenate([_items(piece, mesh, count) for piece in mesh.pieces])
+    centroids = items.mean(axis=1)
+    seeds = _farthest_points(centroids, min(count, len(items)))
+    label = _nearest_seed(centroids, seeds)
+    for _ in range(8):  # Lloyd's iteration settles well before this
+        balls = [_ball(items[label == number]) for number in range(len(seeds))]
+        seeds = np.array([centre for centre, _ in balls])
+        moved = _nearest_seed(centroids, seeds)
+        if np.array_equal(moved, label) or len(np.unique(moved)) < len(seeds):
+            break
+        label = moved
+    balls = [_ball(items[label == number]) for number in range(len(seeds))]
+    radii = np.array([radius for _, radius in balls])
+    return _made(np.array([centre for centre, _ in balls]), radii, float(2 * radii.max()))
+
+
+def _items(piece: MeshPiece, mesh: Mesh, count: int) -> FloatArray:
+    """(m, 8, 3) corners of convex items that together make up the piece."""
+    span = mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)
+    grain = float(np.linalg.norm(span)) / (4.0 * np.cbrt(count) + 8.0)
+    vertices, faces = trimesh.remesh.subdivide_to_size(piece.vertices, piece.faces, grain)[:2]
+    corners = vertices[faces][:, [0, 1, 2, 0, 1, 2, 0, 1]]
+    if not piece.closed:
+        return corners
+    return np.concatenate([corners, _inner_cells(piece, grain)])
+
+
+def _inner_cells(piece: MeshPiece, grain: float) -> FloatArray:
+    """(m, 8, 3) grid cells that may meet the inside: their centre is inside or near the surface."""
+    low, high = piece.vertices.min(axis=0), piece.vertices.max(axis=0)
+    number = np.maximum(np.ceil((high - low) / grain).astype(int), 1)
+    side = (high - low) / number
+    axes = [low[i] + (np.arange(number[i]) + 0.5) * side[i] for i in range(3)]
+    centres = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    inside = winding_inside(piece.vertices[piece.faces], centres)
+    # A cell whose centre is outside can still hold solid, within half a diagonal of the
+    # surface; such solid is in the convex hull of no item, so cells keep a margin.
+    near = _near_surface(piece, centres, float(np.linalg.norm(side)) / 2)
+    signs = np.array(list(product((-0.5, 0.5), repeat=3)))
+    kept = centres[inside | near]
+    return np.clip(kept[:, None] + signs * side, low, high)
+
+
+def winding_inside(corners: FloatArray, points: FloatArray) -> np.ndarray:
+    """(k,) whether points are inside the closed surface of (m, 3, 3) triangles, by solid angles.
+
+    The sum of the signed solid angles is 4 pi inside and 0 outside a watertight surface.
+    """
+    chunk = max(1, 200_000 // len(corners))
+    return np.concatenate(
+        [_winding(corners, points[start : start + chunk]) for start in range(0, len(points), chunk)]
+        or [np.zeros(0, dtype=bool)]
+    )
+
+
+def _winding(corners: FloatArray, points: FloatArray) -> np.ndarray:
+    a, b, c = (corners[None, :, i] - points[:, None] for i in range(3))
+    la, lb, lc = (np.linalg.norm(edge, axis=2) for edge in (a, b, c))
+    volume = np.einsum("kmi,kmi->km", a, np.cross(b, c))
+    spread = (
+        la * lb * lc
+        + np.einsum("kmi,kmi->km", a, b) * lc
+        + np.einsum("kmi,kmi->km", b, c) * la
+        + np.einsum("kmi,kmi->km", c, a) * lb
+    )
+    return np.abs(np.arctan2(volume, spread).sum(axis=1)) > np.pi
+
+
+def _near_surface(piece: MeshPiece, points: FloatArray, reach: float) -> np.ndarray:
+    surface = as_trimesh(piece.vertices, piece.faces)
+    triangles = surface.triangles
+    near = np.zeros(len(points), dtype=bool)
+    for triangle in triangles:
+        low, high = triangle.min(axis=0) - reach, triangle.max(axis=0) + reach
+        candidates = np.flatnonzero(np.all((points >= low) & (points <= high), axis=1) & ~near)
+        if len(candidates):
+            closest = trimesh.triangles.closest_point(
+                np.broadcast_to(triangle, (len(candidates), 3, 3)), points[candidates]
+            )
+            gap = np.linalg.norm(closest - points[candidates], axis=1)
+            near[candidates[gap <= reach]] = True
+    return near
+
+
+def _farthest_points(points: FloatArray, number: int) -> FloatArray:
+    """Start at the point farthest from the middle, then always the one farthest from the chosen."""
+    gap = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    chosen = [int(np.argmax(gap))]
+    gap = np.linalg.norm(points - points[chosen[0]], axis=1)
+    while len(chosen) < number:
+        chosen.append(int(np.argmax(gap)))
+        gap = np.minimum(gap, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return points[chosen]
+
+
+def _nearest_seed(points: FloatArray, seeds: FloatArray) -> np.ndarray:
+    squared = np.sum(seeds**2, axis=1) - 2.0 * points @ seeds.T
+    return np.argmin(squared, axis=1)
+
+
+def _ball(items: FloatArray) -> tuple[FloatArray, float]:
+    """A nearly smallest ball around the corners (Badoiu and Clarkson's iteration)."""
+    corners = items.reshape(-1, 3)
+    centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    for step in range(1, 40):
+        farthest = corners[np.argmax(np.sum((corners - centre) ** 2, axis=1))]
+        centre = centre + (farthest - centre) / (step + 1)
+    return centre, float(np.linalg.norm(corners - centre, axis=1).max())

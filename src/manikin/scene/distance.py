@@ -1,0 +1,318 @@
+"""Signed distances between the body, itself and the scene, with gradients."""
+
+import heapq
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from manikin.errors import SceneError
+from manikin.scene.bounds import PairBounds
+from manikin.scene.collision import CollisionPart, collision_parts
+from manikin.scene.depth import part_meter
+from manikin.scene.mesh import IntArray
+from manikin.scene.pair import Measured, PairMeter
+from manikin.scene.scene import Scene
+from manikin.spatial import FloatArray
+
+Pair = tuple[str, str]
+Ignored = frozenset[Pair]
+NOTHING: Ignored = frozenset()
+
+
+class BodyGeometry(Protocol):
+    """What a body must offer: kinematics, shapes named ``"segment/shape"``, pairs to check."""
+
+    @property
+    def pinocchio(self) -> pin.Model:
+        """Kinematic model."""
+        ...
+
+    @property
+    def geometry(self) -> pin.GeometryModel:
+        """Collision shapes."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ProximityResult:
+    """Signed distances of the pairs that are close.
+
+    Attributes:
+        distance: (k,) [m], negative in penetration.
+        gradient: (k, nv) with respect to the configuration's tangent space.
+        pairs: (body shape, obstacle or other body shape) of each row. An obstacle of several
+            pieces may have several rows.
+        on_body: (k, 3) nearest point of the body shape in the world [m].
+        on_other: (k, 3) nearest point of the obstacle or other shape [m].
+        normal: (k, 3) unit vector from the body shape to the other.
+    """
+
+    distance: FloatArray
+    gradient: FloatArray
+    pairs: tuple[Pair, ...]
+    on_body: FloatArray
+    on_other: FloatArray
+    normal: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.distance)
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """The smallest distance found.
+
+    Attributes:
+        distance: [m], negative in penetration; infinite when there is no pair.
+        pair: (body shape, obstacle or other body shape), or None without pairs.
+        sample: Index of the configuration, 0 for a single one.
+    """
+
+    distance: float
+    pair: Pair | None
+    sample: int = 0
+
+
+class Proximity:
+    """Distances of every body shape to every obstacle and to other body shapes.
+
+    Distances are exact for primitives and convex mesh pieces, with the penetration depth
+    as negative distance. Closed mesh pieces that are not convex give exact clearances and
+    a depth sampled on the body shape; open ones have no inside, and where a shape crosses
+    them the depth is that of the worst triangle.
+
+    One instance works on buffers of its own: use one per thread. Results do not depend on
+    earlier queries.
+
+    Attributes:
+        pairs: (body shape, obstacle or other body shape) of every pair checked.
+    """
+
+    def __init__(self, body: BodyGeometry, scene: Scene, *, self_collision: bool = True) -> None:
+        """Prepare the pairs.
+
+        Args:
+            body: With ``pinocchio``, ``geometry`` and, for self-collision, ``collision_pairs``
+                (of shape names or geometry indices; the geometry's own pairs when absent).
+            scene: Obstacles; the floor is one of them.
+            self_collision: Whether to check the body against itself.
+
+        Raises:
+            SceneError: If a collision pair names no shape of the body.
+        """
+        self._model, self._shapes = body.pinocchio, body.geometry
+        self._data = self._model.createData()
+        self._geometry_data = pin.GeometryData(self._shapes)
+        self._count = len(self._shapes.geometryObjects)
+        parts = tuple(part for obstacle in scene for part in collision_parts(obstacle))
+        first, second = _pair_table(self._count, len(parts), _self_pairs(body) if self_collision else [])
+        self._bounds = PairBounds(self._shapes, parts, first, second)
+        self._meters = _meters(self._shapes, parts, first, second)
+        self.pairs: tuple[Pair, ...] = _pair_names(self._shapes, parts, first, second)
+        moves = _moves(self._model, self._shapes, len(parts))
+        self._sensitivity = moves[second] - moves[first]
+        self._fixed = {
+            self._count + number: coal.Transform3s(part.rotation, part.translation)
+            for number, part in enumerate(parts)
+        }
+        self._first, self._second = first.tolist(), second.tolist()
+        self._masks: dict[Ignored, NDArray[np.bool_]] = {}
+
+    @property
+    def nv(self) -> int:
+        """Dimension of the gradients."""
+        return int(self._model.nv)
+
+    def evaluate(self, q: FloatArray, activation: float = 0.1, ignore: Ignored = NOTHING) -> ProximityResult:
+        """Measure every pair closer than ``activation``.
+
+        The gradient of a distance is ``n^T (J_2 - J_1)``, with ``n`` from the body shape to
+        the other and the Jacobians taken at the nearest points.
+
+        Args:
+            q: (nq,) configuration.
+            activation: [m]; farther pairs are left out.
+            ignore: (segment, obstacle) or (segment, segment) pairs to leave out, in any
+                order; a full shape name may stand for its segment.
+
+        Returns:
+            Rows in the order of :attr:`pairs`.
+        """
+        jacobian = pin.computeJointJacobians(self._model, self._data, q)
+        pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
+        placements = self._placements()
+        near = np.flatnonzero((self._lower(placements) < activation) & self._considered(ignore))
+        measured = self._measure(near.tolist(), placements)
+        kept = [row for row, item in enumerate(measured) if item[0] < activation]
+        rows = near[kept]
+        distance = np.array([measured[row][0] for row in kept])
+        normal, on_body, on_other = (
+            np.array([measured[row][part] for row in kept]).reshape(-1, 3) for part in (1, 2, 3)
+        )
+        wrench = np.hstack([normal, np.cross(on_body, normal)])
+        gradient = (wrench @ jacobian) * self._sensitivity[rows]
+        names = tuple(self.pairs[row] for row in rows)
+        return ProximityResult(distance, gradient, names, on_body, on_other, normal)
+
+    def minimum(self, q: FloatArray, ignore: Ignored = NOTHING) -> Clearance:
+        """Smallest signed distance of all pairs at ``q``; see :meth:`evaluate` for ``ignore``."""
+        placements = self._placements_at(q)
+        lower = np.where(self._considered(ignore), self._lower(placements), np.inf)
+        best = Clearance(np.inf, None)
+        for index in np.argsort(lower, kind="stable").tolist():
+            if lower[index] == np.inf or lower[index] > max(best.distance, 0.0):
+                break
+            distance = self._measure([index], placements)[0][0]
+            if distance < best.distance:
+                best = Clearance(distance, self.pairs[index])
+        return best
+
+    def minimum_over(
+        self, q_samples: FloatArray, ignore: Ignored | Sequence[Ignored] = NOTHING, tolerance: float = 1e-6
+    ) -> Clearance:
+        """Smallest signed distance over many configurations.
+
+        Best first: every (sample, pair) has a lower bound, from covering spheres at first;
+        measuring one of them raises the bounds of its pair at all other samples, because a
+        distance changes no faster than the shape moves. Only what could still be the
+        minimum is measured, so the result is exact to ``tolerance``.
+
+        Args:
+            q_samples: (n, nq).
+            ignore: One set for all samples, or n sets.
+            tolerance: [m].
+
+        Raises:
+            SceneError: If the number of ignore sets is not n.
+        """
+        samples = np.atleast_2d(np.asarray(q_samples, dtype=np.float64))
+        considered = self._considered_over(ignore, len(samples))
+        placements = np.array([self._placements_at(q) for q in samples])
+        rotations, translations = placements[..., :3, :3], placements[..., :3, 3]
+        lower = self._bounds.lower(rotations, translations)
+        lower = np.where(considered, np.where(lower > 0.0, lower, -np.inf), np.inf)
+        queue = [(float(bound), pair) for pair, bound in enumerate(lower.min(axis=0)) if bound < np.inf]
+        heapq.heapify(queue)
+        best = Clearance(np.inf, None)
+        while queue and queue[0][0] < best.distance - tolerance:
+            _, pair = heapq.heappop(queue)
+            column = lower[:, pair]
+            sample = int(np.argmin(column))
+            distance = self._measure([pair], placements[sample])[0][0]
+            if distance < best.distance:
+                best = Clearance(distance, self.pairs[pair], sample)
+            moved = self._bounds.displacement(pair, sample, rotations, translations)
+            np.maximum(column, distance - moved, out=column)
+            column[sample] = np.inf
+            heapq.heappush(queue, (float(column.min()), pair))
+        return best
+
+    def _placements_at(self, q: FloatArray) -> FloatArray:
+        pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data, q)
+        return self._placements()
+
+    def _placements(self) -> FloatArray:
+        """(shapes, 4, 4) shape-to-world transforms, as last updated."""
+        return np.array([item.homogeneous for item in self._geometry_data.oMg]).reshape(-1, 4, 4)
+
+    def _lower(self, placements: FloatArray) -> FloatArray:
+        return self._bounds.lower(placements[None, :, :3, :3], placements[None, :, :3, 3])[0]
+
+    def _considered(self, ignore: Ignored) -> NDArray[np.bool_]:
+        mask = self._masks.get(ignore)
+        if mask is None:
+            mask = np.array([not _is_ignored(pair, ignore) for pair in self.pairs], dtype=bool)
+            self._masks[ignore] = mask
+        return mask
+
+    def _considered_over(self, ignore: Ignored | Sequence[Ignored], number: int) -> NDArray[np.bool_]:
+        if isinstance(ignore, (frozenset, set)):
+            return np.broadcast_to(self._considered(frozenset(ignore)), (number, len(self.pairs)))
+        if len(ignore) != number:
+            raise SceneError(
+                f"ignore has {len(ignore)} sets for {number} samples; valid: one set, or one each"
+            )
+        return np.array([self._considered(frozenset(item)) for item in ignore])
+
+    def _measure(self, indices: list[int], placements: FloatArray) -> list[Measured]:
+        """Distance, normal and the two nearest points of each pair."""
+        places = dict(self._fixed)
+        found = []
+        for index in indices:
+            shape, other = self._first[index], self._second[index]
+            for key in (shape, other):
+                if key not in places:
+                    places[key] = coal.Transform3s(placements[key, :3, :3], placements[key, :3, 3])
+            found.append(self._meters[index](places[shape], places[other]))
+        return found
+
+
+def segment_of(shape_name: str) -> str:
+    """Segment that carries the shape ``"segment/shape"``."""
+    return shape_name.split("/", 1)[0]
+
+
+def _is_ignored(pair: Pair, ignore: Ignored) -> bool:
+    sides = [{name, segment_of(name)} for name in pair]
+    return any((a in sides[0] and b in sides[1]) or (b in sides[0] and a in sides[1]) for a, b in ignore)
+
+
+def _pair_table(shapes: int, parts: int, self_pairs: list[tuple[int, int]]) -> tuple[IntArray, IntArray]:
+    """First and second index of every pair: parts first, numbered behind the shapes."""
+    both = [(shape, shapes + part) for part in range(parts) for shape in range(shapes)] + self_pairs
+    table = np.array(both, dtype=np.int64).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
+
+
+def _pair_names(
+    shapes: pin.GeometryModel, parts: Sequence[CollisionPart], first: IntArray, second: IntArray
+) -> tuple[Pair, ...]:
+    names = [item.name for item in shapes.geometryObjects] + [part.obstacle for part in parts]
+    return tuple((names[a], names[b]) for a, b in zip(first, second, strict=True))
+
+
+def _meters(
+    shapes: pin.GeometryModel, parts: Sequence[CollisionPart], first: IntArray, second: IntArray
+) -> list[Callable[[coal.Transform3s, coal.Transform3s], Measured]]:
+    """One measuring function per pair."""
+    geometries = [item.geometry for item in shapes.geometryObjects]
+    return [
+        PairMeter(geometries[a], geometries[b])
+        if b < len(geometries)
+        else part_meter(geometries[a], parts[b - len(geometries)])
+        for a, b in zip(first.tolist(), second.tolist(), strict=True)
+    ]
+
+
+def _self_pairs(body: BodyGeometry) -> list[tuple[int, int]]:
+    given = getattr(body, "collision_pairs", None)
+    if given is None:
+        given = [(int(pair.first), int(pair.second)) for pair in body.geometry.collisionPairs]
+    indices = {item.name: number for number, item in enumerate(body.geometry.geometryObjects)}
+    return [(_shape_index(a, indices), _shape_index(b, indices)) for a, b in given]
+
+
+def _shape_index(key: str | int, indices: dict[str, int]) -> int:
+    if isinstance(key, str):
+        if key not in indices:
+            raise SceneError(f"collision pair names shape {key!r}; valid: {', '.join(indices)}")
+        return indices[key]
+    if not 0 <= key < len(indices):
+        raise SceneError(f"collision pair names shape {key}; valid: 0 to {len(indices) - 1}")
+    return int(key)
+
+
+def _moves(model: pin.Model, shapes: pin.GeometryModel, parts: int) -> FloatArray:
+    """(shapes + parts, nv): 1 where a velocity coordinate moves the shape."""
+    table = np.zeros((model.njoints, model.nv))
+    for joint in range(1, model.njoints):
+        start, width = model.idx_vs[joint], model.nvs[joint]
+        table[joint] = table[model.parents[joint]]
+        table[joint, start : start + width] = 1.0
+    joints = [item.parentJoint for item in shapes.geometryObjects] + [0] * parts
+    return table[joints]
