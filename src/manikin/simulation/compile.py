@@ -1,0 +1,272 @@
+"""The body and the scene as a MuJoCo model, and the translation of states.
+
+The model is built from the same neutral description as the Pinocchio one, through
+``MjSpec``. It has one MuJoCo body per segment, a free joint on the root, the segment's hinges
+in the same order, one torque motor per hinge, one geometry ``"segment/shape"`` per shape and
+one site ``"effector/<name>"`` per effector.
+
+The engines describe the free root differently. With ``R`` the rotation from the root's axes to the
+world's and ``v = (v_l, w)``, ``a = (a_l, w')`` in the root's axes as in Pinocchio:
+
+* MuJoCo's quaternion is wxyz, ours xyzw;
+* its velocity is ``(R v_l, w)``: the linear part in world axes, the angular part in the root's;
+* its acceleration is ``(R (a_l + w x v_l), w')``, the time derivative of that;
+* its generalised force is ``(R f, m)`` for our ``(f, m)``, so that the power is the same.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.body import BodyModel, Hinge, Segment, Shape, ShapeKind
+from manikin.scene import Scene
+from manikin.simulation.options import PhysicsOptions
+from manikin.simulation.scene_geoms import add_scene, quaternion
+from manikin.spatial import FloatArray
+
+_GEOM_KIND = {
+    ShapeKind.SPHERE: mujoco.mjtGeom.mjGEOM_SPHERE,
+    ShapeKind.CAPSULE: mujoco.mjtGeom.mjGEOM_CAPSULE,
+    ShapeKind.BOX: mujoco.mjtGeom.mjGEOM_BOX,
+}
+_CONE = {"elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC, "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL}
+
+
+@dataclass(frozen=True, eq=False)
+class SimulationModel:
+    """A compiled MuJoCo model with the translation of states from and to Pinocchio's.
+
+    Attributes:
+        body: The body that was compiled.
+        scene: The scene that was compiled, or None.
+        options: The settings.
+        mujoco: The ``mujoco.MjModel``; make a ``MjData`` of it for each simulation.
+    """
+
+    body: BodyModel
+    scene: Scene | None
+    options: PhysicsOptions
+    mujoco: Any = field(repr=False)
+
+    # --- states ----------------------------------------------------------------------------
+
+    def q_to_mujoco(self, q: ArrayLike) -> FloatArray:
+        """(nq,) ``qpos`` of a configuration."""
+        qpos = np.array(q, dtype=np.float64)
+        qpos[3], qpos[4:7] = qpos[6], qpos[3:6].copy()
+        return qpos
+
+    def q_from_mujoco(self, qpos: ArrayLike) -> FloatArray:
+        """(nq,) configuration of ``qpos``; its quaternion is normalised."""
+        q = np.array(qpos, dtype=np.float64)
+        q[6], q[3:6] = q[3], q[4:7].copy()
+        q[3:7] /= np.linalg.norm(q[3:7])
+        return q
+
+    def v_to_mujoco(self, q: ArrayLike, v: ArrayLike) -> FloatArray:
+        """(nv,) ``qvel`` of a velocity at configuration ``q``."""
+        return _turned(root_rotation(q), v)
+
+    def v_from_mujoco(self, qpos: ArrayLike, qvel: ArrayLike) -> FloatArray:
+        """(nv,) velocity of ``qvel`` at ``qpos``."""
+        return _turned(root_rotation(self.q_from_mujoco(qpos)).T, qvel)
+
+    def a_to_mujoco(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> FloatArray:
+        """(nv,) ``qacc`` of an acceleration at the state ``(q, v)``."""
+        speed, acceleration = np.asarray(v, dtype=np.float64), np.array(a, dtype=np.float64)
+        acceleration[:3] += np.cross(speed[3:6], speed[:3])
+        return _turned(root_rotation(q), acceleration)
+
+    def a_from_mujoco(self, qpos: ArrayLike, qvel: ArrayLike, qacc: ArrayLike) -> FloatArray:
+        """(nv,) acceleration of ``qacc`` at ``(qpos, qvel)``."""
+        speed = self.v_from_mujoco(qpos, qvel)
+        acceleration = _turned(root_rotation(self.q_from_mujoco(qpos)).T, qacc)
+        acceleration[:3] -= np.cross(speed[3:6], speed[:3])
+        return acceleration
+
+    def tau_to_mujoco(self, q: ArrayLike, tau: ArrayLike) -> FloatArray:
+        """(nv,) generalised force for MuJoCo of Pinocchio's, root included."""
+        return _turned(root_rotation(q), tau)
+
+    def tau_from_mujoco(self, qpos: ArrayLike, force: ArrayLike) -> FloatArray:
+        """(nv,) generalised force of Pinocchio of MuJoCo's, root included."""
+        return _turned(root_rotation(self.q_from_mujoco(qpos)).T, force)
+
+    def set_state(self, data: Any, q: ArrayLike, v: ArrayLike | None = None) -> None:
+        """Write a state into a ``MjData`` and bring its kinematics up to date."""
+        data.qpos[:] = self.q_to_mujoco(q)
+        data.qvel[:] = 0.0 if v is None else self.v_to_mujoco(q, v)
+        mujoco.mj_forward(self.mujoco, data)
+
+    # --- names -----------------------------------------------------------------------------
+
+    @cached_property
+    def geom_names(self) -> tuple[str, ...]:
+        """Name of each geometry: ``"segment/shape"`` or ``"scene/obstacle[/number]"``."""
+        return tuple(self.mujoco.geom(number).name for number in range(self.mujoco.ngeom))
+
+    def body_id(self, segment: str) -> int:
+        """MuJoCo body id of a segment."""
+        return self.mujoco.body(self.body.segment(segment).name).id
+
+    def geom_id(self, name: str) -> int:
+        """MuJoCo geometry id of ``"segment/shape"`` or ``"scene/obstacle"``."""
+        return self.mujoco.geom(name).id
+
+    def site_id(self, effector: str) -> int:
+        """MuJoCo site id of an effector."""
+        return self.mujoco.site(f"effector/{self.body.effector(effector).name}").id
+
+    @cached_property
+    def colliding_segments(self) -> frozenset[frozenset[str]]:
+        """Pairs of segments whose geometries the engine lets touch."""
+        if not self.options.self_collision:
+            return frozenset()
+        names = [self.mujoco.body(number).name for number in range(self.mujoco.nbody)]
+        excluded = {frozenset((names[code >> 16], names[code & 0xFFFF])) for code in self._excludes}
+        segments = [segment.name for segment in self.body.segments]
+        pairs = {frozenset((a, b)) for a in segments for b in segments if a != b}
+        return frozenset(pairs - excluded)
+
+    @property
+    def _excludes(self) -> list[int]:
+        return [int(code) for code in self.mujoco.exclude_signature]
+
+
+def root_rotation(q: ArrayLike) -> FloatArray:
+    """(3, 3) rotation from the root's axes to the world's of a configuration."""
+    x, y, z, w = np.asarray(q, dtype=np.float64)[3:7]
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _turned(rotation: FloatArray, vector: ArrayLike) -> FloatArray:
+    """Copy of a velocity-like vector with its first three entries turned."""
+    result = np.array(vector, dtype=np.float64)
+    result[:3] = rotation @ result[:3]
+    return result
+
+
+def compile_model(
+    body: BodyModel, scene: Scene | None = None, options: PhysicsOptions | None = None
+) -> SimulationModel:
+    """Compile a body and a scene to MuJoCo.
+
+    With the default options (no damping, no armature) the mass matrix and the bias forces are
+    those of the Pinocchio model. Which segments may touch is :attr:`BodyModel.segment_pairs`
+    exactly: every other pair is excluded by name and MuJoCo's own filter of parents is off.
+
+    Args:
+        body: The body.
+        scene: Obstacles and floor; None for an empty world without a floor.
+        options: Settings; defaults when None.
+
+    Raises:
+        SceneError: If a mesh is too large to simulate.
+    """
+    options = options or PhysicsOptions()
+    spec = mujoco.MjSpec()
+    spec.modelname = body.name
+    _set_options(spec, options)
+    _add_body(spec, body, options)
+    _add_excludes(spec, body)
+    if scene is not None:
+        add_scene(spec, scene, _contact(options, scenery=True))
+    return SimulationModel(body, scene, options, spec.compile())
+
+
+def _set_options(spec: Any, options: PhysicsOptions) -> None:
+    spec.compiler.degree = False
+    spec.compiler.balanceinertia = False
+    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.option.timestep = options.timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = _CONE[options.cone]
+    spec.option.impratio = options.impratio
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+
+
+def _contact(options: PhysicsOptions, *, scenery: bool) -> dict[str, Any]:
+    """Contact settings of a geometry; bits let body and scene touch, and body and body if wanted."""
+    both = options.self_collision
+    return {
+        "friction": [options.friction, 0.005, 0.0001],
+        "condim": 3,
+        "solref": [options.contact_time_constant, options.contact_damping_ratio],
+        "contype": 2 if scenery else 1,
+        "conaffinity": 1 if scenery else (3 if both else 2),
+    }
+
+
+def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
+    made: dict[str, Any] = {}
+    contact = _contact(options, scenery=False)
+    for segment in body.segments:
+        parent = spec.worldbody if segment.parent is None else made[segment.parent]
+        item = parent.add_body(name=segment.name, pos=segment.origin)
+        made[segment.name] = item
+        _set_inertia(item, segment)
+        if segment.parent is None:
+            item.add_freejoint(name="root", align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE)
+        for hinge in segment.hinges:
+            _add_hinge(spec, item, hinge, options)
+        for shape in segment.shapes:
+            _add_shape(item, segment, shape, contact)
+    for effector in body.effectors.values():
+        made[effector.segment].add_site(
+            name=f"effector/{effector.name}", pos=effector.translation, quat=quaternion(effector.rotation)
+        )
+
+
+def _set_inertia(item: Any, segment: Segment) -> None:
+    inertia = segment.inertia
+    item.explicitinertial = True
+    item.mass = segment.mass
+    item.ipos = segment.com
+    item.fullinertia = [
+        inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[0, 1], inertia[0, 2], inertia[1, 2],
+    ]  # fmt: skip
+
+
+def _add_hinge(spec: Any, item: Any, hinge: Hinge, options: PhysicsOptions) -> None:
+    item.add_joint(
+        name=hinge.name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=hinge.axis, pos=[0.0, 0.0, 0.0],
+        limited=options.joint_limits, range=[hinge.lower, hinge.upper],
+        damping=[options.joint_damping, 0.0, 0.0], armature=options.armature,
+    )  # fmt: skip
+    motor = spec.add_actuator(
+        name=hinge.name, target=hinge.name, trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        ctrllimited=True, ctrlrange=[-hinge.torque_limit, hinge.torque_limit],
+    )  # fmt: skip
+    motor.set_to_motor()
+
+
+def _add_shape(item: Any, segment: Segment, shape: Shape, contact: dict[str, Any]) -> None:
+    size = np.zeros(3)
+    size[: len(shape.size)] = shape.size
+    if shape.kind == ShapeKind.CAPSULE:
+        size[1] /= 2.0
+    elif shape.kind == ShapeKind.BOX:
+        size /= 2.0
+    item.add_geom(
+        name=f"{segment.name}/{shape.name}", type=_GEOM_KIND[shape.kind], size=size, mass=0.0,
+        pos=shape.translation, quat=quaternion(shape.rotation), **contact,
+    )  # fmt: skip
+
+
+def _add_excludes(spec: Any, body: BodyModel) -> None:
+    allowed = {frozenset(pair) for pair in body.segment_pairs}
+    names = [segment.name for segment in body.segments]
+    for number, first in enumerate(names):
+        for second in names[number + 1 :]:
+            if frozenset((first, second)) not in allowed:
+                spec.add_exclude(bodyname1=first, bodyname2=second)

@@ -1,0 +1,49 @@
+"""How the physics engine is set up."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from manikin.errors import InputError
+from manikin.spatial import finite_number
+
+
+@dataclass(frozen=True)
+class PhysicsOptions:
+    """Settings of the compiled physics model.
+
+    Attributes:
+        timestep: [s]; 1 ms as in [Qiu2012]_ 6.1.
+        friction: Coulomb coefficient between the body and the scene and of the body with itself.
+        cone: Shape of the friction cones.
+        impratio: Stiffness of friction relative to the normal direction; above 1 holds feet
+            still under sideways load.
+        contact_time_constant: How fast a contact pushes penetration out [s]; at least two
+            time steps.
+        contact_damping_ratio: 1 is critically damped.
+        joint_damping: Passive torque per speed on each hinge [N.m.s/rad].
+        armature: Inertia added to each hinge's own axis [kg.m^2]; 0 keeps the mass matrix that
+            of the planning model.
+        joint_limits: Whether hinges stop at the ends of their ranges.
+        self_collision: Whether the body's own :attr:`~manikin.body.BodyModel.collision_pairs`
+            may touch.
+    """
+
+    timestep: float = 1e-3
+    friction: float = 0.7
+    cone: Literal["elliptic", "pyramidal"] = "elliptic"
+    impratio: float = 10.0
+    contact_time_constant: float = 5e-3
+    contact_damping_ratio: float = 1.0
+    joint_damping: float = 0.0
+    armature: float = 0.0
+    joint_limits: bool = True
+    self_collision: bool = True
+
+    def __post_init__(self) -> None:
+        positive = ("timestep", "friction", "impratio", "contact_time_constant", "contact_damping_ratio")
+        for name in positive:
+            finite_number(getattr(self, name), f"physics {name}", above=0.0, error=InputError)
+        for name in ("joint_damping", "armature"):
+            finite_number(getattr(self, name), f"physics {name}", at_least=0.0, error=InputError)
+        if self.cone not in ("elliptic", "pyramidal"):
+            raise InputError(f"physics cone is {self.cone!r}; valid: elliptic, pyramidal")
