@@ -5,9 +5,9 @@
     DIR/scenario.yaml      the scenario with every default and override, ready to run again
     DIR/stages/*.json      what each stage found, written as soon as it is known
     DIR/motion.h5          planned motion, then planned and executed (manikin.motion.file)
-    DIR/motion.bvh         the last of them, for animation programs
-    DIR/figures/*.png
-    DIR/summary.json       written last: a directory that has it is complete
+    DIR/summary.json       written when every stage is done
+    DIR/motion.bvh         drawn from the files above, for animation programs
+    DIR/figures/*.png      drawn from the files above
 
 Each file is written atomically, so an interrupted run leaves whole files of the stages
 that were done and nothing half-written.

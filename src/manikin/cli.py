@@ -1,0 +1,267 @@
+"""The command line: ``manikin scenarios | run | view | balance | export``.
+
+Exit status: 0 done, 2 bad input (one line on standard error), 3 a run that ended in an
+explained failure, 130 interrupted.  With ``--json`` standard output holds exactly one
+JSON object; everything else goes to standard error.
+"""
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from manikin import __version__
+from manikin.errors import InputError, ManikinError
+
+if TYPE_CHECKING:
+    from manikin.scenarios import Scenario
+
+DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
+
+app = typer.Typer(
+    name="manikin",
+    help="Plans how a person moves through a cluttered scene and proves it in a physics engine.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+ScenarioArgument = Annotated[
+    str, typer.Argument(metavar="NAME|FILE.yaml", help="Built-in scenario or scenario file.")
+]
+RunArgument = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Run directory or motion file (.h5).")]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit status; no traceback for a user's mistake."""
+    try:
+        with _terminated_like_interrupted():
+            status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
+        return status if isinstance(status, int) else DONE
+    except typer.TyperException as error:
+        return _complain(f"{error.format_message()} See 'manikin --help'.", BAD_INPUT)
+    except InputError as error:
+        return _complain(str(error), BAD_INPUT)
+    except ManikinError as error:
+        return _complain(str(error), FAILED)
+    except (KeyboardInterrupt, typer.Abort):
+        return _complain("interrupted; the files of finished stages are kept", INTERRUPTED)
+    except BrokenPipeError:
+        # The reader of our output has gone, as in "manikin ... | head"; nobody is left to tell.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return INTERRUPTED
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        typer.echo(f"manikin {__version__}")
+    elif context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command()
+def scenarios(json: JsonOption = False) -> None:
+    """List the built-in scenarios."""
+    from manikin.scenarios import list_scenarios
+
+    found = list_scenarios()
+    if json:
+        _print_json({"scenarios": found})
+        return
+    width = max(len(name) for name in found)
+    for name, description in found.items():
+        typer.echo(f"{name:{width}}  {description}")
+
+
+@app.command()
+def run(
+    scenario: ScenarioArgument,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Run directory. Default: runs/NAME; none with --json."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed; default: the scenario's.")] = None,
+    json: JsonOption = False,
+    stature: Annotated[float | None, typer.Option(metavar="M", help="Other stature [m].")] = None,
+    mass: Annotated[float | None, typer.Option(metavar="KG", help="Other body mass [kg].")] = None,
+    sex: Annotated[str | None, typer.Option(metavar="male|female", help="Other sex.")] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the figures into the run directory.")] = True,
+) -> int:
+    """Plan a scenario, execute it in the physics engine and report."""
+    from manikin.scenarios import load_scenario
+
+    job = load_scenario(scenario)
+    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex)
+    if seed is not None:
+        job = job.with_seed(seed)
+    directory = out if out is not None else None if json else Path("runs") / job.name
+    summary = _run(job, directory, draw=figures)
+    if json:
+        _print_json(summary)
+    else:
+        _print_summary(summary, directory)
+    return DONE if summary["succeeded"] else FAILED
+
+
+@app.command()
+def view(
+    source: RunArgument,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 picks a free one.")] = 8080,
+) -> None:
+    """Show a motion in the browser, on this computer only."""
+    from manikin.motion.file import read_motions
+
+    content = read_motions(source)
+    from manikin.viewer import serve
+
+    serve(content, port=port, announce=lambda url: typer.echo(f"viewer at {url} (Ctrl-C ends it)", err=True))
+
+
+@app.command()
+def balance(
+    stance: Annotated[Path, typer.Argument(metavar="STANCE.yaml", help="Stance file.")],
+    json: JsonOption = False,
+) -> None:
+    """Polytope and margins of one stance and centre-of-mass state."""
+    from manikin.scenarios.stance_file import load_stance_file
+
+    question = load_stance_file(stance)
+    with _stdout_kept_clean():
+        report = question.evaluate()
+    if json:
+        _print_json(report)
+    else:
+        _print_table(_flat(report))
+
+
+@app.command()
+def export(
+    source: RunArgument,
+    format: Annotated[str, typer.Option("--format", metavar="bvh|csv", help="File format.")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: beside the motion.")] = None,
+    motion: Annotated[
+        str | None, typer.Option(metavar="planned|executed", help="Default: executed if there is one.")
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Samples per second; default: 100 (bvh), all (csv)."),
+    ] = None,
+) -> None:
+    """Write a motion for other programs."""
+    from manikin.export import check_format, export_motion
+
+    check_format(format)
+    from manikin.motion.file import read_motions
+
+    written = export_motion(read_motions(source), source, format, out=out, which=motion, rate=rate)
+    typer.echo(str(written))
+
+
+def _run(job: "Scenario", directory: Path | None, *, draw: bool) -> dict[str, Any]:
+    from manikin.progress import StageProgress
+
+    with _stdout_kept_clean(), StageProgress() as progress:
+        from manikin import pipeline
+
+        result = pipeline.run(job, out=directory, seed=job.seed, progress=progress)
+        if directory is not None and draw and (result.planned is not None or result.executed is not None):
+            from manikin.products import write_products
+
+            write_products(directory, progress)
+        return dict(result.summary)
+
+
+def _print_summary(summary: dict[str, Any], directory: Path | None) -> None:
+    _print_table(_flat({key: value for key, value in summary.items() if key != "failure"}))
+    failure = summary.get("failure")
+    if failure:
+        typer.echo(f"failed in {failure['stage']}: {failure['reason']}", err=True)
+    if directory is not None:
+        typer.echo(f"files in {directory}; see them with: manikin view {directory}", err=True)
+
+
+def _flat(value: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested sections as one level of dotted keys; long mappings and lists as their size."""
+    flat: dict[str, Any] = {}
+    for key, item in value.items():
+        if isinstance(item, dict) and key != "peak_torque_Nm":
+            flat.update(_flat(item, f"{prefix}{key}."))
+        else:
+            flat[f"{prefix}{key}"] = item
+    return flat
+
+
+def _print_table(rows: dict[str, Any]) -> None:
+    width = max(len(name) for name in rows)
+    for name, value in rows.items():
+        typer.echo(f"{name:{width}}  {_shown(value)}")
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, dict):
+        top = max(value.items(), key=lambda item: abs(item[1]), default=None)
+        return "-" if top is None else f"largest {top[1]:.4g} ({top[0]})"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_shown(item) for item in value) + "]"
+    return "-" if value is None else str(value)
+
+
+def _print_json(value: dict[str, Any]) -> None:
+    from manikin.output import to_json
+
+    typer.echo(to_json(value))
+
+
+def _complain(message: str, status: int) -> int:
+    typer.echo(f"manikin: {' '.join(message.split())}", err=True)
+    return status
+
+
+@contextmanager
+def _terminated_like_interrupted() -> Iterator[None]:
+    """Let SIGTERM unwind like Ctrl-C, so that temporary files are removed."""
+
+    def stop(_signal: int, _frame: object) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield  # the host program decides about its signals
+        return
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _stdout_kept_clean() -> Iterator[None]:
+    """Send what native libraries print on standard output to standard error meanwhile."""
+    sys.stdout.flush()
+    saved = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        ctypes.CDLL(None).fflush(None)  # C's own buffer, which a solver's banner may wait in
+        os.dup2(saved, 1)
+        os.close(saved)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
