@@ -1,0 +1,421 @@
+"""Fit one smooth whole-body spline to contacts, swings and a centre-of-mass path.
+
+All samples of the motion are solved together: Gauss-Newton on
+
+    sum_s |x_effector(q_s) - target_s|^2 + |c(q_s) - c_s|^2 + [d_safe - d(q_s)]_+^2
+        + joint limits + |q_s - q_reference|^2 + |a_s|^2 + |Ldot(q_s, v_s, a_s)|^2,
+
+each residual divided by the scale at which it matters, over the control points of a clamped
+quintic spline.  Unlike a posture-by-posture solution ([Qiu2012]_ 6.2) the result is smooth by
+construction and its angular momentum is kept small, as the point-mass plan assumes.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pinocchio as pin
+from scipy.special import expit
+
+from manikin.body import BodyModel
+from manikin.scene import Proximity
+from manikin.spatial import FloatArray
+from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
+from manikin.wholebody.configuration_spline import ConfigurationSpline, states_from_raw, tangent_map
+
+Ignored = frozenset[tuple[str, str]]
+
+
+@dataclass(frozen=True, eq=False)
+class EffectorTarget:
+    """Where an effector has to be at each sample.
+
+    Attributes:
+        position: (n, 3) in the world [m].
+        rotation: (n, 3, 3) effector-to-world, or None when only the position counts.
+        weight: (n,) 1 where the target counts, 0 where the effector is free.
+        rotation_weight: (n,) importance of the orientation, 1 in contact.
+    """
+
+    position: FloatArray
+    rotation: FloatArray | None
+    weight: FloatArray
+    rotation_weight: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FitTargets:
+    """What the motion has to do, sample by sample.
+
+    Attributes:
+        time: (n,) [s].
+        effectors: Target of each controlled effector.
+        com: (n, 3) centre of mass [m].
+        reference: (n, nq) preferred configuration.
+        reference_scale: (nv,) deviation of the tangent [m, rad] that costs as much as one
+            unit of every other residual; infinite entries are free.
+        ignored: Pairs of segment and obstacle whose distance does not count, per sample.
+    """
+
+    time: FloatArray
+    effectors: Mapping[str, EffectorTarget]
+    com: FloatArray
+    reference: FloatArray
+    reference_scale: FloatArray
+    ignored: tuple[Ignored, ...]
+
+
+@dataclass(frozen=True)
+class FitScales:
+    """Size at which each residual costs one unit, and the iteration's limits.
+
+    Attributes:
+        position: Effector position [m].
+        rotation: Effector orientation [rad].
+        com: Centre of mass [m].
+        clearance: Missing clearance [m].
+        safe_distance: Wanted clearance [m].
+        softness: Width of the bend of the softened clearance penalty [m].
+        joint_limit: Violation of a joint range, or of its buffer [rad].
+        joint_buffer: Distance kept from the joint ranges [rad].
+        joint_velocity: Violation of the velocity limits [rad/s].
+        velocity_share: Share of the velocity limits that may be used.
+        acceleration: Joint acceleration [rad/s^2].
+        pelvis_acceleration: Linear [m/s^2] and angular [rad/s^2] pelvis acceleration.
+        momentum_rate: Rate of angular momentum about the centre of mass [N.m].
+        rest: Velocity at both ends [m/s, rad/s].
+        max_iterations: Upper bound of Gauss-Newton steps.
+        decrease: Relative decrease of the objective below which the iteration stops.
+        stages: One solution after the other: the factor by which the tasks' scales are
+            loosened, and whether clearance counts.
+    """
+
+    position: float = 1.0e-4
+    rotation: float = 4.0e-4
+    com: float = 3.0e-4
+    clearance: float = 2.0e-3
+    safe_distance: float = 0.02
+    softness: float = 0.006
+    joint_limit: float = 5.0e-3
+    joint_buffer: float = 0.02
+    joint_velocity: float = 0.1
+    velocity_share: float = 0.9
+    acceleration: float = 8.0
+    pelvis_acceleration: float = 4.0
+    momentum_rate: float = 20.0
+    rest: float = 1.0e-3
+    max_iterations: int = 30
+    decrease: float = 2.0e-3
+    stages: tuple[tuple[float, bool], ...] = ((100.0, False), (100.0, True), (10.0, True), (1.0, True))
+
+    def loosened(self, factor: float) -> "FitScales":
+        """Return the same scales with contacts and centre of mass ``factor`` times looser."""
+        return replace(
+            self,
+            position=self.position * factor,
+            rotation=self.rotation * factor,
+            com=self.com * factor,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """The fitted spline and how well it meets its targets at the samples.
+
+    Attributes:
+        spline: The motion.
+        iterations: Gauss-Newton steps taken.
+        support_error: Largest position error of a controlled effector [m].
+        com_error: Largest centre-of-mass error [m].
+        clearance: Smallest counted distance [m] (infinite when nothing is near).
+        closest: Names of the pair with that distance.
+        cost: Final value of the objective.
+    """
+
+    spline: ConfigurationSpline
+    iterations: int
+    support_error: float
+    com_error: float
+    clearance: float
+    closest: tuple[str, str]
+    cost: float
+
+
+@dataclass(eq=False)
+class _Linearised:
+    """Residuals of all samples with their Gauss-Newton terms, by derivative order."""
+
+    cost: float = 0.0
+    hessian: dict[int, FloatArray] = field(default_factory=dict)
+    gradient: dict[int, FloatArray] = field(default_factory=dict)
+    support_error: float = 0.0
+    com_error: float = 0.0
+    clearance: float = np.inf
+    closest: tuple[str, str] = ("", "")
+
+
+class MotionFit:
+    """Gauss-Newton fit of a whole-body spline.
+
+    Args:
+        body: The body.
+        proximity: Distances of the body to the scene and to itself, or None to ignore them.
+        targets: What to do.
+        knots: Clamped knots of the spline [s].
+        degree: Its degree.
+        scales: Residual scales.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        proximity: Proximity | None,
+        targets: FitTargets,
+        knots: FloatArray,
+        degree: int = 5,
+        scales: FitScales | None = None,
+    ) -> None:
+        self._body = body
+        self._model: pin.Model = body.pinocchio
+        self._data = self._model.createData()
+        self._proximity = proximity
+        self._targets = targets
+        self._final = scales or FitScales()
+        self._scales = self._final
+        self._collides = True
+        self._knots, self._degree = knots, degree
+        self._basis = SampledBasis.at(targets.time, knots, degree)
+        self._system = BlockBandedSystem(self._basis, body.nq)
+        self._frames = {name: body.effector_frame(name) for name in targets.effectors}
+        # Weights make the sum over samples an integral over time, normalised by one sample.
+        self._reference_weight = _inverse_square(targets.reference_scale)
+
+    def initial_spline(self, time: FloatArray, configurations: FloatArray) -> ConfigurationSpline:
+        """Least-squares spline through linearly interpolated configurations (k, nq) at ``time``."""
+        raw = np.stack(
+            [np.interp(self._targets.time, time, column) for column in configurations.T], axis=1
+        )
+        weight = 1e-4
+        system = BlockBandedSystem(self._basis, 1)
+        ones = np.ones((len(raw), 1, 1))
+        system.add(ones, np.zeros((len(raw), 1)))
+        system.add(weight * ones, np.zeros((len(raw), 1)), order=1)
+        points = []
+        for column in raw.T:
+            system._right[:] = 0.0
+            system.add(None, -column[:, None])
+            points.append(system.solve(1e-9)[:, 0])
+        return ConfigurationSpline(self._knots, np.stack(points, axis=1), self._degree)
+
+    def solve(self, start: ConfigurationSpline) -> FitResult:
+        """Solve from ``start``, first with loose tasks, so that the posture stays natural, then tight."""
+        points = np.array(start.control_points)
+        iterations = 0
+        state = _Linearised()
+        for number, (factor, self._collides) in enumerate(self._final.stages, start=1):
+            self._scales = self._final.loosened(factor)
+            points, state, taken = self._descend(points, last=number == len(self._final.stages))
+            iterations += taken
+        spline = ConfigurationSpline(self._knots, points, self._degree)
+        return FitResult(
+            spline, iterations, state.support_error, state.com_error, state.clearance, state.closest,
+            state.cost,
+        )  # fmt: skip
+
+    def _descend(self, points: FloatArray, last: bool) -> tuple[FloatArray, _Linearised, int]:
+        """Damped Gauss-Newton at the current scales.
+
+        A step along the contacts' manifold leaves it by a second-order amount, which the next
+        step repairs; so one step may raise the objective before it has to fall below its best.
+        """
+        damping, uphill = 1e-3, 0
+        best = current = self._linearise(points)
+        best_points = points
+        iteration = 0
+        for iteration in range(1, self._scales.max_iterations + 1):  # noqa: B007
+            step = self._step(current, damping)
+            # A step of more than a radian leaves the region where the model holds.
+            step *= min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
+            points = points + step
+            current = self._linearise(points)
+            if current.cost < best.cost:
+                decrease = (best.cost - current.cost) / best.cost
+                best, best_points, uphill = current, points, 0
+                damping = max(damping * 0.3, 1e-4)
+                if decrease < (self._scales.decrease if last else 0.05):
+                    break
+            elif uphill >= 1:
+                points, current, uphill, damping = best_points, best, 0, damping * 10.0
+                if damping > 1e6:
+                    break
+            else:
+                uphill += 1
+        return best_points, best, iteration
+
+    def _step(self, state: _Linearised, damping: float) -> FloatArray:
+        self._system.reset()
+        for order, gradient in state.gradient.items():
+            self._system.add(state.hessian[order], gradient, order)
+        return self._system.solve(damping)
+
+    def _linearise(self, points: FloatArray) -> _Linearised:
+        raw, rate, second = (self._basis.evaluate(points, order) for order in range(3))
+        states = states_from_raw(raw, rate, second)
+        tangent = tangent_map(raw)
+        out = _Linearised()
+        task_jacobian, task_residual, momentum_jacobian, momentum_residual, offset = self._kinematics(states, out)
+        task_residual = np.concatenate([task_residual, self._reference_residual(offset)], axis=1)
+        task_jacobian = np.concatenate([task_jacobian, self._reference_jacobian(len(raw))], axis=1)
+        jacobian = _to_raw(task_jacobian, tangent)
+        self._accumulate(out, 0, jacobian, task_residual)
+        self._add_radial_and_limits(out, raw, tangent)
+        self._add_rates(out, rate)
+        self._add_accelerations(out, second)
+        self._accumulate(out, 2, _to_raw(momentum_jacobian, tangent), momentum_residual)
+        return out
+
+    def _kinematics(self, states, out: _Linearised):  # noqa: ANN001, ANN202
+        n, nv = len(states.q), self._model.nv
+        targets, scales = self._targets, self._scales
+        rows = 6 * len(self._frames) + 3
+        jacobian, residual = np.zeros((n, rows, nv)), np.zeros((n, rows))
+        momentum_jacobian, momentum = np.zeros((n, 3, nv)), np.zeros((n, 3))
+        offset = np.zeros((n, nv))
+        near: list[tuple[int, FloatArray, FloatArray]] = []
+        for s in range(n):
+            q = states.q[s]
+            pin.computeCentroidalMomentumTimeVariation(self._model, self._data, q, states.v[s], states.a[s])
+            momentum[s] = self._data.dhg.angular
+            pin.computeJointJacobians(self._model, self._data, q)
+            pin.updateFramePlacements(self._model, self._data)
+            pin.ccrba(self._model, self._data, q, states.v[s])
+            momentum_jacobian[s] = self._data.Ag[3:]
+            row = 0
+            for name, frame in self._frames.items():
+                target = targets.effectors[name]
+                if target.weight[s] > 0.0:
+                    self._effector_rows(s, frame, target, jacobian[s, row : row + 6], residual[s, row : row + 6], out)
+                row += 6
+            jacobian[s, row:] = pin.jacobianCenterOfMass(self._model, self._data, q) / scales.com
+            error = self._data.com[0] - targets.com[s]
+            residual[s, row:] = error / scales.com
+            out.com_error = max(out.com_error, float(np.linalg.norm(error)))
+            offset[s] = pin.difference(self._model, targets.reference[s], q)
+            if self._proximity is not None and self._collides:
+                found = self._clearance_rows(s, q, out)
+                if found is not None:
+                    near.append((s, *found))
+        if near:
+            jacobian, residual = _append_ragged(jacobian, residual, near)
+        return jacobian, residual, momentum_jacobian / scales.momentum_rate, momentum / scales.momentum_rate, offset
+
+    def _effector_rows(
+        self, s: int, frame: int, target: EffectorTarget, jacobian: FloatArray, residual: FloatArray, out: _Linearised
+    ) -> None:
+        scales = self._scales
+        placement = self._data.oMf[frame]
+        full = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
+        error = placement.translation - target.position[s]
+        jacobian[:3] = full[:3] / scales.position
+        residual[:3] = error / scales.position
+        out.support_error = max(out.support_error, float(np.linalg.norm(error)))
+        if target.rotation is not None:
+            turn = pin.log3(placement.rotation @ target.rotation[s].T)
+            importance = target.rotation_weight[s] / scales.rotation
+            jacobian[3:] = full[3:] * importance
+            residual[3:] = turn * importance
+
+    def _clearance_rows(self, s: int, q: FloatArray, out: _Linearised) -> tuple[FloatArray, FloatArray] | None:
+        scales = self._scales
+        reach = scales.safe_distance + 4.0 * scales.softness
+        found = self._proximity.evaluate(q, activation=reach, ignore=self._targets.ignored[s])
+        if len(found.distance) == 0:
+            return None
+        worst = int(np.argmin(found.distance))
+        if found.distance[worst] < out.clearance:
+            out.clearance, out.closest = float(found.distance[worst]), found.pairs[worst]
+        # A softened hinge: it also holds back what is about to come too close.
+        missing = (scales.safe_distance - found.distance) / scales.softness
+        slope = expit(missing)
+        value = scales.softness * np.logaddexp(0.0, missing)
+        return -slope[:, None] * found.gradient / scales.clearance, value / scales.clearance
+
+    def _reference_residual(self, offset: FloatArray) -> FloatArray:
+        return offset * np.sqrt(self._reference_weight)
+
+    def _reference_jacobian(self, n: int) -> FloatArray:
+        return np.broadcast_to(np.diag(np.sqrt(self._reference_weight)), (n, self._model.nv, self._model.nv))
+
+    def _accumulate(self, out: _Linearised, order: int, jacobian: FloatArray, residual: FloatArray) -> None:
+        transposed = jacobian.transpose(0, 2, 1)
+        self._add(out, order, transposed @ jacobian, (transposed @ residual[:, :, None])[:, :, 0])
+        out.cost += 0.5 * float(np.sum(residual**2))
+
+    def _add_diagonal(self, out: _Linearised, order: int, weight: FloatArray, residual: FloatArray) -> None:
+        """Add residuals ``weight * (x - x0)`` given as weights and weighted residuals (n, nq)."""
+        n, nq = weight.shape
+        hessian = np.zeros((n, nq, nq))
+        hessian[:, np.arange(nq), np.arange(nq)] = weight**2
+        self._add(out, order, hessian, weight * residual)
+        out.cost += 0.5 * float(np.sum(residual**2))
+
+    @staticmethod
+    def _add(out: _Linearised, order: int, hessian: FloatArray, gradient: FloatArray) -> None:
+        if order in out.hessian:
+            out.hessian[order] += hessian
+            out.gradient[order] += gradient
+        else:
+            out.hessian[order], out.gradient[order] = hessian, gradient
+
+    def _add_radial_and_limits(self, out: _Linearised, raw: FloatArray, tangent: FloatArray) -> None:
+        radial = np.zeros((len(raw), 1, raw.shape[1]))
+        radial[:, 0, :7] = tangent[:, 6]
+        size = np.linalg.norm(raw[:, 3:7], axis=1)
+        self._accumulate(out, 0, radial / 0.05, (size - 1.0)[:, None] / 0.05)
+        buffer = np.minimum(self._scales.joint_buffer, 0.25 * (self._body.upper - self._body.lower))
+        lower, upper = self._body.lower + buffer, self._body.upper - buffer
+        angles = raw[:, 7:]
+        outside = np.minimum(angles - lower, 0.0) + np.maximum(angles - upper, 0.0)
+        weight, residual = np.zeros_like(raw), np.zeros_like(raw)
+        weight[:, 7:] = (outside != 0.0) / self._scales.joint_limit
+        residual[:, 7:] = outside / self._scales.joint_limit
+        self._add_diagonal(out, 0, weight, residual)
+
+    def _add_rates(self, out: _Linearised, rate: FloatArray) -> None:
+        scales = self._scales
+        limit = scales.velocity_share * self._body.velocity_limit
+        excess = np.sign(rate[:, 7:]) * np.maximum(np.abs(rate[:, 7:]) - limit, 0.0)
+        weight, residual = np.zeros_like(rate), np.zeros_like(rate)
+        weight[:, 7:] = (excess != 0.0) / scales.joint_velocity
+        residual[:, 7:] = excess / scales.joint_velocity
+        for end in (0, -1):
+            weight[end], residual[end] = 1.0 / scales.rest, rate[end] / scales.rest
+        self._add_diagonal(out, 1, weight, residual)
+
+    def _add_accelerations(self, out: _Linearised, second: FloatArray) -> None:
+        weight = np.full_like(second, 1.0 / self._scales.acceleration)
+        weight[:, :7] = 1.0 / self._scales.pelvis_acceleration
+        self._add_diagonal(out, 2, weight, weight * second)
+
+
+def _to_raw(jacobian: FloatArray, tangent: FloatArray) -> FloatArray:
+    """Map tangent Jacobians (n, m, nv) to raw coordinates (n, m, nq)."""
+    return np.concatenate([jacobian[:, :, :6] @ tangent[:, :6, :], jacobian[:, :, 6:]], axis=2)
+
+
+def _append_ragged(
+    jacobian: FloatArray, residual: FloatArray, near: list[tuple[int, FloatArray, FloatArray]]
+) -> tuple[FloatArray, FloatArray]:
+    """Append a varying number of rows per sample, padded with zeros."""
+    most = max(len(values) for _, _, values in near)
+    extra_jacobian = np.zeros((len(jacobian), most, jacobian.shape[2]))
+    extra_residual = np.zeros((len(residual), most))
+    for s, rows, values in near:
+        extra_jacobian[s, : len(values)] = rows
+        extra_residual[s, : len(values)] = values
+    return np.concatenate([jacobian, extra_jacobian], axis=1), np.concatenate([residual, extra_residual], axis=1)
+
+
+def _inverse_square(scale: FloatArray) -> FloatArray:
+    with np.errstate(divide="ignore"):
+        return np.where(np.isinf(scale), 0.0, 1.0 / np.square(scale))
