@@ -1,0 +1,411 @@
+"""The posture generator: a whole-body configuration that meets requirements ([Qiu2012]_ 6.2.2).
+
+Sequential quadratic programming on the tangent space of the body.  With requirements
+``r(q) = 0``, distances ``d(q) >= 0`` and wishes ``s(q)`` each iteration solves, for the
+tangent step ``v``,
+
+    min  1/2 |s + S v|^2_W + 1/2 rho |r + R v + u|^2 + 1/2 rho |slack|^2
+    s.t. d + D v + slack >= 0,  hinge ranges,  |v|_inf <= trust region,
+
+which always has a solution, also where the requirements have none.  The offset ``u``
+accumulates what is left of ``r`` (method of multipliers), so that the requirements end up
+exact and not merely heavily weighted.  Steps are accepted when the sum of the squares falls.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import daqp
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from manikin.body.configuration import Configuration
+from manikin.errors import BodyError
+from manikin.posture.problem import PostureProblem
+from manikin.posture.terms import ClearanceTerm, LimitTerm, Linearised, PositionTerm, RotationTerm, Term
+from manikin.scene.distance import Pair
+from manikin.spatial import FloatArray, finite_number, frozen_array
+
+RESTARTS: tuple[dict[str, float], ...] = (
+    {"hip_flexion": 1.4, "knee_flexion": 1.9, "ankle_dorsiflexion": 0.5},
+    {"lumbar_flexion": 0.5, "thorax_flexion": 0.3, "neck_flexion": -0.3,
+     "hip_flexion": 1.8, "knee_flexion": 2.0, "ankle_dorsiflexion": 0.5},
+    {"lumbar_flexion": 0.6, "thorax_flexion": 0.4, "neck_flexion": -0.4,
+     "hip_flexion": 1.2, "knee_flexion": 0.9, "ankle_dorsiflexion": 0.3},
+)  # fmt: skip
+"""Angles [rad] of hinges by the end of their names, from which a failed search is repeated:
+a squat, a crouch and a stoop."""
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """How hard to try.
+
+    Attributes:
+        tolerance: Largest residual of a requirement [m, rad].
+        clearance_tolerance: Largest intrusion into a safety distance [m].
+        settled: Change of a coordinate in one iteration below which the wishes count as met [m, rad].
+        iterations: Largest number of iterations of each start.
+        stiffness: Weight rho of requirements against wishes.
+        trust: First trust region [m, rad].
+        activation: Pairs farther than the safety distance plus this are not looked at [m].
+        buffer: Aimed at beyond the safety distance [m].
+        restarts: Whether to try again from crouched postures.
+        explain: Whether a failure is examined further (costs a few solutions).
+    """
+
+    tolerance: float = 1e-6
+    clearance_tolerance: float = 1e-4
+    settled: float = 5e-3
+    iterations: int = 60
+    stiffness: float = 1e5
+    trust: float = 0.3
+    activation: float = 0.10
+    buffer: float = 5e-4
+    restarts: bool = True
+    explain: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("tolerance", "clearance_tolerance", "settled", "stiffness", "trust", "activation"):
+            finite_number(getattr(self, name), f"posture settings {name}", above=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PostureResult:
+    """A posture, or the best attempt and what it misses.
+
+    Attributes:
+        succeeded: Whether every requirement is met.
+        q: (nq,) configuration found.
+        error: Largest residual of the requirements [m, rad].
+        clearance: Smallest distance beyond the safety distances [m] among the close pairs;
+            infinite when none is close.
+        closest: The pair of shapes there, or None.
+        at_limit: Hinges at an end of their range.
+        iterations: Iterations over all starts.
+        misses: What each requirement that is not met misses, worst first.
+        failure: None, or the explanation in one line.
+    """
+
+    succeeded: bool
+    q: FloatArray
+    error: float
+    clearance: float
+    closest: Pair | None
+    at_limit: tuple[str, ...]
+    iterations: int
+    misses: tuple[str, ...] = ()
+    failure: str | None = None
+
+
+def generate_posture(
+    problem: PostureProblem, start: ArrayLike | None = None, *, settings: SolverSettings | None = None
+) -> PostureResult:
+    """Find a posture.
+
+    Args:
+        problem: Requirements and preferences.
+        start: (nq,) where to begin, such as a neighbouring posture; the reference placed over
+            the contacts when omitted.
+        settings: How hard to try.
+
+    Returns:
+        The posture of the first start that meets all requirements, otherwise the best attempt
+        with an explanation.
+
+    Raises:
+        BodyError: If ``start`` has another length or is not finite.
+    """
+    settings = settings or SolverSettings()
+    solver = PostureSolver(problem, settings)
+    freely = PostureSolver(replace(problem, proximity=None), settings)
+    found: list[_Iterate] = []
+    for q, warm in _starts(problem, start, settings):
+        # A cold start goes to its contacts through the obstacles first: from outside, thin
+        # obstacles would trap it on their wrong side.
+        through = q if warm or problem.proximity is None else freely.solve(q).q
+        found.append(solver.solve(through))
+        if solver.meets(found[-1]):
+            break
+    best = min(found, key=lambda item: (not solver.meets(item), item.violation))
+    return solver.result(best, solver.iterations + freely.iterations)
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterate:
+    """Everything known at one configuration.
+
+    Attributes:
+        q: (nq,).
+        requirement: Stacked residual and Jacobian of the requirements.
+        parts: Slice of each requirement in the stack.
+        wish: Stacked residual and Jacobian of the wishes.
+        clearance: (k,) distances beyond the safety distances, with Jacobian.
+        pairs: Shapes of each clearance.
+    """
+
+    q: FloatArray
+    requirement: Linearised
+    parts: tuple[slice, ...]
+    wish: Linearised
+    clearance: Linearised
+    pairs: tuple[Pair, ...]
+
+    @property
+    def error(self) -> float:
+        """Largest residual of the requirements."""
+        return float(np.abs(self.requirement.residual).max(initial=0.0))
+
+    @property
+    def intrusion(self) -> float:
+        """Deepest intrusion into a safety distance [m]."""
+        return float(max(0.0, -self.clearance.residual.min(initial=np.inf)))
+
+    @property
+    def violation(self) -> float:
+        """Error and intrusion together, for choosing among failures."""
+        return max(self.error, self.intrusion)
+
+
+class PostureSolver:
+    """Solves one problem from several starts."""
+
+    def __init__(self, problem: PostureProblem, settings: SolverSettings) -> None:
+        self.problem = problem
+        self.settings = settings
+        self.requirements: tuple[Term, ...] = problem.requirements()
+        self._limits: LimitTerm = problem.limits()
+        self._clearances: ClearanceTerm | None = problem.clearances(settings.activation)
+        wishes = problem.wishes()
+        self._wishes = tuple(term for _, term in wishes)
+        self._wish_weights = np.concatenate([weight for weight, _ in wishes])
+        self._configuration = Configuration(problem.body, problem.reference)
+        self.iterations = 0
+
+    def solve(self, q: FloatArray) -> _Iterate:
+        """Iterate from one start until the posture settles or nothing improves any more."""
+        settings = self.settings
+        iterate = self.linearise(self._inside_limits(q))
+        offset = np.zeros_like(iterate.requirement.residual)
+        trust, stalled = settings.trust, 0
+        for _ in range(settings.iterations):
+            self.iterations += 1
+            step, predicted = self._step(iterate, offset, trust)
+            candidate = self.linearise(pin.integrate(self.problem.body.pinocchio, iterate.q, step))
+            before = self._merit(iterate, offset)
+            gained = before - self._merit(candidate, offset)
+            expected = before - predicted
+            if gained < 0.1 * expected and not self._tiny(step):
+                trust = 0.3 * min(trust, float(np.abs(step).max()))
+                if trust < 1e-6:
+                    break
+                if gained <= 0.0:
+                    continue
+            elif gained > 0.7 * expected:
+                trust = min(2.0 * trust, 0.8)
+            iterate = candidate
+            if self.meets(iterate) and float(np.abs(step).max()) < settings.settled:
+                break
+            stalled = stalled + 1 if gained < 1e-4 * before and not self.meets(iterate) else 0
+            if stalled >= 8:
+                break
+            if iterate.error < 1e-2:
+                offset = np.clip(offset + iterate.requirement.residual, -0.02, 0.02)
+        return iterate
+
+    def meets(self, iterate: _Iterate) -> bool:
+        """Whether all requirements and safety distances are kept."""
+        return (
+            iterate.error <= self.settings.tolerance
+            and iterate.intrusion <= self.settings.clearance_tolerance
+        )
+
+    def linearise(self, q: FloatArray) -> _Iterate:
+        """Evaluate every term."""
+        configuration = self._configuration.update(q)
+        nv = self.problem.body.nv
+        requirements = [term.evaluate(configuration) for term in self.requirements]
+        ends = np.cumsum([0, *(len(item.residual) for item in requirements)])
+        parts = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        wishes = [term.evaluate(configuration) for term in self._wishes]
+        if self._clearances is None:
+            clearance, pairs = Linearised(np.zeros(0), np.zeros((0, nv))), ()
+        else:
+            found = self._clearances.evaluate(configuration)
+            clearance, pairs = Linearised(found.residual, found.jacobian), found.pairs
+        return _Iterate(q, _stack(requirements, nv), parts, _stack(wishes, nv), clearance, pairs)
+
+    def result(self, iterate: _Iterate, iterations: int) -> PostureResult:
+        """Pack the best iterate, with an explanation when it does not meet the requirements."""
+        succeeded = self.meets(iterate)
+        residual = iterate.clearance.residual
+        worst = int(np.argmin(residual)) if len(residual) else -1
+        misses = () if succeeded else self._misses(iterate)
+        limits = self._limits.at_limit(self._configuration.update(iterate.q))
+        return PostureResult(
+            succeeded,
+            frozen_array(iterate.q, "posture q"),
+            iterate.error,
+            float(residual[worst]) if worst >= 0 else float("inf"),
+            iterate.pairs[worst] if worst >= 0 else None,
+            limits,
+            iterations,
+            misses,
+            None if succeeded else self._explanation(misses, limits),
+        )
+
+    def _inside_limits(self, q: FloatArray) -> FloatArray:
+        body = self.problem.body
+        return np.concatenate([q[:7], np.clip(q[7:], body.lower, body.upper)])
+
+    def _merit(self, iterate: _Iterate, offset: FloatArray) -> float:
+        intrusion = np.minimum(iterate.clearance.residual - self.settings.buffer, 0.0)
+        hard = np.sum((iterate.requirement.residual + offset) ** 2) + np.sum(intrusion**2)
+        soft = np.sum(self._wish_weights * iterate.wish.residual**2)
+        return float(0.5 * soft + 0.5 * self.settings.stiffness * hard)
+
+    def _step(self, iterate: _Iterate, offset: FloatArray, trust: float) -> tuple[FloatArray, float]:
+        """Solve the quadratic programme; returns the step and the merit it predicts."""
+        rho, buffer = self.settings.stiffness, self.settings.buffer
+        residual, jacobian = iterate.requirement
+        wish, wish_jacobian = iterate.wish
+        weighted = self._wish_weights[:, None] * wish_jacobian
+        nv = self.problem.body.nv
+        damping = self.problem.preferences.damping
+        hessian = wish_jacobian.T @ weighted + rho * (jacobian.T @ jacobian) + damping * np.eye(nv)
+        gradient = weighted.T @ wish + rho * (jacobian.T @ (residual + offset))
+        lower, upper = self._bounds(iterate.q, trust)
+        distance, slope = iterate.clearance
+        count = len(distance)
+        step, _, flag, _ = daqp.solve(
+            np.ascontiguousarray(hessian),
+            np.ascontiguousarray(gradient),
+            np.ascontiguousarray(slope),
+            np.concatenate([upper, np.full(count, 1e30)]),
+            np.concatenate([lower, buffer - distance]),
+            np.concatenate([np.zeros(nv), np.full(count, _SOFT)]).astype(np.int32),
+            rho_soft=1.0 / rho,
+        )
+        step = np.asarray(step, dtype=np.float64) if flag > 0 else np.zeros(nv)
+        hard = np.sum((residual + jacobian @ step + offset) ** 2)
+        hard += np.sum(np.minimum(distance + slope @ step - buffer, 0.0) ** 2)
+        soft = np.sum(self._wish_weights * (wish + wish_jacobian @ step) ** 2)
+        return step, float(0.5 * soft + 0.5 * rho * hard)
+
+    def _bounds(self, q: FloatArray, trust: float) -> tuple[FloatArray, FloatArray]:
+        """Trust region cut by the hinge ranges."""
+        angles, body = q[7:], self.problem.body
+        lower, upper = np.full(body.nv, -trust), np.full(body.nv, trust)
+        lower[6:] = np.maximum(lower[6:], np.minimum(body.lower - angles, 0.0))
+        upper[6:] = np.minimum(upper[6:], np.maximum(body.upper - angles, 0.0))
+        return lower, upper
+
+    def _tiny(self, step: FloatArray) -> bool:
+        """A step whose gain drowns in rounding errors of the merit."""
+        return bool(np.abs(step).max(initial=0.0) < 1e-5)
+
+    def _misses(self, iterate: _Iterate) -> tuple[str, ...]:
+        """What is not met, worst first."""
+        found: list[tuple[float, str]] = []
+        for term, part in zip(self.requirements, iterate.parts, strict=True):
+            residual = iterate.requirement.residual[part]
+            size = float(np.abs(residual).max())
+            if size > self.settings.tolerance:
+                found.append((size, term.describe(residual)))
+        if self._clearances is not None and iterate.intrusion > self.settings.clearance_tolerance:
+            text = self._clearances.describe(iterate.clearance.residual, iterate.pairs)
+            found.append((iterate.intrusion, text))
+        return tuple(text for _, text in sorted(found, key=lambda item: -item[0]))
+
+    def _explanation(self, misses: tuple[str, ...], limits: tuple[str, ...]) -> str:
+        text = "; ".join(misses[:2])
+        if limits:
+            text += f"; at the end of their range: {', '.join(limits[:6])}"
+        blame = self._blame() if self.settings.explain else None
+        return text + (f"; a posture exists without {blame}" if blame else "")
+
+    def _blame(self) -> str | None:
+        """A single requirement without which a posture exists, or None."""
+        quick = replace(self.settings, explain=False)
+        for name, lighter in _without_one(self.problem):
+            if generate_posture(lighter, settings=quick).succeeded:
+                return name
+        return None
+
+
+_SOFT = 8
+"""DAQP's mark of a constraint that may be broken at a price."""
+
+
+def place_over_contacts(problem: PostureProblem, q: FloatArray) -> FloatArray:
+    """(nq,) posture ``q`` moved as a rigid whole onto the places its effectors must have.
+
+    The root is turned about the vertical to the mean heading of the required rotations and
+    moved so that the mean of the effectors' positions matches.
+    """
+    positions = [t for t in problem.requirements() if isinstance(t, PositionTerm)]
+    rotations = [t for t in problem.requirements() if isinstance(t, RotationTerm)]
+    feet = [t for t in positions if t.kind == "contact" and "foot" in t.effector] or positions
+    configuration = Configuration(problem.body, q)
+    turned = np.array(configuration.q)
+    if rotations:
+        headings = [
+            _heading(t.rotation @ configuration.effector_placement(t.effector)[0].T) for t in rotations
+        ]
+        yaw = float(np.arctan2(np.sum(np.sin(headings)), np.sum(np.cos(headings))))
+        turn = pin.SE3(pin.utils.rotate("z", yaw), np.zeros(3))
+        turned[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(turned[:7]))
+        configuration.update(turned)
+    if feet:
+        offsets = [t.position - configuration.effector_placement(t.effector)[1] for t in feet]
+        turned[:3] += np.mean(offsets, axis=0)
+    elif problem.com is not None:
+        turned[:3] += np.nan_to_num(problem.com - configuration.com)
+    return turned
+
+
+def _starts(
+    problem: PostureProblem, start: ArrayLike | None, settings: SolverSettings
+) -> Iterator[tuple[FloatArray, bool]]:
+    """Configurations to begin from, the most promising first, and whether each is near a solution."""
+    if start is not None:
+        yield frozen_array(start, "posture start", (problem.body.nq,), BodyError), True
+        if not settings.restarts:
+            return
+    assert problem.reference is not None  # set on construction
+    yield place_over_contacts(problem, problem.reference), False
+    if not settings.restarts:
+        return
+    for angles in RESTARTS:
+        q = np.array(problem.reference)
+        for index, name in enumerate(problem.body.joint_names):
+            q[7 + index] = next((value for key, value in angles.items() if name.endswith(key)), q[7 + index])
+        yield place_over_contacts(problem, q), False
+
+
+def _without_one(problem: PostureProblem) -> Iterator[tuple[str, PostureProblem]]:
+    """The problem with one requirement left out at a time."""
+    if problem.com is not None:
+        yield "the centre-of-mass requirement", replace(problem, com=None)
+    if problem.proximity is not None:
+        yield "the clearances", replace(problem, proximity=None)
+    for contact in problem.contacts:
+        rest = tuple(other for other in problem.contacts if other is not contact)
+        yield f"contact '{contact.effector}'", replace(problem, contacts=rest)
+    for name in problem.placements:
+        rest_of = {key: value for key, value in problem.placements.items() if key != name}
+        yield f"placement '{name}'", replace(problem, placements=rest_of)
+
+
+def _stack(parts: list[Linearised], nv: int) -> Linearised:
+    if not parts:
+        return Linearised(np.zeros(0), np.zeros((0, nv)))
+    return Linearised(
+        np.concatenate([part.residual for part in parts]), np.vstack([part.jacobian for part in parts])
+    )
+
+
+def _heading(rotation: FloatArray) -> float:
+    return float(np.arctan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1]))
