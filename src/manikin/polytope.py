@@ -9,18 +9,16 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linprog
-from scipy.spatial import HalfspaceIntersection, QhullError
+from scipy.spatial import HalfspaceIntersection
 
 from manikin.errors import PolytopeError
+from manikin.normal_fan import NormalFan, fan_of_generators
 from manikin.spatial import FloatArray
 
 FLATNESS = 1e-12
 """Half thickness of a flat polytope, relative to its extent."""
-
-RANK_TOLERANCE = 1e-10
-"""Singular values below this fraction of the largest are a flat direction of a hull."""
 
 _BLOCK = 2048
 
@@ -53,6 +51,19 @@ class Polytope:
             PolytopeError: If there is no point or a coordinate is not finite.
         """
         return cls(*convex_hull(points))
+
+    @classmethod
+    def from_generators(cls, points: ArrayLike, segments: ArrayLike) -> Self:
+        """Hull of points plus the sum of the segments ``[-s, s]`` (a zonotope for one point).
+
+        Args:
+            points: (n, d), at least one.
+            segments: (q, d) half segments.
+
+        Raises:
+            PolytopeError: If there is no point or a number is not finite.
+        """
+        return cls(*convex_hull(points, segments))
 
     @property
     def dimension(self) -> int:
@@ -98,9 +109,9 @@ class Polytope:
         """Radius of the largest ball about ``point`` inside the polytope, 0 outside."""
         return np.maximum(self.margin(point), 0.0)
 
-    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> FloatArray:
+    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
         """Whether each point is inside, give or take ``tolerance``."""
-        return self.margin(points) >= -tolerance
+        return np.asarray(self.margin(points) >= -tolerance)
 
     def inscribed_ball(self) -> tuple[FloatArray, float]:
         """Centre (d,) and radius of the largest ball inside ([Qiu2012]_ 2.25).
@@ -141,10 +152,7 @@ class Polytope:
         centre, radius = self.inscribed_ball()
         if radius <= _tolerance(self.h):
             raise PolytopeError("polytope is flat; valid: one with a ball inside")
-        found = HalfspaceIntersection(np.column_stack([self.H, -self.h]), centre).intersections
-        if not np.all(np.isfinite(found)):
-            raise PolytopeError("polytope is unbounded; valid: a bounded one")
-        return np.unique(found.round(12), axis=0)
+        return vertices_around(self.H, self.h, centre)
 
     def _largest_ball(self, largest: float | None) -> tuple[FloatArray, float]:
         d = self.dimension
@@ -166,57 +174,54 @@ class Polytope:
         return answer.x[:-1] * scale, float(answer.x[-1]) * scale
 
 
-def convex_hull(points: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Facets of the hull of points, each facet once, flat hulls included.
-
-    The hull is found in whitened coordinates of the points' affine hull, as the dual of a
-    halfspace intersection: Qhull then merges coplanar simplices into whole facets.
+def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
+    """Facets of the hull of points (plus segments ``[-s, s]``), each once, flat hulls included.
 
     Args:
         points: (n, d).
+        segments: (q, d), none when omitted.
 
     Returns:
         H (m, d) with unit rows and h (m,).
 
     Raises:
-        PolytopeError: If there is no point, or a coordinate is not finite.
+        PolytopeError: If there is no point, or a number is not finite.
     """
     v = np.asarray(points, dtype=np.float64)
     if v.ndim != 2 or len(v) == 0 or not np.all(np.isfinite(v)):
         raise PolytopeError(f"hull of points of shape {v.shape}; valid: (n, d) finite points, n >= 1")
+    s = np.zeros((0, v.shape[1])) if segments is None else np.asarray(segments, dtype=np.float64)
+    if s.ndim != 2 or s.shape[1] != v.shape[1] or not np.all(np.isfinite(s)):
+        raise PolytopeError(f"segments have shape {s.shape}; valid: (q, {v.shape[1]}) finite half segments")
     centre = v.mean(axis=0)
-    _, spread, axes = np.linalg.svd(v - centre, full_matrices=True)
-    rank = int(np.sum(spread > max(RANK_TOLERANCE * spread[0], 1e-300))) if len(spread) else 0
-    across = axes[rank:]
-    flat_h = across @ centre
-    slack = FLATNESS * max(1.0, float(np.abs(v).max()))
-    H, h = [across, -across], [flat_h + slack, slack - flat_h]
-    if rank:
-        to_white = axes[:rank] / spread[:rank, None]
-        normals = _facet_normals((v - centre) @ to_white.T) @ to_white
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
-        H.insert(0, normals)
-        h.insert(0, (normals @ v.T).max(axis=1))
-    return np.vstack(H), np.concatenate(h)
+    fan = fan_of_generators(v - centre, np.ones((len(v), 1)), np.array([False])).plus_segments(s)
+    H, h = facet_rows(fan, max(1.0, float(np.abs(v).max())))[:2]
+    return H, h + H @ centre
 
 
-def _facet_normals(white: FloatArray) -> FloatArray:
-    """Normals of a full-dimensional hull about the origin, each facet once."""
-    if white.shape[1] == 1:
-        return np.array([[1.0], [-1.0]])
-    white = white * np.sqrt(len(white))
-    try:
-        hull = HalfspaceIntersection(np.column_stack([white, -np.ones(len(white))]), np.zeros(white.shape[1]))
-    except QhullError as error:
-        raise PolytopeError(
-            f"hull of {white.shape} points failed in Qhull: {str(error).splitlines()[0]}"
-        ) from None
-    return _distinct(hull.dual_equations[:, :-1])
+def vertices_around(H: FloatArray, h: FloatArray, interior: FloatArray) -> FloatArray:
+    """(n, d) vertices of ``H x <= h`` around a point strictly inside.
+
+    Raises:
+        PolytopeError: If the polytope is unbounded.
+    """
+    found = HalfspaceIntersection(np.column_stack([H, -h]), interior).intersections
+    if not np.all(np.isfinite(found)) or np.abs(found).max() > 1e12 * (1.0 + np.abs(h).max()):
+        raise PolytopeError("polytope is unbounded; valid: a bounded one")
+    return found
 
 
-def _distinct(rows: FloatArray) -> FloatArray:
-    _, first = np.unique(rows.round(9), axis=0, return_index=True)
-    return rows[np.sort(first)]
+def facet_rows(fan: NormalFan, extent: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rows ``H x <= h`` of a fan's polytope, equalities as loosened pairs at the end.
+
+    Returns:
+        H (m, d), h (m,) and the level multipliers (m, k), zero for equalities.
+    """
+    facets = fan.facets()
+    across = facets.flat
+    slack = np.full(2 * len(across), max(FLATNESS * extent, fan.thickness))
+    multipliers = np.vstack([facets.multipliers, np.zeros((len(slack), facets.multipliers.shape[1]))])
+    return np.vstack([facets.H, across, -across]), np.concatenate([facets.h, slack]), multipliers
 
 
 def _unit_rows(H: ArrayLike, h: ArrayLike) -> tuple[FloatArray, FloatArray]:

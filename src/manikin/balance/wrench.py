@@ -1,21 +1,34 @@
-"""The admissible pseudo-wrench space W_p of a stance and the pseudo-wrench itself."""
+"""The admissible pseudo-wrench space W_p of a stance and the pseudo-wrench itself.
 
+W_p is the sum over the contacts of the wrenches each can apply, under their own caps and
+the stance's cap on the sum of normal forces. It is found from generators: every edge of a
+friction pyramid (every vertex, for a sole with a torsion limit) is a ray of one cone whose
+slice at the caps is W_p, and every axis of a grasp box is a segment added to it.
+
+A stance with few contacts has a flat W_p (a point contact can give no moment about
+itself). Such a W_p carries each equality as a pair of opposite rows at the end of H: the
+margin of a wrench is then 0 at best, and negative as soon as the equality is broken.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.balance.friction import FrictionModel, edge_wrenches
+from manikin.balance.friction import FrictionModel, contact_to_world, cross, edge_wrenches
+from manikin.balance.limiting import LimitingConstraint, limiting_constraint
+from manikin.balance.limits import contact_limits
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.errors import ContactError
-from manikin.polytope import Polytope, convex_hull
-from manikin.spatial import GRAVITY_VECTOR, FloatArray, frozen_array
+from manikin.normal_fan import fan_of_generators
+from manikin.polytope import Polytope, facet_rows, vertices_around
+from manikin.spatial import GRAVITY_VECTOR, FloatArray, finite_number, frozen_array
 
 
 @dataclass(frozen=True, eq=False)
 class WrenchPolytope(Polytope):
-    """W_p: wrenches that the scene can apply to the body ([Qiu2012]_ 4.36).
+    """W_p: the wrenches that the scene can apply to the body ([Qiu2012]_ 4.36).
 
     Attributes:
         H: (m, 6) unit rows over [force; moment], world axes, alpha = 1 m.
@@ -23,19 +36,50 @@ class WrenchPolytope(Polytope):
         stance: The contacts.
         reference: (3,) point of the moments [m].
         friction_model: ``"pyramid"`` or ``"inner"``.
+        stance_cap_multipliers: (m,) growth of each offset per newton of the stance's
+            ``normal_force_cap``; 0 where that cap does not matter.
     """
 
     stance: Stance
     reference: FloatArray
     friction_model: FrictionModel
+    stance_cap_multipliers: FloatArray
 
     def __init__(
-        self, H: ArrayLike, h: ArrayLike, stance: Stance, reference: ArrayLike, friction_model: FrictionModel
+        self,
+        H: ArrayLike,
+        h: ArrayLike,
+        stance: Stance,
+        reference: ArrayLike,
+        friction_model: FrictionModel,
+        stance_cap_multipliers: ArrayLike,
     ) -> None:
+        length = np.linalg.norm(np.asarray(H, dtype=np.float64), axis=1)
         super().__init__(H, h)
         object.__setattr__(self, "stance", stance)
-        object.__setattr__(self, "reference", frozen_array(reference, "reference", (3,), ContactError))
+        object.__setattr__(self, "reference", frozen_array(reference, "reference [m]", (3,), ContactError))
         object.__setattr__(self, "friction_model", friction_model)
+        multipliers = frozen_array(
+            np.asarray(stance_cap_multipliers) / length, "stance_cap_multipliers", (len(self.h),)
+        )
+        object.__setattr__(self, "stance_cap_multipliers", multipliers)
+
+    def at_reference(self, reference: ArrayLike) -> "WrenchPolytope":
+        """The same set with moments about another point, rows of unit length there.
+
+        The margin changes with the reference ([Qiu2012]_ 4.2.9, remark 2).
+        """
+        point = frozen_array(reference, "reference [m]", (3,), ContactError)
+        H = _moved(self.H, self.reference, point)
+        return WrenchPolytope(H, self.h, self.stance, point, self.friction_model, self.stance_cap_multipliers)
+
+    def limiting(self, wrench: ArrayLike) -> LimitingConstraint:
+        """Name the contact and the limit that the nearest facet of W_p stands for.
+
+        Args:
+            wrench: (6,) pseudo-wrench about :attr:`reference`.
+        """
+        return limiting_constraint(self, wrench)
 
 
 def pseudo_wrench(
@@ -47,23 +91,27 @@ def pseudo_wrench(
 ) -> FloatArray:
     """Wrench that the scene must apply: ``[m (a - g); (x - o) ^ m (a - g) + Ldot]``.
 
-    [Qiu2012]_ 4.6 for the point mass, 4.51 with the rate of change of the angular momentum.
+    [Qiu2012]_ 4.6 for the point mass, 4.51 with the rate of change of angular momentum.
 
     Args:
-        mass: [kg].
+        mass: [kg], > 0.
         com: (..., 3) [m].
         acceleration: (..., 3) of the CoM [m/s^2].
         angular_momentum_rate: (..., 3) about the CoM [N.m]; zero when omitted.
-        reference: (3,) point ``o`` of the moments [m]; the world origin when omitted.
+        reference: (..., 3) point ``o`` of the moments [m]; the world origin when omitted.
 
     Returns:
         (..., 6) [N, N.m].
+
+    Raises:
+        InputError: If the mass is not positive.
     """
+    mass = finite_number(mass, "mass [kg]", above=0.0)
     force = mass * (np.asarray(acceleration, dtype=np.float64) - GRAVITY_VECTOR)
     arm = np.asarray(com, dtype=np.float64)
     if reference is not None:
         arm = arm - np.asarray(reference, dtype=np.float64)
-    moment = np.cross(arm, force)
+    moment = cross(arm, force)
     if angular_momentum_rate is not None:
         moment = moment + np.asarray(angular_momentum_rate, dtype=np.float64)
     return np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
@@ -72,37 +120,111 @@ def pseudo_wrench(
 def wrench_polytope(
     stance: Stance, *, friction_model: FrictionModel = "pyramid", reference: ArrayLike = (0.0, 0.0, 0.0)
 ) -> WrenchPolytope:
-    """W_p of a stance.
+    """Facets of W_p, each once ([Qiu2012]_ 4.36; ours are found from generators).
+
+    Args:
+        stance: Contacts and caps; none at all (flight) gives the single point 0.
+        friction_model: ``"pyramid"`` (4.18-4.19) or ``"inner"`` (mu / sqrt 2).
+        reference: (3,) point of the moments [m].
 
     Raises:
-        ContactError: If no cap closes the polytope.
+        ContactError: If the normal force of a contact is bounded by no cap.
     """
-    origin = frozen_array(reference, "reference", (3,), ContactError)
-    points = np.zeros((1, 6))
-    coned = [c for c in stance if c.kind is not ContactKind.GRASP]
-    if coned and stance.normal_force_cap is not None:
-        edges = np.vstack([edge_wrenches(c, friction_model, origin) for c in coned])
-        points = np.vstack([points, stance.normal_force_cap * edges])
-    elif coned:
-        for c in coned:
-            if c.normal_force_cap is None:
-                raise ContactError(
-                    f"no cap bounds the normal force of {c.effector!r}; valid: give it normal_force_cap [N] "
-                    "or give the stance one"
-                )
-            own = np.vstack([np.zeros((1, 6)), c.normal_force_cap * edge_wrenches(c, friction_model, origin)])
-            points = (points[:, None] + own).reshape(-1, 6)
-    for c in stance:
-        if c.kind is ContactKind.GRASP:
-            points = (points[:, None] + _grasp_corners(c, origin)).reshape(-1, 6)
-    return WrenchPolytope(*convex_hull(points), stance, origin, friction_model)
+    origin = frozen_array(reference, "reference [m]", (3,), ContactError)
+    local = np.mean([contact.position for contact in stance], axis=0) if len(stance) else origin
+    caps = _Caps.of(stance)
+    generators, levels = _generators(stance, caps, friction_model, local)
+    segments = [_grasp_segments(c, local) for c in stance if c.kind is ContactKind.GRASP]
+    fan = fan_of_generators(generators, levels, np.ones(levels.shape[1], dtype=np.bool_))
+    fan = fan.plus_segments(np.vstack([np.zeros((0, 6)), *segments]))
+    H, h, multipliers = facet_rows(fan, max(1.0, float(np.abs(generators).max(initial=0.0))))
+    of_stance = np.zeros(len(h)) if caps.total is None else multipliers[:, -1] / caps.total
+    return WrenchPolytope(_moved(H, local, origin), h, stance, origin, friction_model, of_stance)
 
 
-def _grasp_corners(contact: Contact, reference: FloatArray) -> FloatArray:
-    signs = np.array(list(product((-1.0, 1.0), repeat=3)))
-    force = contact.max_force * signs
-    corners = np.hstack([force, np.cross(contact.position - reference, force)])
+@dataclass(frozen=True)
+class _Caps:
+    """Caps that matter: each contact's own, and the one on the sum.
+
+    Attributes:
+        own: One per frictional contact; None where only the sum bounds it.
+        total: On the sum; None where the contacts' own caps imply it.
+    """
+
+    own: Sequence[float | None]
+    total: float | None
+
+    @classmethod
+    def of(cls, stance: Stance) -> "_Caps":
+        total = stance.normal_force_cap
+        frictional = [c for c in stance if c.kind is not ContactKind.GRASP]
+        own = [_own_cap(contact, total) for contact in frictional]
+        known = [cap for cap in own if cap is not None]
+        if not own or (total is not None and len(known) == len(own) and sum(known) <= total):
+            total = None
+        return cls(own, total)
+
+
+def _own_cap(contact: Contact, total: float | None) -> float | None:
+    own = contact.normal_force_cap
+    if own is None and total is None:
+        raise ContactError(
+            f"nothing bounds the normal force of {contact.effector!r}; "
+            "valid: a normal_force_cap [N] for this contact or for the stance"
+        )
+    if contact.torsion_limit is not None:
+        return min(cap for cap in (own, total) if cap is not None)
+    return own if total is None or own is None or own < total else None
+
+
+def _generators(
+    stance: Stance, caps: _Caps, friction_model: FrictionModel, reference: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Generators (n, 6) and the share of each cap that each one uses (n, caps)."""
+    frictional = [c for c in stance if c.kind is not ContactKind.GRASP]
+    with_own = [i for i, cap in enumerate(caps.own) if cap is not None]
+    columns = len(with_own) + (caps.total is not None)
+    generators, levels = [np.zeros((0, 6))], [np.zeros((0, columns))]
+    for i, contact in enumerate(frictional):
+        own = caps.own[i]
+        cap = own if own is not None else caps.total
+        local = _extreme_wrenches(contact, cap if cap is not None else np.inf, friction_model)
+        level = np.zeros((len(local), columns))
+        if own is not None:
+            level[:, with_own.index(i)] = 1.0
+        if caps.total is not None:
+            level[:, -1] = local[:, 2] / caps.total
+        generators.append(contact_to_world(contact, local, reference))
+        levels.append(level)
+    return np.vstack(generators), np.vstack(levels)
+
+
+def _extreme_wrenches(contact: Contact, cap: float, friction_model: FrictionModel) -> FloatArray:
+    """(n, 6) wrenches in the contact frame whose hull with 0 is the contact's set up to the cap."""
+    if contact.torsion_limit is None:
+        return cap * edge_wrenches(contact, friction_model)
+    limits = contact_limits(contact, friction_model)
+    top = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    unit = np.array([cap] * 3 + [cap * contact.length] * 3)
+    vertices = vertices_around(
+        np.vstack([limits.A, top]) * unit, np.append(limits.b, cap), np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.0])
+    )
+    return vertices[np.abs(vertices).max(axis=1) > 1e-9] * unit
+
+
+def _grasp_segments(contact: Contact, reference: FloatArray) -> FloatArray:
+    """(3 or 6, 6) half axes of the grasp's box of forces and moments ([Qiu2012]_ 4.22)."""
+    force = contact.max_force * np.eye(3)
+    forces = np.hstack([force, cross((contact.position - reference)[None], force)])
     if contact.max_moment == 0:
-        return corners
-    moments = np.hstack([np.zeros((8, 3)), contact.max_moment * signs])
-    return (corners[:, None] + moments).reshape(-1, 6)
+        return forces
+    return np.vstack([forces, np.hstack([np.zeros((3, 3)), contact.max_moment * np.eye(3)])])
+
+
+def _moved(H: FloatArray, old: FloatArray, new: FloatArray) -> FloatArray:
+    """Rows on wrenches about ``old`` rewritten for wrenches about ``new``.
+
+    ``H1 f + H2 (tau + (new - old) ^ f)`` with the moment ``tau`` about ``new``.
+    """
+    arm = (new - old)[None]
+    return np.hstack([H[:, :3] + cross(H[:, 3:], np.broadcast_to(arm, (len(H), 3))), H[:, 3:]])

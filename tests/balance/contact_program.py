@@ -1,0 +1,123 @@
+"""The set of admissible wrenches as a linear program over contact forces, independent of the polytopes.
+
+Unknowns are the forces at the contact points (and the wrench of a sole with a torsion
+limit, of a grasp); nothing here knows pyramid edges, hulls or facets.
+"""
+
+import numpy as np
+from scipy.optimize import linprog
+
+from manikin.contact import ContactKind
+from manikin.spatial import skew
+
+
+class ContactProgram:
+    """``w = grasp_matrix @ x`` with ``A x <= b`` and ``E x = 0`` for one stance."""
+
+    def __init__(self, stance, friction_model="pyramid", reference=(0.0, 0.0, 0.0)):
+        self.columns, self.A, self.b, self.E = [], [], [], []
+        self.total = []
+        scale = 1.0 if friction_model == "pyramid" else 1.0 / np.sqrt(2.0)
+        reference = np.asarray(reference)
+        for contact in stance:
+            if contact.kind is ContactKind.GRASP:
+                self._grasp(contact, reference)
+            elif contact.torsion_limit is not None:
+                self._sole_with_torsion(contact, reference, contact.friction * scale)
+            else:
+                self._points(contact, reference, contact.friction * scale)
+        self.n = sum(c.shape[1] for c in self.columns)
+        self.G = np.hstack(self.columns) if self.columns else np.zeros((6, 0))
+        self.rows = [self._wide(row, at) for row, at in self.A]
+        self.equalities = [self._wide(row, at) for row, at in self.E]
+        self.bounds = list(self.b)
+        if stance.normal_force_cap is not None and self.total:
+            row = np.zeros(self.n)
+            for part, at in self.total:
+                row[at : at + len(part)] += part
+            self.rows.append(row)
+            self.bounds.append(stance.normal_force_cap)
+
+    def _wide(self, part, at):
+        row = np.zeros(self.n)
+        row[at : at + len(part)] = part
+        return row
+
+    def _start(self):
+        return sum(c.shape[1] for c in self.columns)
+
+    def _points(self, contact, reference, mu):
+        s, t, n = contact.rotation_contact_to_world.T
+        first = self._start()
+        cap = []
+        for p in contact.points_in_world:
+            at = self._start()
+            self.columns.append(np.vstack([np.eye(3), skew(p - reference)]))
+            for row in (s - mu * n, -s - mu * n, t - mu * n, -t - mu * n):
+                self.A.append((row, at))
+                self.b.append(0.0)
+            cap.append(n)
+        cap = np.concatenate(cap)
+        self.total.append((cap, first))
+        if contact.normal_force_cap is not None:
+            self.A.append((cap, first))
+            self.b.append(contact.normal_force_cap)
+
+    def _sole_with_torsion(self, contact, reference, mu):
+        s, t, n = contact.rotation_contact_to_world.T
+        x, y, z = contact.length / 2, contact.width / 2, np.zeros(3)
+        at = self._start()
+        self.columns.append(
+            np.block([[np.eye(3), np.zeros((3, 3))], [skew(contact.position - reference), np.eye(3)]])
+        )
+        rows = [np.r_[a * d - mu * n, z] for d in (s, t) for a in (1, -1)]
+        rows += [np.r_[-x * n, a * t] for a in (1, -1)] + [np.r_[-y * n, a * s] for a in (1, -1)]
+        for row in rows:
+            self.A.append((row, at))
+            self.b.append(0.0)
+        for a in (1, -1):
+            for b in (1, -1):
+                for c in (1, -1):
+                    self.A.append((np.r_[z, a * n + b * mu * s + c * mu * t], at))
+                    self.b.append(contact.torsion_limit)
+        self.total.append((np.r_[n, z], at))
+        if contact.normal_force_cap is not None:
+            self.A.append((np.r_[n, z], at))
+            self.b.append(contact.normal_force_cap)
+
+    def _grasp(self, contact, reference):
+        at = self._start()
+        self.columns.append(
+            np.block([[np.eye(3), np.zeros((3, 3))], [skew(contact.position - reference), np.eye(3)]])
+        )
+        for axis in range(6):
+            row = np.zeros(6)
+            row[axis] = 1.0
+            limit = contact.max_force if axis < 3 else contact.max_moment
+            for sign in (1.0, -1.0):
+                self.A.append((sign * row, at))
+                self.b.append(limit)
+
+    def _solve(self, cost, extra_columns=0, A_eq=None, b_eq=None):
+        rows = np.array(self.rows).reshape(-1, self.n)
+        rows = np.hstack([rows, np.zeros((len(rows), extra_columns))])
+        answer = linprog(
+            cost, A_ub=rows, b_ub=self.bounds, A_eq=A_eq, b_eq=b_eq, bounds=(None, None), method="highs"
+        )
+        assert answer.status in (0, 2), answer.message
+        return answer
+
+    def support(self, direction):
+        """Largest ``direction @ w`` and a wrench that has it."""
+        answer = self._solve(-(direction @ self.G))
+        return -answer.fun, self.G @ answer.x
+
+    def contains(self, wrench):
+        return self._solve(np.zeros(self.n), A_eq=self.G, b_eq=wrench).status == 0
+
+    def reach(self, start, direction):
+        """Largest t with ``start + t direction`` admissible; start must be."""
+        cost = np.zeros(self.n + 1)
+        cost[-1] = -1.0
+        answer = self._solve(cost, 1, np.hstack([self.G, -direction[:, None]]), start)
+        return -answer.fun if answer.status == 0 else -np.inf
