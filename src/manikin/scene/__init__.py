@@ -6,6 +6,7 @@ from manikin.scene.mesh import Mesh, load_mesh
 from manikin.scene.obstacle import Obstacle
 from manikin.scene.scene import Scene
 from manikin.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Plane, Sphere
+from manikin.scene.spheres import SphereProximity
 from manikin.scene.surface import Surface
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Scene",
     "Sphere",
     "SphereCover",
+    "SphereProximity",
     "Surface",
     "cover",
     "load_mesh",

@@ -110,11 +110,11 @@ class Proximity:
         self._geometry_data = pin.GeometryData(self._shapes)
         self._count = len(self._shapes.geometryObjects)
         parts = tuple(part for obstacle in scene for part in collision_parts(obstacle))
-        first, second = _pair_table(self._count, len(parts), _self_pairs(body) if self_collision else [])
+        first, second = _pair_table(self._count, len(parts), self_pairs(body) if self_collision else [])
         self._bounds = PairBounds(self._shapes, parts, first, second)
         self._meters = _meters(self._shapes, parts, first, second)
         self.pairs: tuple[Pair, ...] = _pair_names(self._shapes, parts, first, second)
-        moves = _moves(self._model, self._shapes, len(parts))
+        moves = moves_by_shape(self._model, self._shapes, len(parts))
         self._sensitivity = moves[second] - moves[first]
         self._fixed = {
             self._count + number: coal.Transform3s(part.rotation, part.translation)
@@ -224,11 +224,9 @@ class Proximity:
         return self._bounds.lower(placements[None, :, :3, :3], placements[None, :, :3, 3])[0]
 
     def _considered(self, ignore: Ignored) -> NDArray[np.bool_]:
-        mask = self._masks.get(ignore)
-        if mask is None:
-            mask = np.array([not _is_ignored(pair, ignore) for pair in self.pairs], dtype=bool)
-            self._masks[ignore] = mask
-        return mask
+        if ignore not in self._masks:
+            self._masks[ignore] = considered(self.pairs, ignore)
+        return self._masks[ignore]
 
     def _considered_over(self, ignore: Ignored | Sequence[Ignored], number: int) -> NDArray[np.bool_]:
         if isinstance(ignore, (frozenset, set)):
@@ -257,14 +255,19 @@ def segment_of(shape_name: str) -> str:
     return shape_name.split("/", 1)[0]
 
 
+def considered(pairs: Sequence[Pair], ignore: Ignored) -> NDArray[np.bool_]:
+    """(pairs,) False where a pair, by shape or segment and in either order, is in ``ignore``."""
+    return np.array([not _is_ignored(pair, ignore) for pair in pairs], dtype=bool)
+
+
 def _is_ignored(pair: Pair, ignore: Ignored) -> bool:
-    sides = [{name, segment_of(name)} for name in pair]
-    return any((a in sides[0] and b in sides[1]) or (b in sides[0] and a in sides[1]) for a, b in ignore)
+    first, second = ((name, segment_of(name)) for name in pair)
+    return any((a, b) in ignore or (b, a) in ignore for a in first for b in second)
 
 
-def _pair_table(shapes: int, parts: int, self_pairs: list[tuple[int, int]]) -> tuple[IntArray, IntArray]:
+def _pair_table(shapes: int, parts: int, inner: list[tuple[int, int]]) -> tuple[IntArray, IntArray]:
     """First and second index of every pair: parts first, numbered behind the shapes."""
-    both = [(shape, shapes + part) for part in range(parts) for shape in range(shapes)] + self_pairs
+    both = [(shape, shapes + part) for part in range(parts) for shape in range(shapes)] + inner
     table = np.array(both, dtype=np.int64).reshape(-1, 2)
     return table[:, 0], table[:, 1]
 
@@ -289,7 +292,12 @@ def _meters(
     ]
 
 
-def _self_pairs(body: BodyGeometry) -> list[tuple[int, int]]:
+def self_pairs(body: BodyGeometry) -> list[tuple[int, int]]:
+    """Indices of the body shapes to check against each other; see :class:`Proximity`.
+
+    Raises:
+        SceneError: If a pair names no shape of the body.
+    """
     given = getattr(body, "collision_pairs", None)
     if given is None:
         given = [(int(pair.first), int(pair.second)) for pair in body.geometry.collisionPairs]
@@ -307,8 +315,8 @@ def _shape_index(key: str | int, indices: dict[str, int]) -> int:
     return int(key)
 
 
-def _moves(model: pin.Model, shapes: pin.GeometryModel, parts: int) -> FloatArray:
-    """(shapes + parts, nv): 1 where a velocity coordinate moves the shape."""
+def moves_by_shape(model: pin.Model, shapes: pin.GeometryModel, parts: int) -> FloatArray:
+    """(shapes + parts, nv): 1 where a velocity coordinate moves the shape; parts never move."""
     table = np.zeros((model.njoints, model.nv))
     for joint in range(1, model.njoints):
         start, width = model.idx_vs[joint], model.nvs[joint]

@@ -150,5 +150,6 @@ def _square(shape: Plane | HalfSpace) -> trimesh.Trimesh:
     first /= np.linalg.norm(first)
     second = np.cross(shape.normal, first)
     corners = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
-    vertices = [shape.normal * shape.offset + DRAWN_HALF_SIZE * (a * first + b * second) for a, b in corners]
-    return as_trimesh(np.array(vertices), np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int64))
+    corner_offsets = [DRAWN_HALF_SIZE * (a * first + b * second) for a, b in corners]
+    vertices: FloatArray = np.array(corner_offsets, dtype=np.float64) + shape.normal * shape.offset
+    return as_trimesh(vertices, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int64))
