@@ -87,11 +87,12 @@ def segment_key(segment: str) -> str:
 
 
 def hanging_segment(body: BodyModel, segment: str) -> Segment | None:
-    """Return the segment that hangs on ``segment`` by hinges, such as the toes, or None."""
-    for candidate in body.segments:
-        if candidate.parent == segment and candidate.hinges:
-            return candidate
-    return None
+    """Return the last segment of a limb when it hangs on ``segment``, as toes on a foot, or None."""
+    children = [candidate for candidate in body.segments if candidate.parent == segment]
+    if len(children) != 1 or not children[0].hinges:
+        return None
+    leaf = all(candidate.parent != children[0].name for candidate in body.segments)
+    return children[0] if leaf else None
 
 
 def _rectangle(lengths: tuple[float, ...], half_width: float) -> FloatArray:

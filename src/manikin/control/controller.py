@@ -55,6 +55,8 @@ class ControlOutput:
         supports: State of each effector of the schedule.
         fallback: Empty when the program was solved; otherwise which fallback was taken and
             why: ``"without joint bounds: ..."`` or ``"previous torques: ..."``.
+        state: Dynamics at the measured state.
+        reference: Planned state.
         problem: The program that was solved (or not).
         iterations: Iterations of the solver.
     """
@@ -64,6 +66,8 @@ class ControlOutput:
     wrenches: dict[str, FloatArray]
     supports: dict[str, SupportState]
     fallback: str
+    state: DynamicsState
+    reference: ReferenceSample
     problem: ControlProblem
     iterations: int
 
@@ -132,7 +136,8 @@ class Controller:
         """
         supports = self._switch.update(time, touching)
         state = self._dynamics.evaluate(q, v)
-        problem = self.problem(state, self.reference.sample(time), supports)
+        reference = self.reference.sample(time)
+        problem = self.problem(state, reference, supports)
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else problem.torque(solution.x)
         self._previous = tau
@@ -143,6 +148,8 @@ class Controller:
             wrenches=problem.wrenches(x),
             supports=supports,
             fallback=fallback,
+            state=state,
+            reference=reference,
             problem=problem,
             iterations=0 if solution is None else solution.iterations,
         )

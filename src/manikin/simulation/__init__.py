@@ -1,6 +1,19 @@
 """Physics: the body and the scene in MuJoCo."""
 
 from manikin.simulation.compile import SimulationModel, compile_model
+from manikin.simulation.execute import default_physics, execute
+from manikin.simulation.execution import Execution
 from manikin.simulation.options import PhysicsOptions
+from manikin.simulation.world import Push, Touch, World
 
-__all__ = ["PhysicsOptions", "SimulationModel", "compile_model"]
+__all__ = [
+    "Execution",
+    "PhysicsOptions",
+    "Push",
+    "SimulationModel",
+    "Touch",
+    "World",
+    "compile_model",
+    "default_physics",
+    "execute",
+]

@@ -1,0 +1,243 @@
+"""Execute a planned motion: the controller drives the body in the physics engine."""
+
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.contact import Contact, ContactKind, ContactSchedule
+from manikin.control import Controller, ControlSettings
+from manikin.control.contact_forces import hanging_segment
+from manikin.control.supports import SupportInterval, support_intervals
+from manikin.errors import InputError
+from manikin.motion import Motion
+from manikin.scene import Scene
+from manikin.simulation.compile import compile_model
+from manikin.simulation.execution import Execution
+from manikin.simulation.options import PhysicsOptions
+from manikin.simulation.recorder import Recorder
+from manikin.simulation.world import Grip, Push, World
+from manikin.spatial import finite_number
+
+JOINT_DAMPING = 1.0
+"""Passive damping of every joint in the default physics [N.m.s/rad]."""
+
+FALL_DISTANCE = 0.3
+"""A body whose CoM is this far from its plan has fallen [m]."""
+
+_SWITCHING = 0.1
+"""A support may touch its surface this long before and after its planned interval [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Hold:
+    """One planned support with the obstacle under it."""
+
+    effector: str
+    segments: tuple[str, ...]
+    interval: SupportInterval
+    obstacle: str
+
+
+def default_physics(schedule: ContactSchedule) -> PhysicsOptions:
+    """Physics of an execution: the least friction of the schedule and passive joint damping."""
+    frictions = [
+        contact.friction
+        for phase in schedule.sequence
+        for contact in phase.stance
+        if contact.kind is not ContactKind.GRASP
+    ]
+    options = PhysicsOptions(joint_damping=JOINT_DAMPING)
+    return replace(options, friction=min(frictions)) if frictions else options
+
+
+def execute(
+    body: BodyModel,
+    scene: Scene,
+    motion: Motion,
+    schedule: ContactSchedule,
+    *,
+    settings: ControlSettings | None = None,
+    physics: PhysicsOptions | None = None,
+    hold: float = 1.0,
+    pushes: Sequence[Push] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Execution:
+    """Execute a planned motion and stand for a while after its end.
+
+    Args:
+        body: The body.
+        scene: Where it moves.
+        motion: Planned motion.
+        schedule: Its contacts in time.
+        settings: Controller settings; the defaults when omitted.
+        physics: Settings of the engine; :func:`default_physics` when omitted.
+        hold: Time to stand at the end [s].
+        pushes: Forces that disturb the execution, in the motion's time.
+        progress: Called with the share done, in [0, 1], after every control step.
+
+    Returns:
+        What happened; a fall, a divergence or an unplanned touch is a result, not an error.
+
+    Raises:
+        InputError: If the control period is not a multiple of the engine's time step, or the
+            motion is of another body.
+        ContactError: If a support does not lie on a surface of the scene.
+    """
+    finite_number(hold, "hold [s]", at_least=0.0)
+    return _Run(body, scene, motion, schedule, settings, physics, pushes).execute(hold, progress)
+
+
+class _Run:
+    """One execution, from its setting up to its report."""
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        motion: Motion,
+        schedule: ContactSchedule,
+        settings: ControlSettings | None,
+        physics: PhysicsOptions | None,
+        pushes: Sequence[Push],
+    ) -> None:
+        self.body, self.plan = body, motion
+        settings = settings or ControlSettings()
+        physics = physics or default_physics(schedule)
+        self.period = settings.period
+        self.substeps = _substeps(settings.period, physics.timestep)
+        damping = np.full(body.nv - 6, physics.joint_damping)
+        self.controller = Controller(body, motion, schedule, settings, joint_damping=damping)
+        self.holds = _holds(body, scene, schedule)
+        self.world = World(compile_model(body, scene, physics))
+        for push in pushes:
+            self.world.apply_push(push.segment, push.force, push.start, push.duration)
+        segments = {name: contact_segments(body, name) for name in schedule.sequence.effectors}
+        self.recorder = Recorder(schedule, segments)
+        self.failure, self.failure_time = "", None
+        self._planned_now: tuple[int, ...] = ()
+
+    def execute(self, hold: float, progress: Callable[[float], None] | None) -> Execution:
+        began = clock.perf_counter()
+        control = 0.0
+        start = float(self.plan.time[0])
+        self.world.reset(self.plan.q[0], self.plan.v[0], start)
+        count = round((self.plan.duration + hold) / self.period) + 1
+        for number in range(count):
+            self._switch(self.world.time)
+            before = clock.perf_counter()
+            output = self.controller.step(
+                start + number * self.period, self.world.q, self.world.v, self._touching()
+            )
+            control += clock.perf_counter() - before
+            self.world.advance(output.tau, 1)
+            self.recorder.record(self.world.sense(), output)
+            self.world.advance(output.tau, self.substeps - 1)
+            if self._failed():
+                break
+            if progress is not None:
+                progress((number + 1) / count)
+        return self._report(clock.perf_counter() - began, control)
+
+    def _switch(self, time: float) -> None:
+        """Tell the world which touches are planned now, and hold on to grasps."""
+        now = tuple(number for number, hold in enumerate(self.holds) if _near(hold.interval, time))
+        if now != self._planned_now:
+            self.world.plan_touches([(self.holds[i].segments, self.holds[i].obstacle) for i in now])
+            self._planned_now = now
+        for item in self.holds:
+            contact = item.interval.contact
+            if contact.kind is ContactKind.GRASP:
+                held = item.interval.start <= time < item.interval.end
+                self._grip(contact) if held else self.world.release(contact.effector)
+
+    def _grip(self, contact: Contact) -> None:
+        self.world.grip(Grip(contact.effector, contact.position, contact.max_force))
+
+    def _touching(self) -> dict[str, bool]:
+        """Whether each effector touches the support it holds or is about to make."""
+        felt: dict[str, bool] = {}
+        for number in self._planned_now:
+            item = self.holds[number]
+            grasp = item.interval.contact.kind is ContactKind.GRASP
+            if not grasp and self.world.time < item.interval.end:
+                felt[item.effector] = self.world.touching(item.segments, item.obstacle)
+        return felt
+
+    def _failed(self) -> bool:
+        time = self.world.time
+        state, reference = self.recorder.samples[-1].output.state, self.recorder.samples[-1].output.reference
+        offset = float(np.linalg.norm(state.com - reference.com))
+        if self.world.divergence or not np.all(np.isfinite(state.com)):
+            self._fail(f"the simulation diverged ({self.world.divergence}) at {time:.3f} s", time)
+        elif offset > FALL_DISTANCE:
+            self._fail(f"fell: the CoM is {offset:.2f} m from its plan at {time:.3f} s", time)
+        return bool(self.failure)
+
+    def _fail(self, reason: str, time: float) -> None:
+        self.failure, self.failure_time = reason, time
+
+    def _report(self, wall: float, control: float) -> Execution:
+        recorder, world = self.recorder, self.world
+        fell = self.failure.startswith("fell")
+        if not self.failure and world.touches:
+            self._fail(f"unplanned touch: {world.touches[0]}", world.touches[0].time)
+        executed = recorder.motion(self.body.joint_names, self.body.mass)
+        com = recorder.com_errors()
+        peak = np.abs(executed.tau[:, 6:]).max(axis=0)
+        simulated = len(recorder.samples) * self.period
+        return Execution(
+            motion=executed,
+            fell=fell,
+            failure=self.failure,
+            failure_time_s=self.failure_time,
+            com_rms_error_m=float(np.sqrt(np.mean(com**2))),
+            com_max_error_m=float(com.max()),
+            max_foot_error_m=float(recorder.effector_errors().max(initial=0.0)),
+            final_com_error_m=float(com[-1]),
+            min_margin=float(executed.margin.min()),
+            max_penetration_m=world.penetration,
+            peak_torque_Nm=dict(zip(self.body.joint_names, peak.tolist(), strict=True)),
+            max_limit_use=float((peak / self.body.torque_limit).max()),
+            realtime_factor=simulated / wall,
+            wall_s=wall,
+            control_ms=1e3 * control / len(recorder.samples),
+            touches=world.touches,
+            fallbacks=tuple(recorder.fallbacks),
+            max_slip_m=recorder.max_slip,
+        )
+
+
+def contact_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
+    """Segments with which an effector touches: its own and the one hanging on it (toes)."""
+    own = body.effector(effector).segment
+    hanging = hanging_segment(body, own)
+    return (own,) if hanging is None else (own, hanging.name)
+
+
+def _substeps(period: float, timestep: float) -> int:
+    count = round(period / timestep)
+    if count < 1 or abs(count * timestep - period) > 1e-9:
+        raise InputError(
+            f"control period is {period:g} s and physics timestep {timestep:g} s; valid: a whole multiple"
+        )
+    return count
+
+
+def _holds(body: BodyModel, scene: Scene, schedule: ContactSchedule) -> tuple[_Hold, ...]:
+    return tuple(
+        _Hold(
+            effector,
+            contact_segments(body, effector),
+            interval,
+            scene.supporting_surface(interval.contact).obstacle,
+        )
+        for effector in schedule.sequence.effectors
+        for interval in support_intervals(schedule, effector, _SWITCHING)
+    )
+
+
+def _near(interval: SupportInterval, time: float) -> bool:
+    return interval.early - 1e-9 <= time <= interval.end + _SWITCHING

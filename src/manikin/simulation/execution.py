@@ -1,0 +1,69 @@
+"""The outcome of executing a motion in the physics engine."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from manikin.motion import Motion
+from manikin.simulation.world import Touch
+
+
+@dataclass(frozen=True, eq=False)
+class Execution:
+    """An executed motion and how well it followed the plan.
+
+    Attributes:
+        motion: What happened, one sample per control step; ``tau`` are the joint torques
+            held from the sample on, ``contact_force`` what the engine measured, with the
+            moment about the *planned* contact frame's origin, ``support`` where it presses,
+            ``margin`` that of the sum of the measured contact forces in the polytope of the
+            stance planned at the time.
+        fell: Whether the body fell.
+        failure: Why the run is no success, in one line; empty for a success.
+        failure_time_s: When it failed [s], or None.
+        com_rms_error_m: Of the distance from the planned CoM, over motion and hold [m].
+        com_max_error_m: Largest such distance [m].
+        max_foot_error_m: Largest distance of an effector of the schedule from its plan [m].
+        final_com_error_m: Distance of the CoM from its plan at the end of the hold [m].
+        min_margin: Least wrench margin [N.m].
+        max_penetration_m: Deepest penetration of any contact, at every engine step [m].
+        peak_torque_Nm: Largest absolute torque by joint [N.m].
+        max_limit_use: Largest ratio of a joint's torque to its limit.
+        realtime_factor: Simulated time per wall time.
+        wall_s: Wall time [s].
+        control_ms: Mean wall time of a control step [ms].
+        touches: Touches that were not planned.
+        fallbacks: Time [s] and reason of every control step whose program was not solved.
+        max_slip_m: Farthest that an effector moved along its surface while in contact [m].
+    """
+
+    motion: Motion
+    fell: bool
+    failure: str
+    failure_time_s: float | None
+    com_rms_error_m: float
+    com_max_error_m: float
+    max_foot_error_m: float
+    final_com_error_m: float
+    min_margin: float
+    max_penetration_m: float
+    peak_torque_Nm: dict[str, float]
+    max_limit_use: float
+    realtime_factor: float
+    wall_s: float
+    control_ms: float
+    touches: tuple[Touch, ...]
+    fallbacks: tuple[tuple[float, str], ...]
+    max_slip_m: float
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the body stood to the end without an unplanned touch."""
+        return not self.failure
+
+    def summary(self) -> dict[str, Any]:
+        """The "execution" block of the run's summary."""
+        names = (
+            "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m",
+            "min_margin", "max_penetration_m", "peak_torque_Nm", "realtime_factor", "wall_s",
+        )  # fmt: skip
+        return {name: getattr(self, name) for name in names}

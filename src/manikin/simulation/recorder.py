@@ -1,0 +1,156 @@
+"""Collects what happens during an execution and turns it into a motion and its measures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.balance import wrench_polytope
+from manikin.contact import Contact, ContactKind, ContactSchedule, Stance
+from manikin.control import ControlOutput, SupportMode
+from manikin.control.supports import support_intervals
+from manikin.motion import Motion
+from manikin.simulation.world import Sensed
+from manikin.spatial import GRAVITY, FloatArray
+
+_PRESSES = 1.0
+"""Force from which an effector counts as a support of the executed motion [N]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One control step as it happened.
+
+    Attributes:
+        sensed: Contact forces and acceleration at the beginning of the step.
+        output: What the controller decided there.
+        wrenches: (effectors, 6) measured force and moment about the planned contact's origin.
+        total: (6,) sum of all measured contact forces, moments about the world origin.
+    """
+
+    sensed: Sensed
+    output: ControlOutput
+    wrenches: FloatArray
+    total: FloatArray
+
+
+class Recorder:
+    """Keeps every control step of an execution."""
+
+    def __init__(self, schedule: ContactSchedule, segments: dict[str, tuple[str, ...]]) -> None:
+        """Start empty.
+
+        Args:
+            schedule: Planned contacts.
+            segments: Names of the segments with which each effector of the schedule touches.
+        """
+        self._schedule = schedule
+        self._segments = segments
+        self.effectors = schedule.sequence.effectors
+        self.samples: list[Sample] = []
+        self.fallbacks: list[tuple[float, str]] = []
+        self._intervals = {name: support_intervals(schedule, name, 0.0) for name in self.effectors}
+        self._landings: dict[str, FloatArray | None] = dict.fromkeys(self.effectors)
+        self.max_slip = 0.0
+
+    def record(self, sensed: Sensed, output: ControlOutput) -> None:
+        """Add one control step."""
+        wrenches = np.array([self._wrench(name, sensed) for name in self.effectors])
+        everything = {item.segment for item in sensed.points}
+        total = sensed.wrench(tuple(everything), np.zeros(3))
+        total = total + sum((sensed.grip_wrench(name, np.zeros(3)) for name in self.effectors), np.zeros(6))
+        self.samples.append(Sample(sensed, output, wrenches, total))
+        if output.fallback:
+            self.fallbacks.append((sensed.time, output.fallback))
+        for name in self.effectors:
+            self._measure_slip(name, output)
+
+    def _wrench(self, name: str, sensed: Sensed) -> FloatArray:
+        contact = self._nearest_contact(name, sensed.time)
+        if contact.kind is ContactKind.GRASP:
+            return sensed.grip_wrench(name, contact.position)
+        return sensed.wrench(self._segments[name], contact.position)
+
+    def _nearest_contact(self, name: str, time: float) -> Contact:
+        """Contact of an effector at ``time``; in flight, the one to come or else the last."""
+        for interval in self._intervals[name]:
+            if time < interval.end:
+                return interval.contact
+        return self._intervals[name][-1].contact
+
+    def _measure_slip(self, name: str, output: ControlOutput) -> None:
+        support, position = output.supports[name], output.state.frames[name].position
+        if support.mode is not SupportMode.STANCE or support.contact is None or support.load_share < 1:
+            self._landings[name] = None
+            return
+        landing = self._landings[name]
+        if landing is None:
+            self._landings[name] = position
+            return
+        moved = position - landing
+        along = moved - (moved @ support.contact.normal) * support.contact.normal
+        self.max_slip = max(self.max_slip, float(np.linalg.norm(along)))
+
+    # --- measures --------------------------------------------------------------------------
+
+    def com_errors(self) -> FloatArray:
+        """(n,) distance of the CoM from its plan [m]."""
+        return np.array([np.linalg.norm(s.output.state.com - s.output.reference.com) for s in self.samples])
+
+    def effector_errors(self) -> FloatArray:
+        """(n, effectors) distance of each effector's origin from its plan [m]."""
+        return np.array(
+            [
+                [
+                    np.linalg.norm(
+                        s.output.state.frames[name].position - s.output.reference.effectors[name].position
+                    )
+                    for name in self.effectors
+                ]
+                for s in self.samples
+            ]
+        )
+
+    def margins(self, mass: float) -> FloatArray:
+        """(n,) wrench margin of the measured contact forces in the planned stances [N.m].
+
+        Args:
+            mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
+        """
+        times = np.array([s.sensed.time for s in self.samples])
+        totals = np.array([s.total for s in self.samples])
+        phases = self._schedule.phase_at(times)
+        margins = np.empty(len(times))
+        for phase in np.unique(phases):
+            stance = _bounded(self._schedule.sequence[int(phase)].stance, mass)
+            rows = phases == phase
+            margins[rows] = wrench_polytope(stance).margin(totals[rows])
+        return margins
+
+    def motion(self, joint_names: Sequence[str], mass: float) -> Motion:
+        """Turn the samples into a motion."""
+        states = [s.output.state for s in self.samples]
+        wrenches = np.array([s.wrenches for s in self.samples])
+        tau = np.array([s.output.tau for s in self.samples])
+        return Motion(
+            time=np.array([s.sensed.time for s in self.samples]),
+            q=np.array([state.q for state in states]),
+            v=np.array([state.v for state in states]),
+            a=np.array([s.sensed.a for s in self.samples]),
+            tau=np.concatenate((np.zeros((len(tau), 6)), tau), axis=1),
+            com=np.array([state.com for state in states]),
+            angular_momentum=np.array([state.momentum[3:] for state in states]),
+            margin=self.margins(mass),
+            support=np.linalg.norm(wrenches[..., :3], axis=-1) > _PRESSES,
+            contact_force=wrenches,
+            contact_names=tuple(self.effectors),
+            joint_names=tuple(joint_names),
+        )
+
+
+def _bounded(stance: Stance, mass: float) -> Stance:
+    """The stance itself, or with a cap of three body weights where nothing bounds its forces."""
+    capped = stance.normal_force_cap is not None or all(
+        contact.kind is ContactKind.GRASP or contact.normal_force_cap is not None for contact in stance
+    )
+    return stance if capped else Stance(stance.contacts, 3.0 * mass * GRAVITY)

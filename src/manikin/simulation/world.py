@@ -1,0 +1,378 @@
+"""A running simulation: state, joint torques, pushes, grips and felt contacts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.errors import InputError
+from manikin.simulation.compile import SimulationModel
+from manikin.simulation.scene_geoms import obstacle_of
+from manikin.spatial import FloatArray, finite_number, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPoint:
+    """One contact point that the engine found.
+
+    Attributes:
+        segment: Segment of the body.
+        other: Obstacle, or the other segment.
+        other_is_segment: Whether ``other`` is a segment.
+        position: (3,) in the world [m].
+        normal: (3,) unit, out of ``other``.
+        force: (3,) on ``segment`` [N].
+        depth: Penetration [m].
+    """
+
+    segment: str
+    other: str
+    other_is_segment: bool
+    position: FloatArray
+    normal: FloatArray
+    force: FloatArray
+    depth: float
+
+
+@dataclass(frozen=True)
+class Touch:
+    """The first time of a touch that was not planned.
+
+    Attributes:
+        time: [s].
+        segment: Segment of the body.
+        other: Obstacle or other segment.
+    """
+
+    time: float
+    segment: str
+    other: str
+
+    def __str__(self) -> str:
+        return f"{self.segment} touches {self.other} at {self.time:.3f} s"
+
+
+@dataclass(frozen=True, eq=False)
+class Push:
+    """A force on the centre of mass of a segment.
+
+    Attributes:
+        segment: Name of the segment.
+        force: (3,) in the world [N].
+        start: [s].
+        duration: [s].
+    """
+
+    segment: str
+    force: FloatArray
+    start: float
+    duration: float
+
+    def active(self, time: float) -> bool:
+        """Whether the force acts in the step that begins at ``time``."""
+        return self.start - 1e-9 <= time < self.start + self.duration - 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """A hand's hold on a point of the scene: a stiff, damped spring of limited force.
+
+    A contact engine has no fingers; a grasp is felt as this spring, and the hand slips
+    (the spring saturates) where more is asked of it than it may hold.
+
+    Attributes:
+        effector: Name of the gripping effector.
+        position: (3,) where it holds on [m].
+        max_force: Limit along each world axis [N].
+        stiffness: [N/m].
+        damping: [N.s/m].
+    """
+
+    effector: str
+    position: FloatArray
+    max_force: float
+    stiffness: float = 2e4
+    damping: float = 200.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What was felt in one engine step; all values belong to the state at its beginning.
+
+    Attributes:
+        time: Beginning of the step [s].
+        a: (nv,) generalised acceleration [m/s^2, rad/s^2].
+        points: The contact points.
+        grips: Force [N] and its point [m] of every grip, (2, 3) each, by effector.
+    """
+
+    time: float
+    a: FloatArray
+    points: tuple[ContactPoint, ...]
+    grips: Mapping[str, FloatArray]
+
+    def wrench(self, segments: Sequence[str], about: FloatArray) -> FloatArray:
+        """(6,) force and moment about a point of the scene on some segments, without grips.
+
+        Args:
+            segments: Names of the segments.
+            about: (3,) point of the moments [m].
+        """
+        total = np.zeros(6)
+        for item in self.points:
+            if item.segment in segments and not item.other_is_segment:
+                total[:3] += item.force
+                total[3:] += np.cross(item.position - about, item.force)
+        return total
+
+    def grip_wrench(self, effector: str, about: FloatArray) -> FloatArray:
+        """(6,) force and moment about a point of the grip of an effector; zero without one."""
+        if effector not in self.grips:
+            return np.zeros(6)
+        force, position = self.grips[effector]
+        return np.concatenate((force, np.cross(position - about, force)))
+
+
+class World:
+    """Steps the physics engine and tells what it feels.
+
+    States go in and come out in Pinocchio's convention.
+    """
+
+    def __init__(self, model: SimulationModel) -> None:
+        """Make a world at rest in the zero configuration.
+
+        Args:
+            model: The compiled body and scene.
+        """
+        self.model = model
+        self._model = model.mujoco
+        self._data = mujoco.MjData(self._model)
+        self._before = (self._data.qpos.copy(), self._data.qvel.copy(), 0.0)
+        self._owners = tuple(_owner(model, geom) for geom in range(self._model.ngeom))
+        self._planned = np.zeros((self._model.ngeom, self._model.ngeom), dtype=bool)
+        self._masks: dict[tuple[tuple[str, ...], bool], NDArray[np.bool_]] = {}
+        self._pushes: list[Push] = []
+        self._grips: dict[str, Grip] = {}
+        self._grip_forces: dict[str, FloatArray] = {}
+        self._touches: dict[tuple[str, str], Touch] = {}
+        self._depth = 0.0
+
+    # --- state -----------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self._data.time)
+
+    @property
+    def q(self) -> FloatArray:
+        """(nq,) configuration."""
+        return self.model.q_from_mujoco(self._data.qpos)
+
+    @property
+    def v(self) -> FloatArray:
+        """(nv,) velocity."""
+        return self.model.v_from_mujoco(self._data.qpos, self._data.qvel)
+
+    def reset(self, q: ArrayLike, v: ArrayLike | None = None, time: float = 0.0) -> None:
+        """Put the body into a state and forget what was felt; pushes and grips stay.
+
+        Args:
+            q: (nq,) configuration.
+            v: (nv,) velocity; at rest when omitted.
+            time: Simulated time to begin with [s].
+        """
+        mujoco.mj_resetData(self._model, self._data)
+        self._data.time = time
+        self.model.set_state(self._data, q, v)
+        self._before = (self._data.qpos.copy(), self._data.qvel.copy(), time)
+        self._grip_forces.clear()
+        self._touches.clear()
+        self._depth = 0.0
+
+    # --- what acts -------------------------------------------------------------------------
+
+    def apply_push(self, segment: str, force: ArrayLike, start: float, duration: float) -> None:
+        """Push a segment at its centre of mass.
+
+        Args:
+            segment: Name of the segment.
+            force: (3,) in the world [N].
+            start: [s] of simulated time.
+            duration: [s].
+
+        Raises:
+            BodyError: If there is no such segment.
+            InputError: If a number is not usable.
+        """
+        self.model.body_id(segment)
+        self._pushes.append(
+            Push(
+                segment,
+                frozen_array(force, "push force [N]", (3,)),
+                finite_number(start, "push start [s]", at_least=0.0),
+                finite_number(duration, "push duration [s]", above=0.0),
+            )
+        )
+
+    def grip(self, grip: Grip) -> None:
+        """Let an effector hold on; replaces what it held."""
+        self.model.site_id(grip.effector)
+        self._grips[grip.effector] = grip
+
+    def release(self, effector: str) -> None:
+        """Let go; nothing happens where nothing was held."""
+        self._grips.pop(effector, None)
+        self._grip_forces.pop(effector, None)
+
+    def plan_touches(self, pairs: Sequence[tuple[Sequence[str], str]]) -> None:
+        """Say which touches are planned from now on; all others are reported.
+
+        Args:
+            pairs: Segments and the obstacle that they may touch.
+
+        Raises:
+            InputError: If an obstacle is not in the scene.
+        """
+        self._planned[:] = False
+        for segments, obstacle in pairs:
+            body, scene = self._mask(tuple(segments), True), self._mask((obstacle,), False)
+            if not scene.any():
+                names = sorted({name for name, segment in self._owners if not segment})
+                raise InputError(f"planned touch of obstacle {obstacle!r}; valid: one of {names}")
+            self._planned |= np.outer(body, scene) | np.outer(scene, body)
+
+    # --- time ------------------------------------------------------------------------------
+
+    def advance(self, tau: ArrayLike, steps: int = 1) -> None:
+        """Hold joint torques for a number of engine steps.
+
+        Args:
+            tau: (nv - 6,) [N.m].
+            steps: Number of steps.
+        """
+        self._data.ctrl[:] = tau
+        for _ in range(steps):
+            self._before = (self._data.qpos.copy(), self._data.qvel.copy(), self.time)
+            self._act()
+            mujoco.mj_step(self._model, self._data)
+            self._note_contacts()
+
+    def _act(self) -> None:
+        self._data.xfrc_applied[:] = 0.0
+        for push in self._pushes:
+            if push.active(self.time):
+                self._data.xfrc_applied[self.model.body_id(push.segment), :3] += push.force
+        for grip in self._grips.values():
+            self._hold(grip)
+
+    def _hold(self, grip: Grip) -> None:
+        site = self.model.site_id(grip.effector)
+        body = int(self._model.site_bodyid[site])
+        position = self._data.site_xpos[site].copy()
+        twist = np.empty(6)
+        mujoco.mj_objectVelocity(self._model, self._data, mujoco.mjtObj.mjOBJ_SITE, site, twist, 0)
+        force = grip.stiffness * (grip.position - position) - grip.damping * twist[3:]
+        force = np.clip(force, -grip.max_force, grip.max_force)
+        self._data.xfrc_applied[body, :3] += force
+        self._data.xfrc_applied[body, 3:] += np.cross(position - self._data.xipos[body], force)
+        self._grip_forces[grip.effector] = np.stack((force, position))
+
+    def _note_contacts(self) -> None:
+        if self._data.ncon == 0:
+            return
+        contact = self._data.contact
+        self._depth = max(self._depth, -float(contact.dist.min()))
+        geoms = contact.geom
+        planned = self._planned[geoms[:, 0], geoms[:, 1]]
+        if planned.all():
+            return
+        for first, second in geoms[~planned]:
+            segment, other, _ = self._parties(int(first), int(second))
+            self._touches.setdefault((segment, other), Touch(self._before[2], segment, other))
+
+    # --- what is felt ----------------------------------------------------------------------
+
+    def touching(self, segments: Sequence[str], obstacle: str) -> bool:
+        """Whether one of the segments was in contact with the obstacle in the last engine step."""
+        geoms = self._data.contact.geom
+        body, scene = self._mask(tuple(segments), True), self._mask((obstacle,), False)
+        first, second = geoms[:, 0], geoms[:, 1]
+        return bool(np.any((body[first] & scene[second]) | (scene[first] & body[second])))
+
+    def _mask(self, names: tuple[str, ...], segments: bool) -> NDArray[np.bool_]:
+        if (names, segments) not in self._masks:
+            self._masks[names, segments] = np.array(
+                [name in names and is_segment == segments for name, is_segment in self._owners]
+            )
+        return self._masks[names, segments]
+
+    def sense(self) -> Sensed:
+        """Return accelerations and contact forces of the last engine step."""
+        qpos, qvel, time = self._before
+        a = self.model.a_from_mujoco(qpos, qvel, self._data.qacc)
+        points = tuple(self._point(number) for number in range(self._data.ncon))
+        return Sensed(time, a, points, dict(self._grip_forces))
+
+    def _point(self, number: int) -> ContactPoint:
+        contact = self._data.contact[number]
+        first, second = int(contact.geom1), int(contact.geom2)
+        segment, other, swapped = self._parties(first, second)
+        local = np.zeros(6)
+        mujoco.mj_contactForce(self._model, self._data, number, local)
+        frame = contact.frame.reshape(3, 3)
+        # The engine's frame has its x axis from the first geometry to the second and its
+        # force is the one on the second.
+        sign = -1.0 if swapped else 1.0
+        return ContactPoint(
+            segment=segment,
+            other=other,
+            other_is_segment=self._owners[first][1] and self._owners[second][1],
+            position=contact.pos.copy(),
+            normal=sign * frame[0],
+            force=sign * (local[:3] @ frame),
+            depth=-float(contact.dist),
+        )
+
+    def _parties(self, first: int, second: int) -> tuple[str, str, bool]:
+        """Segment, other party, and whether the segment is the engine's first geometry."""
+        swapped = not self._owners[second][1]
+        if swapped:
+            first, second = second, first
+        return self._owners[second][0], self._owners[first][0], swapped
+
+    @property
+    def touches(self) -> tuple[Touch, ...]:
+        """Touches that were not planned since the last reset, in order of their first time."""
+        return tuple(self._touches.values())
+
+    @property
+    def penetration(self) -> float:
+        """Deepest penetration of any contact since the last reset [m]."""
+        return self._depth
+
+    @property
+    def divergence(self) -> str:
+        """What the engine complains about (``"BADQACC"``), or an empty text."""
+        for kind in _FATAL:
+            if self._data.warning[kind].number:
+                return kind.name.removeprefix("mjWARN_")
+        return ""
+
+
+_FATAL = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+    mujoco.mjtWarning.mjWARN_BADCTRL,
+)
+
+
+def _owner(model: SimulationModel, geom: int) -> tuple[str, bool]:
+    """Segment or obstacle that a geometry belongs to, and whether it is a segment."""
+    name = model.geom_names[geom]
+    obstacle = obstacle_of(name)
+    return (name.split("/")[0], True) if obstacle is None else (obstacle, False)
