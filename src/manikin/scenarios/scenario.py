@@ -30,6 +30,7 @@ from manikin.spatial import GRAVITY, FloatArray, frozen_array, rotation_from_rpy
 
 if TYPE_CHECKING:
     from manikin.body import BodyModel
+    from manikin.centroidal import CentroidalProblem
     from manikin.scene import Scene
 
 BODY_WEIGHTS_CAP = 3.0
@@ -128,6 +129,14 @@ class Scenario:
             return None
         return self.stature_scale * constraint.max_support_distance_m
 
+    @property
+    def required_margin(self) -> float:
+        """Smallest margin allowed, scaled to the body like a weight times a length [N.m] or [N]."""
+        reference = self.file.reference_mass_kg
+        mass_scale = 1.0 if reference is None else self.mass / reference
+        length_scale = self.stature_scale if self.planning.margin_space == "wrench" else 1.0
+        return self.planning.min_margin * mass_scale * length_scale
+
     def with_body(
         self, stature_m: float | None = None, mass_kg: float | None = None, sex: str | None = None
     ) -> Scenario:
@@ -207,6 +216,39 @@ class Scenario:
             return StanceSequence(phases)
         except InputError as error:
             raise self._error(("supports", "phases"), str(error)) from None
+
+    def build_centroidal_problem(self) -> CentroidalProblem:
+        """Build the problem of the centre-of-mass planner, with every height scaled to the body.
+
+        Raises:
+            ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
+        """
+        from manikin.centroidal import CentroidalProblem, Weights, height_band
+
+        options, band = self.planning, self.height_band
+        rest = (0.0, 0.0, 0.0) if options.zero_end_accelerations else None
+        given = {"degree": options.degree, "samples": options.samples}
+        try:
+            return CentroidalProblem(
+                self.mass,
+                self.build_sequence(planning=True),
+                self.start_com,
+                self.goal_com,
+                start_acceleration=rest,
+                goal_acceleration=rest,
+                margin_space=options.margin_space,
+                required_margin=self.required_margin,
+                support_distance=self.max_support_distance,
+                geometric=() if band is None else height_band(band.lower, band.upper),
+                max_duration=options.max_duration_s,
+                weights=Weights(**options.weights.model_dump(exclude_none=True)),
+                friction_model=options.friction_model,
+                **{key: value for key, value in given.items() if value is not None},
+            )
+        except ScenarioError:
+            raise
+        except InputError as error:
+            raise self._error(("planning",), str(error)) from None
 
     def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
         """Check that every contact of the supports lies on a surface of the scene.

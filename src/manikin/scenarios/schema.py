@@ -19,6 +19,7 @@ from manikin.scenarios.validation import (
     Text,
     Vector2,
     Vector3,
+    Weights3,
     refuse,
     rule_error,
 )
@@ -39,10 +40,10 @@ _KIND_KEYS: dict[str, tuple[str, ...]] = {
 class BodySection(Section):
     """Whose motion it is."""
 
-    model: Literal["human"] = Field("human", description="built-in body")
-    stature_m: Positive = Field(1.75, description="standing height [m]")
-    mass_kg: Positive = Field(79.0, description="body mass [kg]")
-    sex: Literal["male", "female"] = Field("male", description="which anthropometric table")
+    model: Literal["human"] = Field(default="human", description="built-in body")
+    stature_m: Positive = Field(default=1.75, description="standing height [m]")
+    mass_kg: Positive = Field(default=79.0, description="body mass [kg]")
+    sex: Literal["male", "female"] = Field(default="male", description="which anthropometric table")
 
 
 class RoundSection(Section):
@@ -62,22 +63,28 @@ class ObstacleSection(Section):
     """One thing in the scene: a name, one shape and a pose."""
 
     name: Text = Field(description="unique name")
-    box: Size3 | None = Field(None, description="sizes along x, y, z [m]")
-    cylinder: RoundSection | None = Field(None, description="cylinder along z")
-    capsule: RoundSection | None = Field(None, description="capsule along z")
-    sphere: SphereSection | None = Field(None, description="sphere")
-    plane: Vector3 | None = Field(None, description="normal of an infinite two-sided plane through position")
-    half_space: Vector3 | None = Field(None, description="outward normal of a solid half-space at position")
-    mesh: Text | None = Field(None, description="STL, OBJ, PLY or DAE file, relative to this file's folder")
-    scale: Positive | None = Field(None, description="factor on the mesh's coordinates (default 1)")
+    box: Size3 | None = Field(default=None, description="sizes along x, y, z [m]")
+    cylinder: RoundSection | None = Field(default=None, description="cylinder along z")
+    capsule: RoundSection | None = Field(default=None, description="capsule along z")
+    sphere: SphereSection | None = Field(default=None, description="sphere")
+    plane: Vector3 | None = Field(
+        default=None, description="normal of an infinite two-sided plane through position"
+    )
+    half_space: Vector3 | None = Field(
+        default=None, description="outward normal of a solid half-space at position"
+    )
+    mesh: Text | None = Field(
+        default=None, description="STL, OBJ, PLY or DAE file, relative to this file's folder"
+    )
+    scale: Positive | None = Field(default=None, description="factor on the mesh's coordinates (default 1)")
     unit: Literal["m", "cm", "mm", "in"] | None = Field(
-        None, description="unit of the mesh (default: a DAE file's own, else m)"
+        default=None, description="unit of the mesh (default: a DAE file's own, else m)"
     )
     convex: Literal["no", "hull", "parts"] | None = Field(
-        None, description="replace the mesh, or each connected part, by its convex hull"
+        default=None, description="replace the mesh, or each connected part, by its convex hull"
     )
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="origin in the world [m]")
-    rpy_deg: Vector3 = Field((0.0, 0.0, 0.0), description="fixed-axis roll, pitch, yaw [deg]")
+    position: Vector3 = Field(default=(0.0, 0.0, 0.0), description="origin in the world [m]")
+    rpy_deg: Vector3 = Field(default=(0.0, 0.0, 0.0), description="fixed-axis roll, pitch, yaw [deg]")
 
     @property
     def shape(self) -> str:
@@ -111,18 +118,28 @@ class ContactSection(Section):
     """One contact; what it leaves out comes from the section around it."""
 
     kind: Literal["sole", "point", "grasp"] | None = Field(
-        None, description="default: sole for a foot, grasp for a hand"
+        default=None, description="default: sole for a foot, grasp for a hand"
     )
     position: Vector3 = Field(description="of the contact (centre of a sole) in the world [m]")
-    yaw_deg: Number = Field(0.0, description="heading of the toes, counter-clockwise from world x [deg]")
-    normal: Vector3 | None = Field(None, description="surface normal, into the body (default up)")
-    rpy_deg: Vector3 | None = Field(None, description="orientation of a grasping hand [deg]")
-    sole: SoleSection | None = Field(None, description="size of this sole")
-    friction: Positive | None = Field(None, description="Coulomb coefficient")
-    normal_force_cap_N: Positive | None = Field(None, description="largest normal force of this contact [N]")
-    torsion_limit_Nm: Positive | None = Field(None, description="largest moment about the normal [N.m]")
-    max_force_N: Positive | None = Field(None, description="grasp: largest force along each world axis [N]")
-    max_moment_Nm: NonNegative | None = Field(None, description="grasp: largest moment per axis [N.m]")
+    yaw_deg: Number = Field(
+        default=0.0, description="heading of the toes, counter-clockwise from world x [deg]"
+    )
+    normal: Vector3 | None = Field(default=None, description="surface normal, into the body (default up)")
+    rpy_deg: Vector3 | None = Field(default=None, description="orientation of a grasping hand [deg]")
+    sole: SoleSection | None = Field(default=None, description="size of this sole")
+    friction: Positive | None = Field(default=None, description="Coulomb coefficient")
+    normal_force_cap_N: Positive | None = Field(
+        default=None, description="largest normal force of this contact [N]"
+    )
+    torsion_limit_Nm: Positive | None = Field(
+        default=None, description="largest moment about the normal [N.m]"
+    )
+    max_force_N: Positive | None = Field(
+        default=None, description="grasp: largest force along each world axis [N]"
+    )
+    max_moment_Nm: NonNegative | None = Field(
+        default=None, description="grasp: largest moment per axis [N.m]"
+    )
 
     @field_validator("normal")
     @classmethod
@@ -164,12 +181,12 @@ ContactEntry = Annotated[
 class PhaseSection(Section):
     """The contacts of one phase and how long it may last; an effector left out is in the air."""
 
-    left_foot: ContactEntry | None = Field(None, description="contact of the left foot, or 'same'")
-    right_foot: ContactEntry | None = Field(None, description="contact of the right foot, or 'same'")
-    left_hand: ContactEntry | None = Field(None, description="contact of the left hand, or 'same'")
-    right_hand: ContactEntry | None = Field(None, description="contact of the right hand, or 'same'")
-    min_duration_s: Positive = Field(0.1, description="shortest duration [s]")
-    max_duration_s: Positive | None = Field(None, description="longest duration [s]")
+    left_foot: ContactEntry | None = Field(default=None, description="contact of the left foot, or 'same'")
+    right_foot: ContactEntry | None = Field(default=None, description="contact of the right foot, or 'same'")
+    left_hand: ContactEntry | None = Field(default=None, description="contact of the left hand, or 'same'")
+    right_hand: ContactEntry | None = Field(default=None, description="contact of the right hand, or 'same'")
+    min_duration_s: Positive = Field(default=0.1, description="shortest duration [s]")
+    max_duration_s: Positive | None = Field(default=None, description="longest duration [s]")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -194,13 +211,16 @@ class PhaseSection(Section):
 class SupportsSection(Section):
     """An explicit sequence of supports, with the defaults of its contacts."""
 
-    friction: Positive = Field(0.7, description="Coulomb coefficient of soles and points")
-    sole: SoleSection = Field(SoleSection(length_m=0.28, width_m=0.12), description="size of the real soles")
+    friction: Positive = Field(default=0.7, description="Coulomb coefficient of soles and points")
+    sole: SoleSection = Field(
+        default=SoleSection(length_m=0.28, width_m=0.12), description="size of the real soles"
+    )
     planning_sole: SoleSection | None = Field(
-        None, description="smaller soles that planning balances on, for robustness (default: the real ones)"
+        default=None,
+        description="smaller soles that planning balances on, for robustness (default: the real ones)",
     )
     normal_force_cap_N: Positive | None = Field(
-        None, description="largest sum of the normal forces of a stance [N] (default: 3 body weights)"
+        default=None, description="largest sum of the normal forces of a stance [N] (default: 3 body weights)"
     )
     phases: Annotated[list[PhaseSection], Field(min_length=1)] = Field(description="phases in order")
 
@@ -235,10 +255,12 @@ class SupportsSection(Section):
 class StateSection(Section):
     """Where the body starts or ends."""
 
-    com: Vector3 | None = Field(None, description="centre of mass [m]")
-    at: Vector2 | None = Field(None, description="where to stand, x and y [m]")
-    heading_deg: Number | None = Field(None, description="where to face [deg]")
-    posture: Text | None = Field(None, description="standing, seated, crouched, lying or a posture file")
+    com: Vector3 | None = Field(default=None, description="centre of mass [m]")
+    at: Vector2 | None = Field(default=None, description="where to stand, x and y [m]")
+    heading_deg: Number | None = Field(default=None, description="where to face [deg]")
+    posture: Text | None = Field(
+        default=None, description="standing, seated, crouched, lying or a posture file"
+    )
 
     @model_validator(mode="after")
     def _placed(self) -> Self:
@@ -273,9 +295,9 @@ class HeightBandSection(Section):
 class ComConstraintSection(Section):
     """One constraint on the centre of mass: exactly one of the keys."""
 
-    height_band: HeightBandSection | None = Field(None, description="bounds of the CoM's height")
+    height_band: HeightBandSection | None = Field(default=None, description="bounds of the CoM's height")
     max_support_distance_m: Positive | None = Field(
-        None, description="largest distance from the CoM to every foot in contact [m]"
+        default=None, description="largest distance from the CoM to every foot in contact [m]"
     )
 
     @model_validator(mode="after")
@@ -286,15 +308,38 @@ class ComConstraintSection(Section):
         return self
 
 
-class PlanningSection(Section):
-    """Options of the centre-of-mass planner."""
+class WeightsSection(Section):
+    """Weights of the planner's objectives; what is left out has the planner's default."""
 
-    degree: Annotated[int, Field(strict=True, ge=3, le=9)] = Field(5, description="of the B-spline")
-    min_margin_Nm: NonNegative = Field(20.0, description="smallest stability margin wanted [N.m]")
-    max_duration_s: Positive | None = Field(None, description="longest duration of the whole motion [s]")
-    weights: dict[Text, NonNegative] = Field(
-        default_factory=dict, description="weights of the planner's objectives by name"
+    margin: NonNegative | None = Field(default=None, description="of the smallest margin [1/(N.m)] or [1/N]")
+    smoothness: NonNegative | None = Field(default=None, description="of the mean squared derivatives")
+    duration: NonNegative | None = Field(default=None, description="of the duration [1/s]")
+    velocity: Weights3 | None = Field(default=None, description="along x, y, z [s^2/m^2]")
+    acceleration: Weights3 | None = Field(default=None, description="along x, y, z [s^4/m^2]")
+    jerk: Weights3 | None = Field(default=None, description="along x, y, z [s^6/m^2]")
+
+
+class PlanningSection(Section):
+    """Options of the centre-of-mass planner; what is left out has the planner's default."""
+
+    degree: Annotated[int, Field(strict=True, ge=3, le=9)] | None = Field(
+        default=None, description="of the B-spline"
     )
+    samples: Annotated[int, Field(strict=True, ge=2, le=200)] | None = Field(
+        default=None, description="instants per phase at which balance is imposed, less one"
+    )
+    min_margin: NonNegative = Field(
+        default=0.0, description="smallest stability margin allowed [N.m], or [N] in the force space"
+    )
+    margin_space: Literal["wrench", "force"] = Field(default="wrench", description="what the margin measures")
+    friction_model: Literal["pyramid", "inner"] = Field(
+        default="pyramid", description="pyramid around the friction cone, or inside it"
+    )
+    max_duration_s: Positive | None = Field(default=None, description="longest duration of the motion [s]")
+    zero_end_accelerations: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="whether the CoM starts and ends without acceleration"
+    )
+    weights: WeightsSection = Field(default=WeightsSection(), description="of the objectives")
 
 
 class PushSection(Section):
@@ -312,22 +357,29 @@ class ScenarioFile(Section):
     """A whole scenario file."""
 
     name: Text = Field(description="short name")
-    description: str = Field("", description="one line for the list of scenarios")
-    body: BodySection = Field(default_factory=BodySection, description="whose motion it is")
+    description: str = Field(default="", description="one line for the list of scenarios")
+    body: BodySection = Field(default=BodySection(), description="whose motion it is")
     reference_stature_m: Positive | None = Field(
-        None, description="stature that the task's heights and distances were measured for [m] "
+        default=None, description="stature that the task's heights and distances were measured for [m] "
         "(default: the body's own); they are scaled to the actual body"
     )  # fmt: skip
-    floor_height_m: Number | None = Field(0.0, description="height of the floor [m], null for none")
+    reference_mass_kg: Positive | None = Field(
+        default=None,
+        description="mass that planning.min_margin was chosen for [kg] (default: the body's own); the "
+        "margin is scaled with mass and stature",
+    )
+    floor_height_m: Number | None = Field(default=0.0, description="height of the floor [m], null for none")
     scene: list[ObstacleSection] = Field(default_factory=list, description="obstacles")
-    supports: SupportsSection | None = Field(None, description="explicit sequence of supports")
+    supports: SupportsSection | None = Field(default=None, description="explicit sequence of supports")
     task: TaskSection = Field(description="start and goal")
     com_constraints: list[ComConstraintSection] = Field(
         default_factory=list, description="constraints on the centre of mass"
     )
-    planning: PlanningSection = Field(default_factory=PlanningSection, description="options of the planner")
-    push: PushSection | None = Field(None, description="disturbance during the execution")
-    seed: Annotated[int, Field(strict=True, ge=0)] = Field(0, description="seed of every random choice")
+    planning: PlanningSection = Field(default=PlanningSection(), description="options of the planner")
+    push: PushSection | None = Field(default=None, description="disturbance during the execution")
+    seed: Annotated[int, Field(strict=True, ge=0)] = Field(
+        default=0, description="seed of every random choice"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -69,6 +69,11 @@ Size3 = Annotated[
     tuple[Positive, Positive, Positive], BeforeValidator(_vector(3, "three numbers > 0 [x, y, z]"))
 ]
 
+Weights3 = Annotated[
+    tuple[NonNegative, NonNegative, NonNegative],
+    BeforeValidator(_vector(3, "three numbers >= 0 [x, y, z]")),
+]
+
 
 def rule_error(rule: str) -> PydanticCustomError:
     """Make the error of a rule that pydantic does not know; ``rule`` says what is valid."""
