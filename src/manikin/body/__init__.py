@@ -8,7 +8,7 @@ from manikin.body.configuration import (
     interpolate,
     random_configuration,
 )
-from manikin.body.human import human
+from manikin.body.human import body_from_signature, human
 from manikin.body.model import BodyModel
 from manikin.body.segments import Effector, Hinge, Segment, Shape, ShapeKind
 
@@ -22,6 +22,7 @@ __all__ = [
     "Sex",
     "Shape",
     "ShapeKind",
+    "body_from_signature",
     "difference",
     "human",
     "integrate",

@@ -1,7 +1,9 @@
 """A human scaled from stature, mass and sex: 19 segments, 45 degrees of freedom."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +20,7 @@ from manikin.body.anthropometry import (
 from manikin.body.model import BodyModel
 from manikin.body.range_of_motion import HUMAN_HINGES, human_hinges
 from manikin.body.segments import Effector, Segment, Shape, ShapeKind
+from manikin.errors import BodyError
 from manikin.spatial import FloatArray, skew
 
 _ALONG_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -32,7 +35,7 @@ _SOFT_PAIRS = (
     ("lumbar", "thigh"),
 )  # fmt: skip
 
-_ARM_SPREAD = np.deg2rad(12.0)
+_ARM_SPREAD = np.deg2rad(14.0)
 
 _STANDING_DEG = MappingProxyType(
     {"hip_flexion": 2.0, "knee_flexion": 10.0, "ankle_dorsiflexion": 8.0, "elbow_flexion": 15.0}
@@ -95,8 +98,25 @@ def human(
     )
 
 
+def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
+    """Make the body again that :meth:`BodyModel.signature` described.
+
+    Raises:
+        BodyError: If the model is unknown or a value is missing or out of its range.
+    """
+    model = signature.get("model")
+    if model != "human":
+        raise BodyError(f"body model is {model!r}; valid: human")
+    wanted = ("stature", "mass", "sex", "sole_length", "sole_width")
+    missing = [key for key in wanted if key not in signature]
+    if missing:
+        raise BodyError(f"body signature has no {missing[0]!r}; valid: {', '.join(wanted)}")
+    values: dict[str, Any] = {key: signature[key] for key in wanted}
+    return human(**values)
+
+
 def _standing_angles() -> dict[str, float]:
-    """Angles [rad]; the arms hang 12 degrees away from the trunk, straight to the side."""
+    """Angles [rad]; the arms hang 14 degrees away from the trunk, straight to the side."""
     angles = {name: float(np.deg2rad(value)) for name, value in _STANDING_DEG.items()}
     # Direction of the arm on the oblique shoulder axes of range_of_motion.
     arm = np.array([0.0, np.sin(_ARM_SPREAD), -np.cos(_ARM_SPREAD)])

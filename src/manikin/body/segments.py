@@ -71,7 +71,9 @@ class Shape:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "kind", shape_kind)
         object.__setattr__(self, "size", dimensions)
-        object.__setattr__(self, "translation", frozen_array(translation, f"{where} translation", (3,)))
+        object.__setattr__(
+            self, "translation", frozen_array(translation, f"{where} translation", (3,), BodyError)
+        )
         object.__setattr__(self, "rotation", check_rotation(turn, f"{where} rotation", BodyError))
 
 
@@ -175,7 +177,8 @@ class Effector:
 
     def __post_init__(self) -> None:
         where = f"effector {self.name!r}"
-        object.__setattr__(self, "translation", frozen_array(self.translation, f"{where} translation", (3,)))
+        place = frozen_array(self.translation, f"{where} translation", (3,), BodyError)
+        object.__setattr__(self, "translation", place)
         object.__setattr__(self, "rotation", check_rotation(self.rotation, f"{where} rotation", BodyError))
 
 
