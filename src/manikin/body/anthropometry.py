@@ -17,7 +17,7 @@ Our choices, for want of one table that fits the others:
 * Ankle joint 0.043 H above the sole (0.075 m at 1.75 m): Drillis and Contini's bare malleolus
   plus a thin shoe sole, well below the 0.10 m of [Qiu2012]_ Fig. 6.7.
 * de Leva's vertical lengths are curve and landmark distances; with the ankle they add up to
-  1.005 H (women) and 1.024 H (men). Legs, trunk, neck and head are therefore scaled by one common
+  1.003 H (women) and 1.024 H (men). Legs, trunk, neck and head are therefore scaled by one common
   factor, so that sole to vertex is the stature exactly. Arms and feet keep their lengths.
 * Distances between hip joint centres 0.100 H and between shoulder joint centres 0.210 H (men)
   and 0.200 H (women), both well inside the breadths over the flesh.

@@ -68,9 +68,9 @@ def human(
     hand: parallel to the world when the palm lies on a table, fingers forward),
     ``head`` (vertex) and ``pelvis`` (its segment frame).
 
-    Collision shapes are the flesh made slim: breadths and girths are our choice, rounded from
-    Winter's and military surveys' means, scaled with stature and (within 12 %) with the square root
-    of the body mass index, so that limbs standing side by side stay 2 cm apart.
+    Collision shapes are the flesh made slim: the breadth over the hips is Winter's 0.191 H, all
+    other breadths and girths are our choice. They scale with stature and (within 12 %) with the
+    square root of the body mass index, so that limbs standing side by side stay 2 cm apart.
 
     Args:
         stature: Sole to vertex [m], 1.40 to 2.10.
