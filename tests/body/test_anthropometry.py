@@ -39,17 +39,17 @@ def test_segment_masses_of_de_levas_mean_woman():
 def test_trunk_parts_compose_to_de_levas_whole_trunk(sex, length, com, longitudinal):
     """Upper, middle and lower trunk stacked reproduce the table's own CERV-MIDH row.
 
-    The rows were averaged independently: 1 % of the trunk's length for the centre of mass, and
-    2 % of it for the longitudinal radius (whose female sources differ most).
+    Women's rows agree to the printed digits; the men's parts give a centre of mass 3 mm lower than
+    the men's whole trunk, an inconsistency of the table itself.
     """
     rows = [DE_LEVA[Sex(sex)][name] for name in ("upper_trunk", "middle_trunk", "lower_trunk")]
     assert sum(row.length for row in rows) == pytest.approx(length, abs=1.1e-3)
     mass = np.array([row.mass for row in rows])
     start = np.concatenate([[0.0], np.cumsum([row.length for row in rows])[:-1]])
     centre = start + np.array([row.com * row.length for row in rows])
-    assert mass @ centre / mass.sum() / length == pytest.approx(com, abs=0.01)
+    assert mass @ centre / mass.sum() / length == pytest.approx(com, abs=0.006)
     radius = np.sqrt(mass @ np.array([(row.radii[2] * row.length) ** 2 for row in rows]) / mass.sum())
-    assert radius / length == pytest.approx(longitudinal, abs=0.02)
+    assert radius / length == pytest.approx(longitudinal, abs=0.001)
 
 
 def test_thigh_inertia_has_de_levas_radii_of_gyration():
