@@ -4,17 +4,19 @@ Sequential quadratic programming on the tangent space of the body.  With require
 ``r(q) = 0``, distances ``d(q) >= 0`` and wishes ``s(q)`` each iteration solves, for the
 tangent step ``v``,
 
-    min  1/2 |s + S v|^2_W + 1/2 rho |r + R v + u|^2 + 1/2 rho |slack|^2
+    min  1/2 |s + S v|^2_W + 1/2 rho |r + R v|^2 + 1/2 rho |slack|^2
     s.t. d + D v + slack >= 0,  hinge ranges,  |v|_inf <= trust region,
 
-which always has a solution, also where the requirements have none.  The offset ``u``
-accumulates what is left of ``r`` (method of multipliers), so that the requirements end up
-exact and not merely heavily weighted.  Steps are accepted when the sum of the squares falls.
+which always has a solution, also where the requirements have none.  Steps are accepted when
+the sum of the squares falls, after a second-order correction where the requirements curve.
+Last, what the wishes have pulled from the requirements is removed by the smallest changes
+that do so, so that the requirements end up exact and not merely heavily weighted.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import daqp
 import numpy as np
@@ -39,6 +41,16 @@ RESTARTS: tuple[dict[str, float], ...] = (
 a squat, a crouch and a stoop."""
 
 
+NEAR = 2e-3
+"""Violation [m, rad] below which the rest is done by projection onto the requirements."""
+
+MAX_TRUST = 0.8
+"""Largest trust region [m, rad]."""
+
+PATIENCE = 6
+"""Iterations in a row that gain less than half a percent after which a start is given up."""
+
+
 @dataclass(frozen=True)
 class SolverSettings:
     """How hard to try.
@@ -60,7 +72,7 @@ class SolverSettings:
     clearance_tolerance: float = 1e-4
     settled: float = 5e-3
     iterations: int = 60
-    stiffness: float = 1e5
+    stiffness: float = 1e4
     trust: float = 0.3
     activation: float = 0.10
     buffer: float = 5e-4
@@ -133,6 +145,16 @@ def generate_posture(
     return solver.result(best, solver.iterations + freely.iterations)
 
 
+class _Move(NamedTuple):
+    """A step tried: where it leads, its largest component, and the merit before, gained and expected."""
+
+    candidate: "_Iterate"
+    size: float
+    before: float
+    gained: float
+    expected: float
+
+
 @dataclass(frozen=True, eq=False)
 class _Iterate:
     """Everything known at one configuration.
@@ -188,31 +210,52 @@ class PostureSolver:
         """Iterate from one start until the posture settles or nothing improves any more."""
         settings = self.settings
         iterate = self.linearise(self._inside_limits(q))
-        offset = np.zeros_like(iterate.requirement.residual)
-        trust, stalled = settings.trust, 0
+        trust, idle = settings.trust, 0
         for _ in range(settings.iterations):
             self.iterations += 1
-            step, predicted = self._step(iterate, offset, trust)
-            candidate = self.linearise(pin.integrate(self.problem.body.pinocchio, iterate.q, step))
-            before = self._merit(iterate, offset)
-            gained = before - self._merit(candidate, offset)
-            expected = before - predicted
-            if gained < 0.1 * expected and not self._tiny(step):
-                trust = 0.3 * min(trust, float(np.abs(step).max()))
-                if trust < 1e-6:
-                    break
-                if gained <= 0.0:
-                    continue
-            elif gained > 0.7 * expected:
-                trust = min(2.0 * trust, 0.8)
-            iterate = candidate
-            if self.meets(iterate) and float(np.abs(step).max()) < settings.settled:
+            move = self._best_move(iterate, trust)
+            if move.gained < 0.1 * move.expected and move.size > 1e-5:
+                trust = 0.3 * min(trust, move.size)
+            elif move.gained > 0.7 * move.expected:
+                trust = min(2.0 * trust, MAX_TRUST)
+            if move.gained > 0.0:
+                iterate = move.candidate
+            near = iterate.violation < NEAR
+            if near and move.size < settings.settled:
                 break
-            stalled = stalled + 1 if gained < 1e-4 * before and not self.meets(iterate) else 0
-            if stalled >= 8:
+            idle = idle + 1 if move.gained < (1e-3 if near else 5e-3) * move.before else 0
+            if idle >= (2 if near else PATIENCE):
                 break
-            if iterate.error < 1e-2:
-                offset = np.clip(offset + iterate.requirement.residual, -0.02, 0.02)
+        return self._exact(iterate) if iterate.violation < 5.0 * NEAR else iterate
+
+    def _best_move(self, iterate: _Iterate, trust: float) -> "_Move":
+        """The step of the quadratic programme, bent back onto the requirements where that is better."""
+        before = self._merit(iterate)
+        step, predicted = self._step(iterate, trust)
+        move = self._move(iterate, step, before, before - predicted)
+        if move.gained < 0.5 * move.expected:
+            # The requirements are curved: without bending, the trust region would shrink only
+            # because straight steps leave them (Maratos effect).
+            bent, _ = self._step(_bent(iterate, move.candidate, step), trust)
+            other = self._move(iterate, bent, before, before - predicted)
+            move = other if other.gained > move.gained else move
+        return move
+
+    def _move(self, iterate: _Iterate, step: FloatArray, before: float, expected: float) -> "_Move":
+        candidate = self.linearise(pin.integrate(self.problem.body.pinocchio, iterate.q, step))
+        gained = before - self._merit(candidate)
+        return _Move(candidate, float(np.abs(step).max()), before, gained, expected)
+
+    def _exact(self, iterate: _Iterate) -> _Iterate:
+        """Remove what the wishes have pulled from the requirements, by the smallest changes."""
+        for _ in range(8):
+            if iterate.error <= 0.01 * self.settings.tolerance and self.meets(iterate):
+                break
+            step, _ = self._step(iterate, 0.1, wishes=False)
+            moved = self.linearise(pin.integrate(self.problem.body.pinocchio, iterate.q, step))
+            if moved.violation >= iterate.violation and self.meets(iterate):
+                break
+            iterate = moved
         return iterate
 
     def meets(self, iterate: _Iterate) -> bool:
@@ -260,13 +303,13 @@ class PostureSolver:
         body = self.problem.body
         return np.concatenate([q[:7], np.clip(q[7:], body.lower, body.upper)])
 
-    def _merit(self, iterate: _Iterate, offset: FloatArray) -> float:
+    def _merit(self, iterate: _Iterate) -> float:
         intrusion = np.minimum(iterate.clearance.residual - self.settings.buffer, 0.0)
-        hard = np.sum((iterate.requirement.residual + offset) ** 2) + np.sum(intrusion**2)
+        hard = np.sum(iterate.requirement.residual**2) + np.sum(intrusion**2)
         soft = np.sum(self._wish_weights * iterate.wish.residual**2)
         return float(0.5 * soft + 0.5 * self.settings.stiffness * hard)
 
-    def _step(self, iterate: _Iterate, offset: FloatArray, trust: float) -> tuple[FloatArray, float]:
+    def _step(self, iterate: _Iterate, trust: float, *, wishes: bool = True) -> tuple[FloatArray, float]:
         """Solve the quadratic programme; returns the step and the merit it predicts."""
         rho, buffer = self.settings.stiffness, self.settings.buffer
         residual, jacobian = iterate.requirement
@@ -275,7 +318,7 @@ class PostureSolver:
         nv = self.problem.body.nv
         damping = self.problem.preferences.damping
         hessian = wish_jacobian.T @ weighted + rho * (jacobian.T @ jacobian) + damping * np.eye(nv)
-        gradient = weighted.T @ wish + rho * (jacobian.T @ (residual + offset))
+        gradient = (weighted.T @ wish if wishes else 0.0) + rho * (jacobian.T @ residual)
         lower, upper = self._bounds(iterate.q, trust)
         distance, slope = iterate.clearance
         count = len(distance)
@@ -289,7 +332,7 @@ class PostureSolver:
             rho_soft=1.0 / rho,
         )
         step = np.asarray(step, dtype=np.float64) if flag > 0 else np.zeros(nv)
-        hard = np.sum((residual + jacobian @ step + offset) ** 2)
+        hard = np.sum((residual + jacobian @ step) ** 2)
         hard += np.sum(np.minimum(distance + slope @ step - buffer, 0.0) ** 2)
         soft = np.sum(self._wish_weights * (wish + wish_jacobian @ step) ** 2)
         return step, float(0.5 * soft + 0.5 * rho * hard)
@@ -301,10 +344,6 @@ class PostureSolver:
         lower[6:] = np.maximum(lower[6:], np.minimum(body.lower - angles, 0.0))
         upper[6:] = np.minimum(upper[6:], np.maximum(body.upper - angles, 0.0))
         return lower, upper
-
-    def _tiny(self, step: FloatArray) -> bool:
-        """A step whose gain drowns in rounding errors of the merit."""
-        return bool(np.abs(step).max(initial=0.0) < 1e-5)
 
     def _misses(self, iterate: _Iterate) -> tuple[str, ...]:
         """What is not met, worst first."""
@@ -374,15 +413,26 @@ def _starts(
         yield frozen_array(start, "posture start", (problem.body.nq,), BodyError), True
         if not settings.restarts:
             return
+    ready = [place_over_contacts(problem, q) for q in _templates(problem, settings)]
+    configuration = Configuration(problem.body)
+    terms = problem.requirements()
+
+    def distance(q: FloatArray) -> float:
+        return sum(float(np.sum(t.evaluate(configuration.update(q)).residual ** 2)) for t in terms)
+
+    for q in sorted(ready, key=distance):
+        yield q, False
+
+
+def _templates(problem: PostureProblem, settings: SolverSettings) -> Iterator[FloatArray]:
+    """The reference, and the reference bent as in :data:`RESTARTS`."""
     assert problem.reference is not None  # set on construction
-    yield place_over_contacts(problem, problem.reference), False
-    if not settings.restarts:
-        return
-    for angles in RESTARTS:
+    yield problem.reference
+    for angles in RESTARTS if settings.restarts else ():
         q = np.array(problem.reference)
         for index, name in enumerate(problem.body.joint_names):
             q[7 + index] = next((value for key, value in angles.items() if name.endswith(key)), q[7 + index])
-        yield place_over_contacts(problem, q), False
+        yield q
 
 
 def _without_one(problem: PostureProblem) -> Iterator[tuple[str, PostureProblem]]:
@@ -397,6 +447,22 @@ def _without_one(problem: PostureProblem) -> Iterator[tuple[str, PostureProblem]
     for name in problem.placements:
         rest_of = {key: value for key, value in problem.placements.items() if key != name}
         yield f"placement '{name}'", replace(problem, placements=rest_of)
+
+
+def _bent(iterate: _Iterate, candidate: _Iterate, step: FloatArray) -> _Iterate:
+    """The iterate, shifted so that the linear model of residuals and distances is exact at the candidate."""
+    jacobian = iterate.requirement.jacobian
+    distance, slope = iterate.clearance
+    reached = dict(zip(candidate.pairs, candidate.clearance.residual, strict=True))
+    shifts = [
+        reached[pair] - linear if pair in reached else 0.0
+        for pair, linear in zip(iterate.pairs, distance + slope @ step, strict=True)
+    ]
+    return replace(
+        iterate,
+        requirement=Linearised(candidate.requirement.residual - jacobian @ step, jacobian),
+        clearance=Linearised(distance + np.array(shifts).reshape(-1), slope),
+    )
 
 
 def _stack(parts: list[Linearised], nv: int) -> Linearised:
