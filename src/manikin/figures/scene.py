@@ -1,0 +1,165 @@
+"""The path of the centre of mass in the scene, with stick figures at the key instants."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule
+from manikin.figures.style import COLOURS, new_figure
+from manikin.motion import Motion
+from manikin.motion.derived import phases_of, segment_positions
+from manikin.motion.file import MotionFile
+from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
+from manikin.spatial import FloatArray
+
+
+def scene_figure(content: MotionFile, elevation_deg: float = 14.0, azimuth_deg: float = -62.0) -> Figure:
+    """Draw the CoM's path, the obstacles, the supports and the body at every key instant.
+
+    Args:
+        content: At least one motion; body, scene and schedule are drawn when they are there.
+        elevation_deg: Height of the eye above the horizon [deg].
+        azimuth_deg: Direction of the eye about the vertical [deg].
+    """
+    name, motion = list(content.motions.items())[-1]
+    figure = new_figure(9.5, 8.0, f"Motion in the scene ({name})")
+    axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
+    seen = [motion.com]
+    corners = _draw_scene(axes, content.scene) if content.scene is not None else np.zeros((0, 3))
+    if content.schedule is not None:
+        seen.append(_draw_soles(axes, content.schedule))
+    if content.body is not None:
+        seen.append(_draw_figures(axes, content.body, motion, content.schedule))
+    axes.plot(*motion.com.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
+    _frame(axes, np.vstack(seen), corners)
+    axes.view_init(elevation_deg, azimuth_deg)
+    axes.legend(loc="upper left", fontsize=8, frameon=False)
+    return figure
+
+
+def _draw_figures(
+    axes: Axes3D, body: BodyModel, motion: Motion, schedule: ContactSchedule | None
+) -> FloatArray:
+    instants = phases_of(motion, schedule).instants
+    samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
+    postures = [segment_positions(body, motion.q[sample]) for sample in samples]
+    sticks = _sticks(body)
+    for number, places in enumerate(postures):
+        end = number in (0, len(postures) - 1)
+        axes.add_collection3d(
+            Line3DCollection(
+                [[places[first], places[second]] for first, second in sticks],
+                colors=[_stick_colour(first, second) for first, second in sticks],
+                linewidths=2.6 if end else 1.4,
+                alpha=0.95 if end else 0.3 + 0.3 * number / len(postures),
+                capstyle="round",
+                zorder=6,
+            )
+        )
+    _label_heads(axes, instants, postures)
+    axes.scatter(
+        *motion.com[samples].T,
+        s=18,
+        color=COLOURS["ink"],
+        zorder=9,
+        depthshade=False,
+        label="at the key instants",
+    )
+    return np.vstack([list(places.values()) for places in postures])
+
+
+def _label_heads(axes: Axes3D, instants: FloatArray, postures: list[dict[str, FloatArray]]) -> None:
+    """Write the time above each head, the ends first, leaving out what would overlap."""
+    order = sorted(range(len(postures)), key=lambda i: (i not in (0, len(postures) - 1), i))
+    taken: list[FloatArray] = []
+    for index in order:
+        head = postures[index].get("effector/head")
+        if head is None or any(np.linalg.norm(head - other) < 0.13 for other in taken):
+            continue
+        taken.append(head)
+        axes.text(
+            head[0], head[1], head[2] + 0.05, f"{instants[index]:.2f} s", fontsize=7.5, ha="center",
+            color=COLOURS["ink"], zorder=9,
+        )  # fmt: skip
+
+
+def _sticks(body: BodyModel) -> list[tuple[str, str]]:
+    """Pairs of joints to be joined: every segment with its parent, the hands' and the head's ends."""
+    sticks = [(segment.parent, segment.name) for segment in body.segments if segment.parent is not None]
+    free = [e for e in body.effectors.values() if "foot" not in e.name and e.segment != body.segments[0].name]
+    return sticks + [(effector.segment, f"effector/{effector.name}") for effector in free]
+
+
+def _stick_colour(start: str, end: str) -> str:
+    for side in ("left", "right"):
+        if side in start or side in end:
+            return COLOURS[f"{side}_foot"]
+    return COLOURS["ink"]
+
+
+def _draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
+    """Draw every finite obstacle; return the corners of their bounds."""
+    corners = [np.zeros((0, 3))]
+    for obstacle in scene:
+        if isinstance(obstacle.shape, (HalfSpace, Plane)):
+            continue
+        faces = _box_faces(obstacle) if isinstance(obstacle.shape, Box) else _triangles(obstacle)
+        low, high = obstacle.bounds
+        axes.add_collection3d(
+            Poly3DCollection(
+                faces,
+                facecolor=COLOURS["obstacle"],
+                edgecolor="#8D94A0",
+                linewidths=0.6,
+                alpha=0.25,
+                zorder=2,
+            )
+        )
+        axes.text(high[0], low[1], high[2], f" {obstacle.name}", fontsize=8, color="#666C77", zorder=3)
+        corners.append(np.array([low, high]))
+    return np.vstack(corners)
+
+
+def _box_faces(obstacle: Obstacle) -> list[FloatArray]:
+    half = obstacle.shape.size / 2  # type: ignore[union-attr]
+    signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
+    corners = obstacle.to_world(signs * half)
+    quads = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    return [corners[list(quad)] for quad in quads]
+
+
+def _triangles(obstacle: Obstacle) -> FloatArray:
+    return np.asarray(obstacle.to_trimesh().triangles)
+
+
+def _draw_soles(axes: Axes3D, schedule: ContactSchedule) -> FloatArray:
+    corners = []
+    for phase in schedule.sequence:
+        for contact in phase.stance:
+            colour = COLOURS.get(contact.effector, COLOURS["soft"])
+            if len(contact.points) > 2:
+                sole = Poly3DCollection(
+                    [contact.points_in_world], facecolor=colour, edgecolor=colour, alpha=0.15
+                )
+                sole.set_zorder(4)
+                axes.add_collection3d(sole)
+            corners.append(contact.points_in_world)
+    return np.vstack(corners)
+
+
+def _frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
+    """Limit the axes to the motion and to the obstacles within a metre of it."""
+    low, high = seen.min(axis=0) - 0.1, seen.max(axis=0) + 0.1
+    if len(corners):
+        low = np.minimum(low, np.maximum(corners.min(axis=0), low - 1.0))
+        high = np.maximum(high, np.minimum(corners.max(axis=0), high + 1.0))
+    low[2] = min(low[2] + 0.1, 0.0)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(high - low, zoom=1)
+    for axis, label in ((axes.xaxis, "x [m]"), (axes.yaxis, "y [m]"), (axes.zaxis, "z [m]")):
+        axis.set_label_text(label, fontsize=9)
+        axis.set_tick_params(labelsize=7)
+        axis.pane.set_facecolor("#FAFBFC")
+        axis.pane.set_edgecolor("#D5D9DF")
