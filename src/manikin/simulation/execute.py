@@ -8,7 +8,7 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind, ContactSchedule
-from manikin.control import Controller, ControlSettings
+from manikin.control import Controller, ControlOutput, ControlSettings
 from manikin.control.contact_forces import hanging_segment
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.errors import InputError
@@ -26,6 +26,13 @@ JOINT_DAMPING = 1.0
 
 FALL_DISTANCE = 0.3
 """A body whose CoM is this far from its plan has fallen [m]."""
+
+SETTLING = 0.2
+"""Time to stand in the first posture before the motion begins, unrecorded [s]; the feet sink
+in by the fraction of a millimetre that the contact needs to carry."""
+
+_AT_REST = 1e-2
+"""A motion whose first speeds are smaller than this begins at rest [m/s, rad/s]."""
 
 _SWITCHING = 0.1
 """A support may touch its surface this long before and after its planned interval [s]."""
@@ -123,23 +130,29 @@ class _Run:
         began = clock.perf_counter()
         control = 0.0
         start = float(self.plan.time[0])
-        self.world.reset(self.plan.q[0], self.plan.v[0], start)
+        settle = self._settling_steps()
+        self.world.reset(self.plan.q[0], self.plan.v[0], start - settle * self.period)
         count = round((self.plan.duration + hold) / self.period) + 1
-        for number in range(count):
-            self._switch(self.world.time)
+        for number in range(-settle, count):
+            time = start + number * self.period
+            self._switch(time)
             before = clock.perf_counter()
-            output = self.controller.step(
-                start + number * self.period, self.world.q, self.world.v, self._touching()
-            )
+            output = self.controller.step(time, self.world.q, self.world.v, self._touching(time))
             control += clock.perf_counter() - before
             self.world.advance(output.tau, 1)
-            self.recorder.record(self.world.sense(), output)
+            if number >= 0:
+                self.recorder.record(self.world.sense(), output)
             self.world.advance(output.tau, self.substeps - 1)
-            if self._failed():
+            if number >= 0 and self._failed(output):
                 break
-            if progress is not None:
+            if number >= 0 and progress is not None:
                 progress((number + 1) / count)
         return self._report(clock.perf_counter() - began, control)
+
+    def _settling_steps(self) -> int:
+        """Control steps before the motion; none when it begins at speed."""
+        at_rest = float(np.abs(self.plan.v[0]).max()) < _AT_REST
+        return round(SETTLING / self.period) if at_rest else 0
 
     def _switch(self, time: float) -> None:
         """Tell the world which touches are planned now, and hold on to grasps."""
@@ -156,20 +169,19 @@ class _Run:
     def _grip(self, contact: Contact) -> None:
         self.world.grip(Grip(contact.effector, contact.position, contact.max_force))
 
-    def _touching(self) -> dict[str, bool]:
+    def _touching(self, time: float) -> dict[str, bool]:
         """Whether each effector touches the support it holds or is about to make."""
         felt: dict[str, bool] = {}
         for number in self._planned_now:
             item = self.holds[number]
             grasp = item.interval.contact.kind is ContactKind.GRASP
-            if not grasp and self.world.time < item.interval.end:
+            if not grasp and time < item.interval.end - 1e-9:
                 felt[item.effector] = self.world.touching(item.segments, item.obstacle)
         return felt
 
-    def _failed(self) -> bool:
-        time = self.world.time
-        state, reference = self.recorder.samples[-1].output.state, self.recorder.samples[-1].output.reference
-        offset = float(np.linalg.norm(state.com - reference.com))
+    def _failed(self, output: ControlOutput) -> bool:
+        time, state = self.world.time, output.state
+        offset = float(np.linalg.norm(state.com - output.reference.com))
         if self.world.divergence or not np.all(np.isfinite(state.com)):
             self._fail(f"the simulation diverged ({self.world.divergence}) at {time:.3f} s", time)
         elif offset > FALL_DISTANCE:
