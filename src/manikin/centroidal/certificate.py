@@ -18,6 +18,10 @@ TOLERANCE = 1e-6
 """Violation up to which a requirement counts as met [SI unit of the requirement]."""
 
 
+UNIT_SCALE = {"m": 0.01, "m/s": 0.01, "m/s^2": 0.1, "s": 0.01, "N.m": 10.0, "N": 100.0}
+"""Violations that are about equally bad, to compare requirements of different units."""
+
+
 @dataclass(frozen=True)
 class Residual:
     """How far one requirement is violated at worst.
@@ -36,6 +40,11 @@ class Residual:
     unit: str
     phase: int | None = None
     time: float | None = None
+
+    @property
+    def severity(self) -> float:
+        """Violation in units of :data:`UNIT_SCALE`."""
+        return self.value / UNIT_SCALE[self.unit]
 
     def __str__(self) -> str:
         place = "" if self.phase is None else f" in phase {self.phase}"
@@ -67,12 +76,22 @@ class Residuals:
 
     @property
     def largest(self) -> Residual:
-        """The most violated requirement (numbers of different units compared as they are)."""
-        return max(self.items, key=lambda item: item.value)
+        """The most violated requirement, units compared by :data:`UNIT_SCALE`."""
+        return max(self.items, key=lambda item: item.severity)
 
     def within(self, tolerance: float = TOLERANCE) -> bool:
         """Whether every requirement is met."""
-        return self.largest.value <= tolerance
+        return all(item.value <= tolerance for item in self.items)
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """Order of quality, the smaller the better: worst of the other violations, then the margin.
+
+        Violations within :data:`TOLERANCE` count as none.
+        """
+        others = [item for item in self.items if item.requirement != "balance margin"]
+        worst = max((item.severity for item in others if item.value > TOLERANCE), default=0.0)
+        return worst, -self.min_margin
 
 
 def phase_times(trajectory: CentroidalTrajectory, step: float = STEP) -> list[FloatArray]:

@@ -8,6 +8,9 @@ import numpy as np
 
 from manikin.spatial import FloatArray
 
+CoordinateFunction = Callable[[Any, Any, Any], Any]
+"""A smooth function of x, y, z [m], given as numbers, numpy arrays or CasADi symbols."""
+
 
 @dataclass(frozen=True)
 class GeometricConstraint:
@@ -20,7 +23,7 @@ class GeometricConstraint:
     """
 
     name: str
-    function: Callable[[Any, Any, Any], Any]
+    function: CoordinateFunction
 
     def violation(self, position: FloatArray) -> FloatArray:
         """(n,) value of the function at (n, 3) positions; positive means violated [m]."""
@@ -46,29 +49,36 @@ class BentSurface:
     steepness: float
     centre: float
 
-    def height(self, x: Any) -> Any:
+    def __call__(self, x: Any, y: Any = 0.0, z: Any = 0.0) -> Any:  # noqa: ARG002
         """Height at ``x`` [m], for numbers, arrays and CasADi symbols."""
         return self.middle - self.drop / np.pi * np.arctan(self.steepness * (x - self.centre))
 
 
 @dataclass(frozen=True)
 class _Above:
-    surface: BentSurface
+    surface: CoordinateFunction
 
-    def __call__(self, x: Any, y: Any, z: Any) -> Any:  # noqa: ARG002
-        return self.surface.height(x) - z
+    def __call__(self, x: Any, y: Any, z: Any) -> Any:
+        return self.surface(x, y, z) - z
 
 
 @dataclass(frozen=True)
 class _Below:
-    surface: BentSurface
+    surface: CoordinateFunction
 
-    def __call__(self, x: Any, y: Any, z: Any) -> Any:  # noqa: ARG002
-        return z - self.surface.height(x)
+    def __call__(self, x: Any, y: Any, z: Any) -> Any:
+        return z - self.surface(x, y, z)
 
 
-def height_band(lower: BentSurface, upper: BentSurface) -> tuple[GeometricConstraint, GeometricConstraint]:
-    """The CoM between two surfaces ([Qiu2012]_ 5.29)."""
+def height_band(
+    lower: CoordinateFunction, upper: CoordinateFunction
+) -> tuple[GeometricConstraint, GeometricConstraint]:
+    """The CoM between two surfaces ([Qiu2012]_ 5.29).
+
+    Args:
+        lower: Least height [m] at (x, y, z), such as a :class:`BentSurface`.
+        upper: Greatest height [m] at (x, y, z).
+    """
     return (
         GeometricConstraint("height above the lower surface", _Above(lower)),
         GeometricConstraint("height below the upper surface", _Below(upper)),

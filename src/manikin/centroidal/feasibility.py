@@ -15,6 +15,9 @@ from manikin.spatial import FloatArray, skew
 ROUNDING = 1e-9
 """Slack given to comparisons of given lengths and times [m], [s]."""
 
+VANISHING_MARGIN = 1e-6
+"""Margins up to this are none, as free fall has everywhere ([Qiu2012]_ 5.21) [N.m] or [N]."""
+
 
 @dataclass(frozen=True)
 class Failure:
@@ -163,7 +166,7 @@ def _end_balance_failure(problem: CentroidalProblem, polytopes: Sequence[Polytop
     )
     for name, phase, com, acceleration in ends:
         margin = best_margin_at(polytopes[phase], problem, com, acceleration)
-        if margin < problem.required_margin:
+        if margin <= max(problem.required_margin, VANISHING_MARGIN):
             held = ", ".join(problem.sequence[phase].stance.effectors)
             return Failure(
                 f"{name} balance",

@@ -34,7 +34,7 @@ class Structure:
     Attributes:
         degree: Degree of the spline.
         samples: n_s.
-        rows: Number of facets of each phase's polytope.
+        rows: Number of facets imposed in each phase.
         contacts: Number of contacts of each phase.
         margin_space: ``"wrench"`` or ``"force"``.
         geometric: Functions of the geometric constraints.
@@ -62,7 +62,8 @@ class Programme:
     Attributes:
         structure: What it was built for.
         solver: CasADi function made by ``nlpsol``; unknowns are the Bezier points of each
-            phase (column by column), the durations [s] and d_min / MARGIN_SCALE.
+            phase (column by column), the durations [s], d_min and its shortfall below the
+            required margin, both over MARGIN_SCALE.
         groups: Names of the row groups with their number of rows, in order. ``end`` rows are
             start velocity, start acceleration, goal velocity, goal acceleration.
         parameters: Names and shapes of the parameters, in order.
@@ -86,17 +87,19 @@ class Programme:
             packed.append(array.ravel(order="F"))
         return np.concatenate(packed)
 
-    def pack_unknowns(self, bezier: FloatArray, durations: FloatArray, margin: float) -> FloatArray:
-        """Vector of unknowns from (phases, k + 1, 3) points, (phases,) durations and d_min."""
-        scale = MARGIN_SCALE[self.structure.margin_space]
-        return np.concatenate([bezier.transpose(0, 2, 1).ravel(), durations, [margin / scale]])
+    def pack_unknowns(
+        self, bezier: FloatArray, durations: FloatArray, margin: float, shortfall: float
+    ) -> FloatArray:
+        """Vector of unknowns from (phases, k + 1, 3) points, (phases,) durations, d_min and shortfall."""
+        margins = np.array([margin, shortfall]) / MARGIN_SCALE[self.structure.margin_space]
+        return np.concatenate([bezier.transpose(0, 2, 1).ravel(), durations, margins])
 
     def unpack_unknowns(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-        """Inverse of :meth:`pack_unknowns`."""
+        """Bezier points (phases, k + 1, 3), durations (phases,) and d_min."""
         phases, k = self.structure.phases, self.structure.degree
         bezier = unknowns[: self.point_count].reshape(phases, 3, k + 1).transpose(0, 2, 1)
         durations = unknowns[self.point_count : self.point_count + phases]
-        return bezier, durations, float(unknowns[-1]) * MARGIN_SCALE[self.structure.margin_space]
+        return bezier, durations, float(unknowns[-2]) * MARGIN_SCALE[self.structure.margin_space]
 
 
 class _Builder:
@@ -111,6 +114,7 @@ class _Builder:
         self.bezier = [ca.SX.sym(f"b{i}", size, 3) for i in range(structure.phases)]
         self.durations = ca.SX.sym("h", structure.phases)
         self.margin = ca.SX.sym("d")
+        self.shortfall = ca.SX.sym("e")
 
     def parameter(self, name: str, rows: int, columns: int = 1) -> ca.SX:
         self.parameters[name] = ca.SX.sym(name, rows, columns)
@@ -133,8 +137,11 @@ def transcribe(structure: Structure) -> Programme:
             _add_continuity(builder, phase)
     _add_end_conditions(builder)
     builder.add("total_duration", ca.sum1(builder.durations))
+    builder.add("required_margin", builder.margin + builder.shortfall)
     objective = _objective(builder)
-    unknowns = ca.vertcat(*[ca.vec(b) for b in builder.bezier], builder.durations, builder.margin)
+    unknowns = ca.vertcat(
+        *[ca.vec(b) for b in builder.bezier], builder.durations, builder.margin, builder.shortfall
+    )
     problem = {
         "x": unknowns,
         "p": ca.vertcat(*[ca.vec(p) for p in builder.parameters.values()]),
@@ -239,8 +246,12 @@ def _add_end_conditions(builder: _Builder) -> None:
 
 
 def _objective(builder: _Builder) -> ca.SX:
-    """Weighted objectives ([Qiu2012]_ 5.27-5.28), the sums exactly integrated."""
-    weights = builder.parameter("weights", 3)
+    """Weighted objectives ([Qiu2012]_ 5.27-5.28), the sums exactly integrated.
+
+    The required margin is asked for by an exact penalty, so that the largest margin is found
+    when it cannot be reached.
+    """
+    weights = builder.parameter("weights", 4)
     diagonals = [builder.parameter(name, 1, 3) for name in ("velocity", "acceleration", "jerk")]
     total = ca.sum1(builder.durations)
     scale = MARGIN_SCALE[builder.structure.margin_space]
@@ -248,7 +259,8 @@ def _objective(builder: _Builder) -> ca.SX:
     for points, duration in zip(builder.bezier, ca.vertsplit(builder.durations), strict=True):
         for order, diagonal in enumerate(diagonals, start=1):
             smoothness += _squared_integral(points, duration, order, diagonal)
-    return -weights[0] * scale * builder.margin + weights[1] * smoothness / total + weights[2] * total
+    margin = weights[0] * builder.margin - weights[3] * builder.shortfall
+    return -scale * margin + weights[1] * smoothness / total + weights[2] * total
 
 
 def _squared_integral(points: ca.SX, duration: ca.SX, order: int, diagonal: ca.SX) -> ca.SX:
