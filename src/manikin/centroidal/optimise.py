@@ -1,0 +1,220 @@
+"""One optimisation of the timing-free method: from a guess to a measured attempt."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manikin.balance import WrenchPolytope
+from manikin.centroidal.certificate import TOLERANCE, Residuals, measure
+from manikin.centroidal.facets import FacetIndices
+from manikin.centroidal.problem import CentroidalProblem
+from manikin.centroidal.trajectory import CentroidalTrajectory
+from manikin.centroidal.transcription import (
+    MARGIN_SCALE,
+    Programme,
+    Structure,
+    spline_from_bezier,
+    transcribe,
+)
+from manikin.contact import ContactSchedule
+from manikin.spatial import FloatArray
+
+SHORTFALL_WEIGHT = 20.0
+"""First exact penalty of a margin below the required one [1/(N.m)] or [1/N]."""
+
+
+@dataclass(frozen=True)
+class Targets:
+    """What the programme is asked at its samples, a little more than the problem asks everywhere.
+
+    Attributes:
+        margin: Smallest margin [N.m] or [N].
+        position: Distance kept from the geometric constraints and the support distance [m].
+        duration: Distance kept from the total duration [s].
+        shortfall_weight: Penalty of a smaller margin [1/(N.m)] or [1/N].
+    """
+
+    margin: float
+    position: float = 3e-4
+    duration: float = 1e-7
+    shortfall_weight: float = SHORTFALL_WEIGHT
+
+    @classmethod
+    def of(cls, problem: CentroidalProblem) -> "Targets":
+        """Targets of the first round."""
+        return cls(problem.required_margin + 1e-3)
+
+    def grown(self, problem: CentroidalProblem, certificate: Residuals) -> "Targets":
+        """Targets that make up for what the last solution broke between its samples."""
+        positions = ["support distance"] if problem.support_distance is not None else []
+        positions += [constraint.name for constraint in problem.geometric]
+        position = max((certificate[name].value for name in positions), default=0.0)
+        return replace(
+            self,
+            margin=self.margin + 1.2 * max(certificate["balance margin"].value, 0.0),
+            position=self.position + (1.2 * position + 1e-5 if position > TOLERANCE else 0.0),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """Outcome of one optimisation, measured every millisecond against the whole problem.
+
+    Attributes:
+        trajectory: Whatever the solver ended with.
+        certificate: Its residuals.
+        bezier: (phases, k + 1, 3) Bezier points [m], to start again from.
+        durations: (phases,) [s].
+        iterations: Of the solver.
+        margin: d_min at the samples over the imposed facets [N.m] or [N].
+        converged: Whether the solver reports an optimum.
+    """
+
+    trajectory: CentroidalTrajectory
+    certificate: Residuals
+    bezier: FloatArray
+    durations: FloatArray
+    iterations: int
+    margin: float
+    converged: bool
+
+
+def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> Programme:
+    """The compiled optimisation of a problem, shared by all problems of the same structure.
+
+    Args:
+        problem: What to find.
+        facets: Indices of the facets imposed in each phase.
+    """
+    return transcribe(
+        Structure(
+            degree=problem.degree,
+            samples=problem.samples,
+            rows=tuple(len(indices) for indices in facets),
+            contacts=tuple(len(phase.stance) for phase in problem.sequence),
+            margin_space=problem.margin_space,
+            geometric=tuple(constraint.function for constraint in problem.geometric),
+            limited_distance=problem.support_distance is not None,
+        )
+    )
+
+
+def optimise(
+    problem: CentroidalProblem,
+    polytopes: Sequence[WrenchPolytope],
+    facets: FacetIndices,
+    targets: Targets,
+    bezier: FloatArray,
+    durations: FloatArray,
+) -> Attempt:
+    """Run the solver once from the given Bezier points and durations.
+
+    Args:
+        problem: What to find.
+        polytopes: W_i of the phases about the world origin.
+        facets: Indices of the facets imposed in each phase.
+        targets: Bounds used at the samples.
+        bezier: (phases, k + 1, 3) [m].
+        durations: (phases,) [s].
+    """
+    programme = build_programme(problem, facets)
+    lower, upper = _unknown_bounds(programme, problem)
+    row_lower, row_upper = _row_bounds(programme, problem, targets)
+    unknowns = programme.pack_unknowns(bezier, durations, problem.required_margin, 10.0)
+    solution = programme.solver(
+        x0=np.clip(unknowns, lower, upper),
+        p=programme.pack_parameters(_parameters(problem, polytopes, facets, targets)),
+        lbx=lower, ubx=upper, lbg=row_lower, ubg=row_upper,
+    )  # fmt: skip
+    bezier, durations, margin = programme.unpack_unknowns(np.asarray(solution["x"], dtype=np.float64).ravel())
+    trajectory = trajectory_of(problem, bezier, durations)
+    stats = programme.solver.stats()
+    return Attempt(
+        trajectory, measure(problem, trajectory, polytopes),
+        bezier, durations, int(stats["iter_count"]), margin, bool(stats["success"]),
+    )  # fmt: skip
+
+
+def _parameters(
+    problem: CentroidalProblem,
+    polytopes: Sequence[WrenchPolytope],
+    facets: FacetIndices,
+    targets: Targets,
+) -> dict[str, object]:
+    weights = problem.weights
+    values: dict[str, object] = {
+        "mass": problem.mass,
+        "weights": (weights.margin, weights.smoothness, weights.duration, targets.shortfall_weight),
+        "velocity": weights.velocity,
+        "acceleration": weights.acceleration,
+        "jerk": weights.jerk,
+    }
+    for name in ("start_velocity", "start_acceleration", "goal_velocity", "goal_acceleration"):
+        value = getattr(problem, name)
+        values[name] = np.zeros(3) if value is None else value
+    for index, (phase, polytope, rows) in enumerate(zip(problem.sequence, polytopes, facets, strict=True)):
+        values[f"H{index}"], values[f"h{index}"] = polytope.H[rows], polytope.h[rows]
+        values[f"contacts{index}"] = [contact.position for contact in phase.stance]
+    return values
+
+
+def _unknown_bounds(programme: Programme, problem: CentroidalProblem) -> tuple[FloatArray, FloatArray]:
+    phases, k = programme.structure.phases, programme.structure.degree
+    points = np.full((phases, k + 1, 3), np.inf)
+    low, high = -points, points.copy()
+    for bound in (low, high):
+        bound[0, 0], bound[-1, -1] = problem.start_com, problem.goal_com
+    lower = programme.pack_unknowns(low, problem.min_durations, -np.inf, 0.0)
+    upper = programme.pack_unknowns(high, problem.max_durations, np.inf, np.inf)
+    return lower, upper
+
+
+def _row_bounds(
+    programme: Programme, problem: CentroidalProblem, targets: Targets
+) -> tuple[FloatArray, FloatArray]:
+    limit = (problem.support_distance or 0.0) - targets.position
+    longest = np.inf if problem.max_duration is None else problem.max_duration - targets.duration
+    bounds = {
+        "balance": (0.0, np.inf),
+        "distance": (-np.inf, limit**2),
+        "continuity": (0.0, 0.0),
+        "total_duration": (0.0, longest),
+        "required_margin": (targets.margin / MARGIN_SCALE[problem.margin_space], np.inf),
+    }
+    ends = iter(
+        (problem.start_velocity, problem.start_acceleration, problem.goal_velocity, problem.goal_acceleration)
+    )
+    lower, upper = [], []
+    for group, count in programme.groups:
+        if group == "end":
+            low, high = (0.0, 0.0) if next(ends) is not None else (-np.inf, np.inf)
+        elif group.startswith("geometric"):
+            low, high = -np.inf, -targets.position
+        else:
+            low, high = bounds[group]
+        lower.append(np.full(count, low))
+        upper.append(np.full(count, high))
+    return np.concatenate(lower), np.concatenate(upper)
+
+
+def trajectory_of(
+    problem: CentroidalProblem, bezier: FloatArray, durations: FloatArray
+) -> CentroidalTrajectory:
+    """The trajectory of Bezier points (phases, k + 1, 3) and durations, ends and bounds met exactly."""
+    durations = np.clip(durations, problem.min_durations, problem.max_durations)
+    spline = spline_from_bezier(
+        bezier, durations,
+        start=_given(problem.start_com, problem.start_velocity, problem.start_acceleration),
+        goal=_given(problem.goal_com, problem.goal_velocity, problem.goal_acceleration),
+    )  # fmt: skip
+    instants = np.concatenate([[0.0], np.cumsum(durations)])
+    return CentroidalTrajectory(problem.mass, spline, ContactSchedule(problem.sequence, instants))
+
+
+def _given(
+    position: FloatArray, velocity: FloatArray | None, acceleration: FloatArray | None
+) -> tuple[FloatArray, ...]:
+    if velocity is None:
+        return (position,)
+    return (position, velocity) if acceleration is None else (position, velocity, acceleration)
