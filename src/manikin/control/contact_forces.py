@@ -1,6 +1,7 @@
 """Contact forces as non-negative combinations of the edges of friction pyramids."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -138,28 +139,40 @@ def contact_force_basis(
         return _grasp_basis(contact, state)
     edges = pyramid_edges(contact)
     origin = state.frames[contact.effector].position
-    generalised, wrench = [], []
+    count = 4 * geometry.point_count
+    generalised = np.empty((len(state.v), count))
+    wrench = np.empty((6, count))
+    start = 0
     for patch in geometry.patches:
         frame = state.frames[segment_key(patch.segment)]
-        arms = patch.points @ frame.rotation.T
-        forces = np.tile(edges.T, (1, len(arms)))
-        moments = np.concatenate([skew(arm) @ edges.T for arm in arms], axis=1)
-        about_frame = np.vstack((forces, moments))
-        generalised.append(frame.jacobian.T @ about_frame)
-        about_effector = about_frame.copy()
-        about_effector[3:] += skew(frame.position - origin) @ forces
-        wrench.append(about_effector)
-    count = 4 * geometry.point_count
+        end = start + 4 * len(patch.points)
+        wrench[:, start:end] = _edge_wrenches(edges, patch.points @ frame.rotation.T)
+        generalised[:, start:end] = frame.jacobian.T @ wrench[:, start:end]
+        wrench[3:, start:end] += skew(frame.position - origin) @ wrench[:3, start:end]
+        start = end
     return ContactForceBasis(
         contact,
-        np.concatenate(generalised, axis=1),
-        np.concatenate(wrench, axis=1),
+        generalised,
+        wrench,
         np.ones(count),
         np.zeros(count),
         np.full(count, np.inf),
     )
 
 
+def _edge_wrenches(edges: FloatArray, arms: FloatArray) -> FloatArray:
+    """(6, 4 k) force and moment of each of the edges (4, 3) at each of the arms (k, 3)."""
+    wrench = np.empty((6, len(arms), len(edges)))
+    force = edges.T[:, None, :]
+    arm = arms.T[:, :, None]
+    wrench[:3] = force
+    wrench[3] = arm[1] * force[2] - arm[2] * force[1]
+    wrench[4] = arm[2] * force[0] - arm[0] * force[2]
+    wrench[5] = arm[0] * force[1] - arm[1] * force[0]
+    return wrench.reshape(6, -1)
+
+
+@lru_cache(maxsize=256)
 def pyramid_edges(contact: Contact) -> FloatArray:
     """(4, 3) edges of the inner friction pyramid in the world, each with unit normal force.
 
@@ -168,7 +181,9 @@ def pyramid_edges(contact: Contact) -> FloatArray:
     slope = contact.friction / np.sqrt(2.0)
     signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     local = np.column_stack((slope * signs, np.ones(4)))
-    return local @ contact.rotation_contact_to_world.T
+    edges = local @ contact.rotation_contact_to_world.T
+    edges.setflags(write=False)
+    return edges
 
 
 def _grasp_basis(contact: Contact, state: DynamicsState) -> ContactForceBasis:

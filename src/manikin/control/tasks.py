@@ -13,7 +13,7 @@ from manikin.control.dynamics import DynamicsState, FrameState
 from manikin.control.reference import EffectorReference, ReferenceSample
 from manikin.control.settings import Impedance
 from manikin.control.supports import SupportMode, SupportState
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, skew
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,7 @@ def stance_task(
     """
     wanted = -gains.damping * frame.twist
     if support.contact is not None:
-        tilt = np.cross(frame.rotation[:, 2], support.contact.normal)
+        tilt = skew(frame.rotation[:, 2]) @ support.contact.normal
         wanted[3:] += gains.stiffness * tilt
     return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
 

@@ -13,6 +13,8 @@ from manikin.motion import Motion
 from manikin.simulation.world import Sensed
 from manikin.spatial import GRAVITY, FloatArray
 
+_ORIGIN = np.zeros(3)
+
 _PRESSES = 1.0
 """Force from which an effector counts as a support of the executed motion [N]."""
 
@@ -56,9 +58,9 @@ class Recorder:
     def record(self, sensed: Sensed, output: ControlOutput) -> None:
         """Add one control step."""
         wrenches = np.array([self._wrench(name, sensed) for name in self.effectors])
-        everything = {item.segment for item in sensed.points}
-        total = sensed.wrench(tuple(everything), np.zeros(3))
-        total = total + sum((sensed.grip_wrench(name, np.zeros(3)) for name in self.effectors), np.zeros(6))
+        total = sensed.wrench(_ORIGIN)
+        for name in sensed.grips:
+            total = total + sensed.grip_wrench(name, _ORIGIN)
         self.samples.append(Sample(sensed, output, wrenches, total))
         if output.fallback:
             self.fallbacks.append((sensed.time, output.fallback))
@@ -69,7 +71,7 @@ class Recorder:
         contact = self._nearest_contact(name, sensed.time)
         if contact.kind is ContactKind.GRASP:
             return sensed.grip_wrench(name, contact.position)
-        return sensed.wrench(self._segments[name], contact.position)
+        return sensed.wrench(contact.position, self._segments[name])
 
     def _nearest_contact(self, name: str, time: float) -> Contact:
         """Contact of an effector at ``time``; in flight, the one to come or else the last."""

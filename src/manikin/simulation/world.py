@@ -7,33 +7,11 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from manikin.balance.friction import cross
 from manikin.errors import InputError
 from manikin.simulation.compile import SimulationModel
 from manikin.simulation.scene_geoms import obstacle_of
 from manikin.spatial import FloatArray, finite_number, frozen_array
-
-
-@dataclass(frozen=True, eq=False)
-class ContactPoint:
-    """One contact point that the engine found.
-
-    Attributes:
-        segment: Segment of the body.
-        other: Obstacle, or the other segment.
-        other_is_segment: Whether ``other`` is a segment.
-        position: (3,) in the world [m].
-        normal: (3,) unit, out of ``other``.
-        force: (3,) on ``segment`` [N].
-        depth: Penetration [m].
-    """
-
-    segment: str
-    other: str
-    other_is_segment: bool
-    position: FloatArray
-    normal: FloatArray
-    force: FloatArray
-    depth: float
 
 
 @dataclass(frozen=True)
@@ -104,35 +82,46 @@ class Sensed:
     Attributes:
         time: Beginning of the step [s].
         a: (nv,) generalised acceleration [m/s^2, rad/s^2].
-        points: The contact points.
+        segments: Segment of each of the k contact points.
+        others: Obstacle, or other segment, of each contact point.
+        on_scene: (k,) whether ``others`` is an obstacle.
+        positions: (k, 3) of the contact points [m].
+        normals: (k, 3) unit, out of ``others``.
+        forces: (k, 3) on ``segments`` [N].
+        depths: (k,) penetration [m].
         grips: Force [N] and its point [m] of every grip, (2, 3) each, by effector.
     """
 
     time: float
     a: FloatArray
-    points: tuple[ContactPoint, ...]
+    segments: tuple[str, ...]
+    others: tuple[str, ...]
+    on_scene: NDArray[np.bool_]
+    positions: FloatArray
+    normals: FloatArray
+    forces: FloatArray
+    depths: FloatArray
     grips: Mapping[str, FloatArray]
 
-    def wrench(self, segments: Sequence[str], about: FloatArray) -> FloatArray:
-        """(6,) force and moment about a point of the scene on some segments, without grips.
+    def wrench(self, about: FloatArray, segments: Sequence[str] | None = None) -> FloatArray:
+        """(6,) force and moment of the scene, grips apart.
 
         Args:
-            segments: Names of the segments.
             about: (3,) point of the moments [m].
+            segments: Names of the segments to count; the whole body when omitted.
         """
-        total = np.zeros(6)
-        for item in self.points:
-            if item.segment in segments and not item.other_is_segment:
-                total[:3] += item.force
-                total[3:] += np.cross(item.position - about, item.force)
-        return total
+        chosen = self.on_scene
+        if segments is not None:
+            chosen = chosen & np.array([name in segments for name in self.segments], dtype=bool)
+        forces, arms = self.forces[chosen], self.positions[chosen] - about
+        return np.concatenate((forces.sum(axis=0), cross(arms, forces).sum(axis=0)))
 
     def grip_wrench(self, effector: str, about: FloatArray) -> FloatArray:
-        """(6,) force and moment about a point of the grip of an effector; zero without one."""
+        """(6,) force and moment of the grip of an effector; zero without one."""
         if effector not in self.grips:
             return np.zeros(6)
         force, position = self.grips[effector]
-        return np.concatenate((force, np.cross(position - about, force)))
+        return np.concatenate((force, cross(position - about, force)))
 
 
 class World:
@@ -152,6 +141,7 @@ class World:
         self._data = mujoco.MjData(self._model)
         self._before = (self._data.qpos.copy(), self._data.qvel.copy(), 0.0)
         self._owners = tuple(_owner(model, geom) for geom in range(self._model.ngeom))
+        self._segments = frozenset(segment.name for segment in model.body.segments)
         self._planned = np.zeros((self._model.ngeom, self._model.ngeom), dtype=bool)
         self._masks: dict[tuple[tuple[str, ...], bool], NDArray[np.bool_]] = {}
         self._pushes: list[Push] = []
@@ -278,7 +268,7 @@ class World:
         force = grip.stiffness * (grip.position - position) - grip.damping * twist[3:]
         force = np.clip(force, -grip.max_force, grip.max_force)
         self._data.xfrc_applied[body, :3] += force
-        self._data.xfrc_applied[body, 3:] += np.cross(position - self._data.xipos[body], force)
+        self._data.xfrc_applied[body, 3:] += cross(position - self._data.xipos[body], force)
         self._grip_forces[grip.effector] = np.stack((force, position))
 
     def _note_contacts(self) -> None:
@@ -313,28 +303,26 @@ class World:
     def sense(self) -> Sensed:
         """Return accelerations and contact forces of the last engine step."""
         qpos, qvel, time = self._before
-        a = self.model.a_from_mujoco(qpos, qvel, self._data.qacc)
-        points = tuple(self._point(number) for number in range(self._data.ncon))
-        return Sensed(time, a, points, dict(self._grip_forces))
-
-    def _point(self, number: int) -> ContactPoint:
-        contact = self._data.contact[number]
-        first, second = int(contact.geom1), int(contact.geom2)
-        segment, other, swapped = self._parties(first, second)
-        local = np.zeros(6)
-        mujoco.mj_contactForce(self._model, self._data, number, local)
-        frame = contact.frame.reshape(3, 3)
-        # The engine's frame has its x axis from the first geometry to the second and its
-        # force is the one on the second.
-        sign = -1.0 if swapped else 1.0
-        return ContactPoint(
-            segment=segment,
-            other=other,
-            other_is_segment=self._owners[first][1] and self._owners[second][1],
-            position=contact.pos.copy(),
-            normal=sign * frame[0],
-            force=sign * (local[:3] @ frame),
-            depth=-float(contact.dist),
+        contact, count = self._data.contact, self._data.ncon
+        parties = [self._parties(int(first), int(second)) for first, second in contact.geom]
+        # The engine's contact frame has its x axis from the first geometry to the second and
+        # its force is the one on the second.
+        sign = np.array([-1.0 if swapped else 1.0 for *_, swapped in parties]).reshape(-1, 1)
+        frames = np.array(contact.frame).reshape(-1, 3, 3)
+        local = np.zeros((count, 6))
+        for number in range(count):
+            mujoco.mj_contactForce(self._model, self._data, number, local[number])
+        return Sensed(
+            time=time,
+            a=self.model.a_from_mujoco(qpos, qvel, self._data.qacc),
+            segments=tuple(segment for segment, _, _ in parties),
+            others=tuple(other for _, other, _ in parties),
+            on_scene=np.array([other not in self._segments for _, other, _ in parties], dtype=bool),
+            positions=np.array(contact.pos).reshape(-1, 3),
+            normals=sign * frames[:, 0],
+            forces=sign * np.einsum("ki,kij->kj", local[:, :3], frames),
+            depths=-np.array(contact.dist).reshape(-1),
+            grips=dict(self._grip_forces),
         )
 
     def _parties(self, first: int, second: int) -> tuple[str, str, bool]:
