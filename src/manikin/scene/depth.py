@@ -1,13 +1,11 @@
 """Depth of a body shape inside a closed mesh that is not convex."""
 
-from collections.abc import Callable
-
 import coal
 import numpy as np
 
 from manikin.scene.bounds import shape_of
 from manikin.scene.collision import ClosedSurface, CollisionPart
-from manikin.scene.pair import Measured, PairMeter
+from manikin.scene.pair import Measured, Meter, PairMeter, pair_meter
 from manikin.scene.shapes import Capsule, Sphere, local_bounds
 from manikin.spatial import FloatArray
 
@@ -61,12 +59,10 @@ class ClosedMeshMeter:
         return float(heights[lowest] - self._radius), normal, point + self._radius * normal, on_surface
 
 
-def part_meter(
-    geometry: coal.CollisionGeometry, part: CollisionPart
-) -> Callable[[coal.Transform3s, coal.Transform3s], Measured]:
+def part_meter(geometry: coal.CollisionGeometry, part: CollisionPart) -> Meter:
     """Measuring function of a body shape and a part of an obstacle."""
     if part.surface is None:
-        return PairMeter(geometry, part.geometry)
+        return pair_meter(geometry, part.geometry)
     return ClosedMeshMeter(geometry, part.surface)
 
 

@@ -1,7 +1,7 @@
 """Signed distances between the body, itself and the scene, with gradients."""
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -15,7 +15,7 @@ from manikin.scene.bounds import PairBounds
 from manikin.scene.collision import CollisionPart, collision_parts
 from manikin.scene.depth import part_meter
 from manikin.scene.mesh import IntArray
-from manikin.scene.pair import Measured, PairMeter
+from manikin.scene.pair import Measured, Meter, pair_meter
 from manikin.scene.scene import Scene
 from manikin.spatial import FloatArray
 
@@ -142,8 +142,11 @@ class Proximity:
 
         Returns:
             Rows in the order of :attr:`pairs`.
+
+        Raises:
+            SceneError: If ``q`` is not a finite vector of the body's size.
         """
-        jacobian = pin.computeJointJacobians(self._model, self._data, q)
+        jacobian = pin.computeJointJacobians(self._model, self._data, checked_configuration(self._model, q))
         pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
         placements = self._placements()
         near = np.flatnonzero((self._lower(placements) < activation) & self._considered(ignore))
@@ -161,7 +164,7 @@ class Proximity:
 
     def minimum(self, q: FloatArray, ignore: Ignored = NOTHING) -> Clearance:
         """Smallest signed distance of all pairs at ``q``; see :meth:`evaluate` for ``ignore``."""
-        placements = self._placements_at(q)
+        placements = self._placements_at(checked_configuration(self._model, q))
         lower = np.where(self._considered(ignore), self._lower(placements), np.inf)
         best = Clearance(np.inf, None)
         for index in np.argsort(lower, kind="stable").tolist():
@@ -188,9 +191,10 @@ class Proximity:
             tolerance: [m].
 
         Raises:
-            SceneError: If the number of ignore sets is not n.
+            SceneError: If the number of ignore sets is not n, or a sample is not a finite
+                vector of the body's size.
         """
-        samples = np.atleast_2d(np.asarray(q_samples, dtype=np.float64))
+        samples = [checked_configuration(self._model, q) for q in q_samples]
         considered = self._considered_over(ignore, len(samples))
         placements = np.array([self._placements_at(q) for q in samples])
         rotations, translations = placements[..., :3, :3], placements[..., :3, 3]
@@ -255,6 +259,20 @@ def segment_of(shape_name: str) -> str:
     return shape_name.split("/", 1)[0]
 
 
+def checked_configuration(model: pin.Model, q: FloatArray) -> FloatArray:
+    """Return ``q`` after checking it; a NaN would otherwise pass for "nothing is near".
+
+    Raises:
+        SceneError: If it is not a finite vector of the model's size.
+    """
+    q = np.asarray(q, dtype=np.float64)
+    if q.shape != (model.nq,):
+        raise SceneError(f"configuration has shape {q.shape}; valid: ({model.nq},)")
+    if not np.isfinite(q).all():
+        raise SceneError(f"configuration has {q[~np.isfinite(q)][0]} in it; valid: finite numbers")
+    return q
+
+
 def considered(pairs: Sequence[Pair], ignore: Ignored) -> NDArray[np.bool_]:
     """(pairs,) False where a pair, by shape or segment and in either order, is in ``ignore``."""
     return np.array([not _is_ignored(pair, ignore) for pair in pairs], dtype=bool)
@@ -281,11 +299,11 @@ def _pair_names(
 
 def _meters(
     shapes: pin.GeometryModel, parts: Sequence[CollisionPart], first: IntArray, second: IntArray
-) -> list[Callable[[coal.Transform3s, coal.Transform3s], Measured]]:
+) -> list[Meter]:
     """One measuring function per pair."""
     geometries = [item.geometry for item in shapes.geometryObjects]
     return [
-        PairMeter(geometries[a], geometries[b])
+        pair_meter(geometries[a], geometries[b])
         if b < len(geometries)
         else part_meter(geometries[a], parts[b - len(geometries)])
         for a, b in zip(first.tolist(), second.tolist(), strict=True)

@@ -20,6 +20,12 @@ FORMATS = ("stl", "obj", "ply", "dae")
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Units a mesh file may be said to be in, in metres."""
 
+_UP_TO_Z = {
+    "x": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
+    "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    "z": np.eye(3),
+}
+
 MAX_FACES = 50_000
 """Meshes with more triangles are refused unless they are replaced by convex hulls."""
 LARGEST_EXTENT = 1000.0
@@ -122,6 +128,7 @@ def load_mesh(
     path: str | Path,
     *,
     unit: str | None = None,
+    up: str | None = None,
     scale: float = 1.0,
     convex: Convexity = "no",
     max_faces: int = MAX_FACES,
@@ -131,7 +138,9 @@ def load_mesh(
     Args:
         path: File whose extension says the format.
         unit: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``. When omitted, a DAE file's own unit
-            is used, and metres otherwise. A DAE file is turned so that its up axis is z.
+            is used, and metres otherwise.
+        up: Which axis of the file points up, ``"x"``, ``"y"`` or ``"z"``; the mesh is
+            turned so that it is z. When omitted, a DAE file's own, and z otherwise.
         scale: Further factor on every coordinate, > 0.
         convex: As for :class:`Mesh`.
         max_faces: As for :class:`Mesh`.
@@ -147,14 +156,13 @@ def load_mesh(
         raise SceneError(f"mesh file '{file}' does not exist; valid: an existing {_formats_text()} file")
     if unit is not None and unit not in UNITS:
         raise SceneError(f"mesh file '{file}' unit is {unit!r}; valid: {', '.join(UNITS)}")
+    if up is not None and up not in _UP_TO_Z:
+        raise SceneError(f"mesh file '{file}' up is {up!r}; valid: {', '.join(_UP_TO_Z)}")
     factor = finite_number(scale, f"mesh file '{file}' scale", above=0.0, error=SceneError)
     loaded = _read(file, extension)
-    vertices = np.asarray(loaded.vertices, dtype=np.float64)
-    metres = UNITS[unit] if unit is not None else 1.0
-    if extension == "dae":
-        rotation, own_unit = _collada_frame(file)
-        vertices = vertices @ rotation.T
-        metres = own_unit if unit is None else metres
+    own_up, own_metres = _collada_asset(file) if extension == "dae" else ("z", 1.0)
+    metres = own_metres if unit is None else UNITS[unit]
+    vertices = np.asarray(loaded.vertices, dtype=np.float64) @ _UP_TO_Z[up or own_up].T
     return Mesh(vertices * (metres * factor), loaded.faces, str(file), convex=convex, max_faces=max_faces)
 
 
@@ -182,23 +190,18 @@ def _read(file: Path, extension: str) -> trimesh.Trimesh:
     return mesh
 
 
-def _collada_frame(file: Path) -> tuple[FloatArray, float]:
-    """Rotation to z up and unit [m] of a COLLADA file, from its asset element."""
+def _collada_asset(file: Path) -> tuple[str, float]:
+    """Up axis and unit [m] of a COLLADA file, from its asset element."""
     head = file.read_text(encoding="utf-8", errors="replace")
     unit = re.search(r"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']+)[\"']", head)
     up = re.search(r"<up_axis>\s*([XYZ])_UP\s*</up_axis>", head)
-    rotations = {
-        "X": np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]),
-        "Y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-        "Z": np.eye(3),
-    }
-    # COLLADA's defaults are metres and Y up; files without the tag are, in robotics, z up.
-    rotation = rotations[up.group(1)] if up else np.eye(3)
     try:
         metres = float(unit.group(1)) if unit else 1.0
     except ValueError:
         metres = np.nan
-    return rotation, finite_number(metres, f"mesh file '{file}' unit [m]", above=0.0, error=SceneError)
+    # COLLADA's own default is y up, but exporters that leave the tag out mean z up in robotics.
+    axis = up.group(1).lower() if up else "z"
+    return axis, finite_number(metres, f"mesh file '{file}' unit [m]", above=0.0, error=SceneError)
 
 
 def _checked_faces(faces: ArrayLike, vertex_count: int, source: str) -> IntArray:

@@ -72,6 +72,7 @@ class Obstacle:
         path: str | Path,
         *,
         unit: str | None = None,
+        up: str | None = None,
         scale: float = 1.0,
         convex: Convexity = "no",
         rotation: ArrayLike | None = None,
@@ -82,7 +83,7 @@ class Obstacle:
         Raises:
             SceneError: If the file or the placement is not usable.
         """
-        mesh = load_mesh(path, unit=unit, scale=scale, convex=convex)
+        mesh = load_mesh(path, unit=unit, up=up, scale=scale, convex=convex)
         return cls(name, mesh, rotation, translation)
 
     @cached_property

@@ -1,5 +1,7 @@
 """Signed distance of one pair of Coal geometries."""
 
+from collections.abc import Callable
+
 import coal
 import numpy as np
 
@@ -8,13 +10,16 @@ from manikin.spatial import FloatArray
 Measured = tuple[float, FloatArray, FloatArray, FloatArray]
 """Distance [m], unit normal from the first to the second, nearest point on each."""
 
+Meter = Callable[[coal.Transform3s, coal.Transform3s], Measured]
+"""Measures one pair at the placements of both."""
+
 _FINE = 1e-8
 _SAFE = 1e-6
 _FAILED = 1e6  # [m]; Coal leaves the largest number where its iteration breaks down
 
 
 class PairMeter:
-    """Measures one pair; answers depend only on the two placements.
+    """Measures one pair with Coal; answers depend only on the two placements.
 
     Coal's own tolerance of 1e-6 m makes distances that are too rough to differentiate, so
     1e-8 is asked for first. On cylinders that makes the iteration fail now and then, so
@@ -44,6 +49,65 @@ class PairMeter:
         if not np.isfinite(normal[0]):
             normal = _fallback_normal(place, other)
         return distance, normal, result.getNearestPoint1(), result.getNearestPoint2()
+
+
+class BallCylinderMeter:
+    """A ball and a cylinder, in closed form.
+
+    Coal always pushes a ball whose centre is inside the cylinder out through the side, even
+    just below a cap, so its depth is too large and jumps at the cap.
+    """
+
+    def __init__(self, ball: coal.Sphere, cylinder: coal.Cylinder) -> None:
+        self._ball_radius = float(ball.radius)
+        self._radius, self._half_length = float(cylinder.radius), float(cylinder.halfLength)
+
+    def __call__(self, place: coal.Transform3s, other: coal.Transform3s) -> Measured:
+        """Distance, normal and nearest points; see :class:`PairMeter`."""
+        rotation, origin = other.getRotation(), other.getTranslation()
+        centre = place.getTranslation()
+        nearest, outward, height = self._nearest(rotation.T @ (centre - origin))
+        normal = -(rotation @ outward)
+        return (
+            height - self._ball_radius,
+            normal,
+            centre + self._ball_radius * normal,
+            rotation @ nearest + origin,
+        )
+
+    def _nearest(self, point: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        """Surface point nearest to a point, unit vector from it outward, and signed distance."""
+        across = float(np.hypot(point[0], point[1]))
+        radial = np.array([point[0], point[1], 0.0]) / across if across > 1e-12 else np.array([1.0, 0.0, 0.0])
+        axial = np.array([0.0, 0.0, 1.0 if point[2] >= 0.0 else -1.0])
+        beyond_side, beyond_cap = across - self._radius, abs(point[2]) - self._half_length
+        if max(beyond_side, beyond_cap) <= 0.0:
+            outward = radial if beyond_side >= beyond_cap else axial
+            height = max(beyond_side, beyond_cap)
+            return point - height * outward, outward, height
+        gap = max(beyond_side, 0.0) * radial + max(beyond_cap, 0.0) * axial
+        height = float(np.linalg.norm(gap))
+        return point - gap, gap / height, height
+
+
+class _Swapped:
+    """A meter of the same pair in the other order."""
+
+    def __init__(self, meter: Meter) -> None:
+        self._meter = meter
+
+    def __call__(self, place: coal.Transform3s, other: coal.Transform3s) -> Measured:
+        distance, normal, on_second, on_first = self._meter(other, place)
+        return distance, -normal, on_first, on_second
+
+
+def pair_meter(first: coal.CollisionGeometry, second: coal.CollisionGeometry) -> Meter:
+    """Measuring function of two geometries."""
+    if isinstance(first, coal.Sphere) and isinstance(second, coal.Cylinder):
+        return BallCylinderMeter(first, second)
+    if isinstance(first, coal.Cylinder) and isinstance(second, coal.Sphere):
+        return _Swapped(BallCylinderMeter(second, first))
+    return PairMeter(first, second)
 
 
 def _request(tolerance: float) -> coal.DistanceRequest:

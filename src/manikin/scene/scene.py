@@ -1,19 +1,24 @@
 """A scene: named obstacles and a floor."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import coal
 import numpy as np
+from numpy.typing import ArrayLike
 
-from manikin.contact import Contact, ContactKind
+from manikin.contact import Contact, ContactKind, Stance
 from manikin.errors import ContactError, SceneError
+from manikin.scene.collision import collision_parts
+from manikin.scene.depth import part_meter
 from manikin.scene.mesh import Mesh
 from manikin.scene.obstacle import Obstacle
+from manikin.scene.pair import Meter
 from manikin.scene.shapes import HalfSpace
 from manikin.scene.surface import Surface, surfaces_of
-from manikin.spatial import FloatArray, finite_number
+from manikin.spatial import FloatArray, finite_number, frozen_array
 
 FLOOR = "floor"
 """Name of the floor obstacle."""
@@ -99,7 +104,8 @@ class Scene:
 
         Each point must be within ``tolerance`` of the surface, above or below it, and at
         most ``tolerance`` beyond its edge; normals may differ by ``max_angle`` (2 degrees
-        when omitted). A grasp needs only a surface near its point, whatever its normal.
+        when omitted). A grasp needs only a surface near its point, whatever its normal;
+        round obstacles have none, see :meth:`nearest`.
 
         Args:
             contact: The contact.
@@ -118,6 +124,65 @@ class Scene:
         if worst and min(worst) <= tolerance:
             return aligned[int(np.argmin(worst))]
         raise ContactError(self._off_surface(contact, aligned, tolerance))
+
+    def nearest(self, point: ArrayLike) -> tuple[str, float]:
+        """Name of the obstacle nearest to a (3,) world point, and its signed distance [m].
+
+        Raises:
+            SceneError: If the scene is empty.
+        """
+        if not self.obstacles:
+            raise SceneError("scene is empty, so nothing is nearest; valid: at least one obstacle")
+        place = coal.Transform3s(np.eye(3), frozen_array(point, "point [m]", (3,), SceneError))
+        distances = [
+            (min(meter(place, other)[0] for meter, other in meters), name)
+            for name, meters in self._point_meters.items()
+        ]
+        distance, name = min(distances, key=lambda item: item[0])
+        return name, distance
+
+    def resting_pairs(
+        self,
+        stance: Stance,
+        segments: Mapping[str, Sequence[str]] | None = None,
+        tolerance: float = 0.005,
+    ) -> frozenset[tuple[str, str]]:
+        """Pairs (segment, obstacle) that touch on purpose, for ``ignore`` of a proximity.
+
+        Args:
+            stance: The contacts.
+            segments: Segments that may touch with each effector, such as
+                ``{"left_foot": ("left_foot", "left_toes")}``; the effector's own name for
+                those not listed.
+            tolerance: As for :meth:`supporting_surface`.
+
+        Returns:
+            For a sole or point the obstacle of its supporting surface, for a grasp the
+            nearest obstacle.
+
+        Raises:
+            ContactError: If a sole or point lies on no surface.
+        """
+        found = set()
+        for contact in stance:
+            if contact.kind is ContactKind.GRASP:
+                obstacle = self.nearest(contact.position)[0]
+            else:
+                obstacle = self.supporting_surface(contact, tolerance).obstacle
+            names = (segments or {}).get(contact.effector, (contact.effector,))
+            found.update((segment, obstacle) for segment in names)
+        return frozenset(found)
+
+    @cached_property
+    def _point_meters(self) -> dict[str, list[tuple[Meter, coal.Transform3s]]]:
+        point = coal.Sphere(1e-9)
+        return {
+            item.name: [
+                (part_meter(point, part), coal.Transform3s(part.rotation, part.translation))
+                for part in collision_parts(item)
+            ]
+            for item in self.obstacles
+        }
 
     def _aligned(self, contact: Contact, limit: float) -> list[Surface]:
         if contact.kind is ContactKind.GRASP:

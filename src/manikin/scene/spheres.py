@@ -15,6 +15,7 @@ from manikin.scene.distance import (
     Ignored,
     Pair,
     ProximityResult,
+    checked_configuration,
     considered,
     moves_by_shape,
     self_pairs,
@@ -87,7 +88,8 @@ class SphereProximity:
         )
         names = [item.name for item in objects]
         others = [item.name for item in (*flats, *solids)] + names
-        outer = [(shape, other) for other in range(len(flats) + len(solids)) for shape in range(len(objects))]
+        columns = {item.name: column for column, item in enumerate((*flats, *solids))}
+        outer = [(shape, columns[item.name]) for item in scene for shape in range(len(objects))]
         inner = self_pairs(body) if self_collision else []
         table = np.array(outer + [(a, len(others) - len(names) + b) for a, b in inner], dtype=np.int64)
         self._first, self._second = table.reshape(-1, 2).T
@@ -113,7 +115,7 @@ class SphereProximity:
             activation: [m].
             ignore: As for :meth:`manikin.scene.Proximity.evaluate`.
         """
-        jacobian = pin.computeJointJacobians(self._model, self._data, q)
+        jacobian = pin.computeJointJacobians(self._model, self._data, checked_configuration(self._model, q))
         pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
         centres, gaps, least = self._gaps()
         rows = np.flatnonzero((least < activation) & self._considered(ignore))
@@ -126,6 +128,7 @@ class SphereProximity:
 
     def minimum(self, q: FloatArray, ignore: Ignored = NOTHING) -> Clearance:
         """Smallest sphere distance of all pairs at ``q``."""
+        q = checked_configuration(self._model, q)
         pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data, q)
         least = np.where(self._considered(ignore), self._gaps()[2], np.inf)
         if not len(least) or np.isinf(least.min()):

@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+import trimesh
+
+from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene
+from manikin.scene.surface import surfaces_of
+from manikin.spatial import rotation_from_rpy
+
+
+def test_a_box_has_six_faces_pointing_out_with_the_right_areas():
+    item = Obstacle("box", Box((1.0, 2.0, 3.0)), rotation_from_rpy(0.3, 0.5, -0.7), (1.0, 2.0, 3.0))
+    faces = surfaces_of(item)
+    assert sorted(round(face.area, 9) for face in faces) == [2, 2, 3, 3, 6, 6]
+    for face in faces:
+        assert (face.centre - item.translation) @ face.normal > 0
+        assert np.allclose(face.height(face.polygon), 0.0, atol=1e-12)
+    assert np.allclose(sum(face.normal for face in faces), 0.0, atol=1e-12)
+
+
+def test_a_mesh_box_has_the_faces_of_the_box():
+    box = Box((1.0, 2.0, 3.0))
+    shape = trimesh.creation.box(box.size)
+    faces = surfaces_of(Obstacle("mesh", Mesh(shape.vertices, shape.faces)))
+    wanted = surfaces_of(Obstacle("box", box))
+    assert len(faces) == 6
+    for face in wanted:
+        (same,) = [other for other in faces if np.allclose(other.normal, face.normal)]
+        assert np.isclose(same.area, face.area)
+        assert np.allclose(same.centre, face.centre)
+
+
+def test_an_l_shaped_facet_keeps_its_notch():
+    """A concave polygon, extruded: points in the notch are outside."""
+    corners = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], dtype=float)
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])
+    solid = trimesh.creation.extrude_triangulation(corners, triangles, height=0.5)
+    scene = Scene([Obstacle("step", Mesh(solid.vertices, solid.faces))], floor_height=None)
+    (top,) = scene.surfaces_facing((0, 0, 1), 0.01)
+    assert np.isclose(top.area, 3.0)
+    points = np.array([[0.5, 0.5, 0.5], [1.5, 1.5, 0.5], [0.5, 1.9, 0.5], [2.5, 0.5, 0.5]])
+    assert np.allclose(top.outside(points), [0.0, 0.5, 0.0, 0.5])
+
+
+def test_cylinder_caps_planes_and_half_spaces_face_the_right_way():
+    top, bottom = surfaces_of(Obstacle("stool", Cylinder(0.2, 0.5), translation=(0, 0, 0.25)))
+    assert np.allclose(top.normal, (0, 0, 1))
+    assert np.allclose(bottom.normal, (0, 0, -1))
+    # A 32-gon has the circle's area up to a factor sin(2 pi / 32) / (2 pi / 32) = 0.9936.
+    assert np.isclose(top.area, np.pi * 0.04 * 0.9936, rtol=1e-4)
+    assert np.isclose(bottom.area, top.area)
+    assert len(surfaces_of(Obstacle("wall", HalfSpace((1, 0, 0), 2.0)))) == 1
+    front, back = surfaces_of(Obstacle("sheet", Plane((1, 0, 0), 2.0)))
+    assert np.allclose(front.normal, -back.normal)
+    assert np.allclose(front.polygon[:, 0], 2.0)
+    assert surfaces_of(Obstacle("bar", Capsule(0.02, 1.0))) == ()
+
+
+def test_distance_in_space_combines_height_and_overhang():
+    (top,) = Scene([Obstacle("b", Box((1, 1, 1)))], floor_height=None).surfaces_facing((0, 0, 1), 0.1)
+    assert np.allclose(top.distance(np.array([[0.0, 0.0, 0.7], [0.9, 0.0, 0.8]])), [0.2, 0.5])
+
+
+def test_real_stairs_have_a_tread_per_step(scene_files):
+    scene = Scene([Obstacle.from_file("stairs", scene_files / "hpp_environments/stairs.stl")], None)
+    heights = {round(float(s.centre[2]), 2) for s in scene.surfaces_facing((0, 0, 1), 0.05) if s.area > 0.1}
+    assert len(heights) >= 5
+    assert pytest.approx(max(heights) - min(heights), abs=0.1) == 0.6
