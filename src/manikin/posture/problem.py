@@ -31,10 +31,13 @@ class Placement:
     Attributes:
         position: (3,) [m], or None to leave it free.
         rotation: (3, 3) effector-to-world, or None to leave it free.
+        rotation_weight: None when the rotation is required; otherwise it is only wished, with
+            this weight [1/rad^2] beside those of :class:`Preferences`.
     """
 
     position: FloatArray | None = None
     rotation: FloatArray | None = None
+    rotation_weight: float | None = None
 
     def __post_init__(self) -> None:
         if self.position is not None:
@@ -69,9 +72,9 @@ class Preferences:
             "elbow": 0.1, "wrist": 0.3, "forearm": 0.2,
         }
     )  # fmt: skip
-    pelvis: float = 0.4
-    trunk: float = 0.4
-    head: float = 0.3
+    pelvis: float = 0.1
+    trunk: float = 0.2
+    head: float = 0.6
     arms: float = 0.1
     damping: float = 1e-3
 
@@ -136,7 +139,7 @@ class PostureProblem:
         for name, placement in self.placements.items():
             if placement.position is not None:
                 terms.append(PositionTerm(name, placement.position))
-            if placement.rotation is not None:
+            if placement.rotation is not None and placement.rotation_weight is None:
                 terms.append(RotationTerm(name, placement.rotation))
         if self.com is not None and np.any(np.isfinite(self.com)):
             terms.append(ComTerm(self.com))
@@ -149,6 +152,10 @@ class PostureProblem:
         wishes: list[tuple[FloatArray, Term]] = [
             (hinge_weights(self.body, weights), ReferenceTerm(self.reference[7:]))
         ]
+        for name, placement in self.placements.items():
+            if placement.rotation is not None and placement.rotation_weight is not None:
+                weight = np.full(3, placement.rotation_weight)
+                wishes.append((weight, RotationTerm(name, placement.rotation)))
         if self.upright:
             names = {segment.name for segment in self.body.segments}
             sides = ("left_upper_arm", "right_upper_arm")

@@ -53,17 +53,21 @@ class SamplingZone:
     Attributes:
         lower: (3,) lower corner of the box of positions [m].
         upper: (3,) upper corner [m].
-        rotation_spread: Largest random turn away from the shortest turn between the ends [rad].
+        rotation_spread: (3,) largest random turn away from the shortest turn between the ends,
+            about the effector's own axes [rad]; one number for all three.
     """
 
     lower: FloatArray
     upper: FloatArray
-    rotation_spread: float = 0.3
+    rotation_spread: FloatArray | float = 0.2
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "lower", frozen_array(self.lower, "sampling zone lower [m]", (3,)))
         object.__setattr__(self, "upper", frozen_array(self.upper, "sampling zone upper [m]", (3,)))
-        finite_number(self.rotation_spread, "sampling zone rotation_spread [rad]", at_least=0.0)
+        spread = np.broadcast_to(np.asarray(self.rotation_spread, dtype=np.float64), (3,))
+        object.__setattr__(
+            self, "rotation_spread", frozen_array(spread, "sampling zone rotation_spread [rad]", (3,))
+        )
         if not np.all(self.lower <= self.upper):
             raise InputError(
                 f"sampling zone spans {self.lower.tolist()} to {self.upper.tolist()}; valid: lower <= upper"
@@ -71,7 +75,12 @@ class SamplingZone:
 
     @classmethod
     def around(
-        cls, start: Pose, goal: Pose, margin: float = 0.3, above: float = 0.5, rotation_spread: float = 0.3
+        cls,
+        start: Pose,
+        goal: Pose,
+        margin: float = 0.3,
+        above: float = 0.5,
+        rotation_spread: FloatArray | float = 0.2,
     ) -> "SamplingZone":
         """Box around the two ends: ``margin`` to each side and below, ``above`` higher [m]."""
         ends = np.stack([start.position, goal.position])
@@ -329,7 +338,7 @@ class _Search:
         for _ in range(50):
             share = rng.uniform()
             position = rng.uniform(zone.lower, zone.upper)
-            tilt = rng.uniform(-1.0, 1.0, 3) * zone.rotation_spread / np.sqrt(3.0)
+            tilt = rng.uniform(-1.0, 1.0, 3) * zone.rotation_spread
             time = first + share * (last - first)
             reach = self.limits.speed * np.array([time - first, last - time])
             away = [float(np.linalg.norm(position - end.position)) for end in self.ends]

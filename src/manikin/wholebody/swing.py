@@ -26,7 +26,17 @@ from manikin.wholebody.swing_curve import (
     jerk_energy,
 )
 
-__all__ = ["Clearance", "SwingCurve", "SwingLimits", "SwingPlan", "SwingState", "check_swing", "plan_swing"]
+__all__ = [
+    "Clearance",
+    "SwingCheck",
+    "SwingCurve",
+    "SwingLimits",
+    "SwingPlan",
+    "SwingState",
+    "check_swing",
+    "plan_swing",
+    "required_clearance",
+]
 
 Clearance = Callable[[float, Pose], float]
 """Signed distance [m] of an effector at a pose and a time [s] to everything it must not touch."""
@@ -136,6 +146,7 @@ def plan_swing(
     limits: SwingLimits | None = None,
     start_normal: ArrayLike = (0.0, 0.0, 1.0),
     end_normal: ArrayLike = (0.0, 0.0, 1.0),
+    pitch: float = 0.0,
     refine: int = 20,
     controls: int = 20,
 ) -> SwingPlan:
@@ -150,6 +161,7 @@ def plan_swing(
         limits: What to keep.
         start_normal: (3,) normal of the surface that is left.
         end_normal: (3,) normal of the surface that is reached.
+        pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
         refine: Largest number of iterations of the optimisation; 0 tries the family only.
         controls: Number of control poses of the curves.
 
@@ -166,7 +178,13 @@ def plan_swing(
     )
     if end_time <= start_time:
         raise InputError(f"swing ends at {end_time} s; valid: after its start at {start_time} s")
-    family = _family(start, goal, start_time, end_time, normals, controls)
+    family = (
+        SwingCurve.lift(
+            start, goal, start_time, end_time, height=height, lateral=lateral, apex=apex,
+            start_normal=normals[0], end_normal=normals[1], pitch=pitch, controls=controls,
+        )
+        for height, lateral, apex in _choices()
+    )  # fmt: skip
     best, best_check, tried = _first_clear(family, clearance, limits)
     best, best_check, iterations = _refine(best, best_check, clearance, limits, normals, refine)
     return SwingPlan(best, best_check, tried, iterations, limits)
@@ -226,22 +244,12 @@ def _first_clear(
     return curve, check_swing(curve, clearance, limits), len(found)
 
 
-def _family(
-    start: Pose,
-    goal: Pose,
-    start_time: float,
-    end_time: float,
-    normals: tuple[FloatArray, FloatArray],
-    controls: int,
-) -> Iterator[SwingCurve]:
-    choices = itertools.product(HEIGHTS, APEXES, LATERALS)
-    for height, apex, lateral in sorted(
-        choices, key=lambda c: c[0] + 0.5 * abs(c[2]) + 0.2 * abs(c[1] - 0.5)
-    ):
-        yield SwingCurve.lift(
-            start, goal, start_time, end_time, height=height, lateral=lateral, apex=apex,
-            start_normal=normals[0], end_normal=normals[1], controls=controls,
-        )  # fmt: skip
+def _choices() -> list[tuple[float, float, float]]:
+    """Heights, lateral offsets and apexes of the family, from the least to the most effort."""
+    return sorted(
+        itertools.product(HEIGHTS, LATERALS, APEXES),
+        key=lambda choice: choice[0] + 0.5 * abs(choice[1]) + 0.2 * abs(choice[2] - 0.5),
+    )
 
 
 def _instants(curve: SwingCurve, limits: SwingLimits, count: int | None = None) -> FloatArray:
@@ -254,13 +262,27 @@ def _distances(state: SwingState, clearance: Clearance) -> FloatArray:
     return np.array([clearance(float(t), Pose(p, r)) for t, p, r in poses])
 
 
-def _required(curve: SwingCurve, state: SwingState, distance: FloatArray, limits: SwingLimits) -> FloatArray:
-    """Distance wanted at each instant: full in flight, less near the two contacts."""
-    wanted = np.full(len(distance), limits.clearance)
-    for end, contact in ((0, curve.start), (-1, curve.end)):
-        moved = np.linalg.norm(state.position - contact.position, axis=1)
-        wanted = np.minimum(wanted, distance[end] + limits.departure * moved)
+def required_clearance(
+    moved: tuple[FloatArray, FloatArray], at_contact: tuple[float, float], limits: SwingLimits
+) -> FloatArray:
+    """Distance wanted: the full one in flight, less near the two contacts.
+
+    Args:
+        moved: (k,) distances from the pose at lift-off and from the one at touch-down [m].
+        at_contact: Clearances at these two poses [m].
+        limits: Clearance in flight and how it is gained.
+    """
+    wanted = np.full(len(moved[0]), limits.clearance)
+    for away, contact in zip(moved, at_contact, strict=True):
+        wanted = np.minimum(wanted, contact + limits.departure * away)
     return wanted
+
+
+def _required(curve: SwingCurve, state: SwingState, distance: FloatArray, limits: SwingLimits) -> FloatArray:
+    """Distance wanted at each instant of a curve."""
+    from_start = np.linalg.norm(state.position - curve.start.position, axis=1)
+    to_end = np.linalg.norm(state.position - curve.end.position, axis=1)
+    return required_clearance((from_start, to_end), (float(distance[0]), float(distance[-1])), limits)
 
 
 def _refine(

@@ -95,6 +95,7 @@ class SwingCurve:
         *,
         start_normal: ArrayLike = (0.0, 0.0, 1.0),
         end_normal: ArrayLike = (0.0, 0.0, 1.0),
+        pitch: float = 0.0,
         controls: int = 20,
     ) -> "SwingCurve":
         """Smoothest curve (least integral of squared jerk) from ``start`` to ``goal`` through via-points.
@@ -109,6 +110,8 @@ class SwingCurve:
             via: Points to pass: share of the duration in (0, 1) and (3,) position [m].
             start_normal: (3,) surface normal along which the curve leaves.
             end_normal: (3,) surface normal along which it arrives, reversed.
+            pitch: Extra turn about the effector's own y axis in early flight, toes down when
+                positive [rad], as of a foot whose heel comes up first.
             controls: Number of control poses.
 
         Raises:
@@ -123,7 +126,8 @@ class SwingCurve:
         matrix = np.vstack([ends[0], through])
         target = np.concatenate([ends[1], *points])
         positions = _least_norm(jerk_energy(controls), matrix, target)
-        return cls(start_time, end_time, positions, _straight_turn(start.rotation, goal.rotation, controls))
+        rotations = _turning(start.rotation, goal.rotation, pitch, controls)
+        return cls(start_time, end_time, positions, rotations)
 
     @classmethod
     def lift(
@@ -138,6 +142,7 @@ class SwingCurve:
         apex: float = 0.5,
         start_normal: ArrayLike = (0.0, 0.0, 1.0),
         end_normal: ArrayLike = (0.0, 0.0, 1.0),
+        pitch: float = 0.0,
         controls: int = 20,
     ) -> "SwingCurve":
         """Curve over one apex.
@@ -152,6 +157,7 @@ class SwingCurve:
             apex: Share of the duration at which the apex is passed.
             start_normal: (3,) surface normal at lift-off.
             end_normal: (3,) surface normal at touch-down.
+            pitch: As for :meth:`through` [rad].
             controls: Number of control poses.
         """
         up, left = _flight_axes(start.position, goal.position, start_normal, end_normal)
@@ -161,7 +167,7 @@ class SwingCurve:
         point = middle + (top - float(up @ middle)) * up + lateral * left
         return cls.through(
             start, goal, start_time, end_time, [(apex, point)],
-            start_normal=start_normal, end_normal=end_normal, controls=controls,
+            start_normal=start_normal, end_normal=end_normal, pitch=pitch, controls=controls,
         )  # fmt: skip
 
     @classmethod
@@ -373,21 +379,37 @@ def _least_norm(energy: FloatArray, matrix: FloatArray, target: FloatArray) -> F
     return np.asarray(solution[: 3 * n], dtype=np.float64).reshape(n, 3)
 
 
-def _straight_turn(start: FloatArray, goal: FloatArray, controls: int) -> FloatArray:
-    """Control rotations of the shortest turn, spread like the positions of a straight flight."""
-    zero = np.zeros(3)
-    matrix, target = end_conditions(zero, np.array([1.0, 1.0, 1.0]), (0, 0, 1), (0, 0, 1), controls)
-    # Pin both lift control points wholly: the turn starts after lift-off and ends before touch-down.
-    pins = np.vstack(
-        [_select(RESTING, np.eye(3)[2:], controls), _select(controls - RESTING - 1, np.eye(3)[2:], controls)]
-    )
-    share = _least_norm(
-        jerk_energy(controls), np.vstack([matrix, pins]), np.concatenate([target, [0.0, 1.0]])
-    )[:, 0]
+PITCH_DECLINE = 2.0
+"""How much longer the extra pitch takes to fade than to grow: it peaks at a third of the turn."""
+
+
+def _turning(start: FloatArray, goal: FloatArray, pitch: float, controls: int) -> FloatArray:
+    """Control rotations of the shortest turn, timed like a straight flight, and the extra pitch."""
+    share = _straight_shares(controls)
     turn = Rotation.from_matrix(start.T @ goal).as_rotvec()
-    rotations = start @ Rotation.from_rotvec(share[:, None] * turn).as_matrix()
-    rotations[:RESTING], rotations[-RESTING:] = start, goal
+    peak = 1.0 / (1.0 + PITCH_DECLINE)
+    bell = share * (1.0 - share) ** PITCH_DECLINE / (peak * (1.0 - peak) ** PITCH_DECLINE)
+    straight = Rotation.from_rotvec(share[:, None] * turn)
+    nod = Rotation.from_rotvec(bell[:, None] * np.array([0.0, pitch, 0.0]))
+    rotations = start @ (straight * nod).as_matrix()
+    rotations[: RESTING + 1], rotations[-RESTING - 1 :] = start, goal
     return rotations
+
+
+@lru_cache(maxsize=64)
+def _straight_shares(controls: int) -> FloatArray:
+    """(controls,) control values of the smoothest flight from 0 to 1, with one more resting at each end."""
+    matrix = np.zeros((2 * RESTING + 2, controls))
+    resting = RESTING + 1
+    matrix[:resting, :resting] = np.eye(resting)
+    matrix[resting:, controls - resting :] = np.eye(resting)
+    target = np.concatenate([np.zeros(resting), np.ones(resting)])
+    energy = jerk_energy(controls)
+    system = np.block([[energy / np.trace(energy), matrix.T], [matrix, np.zeros((len(target), len(target)))]])
+    solution = np.linalg.lstsq(system, np.concatenate([np.zeros(controls), target]), rcond=None)[0]
+    shares = np.asarray(np.clip(solution[:controls], 0.0, 1.0), dtype=np.float64)
+    shares.setflags(write=False)
+    return shares
 
 
 def _flight_axes(
