@@ -26,6 +26,9 @@ RANK_TOLERANCE = 1e-9
 INCIDENCE_TOLERANCE = 1e-9
 """A ray lies on a facet when the cosine between them is below this."""
 
+QHULL_OPTIONS = ("Qx", "Qx Q12", "Qx Q12 C-1e-10")
+"""Tried in turn: merge coplanar facets; then let nearly coplanar ones merge into wide facets."""
+
 _CHUNK = 4_000_000
 """Entries of one adjacency table (pairs x rays)."""
 
@@ -301,12 +304,15 @@ def _hull_equations(points: FloatArray) -> FloatArray:
     """(m, d + 1) rows ``[normal, offset]``, ``normal x + offset <= 0``, of a hull around 0."""
     if points.shape[1] == 1:
         return np.array([[1.0, -points.max()], [-1.0, points.min()]])
-    try:
-        halfspaces = np.column_stack([points, -np.ones(len(points))])
-        return HalfspaceIntersection(halfspaces, np.zeros(points.shape[1])).dual_equations
-    except QhullError as error:
-        reason = str(error).strip().splitlines()[0]
-        raise PolytopeError(f"Qhull failed on points of shape {points.shape}: {reason}") from None
+    halfspaces = np.column_stack([points, -np.ones(len(points))])
+    reason = ""
+    for options in QHULL_OPTIONS:
+        try:
+            hull = HalfspaceIntersection(halfspaces, np.zeros(points.shape[1]), qhull_options=options)
+            return hull.dual_equations
+        except QhullError as error:
+            reason = str(error).strip().splitlines()[0]
+    raise PolytopeError(f"Qhull failed on points of shape {points.shape}: {reason}")
 
 
 def _usable(kinds: FloatArray, present: BoolArray) -> BoolArray:

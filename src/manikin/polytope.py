@@ -6,7 +6,6 @@ hull, so that the margin of a point on the flat is zero (to that rounding), neve
 """
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,8 +39,8 @@ class Polytope:
         object.__setattr__(self, "H", rows)
         object.__setattr__(self, "h", offsets)
 
-    @classmethod
-    def from_vertices(cls, points: ArrayLike) -> Self:
+    @staticmethod
+    def from_vertices(points: ArrayLike) -> "Polytope":
         """Hull of points; it may be flat.
 
         Args:
@@ -50,10 +49,10 @@ class Polytope:
         Raises:
             PolytopeError: If there is no point or a coordinate is not finite.
         """
-        return cls(*convex_hull(points))
+        return Polytope(*convex_hull(points))
 
-    @classmethod
-    def from_generators(cls, points: ArrayLike, segments: ArrayLike) -> Self:
+    @staticmethod
+    def from_generators(points: ArrayLike, segments: ArrayLike) -> "Polytope":
         """Hull of points plus the sum of the segments ``[-s, s]`` (a zonotope for one point).
 
         Args:
@@ -63,7 +62,7 @@ class Polytope:
         Raises:
             PolytopeError: If there is no point or a number is not finite.
         """
-        return cls(*convex_hull(points, segments))
+        return Polytope(*convex_hull(points, segments))
 
     @property
     def dimension(self) -> int:

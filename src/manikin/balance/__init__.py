@@ -1,6 +1,49 @@
 """Balance: admissible wrenches, margins and the classical criteria ([Qiu2012]_ chapter 4)."""
 
+from manikin.balance.criteria import (
+    admissible_com_polygon,
+    admissible_zmp_polygon,
+    center_of_pressure,
+    centroidal_moment_pivot,
+    foot_rotation_indicator,
+    support_height,
+    support_polygon,
+    zero_moment_point,
+)
+from manikin.balance.evaluate import BalanceReport, GroundPoint, evaluate_balance
 from manikin.balance.friction import FrictionModel
+from manikin.balance.limiting import LimitingConstraint, LimitShare
+from manikin.balance.limits import ContactLimits, LimitKind, contact_limits
+from manikin.balance.margin import StabilityMargins, force_space, moment_space, stability_margins
+from manikin.balance.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
 from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytope
 
-__all__ = ["FrictionModel", "WrenchPolytope", "pseudo_wrench", "wrench_polytope"]
+__all__ = [
+    "BalanceReport",
+    "ContactLimits",
+    "FrictionModel",
+    "GroundPoint",
+    "LimitKind",
+    "LimitShare",
+    "LimitingConstraint",
+    "StabilityMargins",
+    "WrenchPolytope",
+    "admissible_com_polygon",
+    "admissible_zmp_polygon",
+    "center_of_pressure",
+    "centroidal_moment_pivot",
+    "contact_limits",
+    "convex_polygon",
+    "evaluate_balance",
+    "foot_rotation_indicator",
+    "force_space",
+    "moment_space",
+    "polygon_of_halfplanes",
+    "pseudo_wrench",
+    "signed_distance",
+    "stability_margins",
+    "support_height",
+    "support_polygon",
+    "wrench_polytope",
+    "zero_moment_point",
+]

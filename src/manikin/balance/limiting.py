@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -104,7 +104,17 @@ def facet_shares(W: WrenchPolytope, row: int) -> tuple[LimitShare, ...]:
         shares.append(LimitShare("stance", LimitKind.NORMAL_FORCE_CAP, text, cap))
     if not shares:
         return (LimitShare("stance", LimitKind.UNSUPPORTED, "no contact resists this motion", 1.0),)
-    return tuple(sorted(shares, key=lambda s: (s.kind is LimitKind.LIFTING, -s.share)))
+    return tuple(sorted(_merged(shares), key=lambda s: (s.kind is LimitKind.LIFTING, -round(s.share, 6))))
+
+
+def _merged(shares: list[LimitShare]) -> list[LimitShare]:
+    """One share per phrase, several rows of one limit added up."""
+    total: dict[tuple[str, str], LimitShare] = {}
+    for share in shares:
+        key = (share.effector, share.phrase)
+        before = total[key].share if key in total else 0.0
+        total[key] = replace(share, share=before + share.share)
+    return list(total.values())
 
 
 def _contact_shares(contact: Contact, W: WrenchPolytope, normal: FloatArray, cap: float) -> list[LimitShare]:
