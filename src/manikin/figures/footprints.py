@@ -1,12 +1,14 @@
 """Footprints, centre of pressure and projected centre of mass seen from above."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from manikin.contact import Contact, ContactKind, ContactSchedule
-from manikin.figures.style import COLOURS, STYLES, dress, new_figure, readable
+from manikin.figures.style import COLOURS, STYLES, dress, new_figure, readable, white_edge
 from manikin.motion.derived import centre_of_pressure
 from manikin.motion.file import MotionFile
 from manikin.scene import HalfSpace, Plane, Scene
@@ -71,14 +73,14 @@ def _draw_contact(axes: Axes, contact: Contact, number: int) -> None:
     height = f"\nz = {z:g} m" if z else ""
     axes.text(
         heel[0], heel[1], f"{number}: {readable(contact.effector)}{height}", fontsize=7.5, ha="center",
-        va="center", color=colour, zorder=6,
+        va="center", color=colour, zorder=8, path_effects=[white_edge()],
     )  # fmt: skip
 
 
 def _draw_obstacles(axes: Axes, scene: Scene) -> None:
     """Outlines; what hangs above is dashed. Names stand in a column below the first corner in view."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    column: dict[tuple[int, int], int] = {}
+    column: dict[tuple[int, int], list[Any]] = {}
     for obstacle in scene:
         low, high = obstacle.bounds
         outside = low[0] > right or high[0] < left or low[1] > top or high[1] < bottom
@@ -94,16 +96,22 @@ def _draw_obstacles(axes: Axes, scene: Scene) -> None:
         axes.add_patch(outline)
         corner = max(low[0], left), max(low[1], bottom)
         near = round(corner[0] / 0.1), round(corner[1] / 0.1)
-        column[near] = column.get(near, 0) + 1
+        column.setdefault(near, [corner, 0])[1] += 1
+        corner, row = column[near]
         text = f"{obstacle.name}, {'from' if overhead else 'up to'} z = {low[2] if overhead else high[2]:g} m"
-        axes.annotate(
-            text, corner, (3, -11 * column[near]), textcoords="offset points", fontsize=7.5, color="#666C77"
-        )
+        axes.annotate(text, corner, (3, -11 * row), textcoords="offset points", fontsize=7.5, color="#666C77")
 
 
 def _mark_ends(axes: Axes, com: np.ndarray) -> None:
     for point, text, marker in ((com[0], "start", "o"), (com[-1], "goal", "D")):
         axes.plot(point[0], point[1], marker, color=COLOURS["ink"], markersize=5, zorder=7)
         axes.annotate(
-            text, point[:2], (7, 4), textcoords="offset points", fontsize=8, color=COLOURS["ink"], zorder=7
+            text,
+            point[:2],
+            (7, 4),
+            textcoords="offset points",
+            fontsize=8,
+            color=COLOURS["ink"],
+            zorder=8,
+            path_effects=[white_edge()],
         )

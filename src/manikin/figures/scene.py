@@ -1,13 +1,16 @@
 """The path of the centre of mass in the scene, with stick figures at the key instants."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
+from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
-from manikin.figures.style import COLOURS, new_figure
+from manikin.figures.style import COLOURS, new_figure, white_edge
 from manikin.motion import Motion
 from manikin.motion.derived import phases_of, segment_positions
 from manikin.motion.file import MotionFile
@@ -35,6 +38,8 @@ def scene_figure(content: MotionFile, elevation_deg: float = 14.0, azimuth_deg: 
     axes.plot(*motion.com.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
     _frame(axes, np.vstack(seen), corners)
     axes.view_init(elevation_deg, azimuth_deg)
+    if content.body is not None:
+        _label_heads(axes, content.body, motion, content.schedule)
     axes.legend(loc="upper left", fontsize=8, frameon=False)
     return figure
 
@@ -58,7 +63,6 @@ def _draw_figures(
                 zorder=6,
             )
         )
-    _label_heads(axes, instants, postures)
     axes.scatter(
         *motion.com[samples].T,
         s=18,
@@ -70,18 +74,23 @@ def _draw_figures(
     return np.vstack([list(places.values()) for places in postures])
 
 
-def _label_heads(axes: Axes3D, instants: FloatArray, postures: list[dict[str, FloatArray]]) -> None:
+def _label_heads(axes: Axes3D, body: BodyModel, motion: Motion, schedule: ContactSchedule | None) -> None:
     """Write the time above each head, the ends first, leaving out what would overlap."""
-    order = sorted(range(len(postures)), key=lambda i: (i not in (0, len(postures) - 1), i))
+    instants = phases_of(motion, schedule).instants
+    projection = axes.get_proj()
     taken: list[FloatArray] = []
-    for index in order:
-        head = postures[index].get("effector/head")
-        if head is None or any(np.linalg.norm(head - other) < 0.13 for other in taken):
+    for index in sorted(range(len(instants)), key=lambda i: (i not in (0, len(instants) - 1), i)):
+        sample = int(np.argmin(np.abs(motion.time - instants[index])))
+        head = segment_positions(body, motion.q[sample]).get("effector/head")
+        if head is None:
             continue
-        taken.append(head)
+        seen = np.array(proj_transform(head[0], head[1], head[2], projection)[:2])
+        if any(np.all(np.abs(seen - other) < (0.008, 0.005)) for other in taken):
+            continue
+        taken.append(seen)
         axes.text(
             head[0], head[1], head[2] + 0.05, f"{instants[index]:.2f} s", fontsize=7.5, ha="center",
-            color=COLOURS["ink"], zorder=9,
+            color=COLOURS["ink"], zorder=9, path_effects=[white_edge()],
         )  # fmt: skip
 
 
@@ -157,9 +166,11 @@ def _frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
         high = np.maximum(high, np.minimum(corners.max(axis=0), high + 1.0))
     low[2] = min(low[2] + 0.1, 0.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1)
+    zoom: Any = 1.16  # the annotation says int, the function takes any number
+    axes.set_box_aspect(high - low, zoom=zoom)
     for axis, label in ((axes.xaxis, "x [m]"), (axes.yaxis, "y [m]"), (axes.zaxis, "z [m]")):
         axis.set_label_text(label, fontsize=9)
         axis.set_tick_params(labelsize=7)
         axis.pane.set_facecolor("#FAFBFC")
         axis.pane.set_edgecolor("#D5D9DF")
+        axis._axinfo["grid"].update(color="#E3E6EA", linewidth=0.5)  # there is no public way

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from manikin.motion.derived import PhaseTable
 from manikin.motion.file import MotionFile
@@ -96,6 +97,11 @@ def draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
     axes.set_xticks([])
     for side in ("top", "right", "left", "bottom"):
         axes.spines[side].set_visible(False)
+
+
+def white_edge() -> withStroke:
+    """Path effect that keeps a text readable on top of lines."""
+    return withStroke(linewidth=2.5, foreground="white")
 
 
 def legend_above(axes: Axes) -> None:

@@ -1,0 +1,119 @@
+"""The stance file of ``manikin balance``: one stance, one centre-of-mass state."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from manikin.contact import Stance
+from manikin.errors import InputError, ScenarioError
+from manikin.scenarios.scenario import BODY_WEIGHTS_CAP, build_contact
+from manikin.scenarios.schema import ContactSection, SoleSection
+from manikin.scenarios.validation import Positive, Section, Text, Vector3, place, refuse, validate
+from manikin.scenarios.yaml_reader import read_yaml
+from manikin.spatial import GRAVITY
+
+
+class NamedContactSection(ContactSection):
+    """A contact and who makes it."""
+
+    effector: Text = Field(description="name, such as left_foot or right_hand")
+
+
+class StanceFile(Section):
+    """A whole stance file."""
+
+    mass_kg: Positive = Field(description="body mass [kg]")
+    com: Vector3 = Field(description="centre of mass [m]")
+    acceleration: Vector3 = Field(default=(0.0, 0.0, 0.0), description="of the centre of mass [m/s^2]")
+    angular_momentum_rate: Vector3 = Field(
+        default=(0.0, 0.0, 0.0), description="about the centre of mass [N.m]"
+    )
+    contacts: Annotated[list[NamedContactSection], Field(min_length=1)] = Field(description="the contacts")
+    friction: Positive = Field(default=0.7, description="Coulomb coefficient where a contact gives none")
+    sole: SoleSection = Field(
+        default=SoleSection(length_m=0.28, width_m=0.12), description="sole size where a contact gives none"
+    )
+    normal_force_cap_N: Positive | None = Field(
+        default=None, description="largest sum of normal forces [N] (default: 3 body weights)"
+    )
+    friction_model: Literal["pyramid", "inner"] = Field(
+        default="pyramid", description="pyramid around the friction cone, or inside it"
+    )
+    reference: Vector3 = Field(default=(0.0, 0.0, 0.0), description="point of the moments [m]")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        names = [contact.effector for contact in self.contacts]
+        for index, contact in enumerate(self.contacts):
+            if contact.effector in names[:index]:
+                raise refuse(
+                    f"contacts[{index}].effector", f"is {contact.effector!r} again; valid: one contact each"
+                )
+            contact.check_for(contact.effector, f"contacts[{index}].")
+        return self
+
+    def build_stance(self) -> Stance:
+        """Build the stance.
+
+        Raises:
+            ContactError: If a contact is not usable.
+        """
+        contacts = [build_contact(entry.effector, entry, self.friction, self.sole) for entry in self.contacts]
+        return Stance(contacts, self.normal_force_cap_N or BODY_WEIGHTS_CAP * self.mass_kg * GRAVITY)
+
+
+@dataclass(frozen=True, eq=False)
+class BalanceQuestion:
+    """A checked stance file.
+
+    Attributes:
+        file: Its content.
+        source: Its name, for messages.
+    """
+
+    file: StanceFile
+    source: str
+
+    def evaluate(self) -> dict[str, Any]:
+        """Margins, limiting contact and classical criteria as plain values [SI]."""
+        from manikin.balance import pseudo_wrench, wrench_polytope
+
+        file = self.file
+        stance = file.build_stance()
+        polytope = wrench_polytope(stance, friction_model=file.friction_model, reference=file.reference)
+        wrench = pseudo_wrench(
+            file.mass_kg, file.com, file.acceleration, file.angular_momentum_rate, file.reference
+        )
+        margin = float(polytope.margin(wrench))
+        limiting = polytope.limiting(wrench)
+        return {
+            "balanced": margin >= 0.0,
+            "margin": margin,
+            "margin_unit": "N.m",
+            "limiting_contact": limiting.contact,
+            "pseudo_wrench": np.asarray(wrench).tolist(),
+            "facets": len(polytope),
+        }
+
+
+def load_stance_file(path: str | Path) -> BalanceQuestion:
+    """Read a stance file.
+
+    Raises:
+        ScenarioError: One line that names the file, the key, what was wrong and what is valid.
+    """
+    file_path = Path(path)
+    if file_path.is_dir():
+        raise ScenarioError(f"{file_path}: is a directory; valid: a stance file (.yaml)")
+    if not file_path.is_file():
+        raise ScenarioError(f"{file_path}: there is no such file; valid: a stance file (.yaml)")
+    data, lines = read_yaml(file_path)
+    file = validate(StanceFile, data, str(file_path), lines)
+    try:
+        file.build_stance()
+    except InputError as error:
+        raise ScenarioError(f"{place(str(file_path), ('contacts',), lines)} {error}") from None
+    return BalanceQuestion(file, str(file_path))

@@ -1,0 +1,371 @@
+"""One viewer in the browser: the scene, the body, the controls and their state."""
+
+import socket
+import threading
+import time as clock
+from contextlib import redirect_stdout
+from io import StringIO
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import viser
+from viser import uplot
+
+from manikin.errors import InputError
+from manikin.motion import Motion
+from manikin.motion.file import MotionFile
+from manikin.scene import HalfSpace, Plane
+from manikin.spatial import FloatArray
+from manikin.viewer.shapes import segment_triangles
+
+HOST = "127.0.0.1"
+"""The viewer listens to this computer only."""
+
+FRAME_RATE = 30.0
+"""Pictures per second while playing."""
+METRES_PER_NEWTON = 1e-3
+SMALLEST_FORCE = 5.0
+"""Contact forces below this are not drawn [N]."""
+PLOT_POINTS = 400
+SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
+COLOURS = {
+    "planned": (0, 114, 178),
+    "executed": (213, 94, 0),
+    "left": (0, 158, 115),
+    "right": (204, 121, 167),
+    "trunk": (150, 156, 166),
+    "obstacle": (186, 192, 202),
+    "floor": (236, 238, 241),
+    "force": (230, 159, 0),
+}
+
+
+class ViewerSession:
+    """Serves one motion file; every change of state goes through its methods.
+
+    Attributes:
+        server: The viser server.
+        chosen: Name of the motion shown.
+        time: Instant shown [s].
+        playing: Whether time runs.
+        speed: Seconds of motion per second.
+    """
+
+    def __init__(self, content: MotionFile, port: int = 8080) -> None:
+        """Start the server and draw the first instant.
+
+        Args:
+            content: At least one motion, and the body.
+            port: Port to listen on; 0 picks a free one.
+
+        Raises:
+            InputError: If the file holds no body, or the port is taken.
+        """
+        if content.body is None:
+            raise InputError("motion file holds no body; valid: a motion file written by 'manikin run'")
+        self.content = content
+        self.chosen = list(content.motions)[-1]
+        self.playing = False
+        self.speed = 1.0
+        self._body = content.body
+        self._data = content.body.pinocchio.createData()
+        self._lock = threading.RLock()
+        self._closed = threading.Event()
+        with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
+            self.server = viser.ViserServer(host=HOST, port=_checked_port(port), verbose=False)
+        self.time = float(self.motion.time[0])
+        self._build_scene()
+        self._build_body()
+        self._build_controls()
+        self.show(self.time)
+
+    @property
+    def motion(self) -> Motion:
+        """The motion shown."""
+        return self.content.motions[self.chosen]
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return f"http://{HOST}:{self.server.get_port()}"
+
+    def show(self, time: float) -> None:
+        """Show the instant ``time`` [s], held inside the motion."""
+        with self._lock:
+            motion = self.motion
+            self.time = float(np.clip(time, motion.time[0], motion.time[-1]))
+            index = int(np.clip(np.searchsorted(motion.time, self.time), 0, len(motion.time) - 1))
+            with self.server.atomic():
+                self._place_body(motion.q[index])
+                self._place_forces(motion, index)
+                self._com.position = motion.com[index]
+            self._show_numbers(motion, index)
+
+    def choose(self, name: str) -> None:
+        """Show another motion of the file at the same instant.
+
+        Raises:
+            InputError: If the file does not hold it.
+        """
+        if name not in self.content.motions:
+            raise InputError(f"motion is {name!r}; valid here: {', '.join(self.content.motions)}")
+        with self._lock:
+            self.chosen = name
+            self.show(self.time)
+
+    def play(self) -> None:
+        """Let time run, from the beginning when it is at the end."""
+        with self._lock:
+            if self.time >= self.motion.time[-1]:
+                self.show(float(self.motion.time[0]))
+            self.playing = True
+            self._button.label = "Pause"
+
+    def pause(self) -> None:
+        """Stop time."""
+        with self._lock:
+            self.playing = False
+            self._button.label = "Play"
+
+    def advance(self, seconds: float) -> None:
+        """Let ``seconds`` of real time pass; stops at the end of the motion."""
+        with self._lock:
+            if not self.playing:
+                return
+            self.show(self.time + seconds * self.speed)
+            if self.time >= self.motion.time[-1]:
+                self.pause()
+
+    def run(self) -> None:
+        """Serve until :meth:`close` is called or Ctrl-C is pressed."""
+        before = clock.monotonic()
+        try:
+            while not self._closed.wait(1.0 / FRAME_RATE):
+                now = clock.monotonic()
+                self.advance(now - before)
+                before = now
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Stop the server; a second call does nothing."""
+        if not self._closed.is_set():
+            self._closed.set()
+            with redirect_stdout(StringIO()):
+                self.server.stop()
+
+    # --- what stands still ---------------------------------------------------------------
+
+    def _build_scene(self) -> None:
+        scene = self.server.scene
+        scene.set_up_direction("+z")
+        for obstacle in self.content.scene or ():
+            if isinstance(obstacle.shape, (HalfSpace, Plane)):
+                continue
+            mesh = obstacle.to_trimesh()
+            scene.add_mesh_simple(
+                f"/scene/{obstacle.name}",
+                np.asarray(mesh.vertices),
+                np.asarray(mesh.faces),
+                color=COLOURS["obstacle"],
+                opacity=0.55,
+                flat_shading=True,
+                side="double",
+            )
+        if self.content.scene is not None and self.content.scene.floor_height is not None:
+            height = self.content.scene.floor_height - 1e-3
+            scene.add_grid(
+                "/floor", width=8.0, height=8.0, cell_size=0.5, plane="xy", position=(0, 0, height)
+            )
+        for name, motion in self.content.motions.items():
+            path = _thinned(motion.com)
+            segments = np.stack([path[:-1], path[1:]], axis=1)
+            scene.add_line_segments(
+                f"/com/{name}", segments, np.array(COLOURS[name]), thickness=3.0, thickness_units="screen"
+            )
+        self._draw_contacts()
+        self._look_at_the_motion()
+
+    def _draw_contacts(self) -> None:
+        """Outline of every sole of the schedule."""
+        if self.content.schedule is None:
+            return
+        for number, phase in enumerate(self.content.schedule.sequence):
+            for contact in phase.stance:
+                corners = contact.points_in_world + 0.002 * contact.normal
+                if len(corners) < 3:
+                    continue
+                edges = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+                self.server.scene.add_line_segments(
+                    f"/contacts/{number}_{contact.effector}",
+                    edges,
+                    np.array(_side_colour(contact.effector)),
+                    thickness=2.0,
+                    thickness_units="screen",
+                )
+
+    def _look_at_the_motion(self) -> None:
+        middle = self.motion.com.mean(axis=0)
+        self.server.initial_camera.look_at = middle
+        self.server.initial_camera.position = middle + np.array([-1.2, -2.3, 0.5])
+        self.server.initial_camera.up = (0.0, 0.0, 1.0)
+
+    # --- what moves ----------------------------------------------------------------------
+
+    def _build_body(self) -> None:
+        scene = self.server.scene
+        self._frames: dict[str, viser.FrameHandle] = {}
+        for segment in self._body.segments:
+            triangles = segment_triangles(segment)
+            if triangles is None:
+                continue
+            self._frames[segment.name] = scene.add_frame(f"/body/{segment.name}", show_axes=False)
+            scene.add_mesh_simple(
+                f"/body/{segment.name}/shape",
+                *triangles,
+                color=_side_colour(segment.name),
+                flat_shading=False,
+            )
+        self._com = scene.add_icosphere("/com/now", radius=0.03, color=(34, 34, 34))
+        names = dict.fromkeys(
+            name for motion in self.content.motions.values() for name in motion.contact_names
+        )
+        self._arrows = {
+            name: scene.add_arrows(
+                f"/forces/{name}",
+                np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]]),
+                np.array(COLOURS["force"]),
+                shaft_radius=0.012,
+                head_radius=0.03,
+                head_length=0.06,
+                visible=False,
+            )
+            for name in names
+        }
+
+    def _place_body(self, q: FloatArray) -> None:
+        pin.framesForwardKinematics(self._body.pinocchio, self._data, q)
+        for name, frame in self._frames.items():
+            placement = self._data.oMf[self._body.segment_frame(name)]
+            x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+            frame.wxyz, frame.position = (w, x, y, z), placement.translation
+
+    def _place_forces(self, motion: Motion, index: int) -> None:
+        for number, name in enumerate(motion.contact_names):
+            force = motion.contact_force[index, number, :3]
+            drawn = bool(np.linalg.norm(force) >= SMALLEST_FORCE) and self._forces_wanted()
+            if drawn:
+                start = self._data.oMf[self._body.effector_frame(name)].translation
+                self._arrows[name].points = np.array([[start, start + METRES_PER_NEWTON * force]])
+            self._arrows[name].visible = drawn
+
+    def _forces_wanted(self) -> bool:
+        return not hasattr(self, "_forces") or self._forces.value
+
+    # --- controls ------------------------------------------------------------------------
+
+    def _build_controls(self) -> None:
+        gui = self.server.gui
+        gui.configure_theme(control_layout="collapsible", show_logo=False, show_share_button=False)
+        last = max(float(motion.time[-1]) for motion in self.content.motions.values())
+        with gui.add_folder("Playback"):
+            self._slider = gui.add_slider("time [s]", min=0.0, max=last, step=0.001, initial_value=self.time)
+            self._button = gui.add_button("Play")
+            speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
+            motions = gui.add_dropdown("motion", tuple(self.content.motions), initial_value=self.chosen)
+            self._forces = gui.add_checkbox("contact forces", initial_value=True)
+        with gui.add_folder("Now"):
+            self._text = gui.add_markdown("")
+        with gui.add_folder("Margin"):
+            self._build_plot()
+        self._slider.on_update(lambda event: self._scrubbed(event.client is not None))
+        self._button.on_click(lambda _: self.pause() if self.playing else self.play())
+        speed.on_update(lambda _: setattr(self, "speed", float(speed.value)))
+        motions.on_update(lambda _: self.choose(motions.value))
+        self._forces.on_update(lambda _: self.show(self.time))
+
+    def _scrubbed(self, by_hand: bool) -> None:
+        """Follow the slider, unless it was this session that moved it."""
+        if by_hand:
+            self.show(self._slider.value)
+
+    def _build_plot(self) -> None:
+        start = min(float(motion.time[0]) for motion in self.content.motions.values())
+        end = max(float(motion.time[-1]) for motion in self.content.motions.values())
+        self._plot_time = np.linspace(start, end, PLOT_POINTS)
+        self._plot_margins = [
+            np.interp(self._plot_time, motion.time, motion.margin, left=np.nan, right=np.nan)
+            for motion in self.content.motions.values()
+        ]
+        low = min(0.0, *(float(motion.margin.min()) for motion in self.content.motions.values()))
+        high = max(1.0, *(float(motion.margin.max()) for motion in self.content.motions.values()))
+        self._plot_range = (low - 0.05 * (high - low), high + 0.05 * (high - low))
+        series: list[Any] = [uplot.Series(label="time [s]")]
+        for name in self.content.motions:
+            series.append(uplot.Series(label=name, stroke=_css(COLOURS[name]), width=1.5))
+        series.append(uplot.Series(label="now", stroke="#555555", width=1.0, points={"show": False}))
+        self._plot = self.server.gui.add_uplot(
+            self._plot_data(self._plot_time[0]),
+            tuple(series),
+            scales={
+                "x": uplot.Scale(time=False, auto=True),
+                "y": uplot.Scale(auto=False, range=self._plot_range),
+            },
+            axes=(uplot.Axis(label="time [s]"), uplot.Axis(label="margin [N.m]")),
+            aspect=1.35,
+        )
+
+    def _plot_data(self, time: float) -> tuple[FloatArray, ...]:
+        """Time, margins, and a last row that stands up at the instant shown, as a cursor."""
+        low, high = self._plot_range
+        cursor = np.full(PLOT_POINTS, low)
+        cursor[int(np.argmin(np.abs(self._plot_time - time)))] = high
+        return (self._plot_time, *self._plot_margins, cursor)
+
+    def _show_numbers(self, motion: Motion, index: int) -> None:
+        self._slider.value = round(self.time, 3)
+        self._plot.data = self._plot_data(self.time)
+        supports = [
+            n.replace("_", " ")
+            for n, on in zip(motion.contact_names, motion.support[index], strict=True)
+            if on
+        ]
+        load = float(motion.contact_force[index, :, 2].sum())
+        self._text.content = "\n".join(
+            [
+                f"**{self.time:.3f} s**, {self.chosen}",
+                "",
+                f"- margin: **{motion.margin[index]:.1f} N.m**",
+                f"- supports: {', '.join(supports) or 'none'}",
+                f"- vertical contact force: {load:.0f} N",
+                f"- CoM: {', '.join(f'{value:.3f}' for value in motion.com[index])} m",
+            ]
+        )
+
+
+def _checked_port(port: int) -> int:
+    """Return a port that is free, or refuse: viser would silently take another one."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            problem = getattr(error, "strerror", None) or str(error)
+            raise InputError(f"port {port} cannot be used ({problem}); valid: a free port, or 0") from None
+        return int(probe.getsockname()[1])
+
+
+def _side_colour(name: str) -> tuple[int, int, int]:
+    return next((COLOURS[side] for side in ("left", "right") if name.startswith(side)), COLOURS["trunk"])
+
+
+def _css(colour: tuple[int, int, int]) -> str:
+    return f"rgb{colour}"
+
+
+def _thinned(path: FloatArray, largest: int = 1000) -> FloatArray:
+    step = max(1, len(path) // largest)
+    return path[::step]
