@@ -45,20 +45,11 @@ def scene():
 @pytest.fixture(scope="module")
 def motion(person):
     """4 s at 1 kHz: a walk forward with swinging joints."""
-    q = person.standing_posture()
-    steps = np.arange(4000)
-    return np.array(
-        [
-            pin.integrate(
-                person.pinocchio,
-                q,
-                np.concatenate(
-                    [[2e-4 * i, 0, 0.3], np.zeros(3), 0.1 * np.sin(np.arange(person.nv - 6) + i / 400)]
-                ),
-            )
-            for i in steps
-        ]
-    )
+    q, joints = person.standing_posture(), np.arange(person.nv - 6)
+    moves = [
+        np.concatenate([[2e-4 * i, 0, 0.3], np.zeros(3), 0.1 * np.sin(joints + i / 400)]) for i in range(4000)
+    ]
+    return np.array([pin.integrate(person.pinocchio, q, move) for move in moves])
 
 
 @pytest.mark.parametrize("activation", [0.03, 0.1, 0.3])
@@ -96,10 +87,13 @@ def test_evaluate_spheres(benchmark, person, scene):
     benchmark(near.evaluate, person.standing_posture(), 0.1, FEET)
 
 
-def test_evaluate_beside_a_mesh(benchmark, person):
+@pytest.mark.parametrize("distance", [0.35, 0.7], ids=["through", "beside"])
+def test_evaluate_at_a_closed_mesh(benchmark, person, distance):
+    """A wheel of 2048 triangles, through the trunk or just before it."""
     ring = trimesh.creation.torus(0.4, 0.05)
-    wheel = Obstacle("wheel", Mesh(ring.vertices, ring.faces), translation=(0.4, 0.0, 1.0))
+    wheel = Obstacle("wheel", Mesh(ring.vertices, ring.faces), translation=(distance, 0.0, 1.0))
     near = Proximity(person, Scene([wheel]))
+    benchmark.extra_info["minimum"] = near.minimum(person.standing_posture(), FEET).distance
     benchmark(near.evaluate, person.standing_posture(), 0.1, FEET)
 
 

@@ -22,6 +22,8 @@ from manikin.scene import (
     Scene,
     Sphere,
 )
+from manikin.scene.collision import ClosedSurface, triangle_geometry
+from manikin.scene.covering import winding_inside
 from manikin.spatial import rotation_from_rpy
 
 FAR = 100.0
@@ -217,6 +219,20 @@ def test_ball_and_closed_mesh_that_is_not_convex(free_body, pose, x, y, z):
     assert distance == pytest.approx(expected - 0.1, abs=TIGHT)
     gap = result.normal[0] @ (result.on_other[0] - result.on_body[0])
     assert gap == pytest.approx(distance, abs=TIGHT)
+
+
+def test_the_sign_of_a_point_is_that_of_the_winding_number():
+    """On a surface with ridges, hollows and a hole, also near its edges and corners."""
+    ring = trimesh.creation.torus(0.5, 0.2, major_sections=9, minor_sections=5)
+    (piece,) = Mesh(ring.vertices, ring.faces).pieces
+    surface = ClosedSurface(piece.vertices, piece.faces, triangle_geometry(piece.vertices, piece.faces))
+    rng = np.random.default_rng(0)
+    anywhere = rng.uniform(-0.8, 0.8, size=(500, 3))
+    corners = piece.vertices[rng.integers(len(piece.vertices), size=500)] + rng.normal(size=(500, 3)) * 0.02
+    points = np.vstack([anywhere, corners])
+    inside = winding_inside(piece.vertices[piece.faces], points)
+    heights = np.array([surface.signed(point)[0] for point in points])
+    assert np.array_equal(heights < 0.0, inside)
 
 
 @pytest.mark.parametrize(

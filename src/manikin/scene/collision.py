@@ -7,7 +7,6 @@ import coal
 import numpy as np
 import trimesh
 
-from manikin.scene.covering import winding_inside
 from manikin.scene.mesh import IntArray, Mesh, MeshPiece
 from manikin.scene.obstacle import Obstacle
 from manikin.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere, local_bounds
@@ -88,23 +87,65 @@ class ClosedSurface:
     faces: IntArray
     geometry: coal.CollisionGeometry
 
-    @cached_property
-    def _corners(self) -> FloatArray:
-        return self.vertices[self.faces]
+    def signed(self, point: FloatArray) -> tuple[float, FloatArray]:
+        """Signed distance of a point [m], negative inside, and the nearest surface point.
 
-    def contains(self, points: FloatArray) -> np.ndarray:
-        """(k,) whether each of the (k, 3) points is inside."""
-        return winding_inside(self._corners, points)
-
-    def nearest(self, point: FloatArray) -> tuple[float, FloatArray]:
-        """Unsigned distance of a point to the surface [m] and the nearest surface point."""
+        The sign is that of the angle-weighted normal of the nearest face, edge or vertex,
+        which is exact on a closed surface (Baerentzen and Aanaes 2005).
+        """
         result = coal.DistanceResult()
         place = coal.Transform3s(np.eye(3), point)
-        coal.distance(_POINT, place, self.geometry, _HERE, coal.DistanceRequest(), result)
-        nearest = result.getNearestPoint2()
-        return float(np.linalg.norm(nearest - point)), nearest
+        # The mesh comes first: in the other order Coal loses the triangle's index.
+        coal.distance(self.geometry, _HERE, _POINT, place, _REQUEST, result)
+        nearest = result.getNearestPoint1()
+        away = point - nearest
+        distance = float(np.linalg.norm(away))
+        return (distance if away @ self._normal_at(int(result.b1), nearest) >= 0.0 else -distance), nearest
+
+    def _normal_at(self, face: int, point: FloatArray) -> FloatArray:
+        """Angle-weighted normal of the face, its edge or its corner on which a point lies."""
+        a, b, c = self.vertices[self.faces[face]]
+        first, second, away = b - a, c - a, point - a
+        gram = np.array([[first @ first, first @ second], [first @ second, second @ second]])
+        weights = np.linalg.solve(gram, np.array([away @ first, away @ second]))
+        shares = np.array([1.0 - weights.sum(), *weights])
+        zero = shares < 1e-6
+        if not zero.any():
+            return self._face_normals[face]
+        if zero.sum() == 1:
+            return self._edge_normals[face, int(np.argmax(zero))]
+        return self._vertex_normals[self.faces[face, int(np.argmax(shares))]]
+
+    @cached_property
+    def _face_normals(self) -> FloatArray:
+        corners = self.vertices[self.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+    @cached_property
+    def _edge_normals(self) -> FloatArray:
+        """(m, 3, 3): sum of the two faces' normals at the edge opposite to each corner."""
+        edges = np.sort(self.faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+        _, index = np.unique(edges, axis=0, return_inverse=True)
+        sums = np.zeros((index.max() + 1, 3))
+        np.add.at(sums, index.reshape(-1), np.repeat(self._face_normals, 3, axis=0))
+        return sums[index.reshape(-1)].reshape(-1, 3, 3)
+
+    @cached_property
+    def _vertex_normals(self) -> FloatArray:
+        corners = self.vertices[self.faces]
+        ahead = np.roll(corners, -1, axis=1) - corners
+        back = np.roll(corners, 1, axis=1) - corners
+        cosine = np.einsum("fki,fki->fk", ahead, back)
+        angle = np.arccos(
+            np.clip(cosine / (np.linalg.norm(ahead, axis=2) * np.linalg.norm(back, axis=2)), -1.0, 1.0)
+        )
+        sums = np.zeros_like(self.vertices)
+        np.add.at(sums, self.faces, angle[..., None] * self._face_normals[:, None])
+        return sums
 
 
+_REQUEST = coal.DistanceRequest()
 _POINT = coal.Sphere(1e-9)
 _HERE = coal.Transform3s.Identity()
 

@@ -40,23 +40,20 @@ class ClosedMeshMeter:
 
     def _may_be_inside(self, point: FloatArray) -> bool:
         within = np.all((point >= self._low) & (point <= self._high))
-        return bool(within) and bool(self._surface.contains(point[None])[0])
+        return bool(within) and self._surface.signed(point)[0] < 0.0
 
     def _deepest(
         self, points: FloatArray, rotation: FloatArray, translation: FloatArray, outside: Measured
     ) -> Measured:
-        inside = self._surface.contains(points)
-        nearest = [self._surface.nearest(point) for point in points]
-        gaps = np.array([gap for gap, _ in nearest])
-        heights = np.where(inside, -gaps, gaps)
-        lowest = int(np.argmin(heights))
-        if gaps[lowest] < 1e-9 or heights[lowest] - self._radius > 0.0:
+        measured = [self._surface.signed(point) for point in points]
+        lowest = int(np.argmin([height for height, _ in measured]))
+        height, nearest = measured[lowest]
+        if abs(height) < 1e-9 or height - self._radius > 0.0:
             return (min(outside[0], 0.0), *outside[1:])
-        toward = (nearest[lowest][1] - points[lowest]) / gaps[lowest]
-        normal = rotation @ (-toward if inside[lowest] else toward)
+        normal = rotation @ ((nearest - points[lowest]) / height)
         point = rotation @ points[lowest] + translation
-        on_surface = rotation @ nearest[lowest][1] + translation
-        return float(heights[lowest] - self._radius), normal, point + self._radius * normal, on_surface
+        on_surface = rotation @ nearest + translation
+        return height - self._radius, normal, point + self._radius * normal, on_surface
 
 
 def part_meter(geometry: coal.CollisionGeometry, part: CollisionPart) -> Meter:
