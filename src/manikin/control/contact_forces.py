@@ -1,7 +1,7 @@
 """Contact forces as non-negative combinations of the edges of friction pyramids."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class ContactGeometry:
         """Names of the segments that carry force."""
         return tuple(patch.segment for patch in self.patches)
 
-    @property
+    @cached_property
     def point_count(self) -> int:
         """Number of points of all patches."""
         return sum(len(patch.points) for patch in self.patches)

@@ -117,7 +117,7 @@ class Controller:
             for segment in geometry.segments
         }
         self._dynamics = Dynamics(body, {**segments, **frames})
-        self.reference = Reference(body, motion, frames)
+        self.reference = Reference(body, motion, frames, self.settings.period)
         self._solver = make_solver(self.settings.solver)
         self._spare_solver = make_solver(self.settings.solver)
         self._previous = np.zeros(joints)

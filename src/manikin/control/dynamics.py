@@ -80,15 +80,14 @@ class Dynamics:
     def evaluate(self, q: FloatArray, v: FloatArray) -> DynamicsState:
         """Compute all terms at the configuration ``q`` (nq,) and the velocity ``v`` (nv,)."""
         model, data = self._model, self._data
-        upper = np.triu(pin.crba(model, data, q))
-        mass_matrix = upper + np.triu(upper, 1).T
+        mass_matrix = pin.crba(model, data, q).copy()
         bias = pin.nonLinearEffects(model, data, q, v).copy()
+        # ccrba also leaves the joint Jacobians in the data, and the next call the
+        # velocities and (without gravity, joints at rest) the drift accelerations.
         pin.ccrba(model, data, q, v)
         centroidal_map, momentum = data.Ag.copy(), data.hg.vector.copy()
         pin.computeCentroidalMomentumTimeVariation(model, data, q, v, self._rest)
         momentum_drift, com = data.dhg.vector.copy(), data.com[0].copy()
-        pin.computeJointJacobians(model, data, q)
-        pin.forwardKinematics(model, data, q, v, self._rest)
         frames = {name: self._frame(index) for name, index in self._frames.items()}
         return DynamicsState(
             q, v, mass_matrix, bias, self._mass, com, momentum, centroidal_map, momentum_drift, frames

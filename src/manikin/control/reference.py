@@ -21,7 +21,8 @@ class EffectorReference:
         rotation: (3, 3) frame to world.
         position: (3,) [m].
         twist: (6,) linear, angular [m/s, rad/s].
-        acceleration: (6,) linear (of the frame's origin), angular [m/s^2, rad/s^2].
+        acceleration: (6,) mean over the hold, linear (of the frame's origin), angular
+            [m/s^2, rad/s^2].
     """
 
     rotation: FloatArray
@@ -37,12 +38,12 @@ class ReferenceSample:
     Attributes:
         q: (nq,) configuration.
         v: (nv,) velocity.
-        a: (nv,) acceleration.
+        a: (nv,) mean acceleration over the hold.
         com: (3,) [m].
         com_velocity: (3,) [m/s].
-        com_acceleration: (3,) [m/s^2].
+        com_acceleration: (3,) mean over the hold [m/s^2].
         angular_momentum: (3,) about the CoM [kg.m^2/s].
-        angular_momentum_rate: (3,) [N.m].
+        angular_momentum_rate: (3,) mean over the hold [N.m].
         effectors: Reference of each frame by name.
     """
 
@@ -58,15 +59,21 @@ class ReferenceSample:
 
 
 class Reference:
-    """Samples a motion anywhere in time; before and after it the body is at rest."""
+    """Samples a motion anywhere in time; before and after it the body is at rest.
 
-    def __init__(self, body: BodyModel, motion: Motion, frames: dict[str, int]) -> None:
+    Accelerations are means over the time for which the torques will be held, the difference
+    of the planned velocities at its ends: a torque that is held cannot follow anything finer,
+    and the acceleration at the beginning of the hold would make the body lag behind.
+    """
+
+    def __init__(self, body: BodyModel, motion: Motion, frames: dict[str, int], period: float) -> None:
         """Bind a motion to a body.
 
         Args:
             body: The body that the motion was planned for.
             motion: Planned motion.
             frames: Pinocchio frame indices by the name they get in ``ReferenceSample.effectors``.
+            period: Time for which torques are held [s].
 
         Raises:
             InputError: If the motion's joints are not the body's.
@@ -80,49 +87,83 @@ class Reference:
         self._model = body.pinocchio
         self._data = self._model.createData()
         self._frames = dict(frames)
+        self._period = period
         self._rest = np.zeros(self._model.nv)
+        self._next: _Rates | None = None
 
     def sample(self, time: float) -> ReferenceSample:
         """Return the planned state at ``time`` [s], interpolated between the samples."""
-        q, v, a, com_target = self._state(time)
-        model, data = self._model, self._data
-        pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a)
-        mass = data.mass[0]
+        now, then = self._rates(time), self._rates(time + self._period)
+        self._next = then
         return ReferenceSample(
-            q=q,
-            v=v,
-            a=a,
-            com=com_target,
-            com_velocity=data.hg.linear / mass,
-            com_acceleration=data.dhg.linear / mass,
-            angular_momentum=data.hg.angular.copy(),
-            angular_momentum_rate=data.dhg.angular.copy(),
-            effectors={name: self._frame(index) for name, index in self._frames.items()},
+            q=now.q,
+            v=now.v,
+            a=(then.v - now.v) / self._period,
+            com=now.com,
+            com_velocity=now.com_velocity,
+            com_acceleration=(then.com_velocity - now.com_velocity) / self._period,
+            angular_momentum=now.angular_momentum,
+            angular_momentum_rate=(then.angular_momentum - now.angular_momentum) / self._period,
+            effectors={
+                name: EffectorReference(
+                    frame.rotation,
+                    frame.position,
+                    frame.twist,
+                    (then.frames[name].twist - frame.twist) / self._period,
+                )
+                for name, frame in now.frames.items()
+            },
         )
 
-    def _state(self, time: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _rates(self, time: float) -> "_Rates":
+        if self._next is not None and abs(self._next.time - time) < 1e-9:
+            return self._next
+        q, v, com = self._state(time)
+        model, data = self._model, self._data
+        pin.forwardKinematics(model, data, q, v)
+        pin.computeCentroidalMomentum(model, data)
+        frames = {name: self._frame(index) for name, index in self._frames.items()}
+        velocity = data.hg.linear / data.mass[0]
+        return _Rates(time, q, v, com, velocity, data.hg.angular.copy(), frames)
+
+    def _state(self, time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         motion = self.motion
-        if not motion.time[0] <= time <= motion.time[-1]:
+        if not motion.time[0] - 1e-9 <= time <= motion.time[-1] + 1e-9:
             end = 0 if time < motion.time[0] else -1
-            return motion.q[end], self._rest, self._rest, motion.com[end]
-        after = int(np.searchsorted(motion.time, time - 1e-9))
+            return motion.q[end], self._rest, motion.com[end]
+        after = min(int(np.searchsorted(motion.time, time - 1e-9)), len(motion.time) - 1)
         if after == 0 or abs(motion.time[after] - time) < 1e-9:
-            return motion.q[after], motion.v[after], motion.a[after], motion.com[after]
+            return motion.q[after], motion.v[after], motion.com[after]
         before = after - 1
         share = (time - motion.time[before]) / (motion.time[after] - motion.time[before])
         q = pin.interpolate(self._model, motion.q[before], motion.q[after], share)
-        v, a, com = (
-            (1 - share) * values[before] + share * values[after]
-            for values in (motion.v, motion.a, motion.com)
-        )
-        return q, v, a, com
+        v, com = ((1 - share) * values[before] + share * values[after] for values in (motion.v, motion.com))
+        return q, v, com
 
-    def _frame(self, index: int) -> EffectorReference:
+    def _frame(self, index: int) -> "_FrameRate":
         model, data = self._model, self._data
         placement = pin.updateFramePlacement(model, data, index)
-        return EffectorReference(
-            rotation=placement.rotation.copy(),
-            position=placement.translation.copy(),
-            twist=pin.getFrameVelocity(model, data, index, _WORLD_ALIGNED).vector,
-            acceleration=pin.getFrameClassicalAcceleration(model, data, index, _WORLD_ALIGNED).vector,
-        )
+        twist = pin.getFrameVelocity(model, data, index, _WORLD_ALIGNED).vector
+        return _FrameRate(placement.rotation.copy(), placement.translation.copy(), twist)
+
+
+@dataclass(frozen=True, eq=False)
+class _FrameRate:
+    """Planned placement and twist of a frame at one time."""
+
+    rotation: FloatArray
+    position: FloatArray
+    twist: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Rates:
+    """Planned state and velocities at one time."""
+
+    time: float
+    q: FloatArray
+    v: FloatArray
+    com: FloatArray
+    com_velocity: FloatArray
+    angular_momentum: FloatArray
+    frames: dict[str, _FrameRate]
