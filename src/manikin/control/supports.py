@@ -10,8 +10,8 @@ import numpy as np
 from manikin.contact import Contact, ContactSchedule
 from manikin.control.settings import SupportSettings
 
-_FIRST_SHARE = 0.1
-"""Load share at the very touch-down, so that the QP may react to the impact."""
+_FIRST_SHARE = 0.05
+"""Load share at touch-down, and of a foot that lands early until its planned landing."""
 
 
 class SupportMode(StrEnum):
@@ -139,7 +139,7 @@ class SupportSwitch:
         planned = time >= interval.start - 1e-9
         self._remember_touch(memory, time, planned if touching is None else touching)
         if memory.landed is not None:
-            share = self._load_share(time, memory.landed, interval.end)
+            share = self._load_share(time, max(memory.landed, interval.start), interval.end)
             return SupportState(name, SupportMode.STANCE, interval.contact, share)
         if not planned:
             return SupportState(name, SupportMode.SWING, None)

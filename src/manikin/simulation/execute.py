@@ -139,10 +139,13 @@ class _Run:
             before = clock.perf_counter()
             output = self.controller.step(time, self.world.q, self.world.v, self._touching(time))
             control += clock.perf_counter() - before
+            if number == 0:
+                self.world.forget()
             self.world.advance(output.tau, 1)
-            if number >= 0:
-                self.recorder.record(self.world.sense(), output)
+            sensed = self.world.sense()
             self.world.advance(output.tau, self.substeps - 1)
+            if number >= 0:
+                self.recorder.record(sensed, output, self.world.mean_wrench())
             if number >= 0 and self._failed(output):
                 break
             if number >= 0 and progress is not None:

@@ -13,10 +13,11 @@ class Execution:
 
     Attributes:
         motion: What happened, one sample per control step; ``tau`` are the joint torques
-            held from the sample on, ``contact_force`` what the engine measured, with the
-            moment about the *planned* contact frame's origin, ``support`` where it presses,
-            ``margin`` that of the sum of the measured contact forces in the polytope of the
-            stance planned at the time.
+            held from the sample on, ``a`` and ``contact_force`` what the engine measured in
+            the step's first millisecond, moments about the *planned* contact frame's origin,
+            ``support`` where it presses, ``margin`` that of the measured wrench of all
+            contacts, averaged over the control step, in the polytope of the stance planned
+            for its beginning.
         fell: Whether the body fell.
         failure: Why the run is no success, in one line; empty for a success.
         failure_time_s: When it failed [s], or None.

@@ -13,8 +13,6 @@ from manikin.motion import Motion
 from manikin.simulation.world import Sensed
 from manikin.spatial import GRAVITY, FloatArray
 
-_ORIGIN = np.zeros(3)
-
 _PRESSES = 1.0
 """Force from which an effector counts as a support of the executed motion [N]."""
 
@@ -27,7 +25,7 @@ class Sample:
         sensed: Contact forces and acceleration at the beginning of the step.
         output: What the controller decided there.
         wrenches: (effectors, 6) measured force and moment about the planned contact's origin.
-        total: (6,) sum of all measured contact forces, moments about the world origin.
+        total: (6,) mean over the step of the wrench of all contacts about the world origin.
     """
 
     sensed: Sensed
@@ -55,12 +53,15 @@ class Recorder:
         self._landings: dict[str, FloatArray | None] = dict.fromkeys(self.effectors)
         self.max_slip = 0.0
 
-    def record(self, sensed: Sensed, output: ControlOutput) -> None:
-        """Add one control step."""
+    def record(self, sensed: Sensed, output: ControlOutput, total: FloatArray) -> None:
+        """Add one control step.
+
+        Args:
+            sensed: What was felt in its first engine step.
+            output: What the controller decided.
+            total: (6,) mean wrench of all contacts over the whole step.
+        """
         wrenches = np.array([self._wrench(name, sensed) for name in self.effectors])
-        total = sensed.wrench(_ORIGIN)
-        for name in sensed.grips:
-            total = total + sensed.grip_wrench(name, _ORIGIN)
         self.samples.append(Sample(sensed, output, wrenches, total))
         if output.fallback:
             self.fallbacks.append((sensed.time, output.fallback))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from manikin.balance.friction import cross
 from manikin.errors import InputError
-from manikin.simulation.compile import SimulationModel
+from manikin.simulation.compile import SimulationModel, root_rotation
 from manikin.simulation.scene_geoms import obstacle_of
 from manikin.spatial import FloatArray, finite_number, frozen_array
 
@@ -149,6 +149,7 @@ class World:
         self._grip_forces: dict[str, FloatArray] = {}
         self._touches: dict[tuple[str, str], Touch] = {}
         self._depth = 0.0
+        self._total, self._steps = np.zeros(6), 0
 
     # --- state -----------------------------------------------------------------------------
 
@@ -180,8 +181,13 @@ class World:
         self.model.set_state(self._data, q, v)
         self._before = (self._data.qpos.copy(), self._data.qvel.copy(), time)
         self._grip_forces.clear()
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget unplanned touches, the deepest penetration and the wrenches so far."""
         self._touches.clear()
         self._depth = 0.0
+        self._total[:], self._steps = 0.0, 0
 
     # --- what acts -------------------------------------------------------------------------
 
@@ -250,6 +256,28 @@ class World:
             self._act()
             mujoco.mj_step(self._model, self._data)
             self._note_contacts()
+            self._total += self._constraint_wrench()
+            self._steps += 1
+
+    def mean_wrench(self) -> FloatArray:
+        """(6,) mean wrench of the scene on the body since the last call, grips included.
+
+        Moments are about the world origin. Of all engine steps since then, not only of the
+        last: an impact of one step counts with the share of time that it lasts.
+        """
+        mean = self._total / max(self._steps, 1)
+        self._total[:], self._steps = 0.0, 0
+        return mean
+
+    def _constraint_wrench(self) -> FloatArray:
+        """Wrench of all contacts and grips in the last step; inner forces cancel in the root."""
+        qpos, _, _ = self._before
+        force = self._data.qfrc_constraint[:3]
+        moment = root_rotation(self.model.q_from_mujoco(qpos)) @ self._data.qfrc_constraint[3:6]
+        total = np.concatenate((force, cross(qpos[:3], force) + moment))
+        for pull, position in self._grip_forces.values():
+            total += np.concatenate((pull, cross(position, pull)))
+        return total
 
     def _act(self) -> None:
         self._data.xfrc_applied[:] = 0.0
