@@ -82,7 +82,7 @@ def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
 
 
 def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Feasibility:
-    """Test everything that needs no optimisation, in order of cost.
+    """Test everything that needs no optimisation.
 
     Durations and end points against their bounds, then emptiness of the intersections
     (Proposition 1) and their radius against the required margin (Proposition 2), then whether
@@ -142,13 +142,13 @@ def _end_failure(problem: CentroidalProblem) -> Failure | None:
 def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Failure | None:
     for index, radius in enumerate(radii):
         where = f"phases {index} and {index + 1}"
-        if radius < 0:
+        if radius < -VANISHING_MARGIN:
             return Failure(
                 "intersection",
                 f"no wrench is admissible in both of {where}: their polytopes do not meet (Proposition 1)",
                 index, where=where,
             )  # fmt: skip
-        if problem.margin_space == "wrench" and radius < problem.required_margin:
+        if problem.margin_space == "wrench" and radius <= max(problem.required_margin, VANISHING_MARGIN):
             return Failure(
                 "intersection",
                 f"the margin between {where} is at most {radius:.2f} N.m, the radius of the largest ball "

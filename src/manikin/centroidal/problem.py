@@ -14,8 +14,8 @@ from manikin.errors import InputError
 from manikin.spatial import FloatArray, finite_number, frozen_array
 
 MarginSpace = Literal["wrench", "force"]
-"""``wrench``: distance to the facets in [N.m] with alpha = 1 m ([Qiu2012]_ 4.40);
-``force``: largest force at the CoM in any direction, [N] ([Qiu2012]_ 4.3.3, case 1)."""
+"""``wrench``: distance to the facets of W_p in [N.m] with alpha = 1 m; ``force``: smallest force
+at the CoM that ends balance, [N] ([Qiu2012]_ 4.2.9, cases 3 and 1)."""
 
 _UNITS: dict[str, str] = {"wrench": "N.m", "force": "N"}
 

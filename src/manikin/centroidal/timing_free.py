@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from manikin.balance import WrenchPolytope
+from manikin.balance import LimitingConstraint, WrenchPolytope
 from manikin.centroidal.certificate import Residuals, measure
 from manikin.centroidal.facets import facet_distances, nearest_facets, with_violated
 from manikin.centroidal.feasibility import Failure, Feasibility, assess_feasibility, polytopes_of
@@ -69,6 +69,18 @@ class CentroidalResult:
         return None if self.certificate is None else self.certificate.limiting_phase
 
     @property
+    def limiting(self) -> LimitingConstraint | None:
+        """What limits the smallest margin: contact, what gives way there and in which direction."""
+        if self.trajectory is None or self.certificate is None:
+            return None
+        return _limiting(self.trajectory, self.certificate, self.polytopes)
+
+    @property
+    def limiting_contact(self) -> str | None:
+        """Effector whose contact limits the smallest margin."""
+        return None if self.limiting is None else self.limiting.effector
+
+    @property
     def feasibility_radius(self) -> float:
         """Upper bound of d_min ([Qiu2012]_ Proposition 2) [N.m]."""
         return self.feasibility.radius
@@ -106,7 +118,7 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     if failure is None:
         attempts = _search(problem, polytopes)
         best = min(attempts, key=lambda attempt: attempt.certificate.rank)
-        failure = None if best.certificate.within() else _explain(problem, best)
+        failure = None if best.certificate.within() else _explain(problem, polytopes, best)
     return CentroidalResult(
         problem, polytopes, feasibility, failure,
         best.trajectory if best is not None and failure is None else None,
@@ -151,7 +163,14 @@ def _hopeless(attempt: Attempt, targets: Targets) -> bool:
     return not attempt.converged or attempt.margin < targets.margin - 1e-3
 
 
-def _explain(problem: CentroidalProblem, best: Attempt) -> Failure:
+def _limiting(
+    trajectory: CentroidalTrajectory, certificate: Residuals, polytopes: Sequence[WrenchPolytope]
+) -> LimitingConstraint:
+    wrench = trajectory.pseudo_wrench(certificate.limiting_time)
+    return polytopes[certificate.limiting_phase].limiting(wrench)
+
+
+def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], best: Attempt) -> Failure:
     """Name the requirement that fails in the best attempt.
 
     The required margin is penalised and not imposed, so that an attempt that breaks nothing
@@ -162,10 +181,10 @@ def _explain(problem: CentroidalProblem, best: Attempt) -> Failure:
         return Failure(
             worst.requirement, f"no trajectory found: {worst} in the best attempt", worst.phase, worst.time
         )
-    phase, unit = found.limiting_phase, problem.margin_unit
-    held = ", ".join(problem.sequence[phase].stance.effectors)
+    limit = _limiting(best.trajectory, found, polytopes)
+    unit = problem.margin_unit
     reason = (
-        f"the largest margin found is {found.min_margin:.2f} {unit}, limited in phase {phase} on "
-        f"{held or 'no contact'}; required {problem.required_margin:.2f} {unit}"
+        f"the largest margin found is {found.min_margin:.2f} {unit}, limited in phase {found.limiting_phase} "
+        f"at {found.limiting_time:.3f} s by {limit.description}; required {problem.required_margin:.2f} {unit}"
     )
-    return Failure("balance margin", reason, phase, found.limiting_time, held)
+    return Failure("balance margin", reason, found.limiting_phase, found.limiting_time, limit.effector)

@@ -156,10 +156,14 @@ def _compile(problem: dict[str, ca.SX]) -> ca.Function:
     options = {
         "print_time": False,
         "error_on_fail": False,
+        "calc_lam_p": False,
+        "no_nlp_grad": True,
         "ipopt": {
             "print_level": 0,
             "sb": "yes",
             "mu_strategy": "adaptive",
+            "adaptive_mu_globalization": "never-monotone-mode",
+            "alpha_for_y": "min-dual-infeas",
             "max_iter": 250,
             "tol": 1e-5,
             "constr_viol_tol": 1e-8,
