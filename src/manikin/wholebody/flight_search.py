@@ -142,6 +142,7 @@ def search_swing(
     zone: SamplingZone | None = None,
     iterations: int = 2000,
     shortcuts: int = 60,
+    attempts: int = 3,
 ) -> SwingSearch:
     """Search a path with the Bi-RRT, shorten it and turn it into a smooth swing.
 
@@ -158,18 +159,44 @@ def search_swing(
         zone: Where poses are drawn.
         iterations: Largest number of random points.
         shortcuts: How many replacements are tried on the path.
+        attempts: How many paths are searched when no smooth curve follows one.
     """
     limits = limits or FlightLimits()
     slower = replace(
         limits, speed=PATH_SPEED_SHARE * limits.speed, angular_speed=PATH_SPEED_SHARE * limits.angular_speed
     )
-    strict = roomy or feasible
+    result: SwingSearch | None = None
+    for _ in range(max(1, attempts)):
+        result = _search_once(
+            start, goal, start_time, end_time, feasible, roomy or feasible, rng, limits, slower, zone,
+            iterations, shortcuts,
+        )  # fmt: skip
+        if result.succeeded or result.path is None:
+            break
+    assert result is not None  # there is at least one attempt
+    return result
+
+
+def _search_once(
+    start: Pose,
+    goal: Pose,
+    start_time: float,
+    end_time: float,
+    feasible: Feasible,
+    roomy: Feasible,
+    rng: np.random.Generator,
+    limits: FlightLimits,
+    slower: FlightLimits,
+    zone: SamplingZone | None,
+    iterations: int,
+    shortcuts: int,
+) -> SwingSearch:
     found = plan_flight(
-        start, goal, start_time, end_time, strict, rng, limits=slower, zone=zone, iterations=iterations
+        start, goal, start_time, end_time, roomy, rng, limits=slower, zone=zone, iterations=iterations
     )
     if found.path is None:
         return SwingSearch(None, None, found.statistics, found.failure)
-    shorter = smooth_path(found.path, strict, rng, limits=slower, hints=found.hints, iterations=shortcuts)
+    shorter = smooth_path(found.path, roomy, rng, limits=slower, hints=found.hints, iterations=shortcuts)
     failure = None
     for path in (shorter.path, found.path):
         curve = smooth_curve(path, feasible, limits=limits, hint=found.hints[0])

@@ -72,7 +72,7 @@ class SwingLimits:
     speed: float = 3.0
     angular_speed: float = 8.0
     departure: float = 0.5
-    time_step: float = 0.01
+    time_step: float = 0.004
 
     def __post_init__(self) -> None:
         finite_number(self.clearance, "swing limits clearance [m]", at_least=0.0)
@@ -209,7 +209,7 @@ def check_swing(
     in_flight = required >= limits.clearance
     smallest = float(distance[in_flight].min() if np.any(in_flight) else distance[1:-1].min())
     failure = None
-    if slack[worst - 1] < -1e-9:
+    if slack[worst - 1] < -TOLERANCE:
         place = ", ".join(f"{x:.3f}" for x in state.position[worst])
         failure = (
             f"clearance is {distance[worst]:.4f} m at t = {state.time[worst]:.3f} s with the effector at "
@@ -333,10 +333,16 @@ UNIT_JERK = 720.0
 TRUST = 0.05
 """Largest change of a control coordinate in one iteration [m]."""
 
+ROW_STEP = 0.012
+"""Spacing of the instants at which the optimisation linearises the distances [s]."""
+
 SETTLED = 0.004
 """Change of the control coordinates below which the optimisation stops [m]."""
 
-BUFFER = 0.002
+TOLERANCE = 1e-5
+"""Accuracy expected of measured distances [m]."""
+
+BUFFER = 0.003
 """Aimed at beyond the required clearance, for what lies between the samples [m]."""
 
 
@@ -372,7 +378,7 @@ def _distance_rows(
     curve: SwingCurve, clearance: Clearance, limits: SwingLimits
 ) -> tuple[FloatArray, FloatArray]:
     """Rows G and bounds l of ``G dx >= l`` from the distances near the required ones."""
-    state = curve.evaluate(_instants(curve, limits))
+    state = curve.evaluate(_instants(curve, limits, max(33, int(curve.duration / ROW_STEP))))
     distance = _distances(state, clearance)
     required = _required(curve, state, distance, limits)
     weights = basis((state.time - curve.start_time) / curve.duration, len(curve.control_position))
@@ -381,7 +387,9 @@ def _distance_rows(
         pose = Pose(state.position[index], state.rotation[index])
         slope = _slope(clearance, float(state.time[index]), pose, float(distance[index]))
         rows.append(np.kron(weights[index], slope))
-        lower.append(required[index] + BUFFER - distance[index])
+        # Near its contacts the effector cannot have gained the whole buffer yet.
+        buffer = BUFFER * min(1.0, max(0.0, required[index]) / max(limits.clearance, BUFFER))
+        lower.append(required[index] + buffer - distance[index])
     if not rows:
         return np.zeros((0, 3 * len(curve.control_position))), np.zeros(0)
     return np.array(rows), np.array(lower)
