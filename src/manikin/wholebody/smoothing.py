@@ -14,6 +14,9 @@ from manikin.wholebody.swing_curve import SwingCurve
 CONTROLS = (12, 14, 17, 20, 24, 29, 35, 42, 50, 64, 80)
 """Numbers of control poses that are tried, from the smoothest curve to the closest."""
 
+SHORTEST = 1e-6
+"""Shortest segment that a replacement may leave [s]."""
+
 SHARPENINGS = (0, 1, 3)
 """Corrections towards the corners of the path that are tried for each of them."""
 
@@ -139,7 +142,9 @@ def _shortcut(
     steps = np.diff(path.time)
     times = path.time[[first, second]] + shares * steps[[first, second]]
     position, rotation = path.sample(times)
-    if not times[1] > times[0] > path.time[0]:
+    # Hardly beside a node, the new edge would begin or end in a segment without duration.
+    spans = (times[0] - path.time[first], times[1] - times[0], path.time[second + 1] - times[1])
+    if min(spans) < SHORTEST:
         return None
     edge = EffectorPath(times, position, rotation)
     distance = np.linalg.norm(np.diff(position, axis=0), axis=1)
