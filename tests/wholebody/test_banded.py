@@ -43,3 +43,20 @@ def test_solution_equals_the_dense_normal_equations():
             right -= full.T @ residual[k]
     expected = np.linalg.solve(dense + 1e-3 * np.eye(len(dense)), right).reshape(basis.size, d)
     np.testing.assert_allclose(system.solve(1e-3), expected, rtol=1e-6, atol=1e-9)
+
+
+def test_coupled_terms_equal_the_dense_normal_equations():
+    degree, knots, time, basis = _setup()
+    rng = np.random.default_rng(2)
+    d, n = 3, len(time)
+    jacobians = tuple(rng.normal(size=(n, 2, d)) for _ in range(3))
+    residual = rng.normal(size=(n, 2))
+    system = BlockBandedSystem(basis, d)
+    system.add_coupled(jacobians, residual)
+    identity = BSpline(knots, np.eye(basis.size), degree)
+    full = sum(
+        np.einsum("ns,nmd->nmsd", identity(time, nu=order), jacobians[order]) for order in range(3)
+    ).reshape(n * 2, -1)
+    dense = full.T @ full + 1e-3 * np.eye(full.shape[1])
+    expected = np.linalg.solve(dense, -full.T @ residual.ravel()).reshape(basis.size, d)
+    np.testing.assert_allclose(system.solve(1e-3), expected, rtol=1e-6, atol=1e-9)

@@ -9,7 +9,9 @@ from manikin.wholebody.configuration_spline import (
     ConfigurationSpline,
     align_quaternions,
     rotation_from_quaternion,
+    states_from_raw,
     tangent_map,
+    turn_derivatives,
 )
 
 
@@ -84,3 +86,26 @@ def test_aligned_quaternions_never_jump_to_the_opposite_half_space():
 def test_knots_and_control_points_must_fit():
     with pytest.raises(SplineError, match="knots = control points"):
         ConfigurationSpline(np.zeros(5), np.zeros((3, 8)), 5)
+
+
+def test_turn_derivatives_agree_with_finite_differences():
+    """Central differences of smooth functions of size one: error ~ 1e-9."""
+    rng = np.random.default_rng(4)
+    raw, rate, second = (rng.normal(size=(5, 7)) for _ in range(3))
+    exact = turn_derivatives(raw[:, 3:], rate[:, 3:], second[:, 3:])
+    h = 1e-6
+    for column in range(4):
+        for which in range(3):
+            step = np.zeros(7)
+            step[3 + column] = h
+            plus, minus = (
+                states_from_raw(*[x + sign * step * (which == k) for k, x in enumerate((raw, rate, second))])
+                for sign in (1.0, -1.0)
+            )
+            omega, alpha = (
+                (a[:, 3:6] - b[:, 3:6]) / (2 * h) for a, b in ((plus.v, minus.v), (plus.a, minus.a))
+            )
+            by_value_rate = (exact.omega_by_value, exact.omega_by_rate, np.zeros((5, 3, 4)))[which]
+            by_all = (exact.alpha_by_value, exact.alpha_by_rate, exact.alpha_by_second)[which]
+            np.testing.assert_allclose(omega, by_value_rate[:, :, column], atol=1e-7)
+            np.testing.assert_allclose(alpha, by_all[:, :, column], atol=1e-6)

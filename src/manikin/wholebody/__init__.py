@@ -1,1 +1,24 @@
 """Whole-body motion: swings, their search, and the motion that joins them."""
+
+from manikin.wholebody.assemble import (
+    WholeBodyFailure,
+    WholeBodyResult,
+    WholeBodySettings,
+    plan_whole_body,
+)
+from manikin.wholebody.certificate import WholeBodyRequirements, WholeBodyResiduals
+from manikin.wholebody.configuration_spline import ConfigurationSpline
+from manikin.wholebody.fit import FitScales
+from manikin.wholebody.flights import PlannedSwing
+
+__all__ = [
+    "ConfigurationSpline",
+    "FitScales",
+    "PlannedSwing",
+    "WholeBodyFailure",
+    "WholeBodyRequirements",
+    "WholeBodyResiduals",
+    "WholeBodyResult",
+    "WholeBodySettings",
+    "plan_whole_body",
+]

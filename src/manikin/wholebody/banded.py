@@ -76,6 +76,29 @@ class BlockBandedSystem:
             self._blocks += self._products[order] @ hessian.reshape(len(hessian), -1)
         self._right -= self._rows[order] @ gradient
 
+    def add_coupled(self, jacobians: tuple[FloatArray, FloatArray, FloatArray], residual: FloatArray) -> None:
+        """Add residuals that depend on values, rates and accelerations at once.
+
+        Args:
+            jacobians: Three (n, m, d) derivatives, by value, rate and acceleration.
+            residual: (n, m).
+        """
+        n, m, d = jacobians[0].shape
+        width, size = self._bandwidth, self._basis.size
+        local = np.zeros((n, m, width, d))
+        for order, jacobian in enumerate(jacobians):
+            local += self._basis.values[order][:, None, :, None] * jacobian[:, :, None, :]
+        local = local.reshape(n, m, width * d)
+        spans, start = np.unique(self._basis.first, return_index=True)
+        stop = np.append(start[1:], n)
+        for first, a, b in zip(spans, start, stop, strict=True):
+            rows = local[a:b].reshape(-1, width * d)
+            hessian = (rows.T @ rows).reshape(width, d, width, d)
+            for column in range(width):
+                for row in range(column, width):
+                    self._blocks[(row - column) * size + first + column] += hessian[row, :, column].ravel()
+            self._right[first : first + width] -= (rows.T @ residual[a:b].ravel()).reshape(width, d)
+
     def solve(self, damping: float) -> FloatArray:
         """Return the step of every control point, (size, d), with Levenberg damping."""
         size, d = self._basis.size, self._dimension

@@ -112,6 +112,47 @@ def tangent_map(raw: FloatArray) -> FloatArray:
     return block
 
 
+class TurnDerivatives(NamedTuple):
+    """How the pelvis' angular velocity and acceleration depend on the raw quaternion.
+
+    Attributes:
+        omega_by_value: (n, 3, 4) derivative of the angular velocity by the raw quaternion.
+        omega_by_rate: (n, 3, 4) by its rate.
+        alpha_by_value: (n, 3, 4) derivative of the angular acceleration by the quaternion.
+        alpha_by_rate: (n, 3, 4) by its rate.
+        alpha_by_second: (n, 3, 4) by its second derivative.
+    """
+
+    omega_by_value: FloatArray
+    omega_by_rate: FloatArray
+    alpha_by_value: FloatArray
+    alpha_by_rate: FloatArray
+    alpha_by_second: FloatArray
+
+
+def turn_derivatives(rho: FloatArray, rho_1: FloatArray, rho_2: FloatArray) -> TurnDerivatives:
+    """Differentiate ``omega = 2 Q(rho) rho' / |rho|^2`` and its rate (arguments (n, 4)).
+
+    ``alpha = 2 Q(rho) rho'' / |rho|^2 - 2 omega (rho . rho') / |rho|^2``, and
+    ``Q(a) b = -Q(b) a`` gives the derivatives by the quaternion itself.
+    """
+    square = np.sum(rho**2, axis=1)[:, None, None]
+    q0, q1, q2 = (_quaternion_left_vector(part) for part in (rho, rho_1, rho_2))
+    omega = 2.0 * (q0 @ rho_1[:, :, None]) / square
+    stretch = np.sum(rho * rho_1, axis=1)[:, None, None]
+    row, row_1 = rho[:, None, :], rho_1[:, None, :]
+    by_second = 2.0 * q0 / square
+    omega_by_value = -2.0 * q1 / square - 2.0 * omega @ row / square
+    alpha = by_second @ rho_2[:, :, None] - 2.0 * omega * stretch / square
+    alpha_by_rate = -2.0 * (stretch * by_second + omega @ row) / square
+    alpha_by_value = (
+        -2.0 * q2 / square
+        - 2.0 * alpha @ row / square
+        - 2.0 * (stretch * omega_by_value + omega @ row_1) / square
+    )
+    return TurnDerivatives(omega_by_value, by_second, alpha_by_value, alpha_by_rate, by_second)
+
+
 def align_quaternions(configurations: FloatArray) -> FloatArray:
     """Flip quaternion signs so that consecutive rows lie in the same half-space."""
     aligned = np.array(configurations, dtype=float)

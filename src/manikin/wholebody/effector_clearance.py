@@ -12,6 +12,7 @@ import coal
 import numpy as np
 
 from manikin.body import BodyModel
+from manikin.body.limb import hanging_segment
 from manikin.body.segments import Segment
 from manikin.contact import Contact
 from manikin.scene import Scene
@@ -76,13 +77,13 @@ class EffectorClearance:
 def end_shapes(body: BodyModel, effector: str) -> list[tuple[Any, FloatArray, FloatArray]]:
     """Coal geometry, rotation and translation in the effector frame of its end segments' shapes.
 
-    The end segments are the effector's own and those that hang on it (toes), at zero angle.
+    The end segments are the effector's own and the one that hangs on it (toes), at zero angle.
     """
     frame = body.effector(effector)
     offsets = {frame.segment: np.zeros(3)}
-    for segment in body.segments:
-        if segment.parent in offsets:
-            offsets[segment.name] = offsets[segment.parent] + segment.origin
+    hanging = hanging_segment(body, frame.segment)
+    if hanging is not None:
+        offsets[hanging.name] = hanging.origin
     geometries = {item.name: item.geometry for item in body.geometry.geometryObjects}
     shapes = []
     for name, offset in offsets.items():

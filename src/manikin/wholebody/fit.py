@@ -10,7 +10,6 @@ quintic spline.  Unlike a posture-by-posture solution ([Qiu2012]_ 6.2) the resul
 construction and its angular momentum is kept small, as the point-mass plan assumes.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,50 +18,15 @@ from scipy.special import expit
 
 from manikin.body import BodyModel
 from manikin.scene import Proximity
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, skew
 from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
-from manikin.wholebody.configuration_spline import ConfigurationSpline, states_from_raw, tangent_map
-
-Ignored = frozenset[tuple[str, str]]
-
-
-@dataclass(frozen=True, eq=False)
-class EffectorTarget:
-    """Where an effector has to be at each sample.
-
-    Attributes:
-        position: (n, 3) in the world [m].
-        rotation: (n, 3, 3) effector-to-world, or None when only the position counts.
-        weight: (n,) 1 where the target counts, 0 where the effector is free.
-        rotation_weight: (n,) importance of the orientation, 1 in contact.
-    """
-
-    position: FloatArray
-    rotation: FloatArray | None
-    weight: FloatArray
-    rotation_weight: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class FitTargets:
-    """What the motion has to do, sample by sample.
-
-    Attributes:
-        time: (n,) [s].
-        effectors: Target of each controlled effector.
-        com: (n, 3) centre of mass [m].
-        reference: (n, nq) preferred configuration.
-        reference_scale: (nv,) deviation of the tangent [m, rad] that costs as much as one
-            unit of every other residual; infinite entries are free.
-        ignored: Pairs of segment and obstacle whose distance does not count, per sample.
-    """
-
-    time: FloatArray
-    effectors: Mapping[str, EffectorTarget]
-    com: FloatArray
-    reference: FloatArray
-    reference_scale: FloatArray
-    ignored: tuple[Ignored, ...]
+from manikin.wholebody.configuration_spline import (
+    ConfigurationSpline,
+    states_from_raw,
+    tangent_map,
+    turn_derivatives,
+)
+from manikin.wholebody.targets import EffectorTarget, FitTargets
 
 
 @dataclass(frozen=True)
@@ -82,18 +46,21 @@ class FitScales:
         velocity_share: Share of the velocity limits that may be used.
         acceleration: Joint acceleration [rad/s^2].
         pelvis_acceleration: Linear [m/s^2] and angular [rad/s^2] pelvis acceleration.
-        momentum_rate: Rate of angular momentum about the centre of mass [N.m].
+        force: Rate of linear momentum, against the planned one [N].
+        moment: Rate of angular momentum about the centre of mass, against none [N.m].
         rest: Velocity at both ends [m/s, rad/s].
         max_iterations: Upper bound of Gauss-Newton steps.
         decrease: Relative decrease of the objective below which the iteration stops.
-        stages: One solution after the other: the factor by which the tasks' scales are
-            loosened, and whether clearance counts.
+        stages: Factors by which the tasks' scales are loosened, one solution after the other.
+        multiplier_rounds: Most updates of the multipliers of contacts and centre of mass.
+        tolerance: Largest error of the contacts at convergence [m]; three times that for the
+            centre of mass.
     """
 
-    position: float = 1.0e-4
-    rotation: float = 4.0e-4
-    com: float = 3.0e-4
-    clearance: float = 2.0e-3
+    position: float = 1.0e-3
+    rotation: float = 4.0e-3
+    com: float = 3.0e-3
+    clearance: float = 1.0e-3
     safe_distance: float = 0.02
     softness: float = 0.006
     joint_limit: float = 5.0e-3
@@ -102,11 +69,14 @@ class FitScales:
     velocity_share: float = 0.9
     acceleration: float = 8.0
     pelvis_acceleration: float = 4.0
-    momentum_rate: float = 20.0
+    force: float = 20.0
+    moment: float = 12.0
     rest: float = 1.0e-3
     max_iterations: int = 30
     decrease: float = 2.0e-3
-    stages: tuple[tuple[float, bool], ...] = ((100.0, False), (100.0, True), (10.0, True), (1.0, True))
+    stages: tuple[float, ...] = (3.0, 1.0)
+    multiplier_rounds: int = 5
+    tolerance: float = 3.0e-4
 
     def loosened(self, factor: float) -> "FitScales":
         """Return the same scales with contacts and centre of mass ``factor`` times looser."""
@@ -146,12 +116,26 @@ class _Linearised:
     """Residuals of all samples with their Gauss-Newton terms, by derivative order."""
 
     cost: float = 0.0
+    task_residual: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     hessian: dict[int, FloatArray] = field(default_factory=dict)
     gradient: dict[int, FloatArray] = field(default_factory=dict)
+    momentum_jacobians: tuple[FloatArray, FloatArray, FloatArray] | None = None
+    momentum_residual: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
     support_error: float = 0.0
     com_error: float = 0.0
     clearance: float = np.inf
     closest: tuple[str, str] = ("", "")
+
+
+@dataclass(frozen=True, eq=False)
+class _MomentumRate:
+    """Rate of the centroidal momentum (n, 6) [N, N.m], its derivatives by q, v and a (n, 6, nv)."""
+
+    value: FloatArray
+    by_q: FloatArray
+    by_v: FloatArray
+    by_a: FloatArray
+    pelvis_velocity: FloatArray
 
 
 class MotionFit:
@@ -182,7 +166,10 @@ class MotionFit:
         self._targets = targets
         self._final = scales or FitScales()
         self._scales = self._final
-        self._collides = True
+        self._damping = 1.0
+        held = [np.repeat(target.weight[:, None] >= 1.0, 6, axis=1) for target in targets.effectors.values()]
+        self._exact_rows = np.hstack([*held, np.ones((len(targets.time), 3), dtype=bool)])
+        self._multiplier = np.zeros((len(targets.time), 6 * len(targets.effectors) + 3))
         self._knots, self._degree = knots, degree
         self._basis = SampledBasis.at(targets.time, knots, degree)
         self._system = BlockBandedSystem(self._basis, body.nq)
@@ -192,9 +179,7 @@ class MotionFit:
 
     def initial_spline(self, time: FloatArray, configurations: FloatArray) -> ConfigurationSpline:
         """Least-squares spline through linearly interpolated configurations (k, nq) at ``time``."""
-        raw = np.stack(
-            [np.interp(self._targets.time, time, column) for column in configurations.T], axis=1
-        )
+        raw = np.stack([np.interp(self._targets.time, time, column) for column in configurations.T], axis=1)
         weight = 1e-4
         system = BlockBandedSystem(self._basis, 1)
         ones = np.ones((len(raw), 1, 1))
@@ -208,54 +193,58 @@ class MotionFit:
         return ConfigurationSpline(self._knots, np.stack(points, axis=1), self._degree)
 
     def solve(self, start: ConfigurationSpline) -> FitResult:
-        """Solve from ``start``, first with loose tasks, so that the posture stays natural, then tight."""
+        """Solve from ``start``: first with loose tasks, so that the posture stays natural, then exactly.
+
+        The last scales stay soft; the method of multipliers makes contacts and centre of mass
+        exact without the stiff valleys of a large penalty.
+        """
         points = np.array(start.control_points)
         iterations = 0
         state = _Linearised()
-        for number, (factor, self._collides) in enumerate(self._final.stages, start=1):
+        for factor in self._final.stages:
             self._scales = self._final.loosened(factor)
-            points, state, taken = self._descend(points, last=number == len(self._final.stages))
+            points, state, taken = self._descend(points, 0.02)
             iterations += taken
+        for _ in range(self._final.multiplier_rounds):
+            self._multiplier = self._multiplier + self._exact_rows * state.task_residual
+            points, state, taken = self._descend(points, self._final.decrease)
+            iterations += taken
+            if state.support_error < self._final.tolerance and state.com_error < 3.0 * self._final.tolerance:
+                break
         spline = ConfigurationSpline(self._knots, points, self._degree)
         return FitResult(
             spline, iterations, state.support_error, state.com_error, state.clearance, state.closest,
             state.cost,
         )  # fmt: skip
 
-    def _descend(self, points: FloatArray, last: bool) -> tuple[FloatArray, _Linearised, int]:
-        """Damped Gauss-Newton at the current scales.
-
-        A step along the contacts' manifold leaves it by a second-order amount, which the next
-        step repairs; so one step may raise the objective before it has to fall below its best.
-        """
-        damping, uphill = 1e-3, 0
-        best = current = self._linearise(points)
-        best_points = points
-        iteration = 0
+    def _descend(self, points: FloatArray, least_decrease: float) -> tuple[FloatArray, _Linearised, int]:
+        """Levenberg-Marquardt at the current scales, with damping kept from call to call."""
+        current = self._linearise(points)
+        iteration, growth = 0, 2.0
         for iteration in range(1, self._scales.max_iterations + 1):  # noqa: B007
-            step = self._step(current, damping)
+            step = self._step(current, self._damping)
             # A step of more than a radian leaves the region where the model holds.
             step *= min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
-            points = points + step
-            current = self._linearise(points)
-            if current.cost < best.cost:
-                decrease = (best.cost - current.cost) / best.cost
-                best, best_points, uphill = current, points, 0
-                damping = max(damping * 0.3, 1e-4)
-                if decrease < (self._scales.decrease if last else 0.05):
-                    break
-            elif uphill >= 1:
-                points, current, uphill, damping = best_points, best, 0, damping * 10.0
-                if damping > 1e6:
+            trial = self._linearise(points + step)
+            if trial.cost < current.cost:
+                decrease = (current.cost - trial.cost) / current.cost
+                points, current, growth = points + step, trial, 2.0
+                self._damping = max(self._damping / 5.0, 1e-2)
+                if decrease < least_decrease:
                     break
             else:
-                uphill += 1
-        return best_points, best, iteration
+                self._damping *= growth
+                growth *= 2.0
+                if self._damping > 1e7:
+                    break
+        return points, current, iteration
 
     def _step(self, state: _Linearised, damping: float) -> FloatArray:
         self._system.reset()
         for order, gradient in state.gradient.items():
             self._system.add(state.hessian[order], gradient, order)
+        if state.momentum_jacobians is not None:
+            self._system.add_coupled(state.momentum_jacobians, state.momentum_residual)
         return self._system.solve(damping)
 
     def _linearise(self, points: FloatArray) -> _Linearised:
@@ -263,69 +252,123 @@ class MotionFit:
         states = states_from_raw(raw, rate, second)
         tangent = tangent_map(raw)
         out = _Linearised()
-        task_jacobian, task_residual, momentum_jacobian, momentum_residual, offset = self._kinematics(states, out)
+        task_jacobian, task_residual, momentum, offset, turn_jacobian = self._kinematics(states, out)
         task_residual = np.concatenate([task_residual, self._reference_residual(offset)], axis=1)
-        task_jacobian = np.concatenate([task_jacobian, self._reference_jacobian(len(raw))], axis=1)
+        task_jacobian = np.concatenate([task_jacobian, self._reference_jacobian(turn_jacobian)], axis=1)
         jacobian = _to_raw(task_jacobian, tangent)
         self._accumulate(out, 0, jacobian, task_residual)
         self._add_radial_and_limits(out, raw, tangent)
         self._add_rates(out, rate)
         self._add_accelerations(out, second)
-        self._accumulate(out, 2, _to_raw(momentum_jacobian, tangent), momentum_residual)
+        self._add_momentum_rate(out, momentum, (raw, rate, second), tangent)
         return out
+
+    def _add_momentum_rate(
+        self,
+        out: _Linearised,
+        momentum: "_MomentumRate",
+        raw: tuple[FloatArray, FloatArray, FloatArray],
+        tangent: FloatArray,
+    ) -> None:
+        """Rate of the centroidal momentum against what the planned trajectory needs."""
+        turn = turn_derivatives(*(part[:, 3:7] for part in raw))
+        omega, alpha = momentum.by_v[:, :, 3:6], momentum.by_a[:, :, 3:6]
+        # With the world velocity of the pelvis held, its velocity in the pelvis frame turns.
+        omega = omega + momentum.by_a[:, :, :3] @ skew(momentum.pelvis_velocity)
+        jacobians = [np.zeros((*momentum.by_q.shape[:2], self._body.nq)) for _ in range(3)]
+        for jacobian, joints in zip(jacobians, (momentum.by_q, momentum.by_v, momentum.by_a), strict=True):
+            jacobian[:, :, 7:] = joints[:, :, 6:]
+        # The whole body turns with the pelvis, and the momentum with it.
+        mass = self._body.mass
+        turning = momentum.value.copy()
+        turning[:, :3] -= mass * raw[2][:, :3]
+        rotation = tangent[:, :3, :3].transpose(0, 2, 1)
+        turned = [-skew(part) @ rotation @ tangent[:, 3:6, 3:7] for part in (turning[:, :3], turning[:, 3:])]
+        jacobians[0][:, :, 3:7] = (
+            np.concatenate(turned, axis=1) + omega @ turn.omega_by_value + alpha @ turn.alpha_by_value
+        )
+        jacobians[1][:, :, 3:7] = omega @ turn.omega_by_rate + alpha @ turn.alpha_by_rate
+        jacobians[2][:, :, 3:7] = alpha @ turn.alpha_by_second
+        jacobians[2][:, :3, :3] = mass * np.eye(3)
+        scale = np.repeat([self._scales.force, self._scales.moment], 3)
+        wanted = np.hstack([mass * self._targets.com_acceleration, np.zeros((len(turning), 3))])
+        out.momentum_jacobians = tuple(jacobian / scale[:, None] for jacobian in jacobians)
+        out.momentum_residual = (momentum.value - wanted) / scale
+        out.cost += 0.5 * float(np.sum(out.momentum_residual**2))
 
     def _kinematics(self, states, out: _Linearised):  # noqa: ANN001, ANN202
         n, nv = len(states.q), self._model.nv
         targets, scales = self._targets, self._scales
         rows = 6 * len(self._frames) + 3
         jacobian, residual = np.zeros((n, rows, nv)), np.zeros((n, rows))
-        momentum_jacobian, momentum = np.zeros((n, 3, nv)), np.zeros((n, 3))
-        offset = np.zeros((n, nv))
+        momentum, by_q, by_v, by_a = np.zeros((n, 6)), *np.zeros((3, n, 6, nv))
+        offset, turn_jacobian = np.zeros((n, nv)), np.zeros((n, 3, 3))
         near: list[tuple[int, FloatArray, FloatArray]] = []
         for s in range(n):
             q = states.q[s]
-            pin.computeCentroidalMomentumTimeVariation(self._model, self._data, q, states.v[s], states.a[s])
-            momentum[s] = self._data.dhg.angular
+            _, rate_by_q, rate_by_v, rate_by_a = pin.computeCentroidalDynamicsDerivatives(
+                self._model, self._data, q, states.v[s], states.a[s]
+            )
+            momentum[s] = self._data.dhg.vector
+            by_q[s], by_v[s], by_a[s] = rate_by_q, rate_by_v, rate_by_a
             pin.computeJointJacobians(self._model, self._data, q)
             pin.updateFramePlacements(self._model, self._data)
-            pin.ccrba(self._model, self._data, q, states.v[s])
-            momentum_jacobian[s] = self._data.Ag[3:]
             row = 0
             for name, frame in self._frames.items():
                 target = targets.effectors[name]
                 if target.weight[s] > 0.0:
-                    self._effector_rows(s, frame, target, jacobian[s, row : row + 6], residual[s, row : row + 6], out)
+                    self._effector_rows(
+                        s, frame, target, jacobian[s, row : row + 6], residual[s, row : row + 6], out
+                    )
                 row += 6
             jacobian[s, row:] = pin.jacobianCenterOfMass(self._model, self._data, q) / scales.com
             error = self._data.com[0] - targets.com[s]
             residual[s, row:] = error / scales.com
             out.com_error = max(out.com_error, float(np.linalg.norm(error)))
-            offset[s] = pin.difference(self._model, targets.reference[s], q)
-            if self._proximity is not None and self._collides:
+            offset[s], turn_jacobian[s] = self._deviation(s, q)
+            if self._proximity is not None:
                 found = self._clearance_rows(s, q, out)
                 if found is not None:
                     near.append((s, *found))
+        out.task_residual = residual.copy()
+        residual = residual + self._multiplier
         if near:
             jacobian, residual = _append_ragged(jacobian, residual, near)
-        return jacobian, residual, momentum_jacobian / scales.momentum_rate, momentum / scales.momentum_rate, offset
+        return (
+            jacobian,
+            residual,
+            _MomentumRate(momentum, by_q, by_v, by_a, states.v[:, :3]),
+            offset,
+            turn_jacobian,
+        )
 
     def _effector_rows(
-        self, s: int, frame: int, target: EffectorTarget, jacobian: FloatArray, residual: FloatArray, out: _Linearised
+        self,
+        s: int,
+        frame: int,
+        target: EffectorTarget,
+        jacobian: FloatArray,
+        residual: FloatArray,
+        out: _Linearised,
     ) -> None:
         scales = self._scales
         placement = self._data.oMf[frame]
         full = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
         error = placement.translation - target.position[s]
-        jacobian[:3] = full[:3] / scales.position
-        residual[:3] = error / scales.position
-        out.support_error = max(out.support_error, float(np.linalg.norm(error)))
+        weight = target.weight[s] / scales.position
+        jacobian[:3] = weight * full[:3]
+        residual[:3] = weight * error
+        if target.weight[s] >= 1.0:
+            out.support_error = max(out.support_error, float(np.linalg.norm(error)))
         if target.rotation is not None:
-            turn = pin.log3(placement.rotation @ target.rotation[s].T)
+            relative = placement.rotation @ target.rotation[s].T
             importance = target.rotation_weight[s] / scales.rotation
-            jacobian[3:] = full[3:] * importance
-            residual[3:] = turn * importance
+            jacobian[3:] = importance * pin.Jlog3(relative) @ relative.T @ full[3:]
+            residual[3:] = importance * pin.log3(relative)
 
-    def _clearance_rows(self, s: int, q: FloatArray, out: _Linearised) -> tuple[FloatArray, FloatArray] | None:
+    def _clearance_rows(
+        self, s: int, q: FloatArray, out: _Linearised
+    ) -> tuple[FloatArray, FloatArray] | None:
         scales = self._scales
         reach = scales.safe_distance + 4.0 * scales.softness
         found = self._proximity.evaluate(q, activation=reach, ignore=self._targets.ignored[s])
@@ -343,8 +386,18 @@ class MotionFit:
     def _reference_residual(self, offset: FloatArray) -> FloatArray:
         return offset * np.sqrt(self._reference_weight)
 
-    def _reference_jacobian(self, n: int) -> FloatArray:
-        return np.broadcast_to(np.diag(np.sqrt(self._reference_weight)), (n, self._model.nv, self._model.nv))
+    def _reference_jacobian(self, turn_jacobian: FloatArray) -> FloatArray:
+        root = np.sqrt(self._reference_weight)
+        jacobian = np.tile(np.diag(root), (len(turn_jacobian), 1, 1))
+        jacobian[:, 3:6, 3:6] = root[3:6, None] * turn_jacobian
+        return jacobian
+
+    def _deviation(self, s: int, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Deviation (nv,) from the reference posture and the derivative of its turn."""
+        reference = self._targets.reference[s]
+        relative = (pin.Quaternion(reference[3:7]).inverse() * pin.Quaternion(q[3:7])).matrix()
+        deviation = np.concatenate([q[:3] - reference[:3], pin.log3(relative), q[7:] - reference[7:]])
+        return deviation, pin.Jlog3(relative)
 
     def _accumulate(self, out: _Linearised, order: int, jacobian: FloatArray, residual: FloatArray) -> None:
         transposed = jacobian.transpose(0, 2, 1)
@@ -413,7 +466,9 @@ def _append_ragged(
     for s, rows, values in near:
         extra_jacobian[s, : len(values)] = rows
         extra_residual[s, : len(values)] = values
-    return np.concatenate([jacobian, extra_jacobian], axis=1), np.concatenate([residual, extra_residual], axis=1)
+    return np.concatenate([jacobian, extra_jacobian], axis=1), np.concatenate(
+        [residual, extra_residual], axis=1
+    )
 
 
 def _inverse_square(scale: FloatArray) -> FloatArray:

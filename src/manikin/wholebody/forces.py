@@ -13,8 +13,10 @@ import pinocchio as pin
 from scipy.optimize import nnls
 
 from manikin.body import BodyModel
+from manikin.body.limb import carrying_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, Stance
 from manikin.spatial import FloatArray, skew
+from manikin.wholebody.configuration_spline import rotation_from_quaternion
 
 _RAMP = 0.08
 """Time over which a contact takes or loses its share of the load [s]."""
@@ -81,12 +83,13 @@ def plan_forces(
     stances = [_generators(body, phase.stance, names) for phase in schedule.sequence]
     shares = load_shares(schedule, time, names)
     phases = schedule.phase_at(time)
+    rotations = rotation_from_quaternion(q[:, 3:7])
     tau = np.zeros((len(time), model.nv))
     forces = np.zeros((len(time), len(names), 6))
     for k in range(len(time)):
         needed = pin.rnea(model, data, q[k], v[k], a[k]).copy()
         generators, stance = stances[phases[k]], schedule.sequence[int(phases[k])].stance
-        wrench = _base_wrench_in_world(needed[:6], q[k], data)
+        wrench = _base_wrench_in_world(needed[:6], q[k], rotations[k])
         magnitude = _share_wrench(generators, wrench, shares[k])
         pin.computeJointJacobians(model, data, q[k])
         tau[k] = needed - _apply(model, data, generators, magnitude)
@@ -115,7 +118,8 @@ def _generators(body: BodyModel, stance: Stance, names: tuple[str, ...]) -> _Gen
     for contact in stance:
         edges = _edges(contact)
         for local, world in zip(contact.points, contact.points_in_world, strict=True):
-            carrier = body.pinocchio.frames[body.carrier_frame(contact.effector, local)].parentJoint
+            segment = carrying_segment(body, contact.effector, local)
+            carrier = body.pinocchio.frames[body.segment_frame(segment)].parentJoint
             for edge in edges:
                 points.append(world)
                 directions.append(edge)
@@ -132,9 +136,8 @@ def _edges(contact: Contact) -> FloatArray:
     return local @ contact.rotation_contact_to_world.T
 
 
-def _base_wrench_in_world(base: FloatArray, q: FloatArray, data: pin.Data) -> FloatArray:
+def _base_wrench_in_world(base: FloatArray, q: FloatArray, rotation: FloatArray) -> FloatArray:
     """Wrench about the world origin of the pelvis part of a generalised force."""
-    rotation = data.oMi[1].rotation
     force = rotation @ base[:3]
     return np.concatenate([force, rotation @ base[3:6] + np.cross(q[:3], force)])
 

@@ -1,0 +1,145 @@
+"""Certificate of a planned whole-body motion, measured afresh at every millisecond.
+
+Nothing here comes from the solver: placements, centre of mass, distances and dynamics are
+computed again from the samples of the finished motion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.body import BodyModel
+from manikin.centroidal import CentroidalTrajectory
+from manikin.motion import Motion
+from manikin.scene import Proximity
+from manikin.spatial import FloatArray
+from manikin.wholebody.targets import Ignored
+
+
+@dataclass(frozen=True)
+class WholeBodyRequirements:
+    """What a whole-body motion must keep to count as a success.
+
+    Attributes:
+        support_error: Largest distance of an effector from its contact [m].
+        support_turn: Largest angle of a sole from its contact [rad].
+        com_error: Largest distance of the centre of mass from its plan [m].
+        clearance: Least distance to obstacles and between body parts [m].
+        joint_limit: Largest violation of a joint range [rad].
+        velocity_share: Largest share of a joint's velocity limit.
+    """
+
+    support_error: float = 1.0e-3
+    support_turn: float = 5.0e-3
+    com_error: float = 2.0e-3
+    clearance: float = 0.01
+    joint_limit: float = 1.0e-9
+    velocity_share: float = 1.0
+
+
+@dataclass(frozen=True)
+class WholeBodyResiduals:
+    """Largest violations of a planned motion.
+
+    Attributes:
+        max_support_error_m: Distance of an effector from its contact [m].
+        max_support_turn_rad: Angle of a sole from its contact [rad].
+        max_com_error_m: Distance of the centre of mass from its plan [m].
+        min_clearance_m: Least counted distance [m].
+        closest_pair: Names of the shapes at that distance.
+        max_joint_limit_violation_rad: Violation of a joint range [rad].
+        max_velocity_share: Largest share of a joint's velocity limit.
+        max_missing_wrench: Part of the dynamics that no admissible contact force supplies [N, N.m].
+        max_torque_share: Largest share of a joint's torque limit.
+        worst_times_s: When each of the errors is largest [s], by field name.
+    """
+
+    max_support_error_m: float
+    max_support_turn_rad: float
+    max_com_error_m: float
+    min_clearance_m: float
+    closest_pair: tuple[str, str]
+    max_joint_limit_violation_rad: float
+    max_velocity_share: float
+    max_missing_wrench: float
+    max_torque_share: float
+    worst_times_s: dict[str, float]
+
+    def violation(self, requirements: WholeBodyRequirements) -> tuple[str, float] | None:
+        """Explain the first requirement that is not kept, with its time [s]; None when all are."""
+        r = requirements
+        pair = " and ".join(self.closest_pair)
+        checks = [
+            ("max_support_error_m", self.max_support_error_m, r.support_error, "support error [m]"),
+            ("max_support_turn_rad", self.max_support_turn_rad, r.support_turn, "support turn [rad]"),
+            ("max_com_error_m", self.max_com_error_m, r.com_error, "centre-of-mass error [m]"),
+            ("min_clearance_m", -self.min_clearance_m, -r.clearance, f"clearance [m] of {pair}, negated,"),
+            ("max_joint_limit_violation_rad", self.max_joint_limit_violation_rad, r.joint_limit,
+             "joint range violation [rad]"),
+            ("max_velocity_share", self.max_velocity_share, r.velocity_share, "share of a velocity limit"),
+        ]  # fmt: skip
+        for name, value, limit, what in checks:
+            if value > limit:
+                return f"{what} is {value:.4g}; allowed {limit:.4g}", self.worst_times_s[name]
+        return None
+
+
+def certify(
+    body: BodyModel,
+    proximity: Proximity,
+    trajectory: CentroidalTrajectory,
+    motion: Motion,
+    ignored: tuple[Ignored, ...],
+) -> WholeBodyResiduals:
+    """Measure a motion against its contacts, centre of mass, limits and obstacles.
+
+    Args:
+        body: The body.
+        proximity: Distances to the scene and within the body.
+        trajectory: Planned centre of mass and contacts.
+        motion: The planned motion, densely sampled.
+        ignored: Pairs that may touch, per sample.
+    """
+    support, turn = _support_errors(body, trajectory, motion)
+    com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
+    angles = motion.q[:, 7:]
+    limit = np.maximum(body.lower - angles, angles - body.upper).max(axis=1)
+    speed = (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1)
+    torque = (np.abs(motion.tau[:, 6:]) / body.torque_limit).max(axis=1)
+    missing = np.linalg.norm(motion.tau[:, :6], axis=1)
+    clearance = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
+    series = {
+        "max_support_error_m": support, "max_support_turn_rad": turn, "max_com_error_m": com,
+        "max_joint_limit_violation_rad": np.maximum(limit, 0.0), "max_velocity_share": speed,
+        "max_missing_wrench": missing, "max_torque_share": torque,
+    }  # fmt: skip
+    times = {name: float(motion.time[int(np.argmax(values))]) for name, values in series.items()}
+    closest_sample = clearance.sample if clearance.sample is not None else 0
+    times["min_clearance_m"] = float(motion.time[closest_sample])
+    return WholeBodyResiduals(
+        **{name: float(values.max()) for name, values in series.items()},
+        min_clearance_m=float(clearance.distance),
+        closest_pair=clearance.pair or ("", ""),
+        worst_times_s=times,
+    )
+
+
+def _support_errors(
+    body: BodyModel, trajectory: CentroidalTrajectory, motion: Motion
+) -> tuple[FloatArray, FloatArray]:
+    """(n,) largest position [m] and orientation [rad] error of the effectors in contact."""
+    model, data = body.pinocchio, body.pinocchio.createData()
+    schedule = trajectory.schedule
+    position, turn = np.zeros(len(motion.time)), np.zeros(len(motion.time))
+    phases = schedule.phase_at(motion.time)
+    frames = {name: body.effector_frame(name) for name in schedule.sequence.effectors}
+    for k, q in enumerate(motion.q):
+        pin.forwardKinematics(model, data, q)
+        for contact in schedule.sequence[int(phases[k])].stance:
+            placement = pin.updateFramePlacement(model, data, frames[contact.effector])
+            position[k] = max(position[k], float(np.linalg.norm(placement.translation - contact.position)))
+            if contact.kind == "sole":
+                relative = contact.rotation_contact_to_world.T @ placement.rotation
+                turn[k] = max(turn[k], float(np.linalg.norm(pin.log3(relative))))
+    return position, turn

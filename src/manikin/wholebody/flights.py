@@ -1,0 +1,139 @@
+"""A curve for every flight of a motion: smooth curves first, the Bi-RRT where they fail."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.body.limb import end_segments
+from manikin.centroidal import CentroidalTrajectory
+from manikin.contact import Contact, ContactSchedule, Swing
+from manikin.posture import PostureProblem
+from manikin.scene import Proximity, Scene
+from manikin.spatial import FloatArray
+from manikin.wholebody.effector_clearance import EffectorClearance
+from manikin.wholebody.flight_search import ClearFlight, PostureCheck, search_swing
+from manikin.wholebody.path import Pose
+from manikin.wholebody.swing import SwingLimits, plan_swing
+from manikin.wholebody.swing_curve import SwingCurve
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedSwing:
+    """A flight and the curve found for it.
+
+    Attributes:
+        swing: The flight.
+        curve: Its curve, or the best attempt.
+        method: ``"smooth"`` or ``"bi-rrt"``.
+        failure: None, or what the best attempt does not keep.
+    """
+
+    swing: Swing
+    curve: SwingCurve
+    method: str
+    failure: str | None = None
+
+
+class FlightPlanner:
+    """Plans the flights of one motion.
+
+    Args:
+        body: The body.
+        scene: The obstacles.
+        trajectory: Centre of mass and contacts in time.
+        limits: What a smooth swing must keep.
+        rng: Source of all randomness of the search.
+        reference: (time) -> (nq,) preferred posture, for the posture checks.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        trajectory: CentroidalTrajectory,
+        limits: SwingLimits,
+        rng: np.random.Generator,
+        reference: Callable[[float], FloatArray],
+    ) -> None:
+        self._body, self._scene, self._trajectory = body, scene, trajectory
+        self._limits, self._rng, self._reference = limits, rng, reference
+        self._proximity = Proximity(body, scene)
+
+    @property
+    def schedule(self) -> ContactSchedule:
+        """Contacts in time."""
+        return self._trajectory.schedule
+
+    def flights(self) -> tuple[Swing, ...]:
+        """Every flight from one contact to another."""
+        swings = self.schedule.sequence.swings()
+        return tuple(swing for swing in swings if swing.start is not None and swing.end is not None)
+
+    def plan(self, swing: Swing) -> PlannedSwing:
+        """Find a smooth curve, or else search one."""
+        assert swing.start is not None
+        assert swing.end is not None
+        start, end = self.schedule.swing_interval(swing)
+        plan = plan_swing(
+            _pose(swing.start), _pose(swing.end), start, end, self._clearance(swing), limits=self._limits,
+            start_normal=swing.start.normal, end_normal=swing.end.normal,
+        )  # fmt: skip
+        smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure)
+        return smooth if plan.succeeded else self.search(swing, smooth)
+
+    def search(self, swing: Swing, fallback: PlannedSwing) -> PlannedSwing:
+        """Search a curve with the Bi-RRT and posture checks; ``fallback`` when there is none."""
+        assert swing.start is not None
+        assert swing.end is not None
+        start, end = self.schedule.swing_interval(swing)
+        ends = _pose(swing.start), _pose(swing.end)
+        clearance = self._clearance(swing)
+
+        def check(extra: float) -> PostureCheck:
+            screen = ClearFlight(clearance, *ends, start, end, self._limits, extra)
+            return PostureCheck(
+                swing.effector, lambda time: self._problem(swing, time), screen, rotation_weight=0.3
+            )
+
+        found = search_swing(*ends, start, end, check(0.0), self._rng, roomy=check(0.01))
+        if found.curve is None:
+            reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
+            return PlannedSwing(swing, fallback.curve, fallback.method, reason)
+        return PlannedSwing(swing, found.curve, "bi-rrt")
+
+    def _clearance(self, swing: Swing) -> EffectorClearance:
+        return EffectorClearance(
+            self._body, self._scene, swing.effector, standing_during(self.schedule, swing),
+            self._trajectory.position,
+        )  # fmt: skip
+
+    def _problem(self, swing: Swing, time: float) -> PostureProblem:
+        stance = self.schedule.stance_at(time)
+        others = [contact for contact in stance if contact.effector != swing.effector]
+        touching = [*others, *(contact for contact in (swing.start, swing.end) if contact is not None)]
+        return PostureProblem(
+            self._body, tuple(others), com=self._trajectory.position(time), proximity=self._proximity,
+            ignore=frozenset().union(*(touch_pairs(self._body, self._scene, item) for item in touching)),
+            reference=self._reference(time),
+        )  # fmt: skip
+
+
+def standing_during(schedule: ContactSchedule, swing: Swing) -> tuple[Contact, ...]:
+    """Every contact held at some time of a flight."""
+    found: dict[tuple[str, bytes], Contact] = {}
+    for index in range(swing.first_phase, swing.last_phase + 1):
+        for contact in schedule.sequence[index].stance:
+            found[(contact.effector, contact.position.tobytes())] = contact
+    return tuple(found.values())
+
+
+def touch_pairs(body: BodyModel, scene: Scene, contact: Contact) -> frozenset[tuple[str, str]]:
+    """Pairs of end segment and obstacle that a contact brings together."""
+    obstacle = scene.supporting_surface(contact, tolerance=0.02).obstacle
+    return frozenset((segment, obstacle) for segment in end_segments(body, contact.effector))
+
+
+def _pose(contact: Contact) -> Pose:
+    return Pose(contact.position, contact.rotation_contact_to_world)

@@ -1,0 +1,119 @@
+"""What a whole-body motion has to do, sample by sample."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule
+from manikin.scene import Scene
+from manikin.spatial import FloatArray
+from manikin.wholebody.flights import PlannedSwing, touch_pairs
+
+Ignored = frozenset[tuple[str, str]]
+"""Pairs of segment and obstacle (or segment) whose distance does not count."""
+
+
+@dataclass(frozen=True, eq=False)
+class EffectorTarget:
+    """Where an effector has to be at each sample.
+
+    Attributes:
+        position: (n, 3) in the world [m].
+        rotation: (n, 3, 3) effector-to-world, or None when only the position counts.
+        weight: (n,) importance of the position: 1 in contact, less in flight, 0 where free.
+        rotation_weight: (n,) importance of the orientation, likewise.
+    """
+
+    position: FloatArray
+    rotation: FloatArray | None
+    weight: FloatArray
+    rotation_weight: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FitTargets:
+    """What the motion has to do.
+
+    Attributes:
+        time: (n,) [s].
+        effectors: Target of each controlled effector.
+        com: (n, 3) centre of mass [m].
+        com_acceleration: (n, 3) its acceleration [m/s^2].
+        reference: (n, nq) preferred configuration.
+        reference_scale: (nv,) deviation of the tangent [m, rad] that costs as much as one
+            unit of every other residual; infinite entries are free.
+        ignored: Pairs whose distance does not count, per sample.
+    """
+
+    time: FloatArray
+    effectors: Mapping[str, EffectorTarget]
+    com: FloatArray
+    com_acceleration: FloatArray
+    reference: FloatArray
+    reference_scale: FloatArray
+    ignored: tuple[Ignored, ...]
+
+
+def effector_targets(
+    schedule: ContactSchedule, swings: Sequence[PlannedSwing], time: FloatArray
+) -> dict[str, EffectorTarget]:
+    """Placement of every effector of the schedule at every time; free where it has no task."""
+    phases = schedule.phase_at(time)
+    targets = {}
+    for name in schedule.sequence.effectors:
+        position, rotation = np.zeros((len(time), 3)), np.tile(np.eye(3), (len(time), 1, 1))
+        weight, rotation_weight = np.zeros(len(time)), np.ones(len(time))
+        for index, phase in enumerate(schedule.sequence):
+            if name in phase.stance:
+                contact, rows = phase.stance[name], phases == index
+                position[rows], rotation[rows] = contact.position, contact.rotation_contact_to_world
+                weight[rows] = 1.0
+        for item in swings:
+            if item.swing.effector == name:
+                start, end = schedule.swing_interval(item.swing)
+                rows = (time >= start) & (time < end)
+                state = item.curve.evaluate(time[rows])
+                position[rows], rotation[rows] = state.position, state.rotation
+                share = (time[rows] - start) / (end - start)
+                weight[rows] = _flight_weight(share, FLIGHT_POSITION_WEIGHT)
+                rotation_weight[rows] = _flight_weight(share, FLIGHT_ROTATION_WEIGHT)
+        targets[name] = EffectorTarget(position, rotation, weight, rotation_weight)
+    return targets
+
+
+FLIGHT_POSITION_WEIGHT = 0.1
+"""Importance of an effector's position in the middle of a flight."""
+
+FLIGHT_ROTATION_WEIGHT = 0.02
+"""Importance of its orientation there: a hint, so that the ankle may follow the shank."""
+
+
+def _flight_weight(share: FloatArray, middle: float) -> FloatArray:
+    """Importance during a flight: full at its ends, so that contacts are left and met well."""
+    blend = np.clip(np.minimum(share, 1.0 - share) / 0.25, 0.0, 1.0)
+    return 1.0 - 1e-9 - (1.0 - middle) * blend**2 * (3.0 - 2.0 * blend)
+
+
+def ignored_pairs(
+    body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
+) -> tuple[Ignored, ...]:
+    """Segments that may touch an obstacle at each time: those on, leaving or reaching a support."""
+    sequence = schedule.sequence
+    touching = [
+        {contact.effector: touch_pairs(body, scene, contact) for contact in phase.stance}
+        for phase in sequence
+    ]
+    per_phase = []
+    for index in range(len(sequence)):
+        pairs: set[tuple[str, str]] = set()
+        for found in touching[index].values():
+            pairs |= found
+        per_phase.append(pairs)
+    for swing in sequence.swings():
+        for index in range(swing.first_phase, swing.last_phase + 1):
+            for contact in (swing.start, swing.end):
+                if contact is not None:
+                    per_phase[index] |= touch_pairs(body, scene, contact)
+    return tuple(frozenset(per_phase[index]) for index in schedule.phase_at(time))
