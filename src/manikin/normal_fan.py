@@ -56,6 +56,7 @@ class NormalFan:
 
     Attributes:
         basis: (d, r) directions of the polytope; ``x = basis @ y``.
+        inverse: (r, d) pseudo-inverse of ``basis``.
         rays: (n, r + k) generators and slacks ``(y, levels)`` of the cone.
         normals: (m, r + k) rays ``(a, alpha)`` of its polar: ``a y + alpha levels <= 0``.
         on_generator: (m, n) whether generator (or slack) j lies on facet i.
@@ -65,6 +66,7 @@ class NormalFan:
     """
 
     basis: FloatArray
+    inverse: FloatArray
     rays: FloatArray
     normals: FloatArray
     on_generator: BoolArray
@@ -81,7 +83,7 @@ class NormalFan:
         """Irredundant facets of the polytope, flats as pairs of rows at the end."""
         real = self._real_facets()
         normals, side = self.normals[real], self.side[real]
-        H = normals[:, : self.rank] @ np.linalg.pinv(self.basis)
+        H = normals[:, : self.rank] @ self.inverse
         length = np.linalg.norm(H, axis=1)
         H /= length[:, None]
         multipliers = self._tight_multipliers(normals) / length[:, None]
@@ -132,7 +134,7 @@ class NormalFan:
         return real
 
     def _face_dimension(self, facet: int, live: BoolArray, kinds: FloatArray) -> int:
-        across = self.segments[self.side[facet] == 0] @ np.linalg.pinv(self.basis).T
+        across = self.segments[self.side[facet] == 0] @ self.inverse.T
         across = np.hstack([across, np.zeros((len(across), self.rays.shape[1] - self.rank))])
         spanning = np.vstack([self.rays[self.on_generator[facet] & live], across])
         return int(_rank(spanning) - _rank(kinds))
@@ -152,7 +154,7 @@ class NormalFan:
     def _off_span(self, vectors: FloatArray) -> FloatArray:
         if self.rank == self.basis.shape[0]:
             return np.zeros_like(vectors)
-        return vectors - vectors @ np.linalg.pinv(self.basis).T @ self.basis.T
+        return vectors - vectors @ self.inverse.T @ self.basis.T
 
     def _most_independent(self, segments: list[FloatArray]) -> int | None:
         if not segments or self.rank == self.basis.shape[0]:
@@ -172,8 +174,10 @@ class NormalFan:
         side = np.zeros((m + 2, len(self.segments) + 1), dtype=np.int8)
         side[:m, :-1] = self.side
         side[m:, -1] = 1, -1
+        basis = np.column_stack([self.basis, segment])
         return NormalFan(
-            np.column_stack([self.basis, segment]),
+            basis,
+            np.asarray(np.linalg.pinv(basis), dtype=np.float64),
             np.insert(self.rays, r, 0.0, axis=1),
             np.vstack([normals, ends]),
             np.vstack([self.on_generator, np.ones((2, n), dtype=np.bool_)]),
@@ -184,7 +188,7 @@ class NormalFan:
 
     def _refined(self, segment: FloatArray) -> "NormalFan":
         """Sum with a segment of the span: cut the fan by the hyperplane across it."""
-        y = np.linalg.pinv(self.basis) @ segment
+        y = self.inverse @ segment
         along = self.normals[:, : self.rank] @ (y / np.linalg.norm(y))
         sign = np.sign(np.where(np.abs(along) > INCIDENCE_TOLERANCE, along, 0.0)).astype(np.int8)
         p, q = self._crossing_edges(np.flatnonzero(sign > 0), np.flatnonzero(sign < 0))
@@ -194,14 +198,12 @@ class NormalFan:
         side = np.column_stack(
             [np.vstack([self.side, inherited]), np.concatenate([sign, np.zeros(len(p), dtype=np.int8)])]
         )
-        return NormalFan(
-            self.basis,
-            self.rays,
-            np.vstack([self.normals, new]),
-            np.vstack([self.on_generator, self.on_generator[p] & self.on_generator[q]]),
-            np.vstack([self.segments, segment]),
-            side,
-            self.thickness,
+        return replace(
+            self,
+            normals=np.vstack([self.normals, new]),
+            on_generator=np.vstack([self.on_generator, self.on_generator[p] & self.on_generator[q]]),
+            segments=np.vstack([self.segments, segment]),
+            side=side,
         )
 
     def _crossing_edges(self, plus: NDArray, minus: NDArray) -> tuple[NDArray, NDArray]:
@@ -238,7 +240,7 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
     """
     n, d = generators.shape
     k = levels.shape[1]
-    y, basis, thickness = _white_coordinates(generators)
+    y, basis, inverse, thickness = _white_coordinates(generators)
     r = basis.shape[1]
     slack = np.eye(k)[bounded_above]
     rays = np.vstack([np.hstack([y, levels]), np.hstack([np.zeros((len(slack), r)), slack])])
@@ -249,9 +251,15 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
         normals = polar_rays(rays, np.append(np.zeros(r), np.ones(k)))
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
     cosine = normals @ (rays / np.linalg.norm(rays, axis=1)[:, None]).T
-    side = np.zeros((len(normals), 0), dtype=np.int8)
     return NormalFan(
-        basis, rays, normals, cosine > -INCIDENCE_TOLERANCE, np.zeros((0, d)), side, max(k, 1) * thickness
+        basis=basis,
+        inverse=inverse,
+        rays=rays,
+        normals=normals,
+        on_generator=cosine > -INCIDENCE_TOLERANCE,
+        segments=np.zeros((0, d)),
+        side=np.zeros((len(normals), 0), dtype=np.int8),
+        thickness=max(k, 1) * thickness,
     )
 
 
@@ -286,18 +294,20 @@ def _pyramid_normals(base: FloatArray, cap: FloatArray) -> FloatArray:
     return np.vstack([np.column_stack([sides, np.zeros(len(sides))]), np.append(cap, -1.0)])
 
 
-def _white_coordinates(generators: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Coordinates y (n, r) of unit covariance and basis (d, r), ``generators = y @ basis.T + rest``.
+def _white_coordinates(generators: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Coordinates y (n, r) of unit covariance with ``generators = y @ basis.T + rest``.
 
-    The last value bounds the length of the rest.
+    Returns:
+        y, basis (d, r), its pseudo-inverse (r, d), and a bound on the length of the rest.
     """
     n, d = generators.shape
     if n == 0:
-        return np.zeros((0, 0)), np.zeros((d, 0)), 0.0
+        return np.zeros((0, 0)), np.zeros((d, 0)), np.zeros((0, d)), 0.0
     u, s, vt = np.linalg.svd(generators, full_matrices=False)
     r = int(np.sum(s > RANK_TOLERANCE * s[0])) if s[0] > 0 else 0
     thickness = float(np.linalg.norm(s[r:]))
-    return u[:, :r] * np.sqrt(n), vt[:r].T * (s[:r] / np.sqrt(n)), thickness
+    scale = s[:r] / np.sqrt(n)
+    return u[:, :r] * np.sqrt(n), vt[:r].T * scale, vt[:r] / scale[:, None], thickness
 
 
 def _hull_equations(points: FloatArray) -> FloatArray:

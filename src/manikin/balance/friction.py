@@ -38,10 +38,10 @@ def edge_wrenches(contact: Contact, friction_model: FrictionModel = "pyramid") -
         (4 k, 6) in the contact frame, moments about its origin.
     """
     mu = pyramid_friction(contact, friction_model)
-    forces = np.column_stack([mu * EDGE_SIGNS, np.ones(4)])
-    k = len(contact.points)
-    all_forces = np.tile(forces, (k, 1))
-    return np.hstack([all_forces, cross(np.repeat(contact.points, 4, axis=0), all_forces)])
+    wrenches = np.empty((len(contact.points), 4, 6))
+    wrenches[..., :2], wrenches[..., 2] = mu * EDGE_SIGNS, 1.0
+    wrenches[..., 3:] = cross(contact.points[:, None, :], wrenches[..., :3])
+    return wrenches.reshape(-1, 6)
 
 
 def contact_to_world(contact: Contact, wrenches: FloatArray, reference: FloatArray) -> FloatArray:
@@ -62,4 +62,8 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross product along the last axis; several times faster than numpy's on small arrays."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product[..., 0] = ay * bz - az * by
+    product[..., 1] = az * bx - ax * bz
+    product[..., 2] = ax * by - ay * bx
+    return product
