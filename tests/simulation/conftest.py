@@ -46,9 +46,9 @@ class Kinematics:
         pin.framesForwardKinematics(self.model, self.data, q)
         return [pin.SE3(self.data.oMf[frame]) for frame in self.frames]
 
-    def solve(self, q, com, feet, iterations=30):
+    def solve(self, q, com, feet, iterations=60):
         model, data, nv = self.model, self.data, self.model.nv
-        posture = np.diag(np.r_[np.zeros(6), np.full(nv - 6, 3e-2)])
+        posture = np.diag(np.r_[np.zeros(6), np.full(nv - 6, 0.1)])
         for _ in range(iterations):
             pin.computeJointJacobians(model, data, q)
             pin.framesForwardKinematics(model, data, q)
@@ -57,12 +57,13 @@ class Kinematics:
             for frame, wanted in zip(self.frames, feet, strict=True):
                 rows.append(10 * pin.getFrameJacobian(model, data, frame, pin.LOCAL))
                 errors.append(10 * pin.log6(data.oMf[frame].actInv(wanted)).vector)
-            rows.append(pin.getFrameJacobian(model, data, self.pelvis, pin.LOCAL)[3:])
-            errors.append(pin.log3(data.oMf[self.pelvis].rotation.T))
+            rows.append(0.2 * pin.getFrameJacobian(model, data, self.pelvis, pin.LOCAL)[3:])
+            errors.append(0.2 * pin.log3(data.oMf[self.pelvis].rotation.T))
             rows.append(posture)
             errors.append(posture @ pin.difference(model, q, self.rest))
             matrix, error = np.concatenate(rows), np.concatenate(errors)
-            step = np.linalg.solve(matrix.T @ matrix + 1e-8 * np.eye(nv), matrix.T @ error)
+            step = np.linalg.solve(matrix.T @ matrix + 1e-6 * np.eye(nv), matrix.T @ error)
+            step *= min(1.0, 0.2 / np.abs(step).max())
             q = pin.integrate(model, q, step)
             if np.abs(step).max() < 1e-7:
                 break
@@ -139,8 +140,8 @@ def step(body) -> Callable[..., Plan]:
         schedule = ContactSchedule(StanceSequence(phases), [0.0, lift, land, end])
 
         def com_at(time, k):
-            over = np.array([*left.translation[:2], k.com[2] - 0.03])
-            final = k.com + 0.5 * np.asarray(stride) - [0.0, 0.0, 0.01]
+            over = np.array([*left.translation[:2], k.com[2] - 0.06])
+            final = k.com + 0.5 * np.asarray(stride) - [0.0, 0.0, 0.03]
             return k.com + smooth(time / lift) * (over - k.com) + smooth((time - land) / shift) * (final - over)
 
         def feet_at(time, k):
