@@ -5,7 +5,7 @@ from them by the equation of motion, which splits into six equalities (nobody pu
 pelvis) and the torque limits.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -76,13 +76,13 @@ class LoadedContact:
 
     Attributes:
         basis: The force map.
-        load_share: Share of its limits that it may use, in [0, 1].
-        cap: Largest normal force at full load [N].
+        cap: Largest normal force now [N].
+        grasp_share: Share of a grasp's limits that it may use now, in [0, 1].
     """
 
     basis: ContactForceBasis
-    load_share: float
     cap: float
+    grasp_share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +115,18 @@ class ControlProblem:
 
     def wrenches(self, x: FloatArray) -> dict[str, FloatArray]:
         """Force and moment about the effector frame of each contact in ``x``, by effector."""
-        found: dict[str, FloatArray] = {}
+        return {name: basis.wrench @ part for name, basis, part in self._forces(x)}
+
+    def normal_forces(self, x: FloatArray) -> dict[str, float]:
+        """Normal force of each contact in ``x`` by effector [N]; 0 for a grasp."""
+        return {name: float(basis.normal @ part) for name, basis, part in self._forces(x)}
+
+    def _forces(self, x: FloatArray) -> Iterator[tuple[str, ContactForceBasis, FloatArray]]:
         start = len(self.state.v)
         for loaded in self.contacts:
-            end = start + loaded.basis.wrench.shape[1]
-            found[loaded.basis.contact.effector] = loaded.basis.wrench @ x[start:end]
+            end = start + len(loaded.basis.normal)
+            yield loaded.basis.contact.effector, loaded.basis, x[start:end]
             start = end
-        return found
 
 
 def build_qp(
@@ -143,8 +148,7 @@ def build_qp(
     Args:
         state: Current dynamics.
         tasks: Weighted tasks on the acceleration.
-        contacts: Contacts that may carry load; those with ``load_share`` 0 keep their
-            variables, at zero, so that the size of the program does not change.
+        contacts: Contacts that may carry load.
         bounds: Joint limits.
         period: Time over which the torques will be held [s].
         acceleration_weight: Regularisation of the accelerations.
@@ -228,7 +232,7 @@ def _normal_force_rows(
             row = np.zeros(size)
             row[start:end] = loaded.basis.normal
             rows.append(row)
-            limits.append(loaded.cap * loaded.load_share)
+            limits.append(loaded.cap)
         start = end
     if sum_cap is not None and rows:
         rows.append(np.sum(rows, axis=0))
@@ -241,12 +245,7 @@ def _variable_bounds(contacts: Sequence[LoadedContact], bounds: JointBounds) -> 
     lower = [-unbounded, bounds.acceleration_lower]
     upper = [unbounded, bounds.acceleration_upper]
     for loaded in contacts:
-        if loaded.load_share > 0:
-            grasp = ~loaded.basis.normal.astype(bool)
-            share = np.where(grasp, loaded.load_share, 1.0)
-            lower.append(loaded.basis.lower * share)
-            upper.append(loaded.basis.upper * share)
-        else:
-            lower.append(np.zeros_like(loaded.basis.lower))
-            upper.append(np.zeros_like(loaded.basis.upper))
+        share = np.where(loaded.basis.normal > 0, 1.0, loaded.grasp_share)
+        lower.append(loaded.basis.lower * share)
+        upper.append(loaded.basis.upper * share)
     return np.concatenate(lower), np.concatenate(upper)

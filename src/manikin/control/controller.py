@@ -121,6 +121,7 @@ class Controller:
         self._solver = make_solver(self.settings.solver)
         self._spare_solver = make_solver(self.settings.solver)
         self._previous = np.zeros(joints)
+        self._carried: dict[str, float] = {}
 
     def step(
         self, time: float, q: FloatArray, v: FloatArray, touching: Mapping[str, bool] | None = None
@@ -141,6 +142,8 @@ class Controller:
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else problem.torque(solution.x)
         self._previous = tau
+        if solution is not None:
+            self._remember_loads(supports, problem.normal_forces(solution.x))
         x = np.zeros(len(problem.program.gradient)) if solution is None else solution.x
         return ControlOutput(
             tau=tau,
@@ -212,7 +215,16 @@ class Controller:
     def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
         basis = contact_force_basis(contact, self._geometry[support.effector], state)
         cap = contact.normal_force_cap or self.settings.supports.default_cap * state.mass * GRAVITY
-        return LoadedContact(basis, support.load_share, cap)
+        cap *= support.load_share
+        if support.unload_share < 1.0:
+            cap = min(cap, support.unload_share * self._carried.get(support.effector, cap))
+        return LoadedContact(basis, cap, min(support.load_share, support.unload_share))
+
+    def _remember_loads(self, supports: Mapping[str, SupportState], loads: Mapping[str, float]) -> None:
+        """Keep what each support carries until its unloading begins."""
+        for name, load in loads.items():
+            if supports[name].unload_share >= 1.0:
+                self._carried[name] = load
 
     def _bounds(self, state: DynamicsState) -> JointBounds:
         body, settings = self.body, self.settings

@@ -33,8 +33,10 @@ class SupportState:
         effector: Its name.
         mode: Swing, landing or stance.
         contact: The planned contact in landing and stance; None in flight.
-        load_share: Share of the normal-force limit (grasp: of the force limits) that it
-            may use now, in [0, 1]; ramps after touch-down and before lift-off.
+        load_share: Share of the contact's force limits that it may use after its touch-down,
+            rising to 1.
+        unload_share: Share of the load it carried when its unloading began that it may
+            still carry, falling to 0 at lift-off; 1 before that.
         press: How far below the planned contact a landing effector is sent [m].
     """
 
@@ -42,6 +44,7 @@ class SupportState:
     mode: SupportMode
     contact: Contact | None
     load_share: float = 0.0
+    unload_share: float = 1.0
     press: float = 0.0
 
 
@@ -139,13 +142,20 @@ class SupportSwitch:
         planned = time >= interval.start - 1e-9
         self._remember_touch(memory, time, planned if touching is None else touching)
         if memory.landed is not None:
-            share = self._load_share(time, max(memory.landed, interval.start), interval.end)
-            return SupportState(name, SupportMode.STANCE, interval.contact, share)
+            rising = (time - max(memory.landed, interval.start)) / self._settings.load_time
+            falling = (interval.end - time) / self._settings.unload_time
+            return SupportState(
+                name,
+                SupportMode.STANCE,
+                interval.contact,
+                load_share=float(np.clip(rising, _FIRST_SHARE, 1.0)),
+                unload_share=float(np.clip(falling, 0.0, 1.0)),
+            )
         if not planned:
             return SupportState(name, SupportMode.SWING, None)
         late = time - max(interval.start, memory.touched)
         press = min(self._settings.press_depth, self._settings.press_speed * late)
-        return SupportState(name, SupportMode.LANDING, interval.contact, 0.0, press)
+        return SupportState(name, SupportMode.LANDING, interval.contact, press=press)
 
     def _interval(self, name: str, time: float) -> tuple[int, SupportInterval | None]:
         for number, interval in enumerate(self._intervals[name]):
@@ -160,8 +170,3 @@ class SupportSwitch:
                 memory.landed = time
         elif memory.landed is not None and time - memory.touched > self._settings.release_time + 1e-9:
             memory.landed = None
-
-    def _load_share(self, time: float, landed: float, end: float) -> float:
-        rising = (time - landed) / self._settings.load_time
-        falling = (end - time) / self._settings.unload_time
-        return float(np.clip(min(max(rising, _FIRST_SHARE), falling), 0.0, 1.0))

@@ -17,7 +17,7 @@ from manikin.scene import Scene
 from manikin.simulation.compile import compile_model
 from manikin.simulation.execution import Execution
 from manikin.simulation.options import PhysicsOptions
-from manikin.simulation.recorder import Recorder
+from manikin.simulation.recorder import SWITCHING, Recorder, near
 from manikin.simulation.world import Grip, Push, World
 from manikin.spatial import finite_number
 
@@ -33,9 +33,6 @@ in by the fraction of a millimetre that the contact needs to carry."""
 
 _AT_REST = 1e-2
 """A motion whose first speeds are smaller than this begins at rest [m/s, rad/s]."""
-
-_SWITCHING = 0.1
-"""A support may touch its surface this long before and after its planned interval [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +156,7 @@ class _Run:
 
     def _switch(self, time: float) -> None:
         """Tell the world which touches are planned now, and hold on to grasps."""
-        now = tuple(number for number, hold in enumerate(self.holds) if _near(hold.interval, time))
+        now = tuple(number for number, hold in enumerate(self.holds) if near(hold.interval, time))
         if now != self._planned_now:
             self.world.plan_touches([(self.holds[i].segments, self.holds[i].obstacle) for i in now])
             self._planned_now = now
@@ -250,9 +247,5 @@ def _holds(body: BodyModel, scene: Scene, schedule: ContactSchedule) -> tuple[_H
             scene.supporting_surface(interval.contact).obstacle,
         )
         for effector in schedule.sequence.effectors
-        for interval in support_intervals(schedule, effector, _SWITCHING)
+        for interval in support_intervals(schedule, effector, SWITCHING)
     )
-
-
-def _near(interval: SupportInterval, time: float) -> bool:
-    return interval.early - 1e-9 <= time <= interval.end + _SWITCHING

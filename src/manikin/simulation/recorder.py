@@ -8,10 +8,13 @@ import numpy as np
 from manikin.balance import wrench_polytope
 from manikin.contact import Contact, ContactKind, ContactSchedule, Stance
 from manikin.control import ControlOutput, SupportMode
-from manikin.control.supports import support_intervals
+from manikin.control.supports import SupportInterval, support_intervals
 from manikin.motion import Motion
 from manikin.simulation.world import Sensed
 from manikin.spatial import GRAVITY, FloatArray
+
+SWITCHING = 0.1
+"""A support may touch its surface this long before and after its planned interval [s]."""
 
 _PRESSES = 1.0
 """Force from which an effector counts as a support of the executed motion [N]."""
@@ -49,7 +52,7 @@ class Recorder:
         self.effectors = schedule.sequence.effectors
         self.samples: list[Sample] = []
         self.fallbacks: list[tuple[float, str]] = []
-        self._intervals = {name: support_intervals(schedule, name, 0.0) for name in self.effectors}
+        self._intervals = {name: support_intervals(schedule, name, SWITCHING) for name in self.effectors}
         self._landings: dict[str, FloatArray | None] = dict.fromkeys(self.effectors)
         self.max_slip = 0.0
 
@@ -77,7 +80,7 @@ class Recorder:
     def _nearest_contact(self, name: str, time: float) -> Contact:
         """Contact of an effector at ``time``; in flight, the one to come or else the last."""
         for interval in self._intervals[name]:
-            if time < interval.end:
+            if time < interval.end + (SWITCHING if near(interval, time) else 0.0):
                 return interval.contact
         return self._intervals[name][-1].contact
 
@@ -115,20 +118,37 @@ class Recorder:
         )
 
     def margins(self, mass: float) -> FloatArray:
-        """(n,) wrench margin of the measured contact forces in the planned stances [N.m].
+        """(n,) wrench margin of the mean measured wrenches [N.m].
+
+        The stance is the planned one and those contacts that press although they are planned
+        for a little later or earlier, all at their planned placements.
 
         Args:
             mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
         """
-        times = np.array([s.sensed.time for s in self.samples])
-        totals = np.array([s.total for s in self.samples])
-        phases = self._schedule.phase_at(times)
-        margins = np.empty(len(times))
-        for phase in np.unique(phases):
-            stance = _bounded(self._schedule.sequence[int(phase)].stance, mass)
-            rows = phases == phase
-            margins[rows] = wrench_polytope(stance).margin(totals[rows])
+        samples: dict[tuple[int, tuple[str, ...]], list[int]] = {}
+        for number, sample in enumerate(self.samples):
+            phase = int(self._schedule.phase_at(sample.sensed.time))
+            samples.setdefault((phase, self._unscheduled(sample, phase)), []).append(number)
+        margins = np.empty(len(self.samples))
+        for (phase, extra), rows in samples.items():
+            stance = self._schedule.sequence[phase].stance
+            contacts = [self._nearest_contact(name, self.samples[rows[0]].sensed.time) for name in extra]
+            totals = np.array([self.samples[row].total for row in rows])
+            whole = _bounded(Stance([*stance, *contacts], stance.normal_force_cap), mass)
+            margins[rows] = wrench_polytope(whole).margin(totals)
         return margins
+
+    def _unscheduled(self, sample: Sample, phase: int) -> tuple[str, ...]:
+        """Effectors that press near, but outside, the time for which they are planned."""
+        stance, time = self._schedule.sequence[phase].stance, sample.sensed.time
+        return tuple(
+            name
+            for name, wrench in zip(self.effectors, sample.wrenches, strict=True)
+            if name not in stance
+            and np.linalg.norm(wrench[:3]) > _PRESSES
+            and any(near(interval, time) for interval in self._intervals[name])
+        )
 
     def motion(self, joint_names: Sequence[str], mass: float) -> Motion:
         """Turn the samples into a motion."""
@@ -149,6 +169,11 @@ class Recorder:
             contact_names=tuple(self.effectors),
             joint_names=tuple(joint_names),
         )
+
+
+def near(interval: SupportInterval, time: float) -> bool:
+    """Whether a support is planned at ``time`` [s] or has just been, or is about to be."""
+    return interval.early - 1e-9 <= time <= interval.end + SWITCHING
 
 
 def _bounded(stance: Stance, mass: float) -> Stance:
