@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
         return status if isinstance(status, int) else DONE
     except typer.TyperException as error:
-        return _complain(f"{error.format_message()} See 'manikin --help'.", BAD_INPUT)
+        return _complain(f"{error.format_message().rstrip('.')}; see 'manikin --help'", BAD_INPUT)
     except InputError as error:
         return _complain(str(error), BAD_INPUT)
     except ManikinError as error:
@@ -133,13 +133,14 @@ def view(
 def balance(
     stance: Annotated[Path, typer.Argument(metavar="STANCE.yaml", help="Stance file.")],
     json: JsonOption = False,
+    polytope: Annotated[bool, typer.Option("--polytope", help="Add the rows H and h to the JSON.")] = False,
 ) -> None:
     """Polytope and margins of one stance and centre-of-mass state."""
     from manikin.scenarios.stance_file import load_stance_file
 
     question = load_stance_file(stance)
     with _stdout_kept_clean():
-        report = question.evaluate()
+        report = question.evaluate().as_dict(polytope=polytope and json)
     if json:
         _print_json(report)
     else:

@@ -25,12 +25,13 @@ def write_products(directory: str | Path, progress: Callable[[str, float], None]
     folder = Path(directory)
     content = read_motions(folder / MOTION)
     (folder / FIGURES).mkdir(exist_ok=True)
-    written = write_figures(
-        content,
-        folder / FIGURES,
-        None if progress is None else lambda share: progress("figures", 0.9 * share),
-    )
+    report = progress or _silent
+    written = write_figures(content, folder / FIGURES, lambda share: report("figures", 0.9 * share))
     if content.body is not None:
         written.append(export_motion(content, folder, "bvh"))
     report("figures", 1.0)
     return written
+
+
+def _silent(_stage: str, _share: float) -> None:
+    """Take a progress report and do nothing."""

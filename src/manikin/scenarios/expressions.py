@@ -20,6 +20,9 @@ from manikin.errors import ScenarioError
 MAX_LENGTH = 1000
 """Longest expression that is parsed [characters]."""
 
+MAX_DEPTH = 100
+"""Deepest nesting of operations; evaluation recurses that deep."""
+
 CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
 
 _NUMPY_NAMES: Mapping[str, str] = {
@@ -87,9 +90,15 @@ def _parse(text: str, variables: tuple[str, ...]) -> _Evaluator:
         raise ScenarioError(f"expression has {len(text)} characters; valid: at most {MAX_LENGTH}")
     try:
         tree = ast.parse(text.strip(), mode="eval")
+        if _depth(tree.body) > MAX_DEPTH:
+            raise ScenarioError(f"expression is nested too deeply; valid: at most {MAX_DEPTH} levels")
         return _build(tree.body, text, variables)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ScenarioError(f"expression {text!r} cannot be read; {_valid(variables)}") from None
+
+
+def _depth(node: ast.AST) -> int:
+    return 1 + max((_depth(child) for child in ast.iter_child_nodes(node)), default=0)
 
 
 def _build(node: ast.AST, text: str, variables: tuple[str, ...]) -> _Evaluator:

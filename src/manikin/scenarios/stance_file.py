@@ -1,10 +1,11 @@
 """The stance file of ``manikin balance``: one stance, one centre-of-mass state."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from manikin.contact import Stance
@@ -14,6 +15,9 @@ from manikin.scenarios.schema import ContactSection, SoleSection
 from manikin.scenarios.validation import Positive, Section, Text, Vector3, place, refuse, validate
 from manikin.scenarios.yaml_reader import read_yaml
 from manikin.spatial import GRAVITY
+
+if TYPE_CHECKING:
+    from manikin.balance import BalanceReport
 
 
 class NamedContactSection(ContactSection):
@@ -77,26 +81,27 @@ class BalanceQuestion:
     file: StanceFile
     source: str
 
-    def evaluate(self) -> dict[str, Any]:
-        """Margins, limiting contact and classical criteria as plain values [SI]."""
-        from manikin.balance import pseudo_wrench, wrench_polytope
+    def evaluate(self) -> BalanceReport:
+        """Judge the stance by its wrench polytope and by the classical criteria.
+
+        Raises:
+            ScenarioError: If the contacts or the state are not usable.
+        """
+        from manikin.balance import evaluate_balance
 
         file = self.file
-        stance = file.build_stance()
-        polytope = wrench_polytope(stance, friction_model=file.friction_model, reference=file.reference)
-        wrench = pseudo_wrench(
-            file.mass_kg, file.com, file.acceleration, file.angular_momentum_rate, file.reference
-        )
-        margin = float(polytope.margin(wrench))
-        limiting = polytope.limiting(wrench)
-        return {
-            "balanced": margin >= 0.0,
-            "margin": margin,
-            "margin_unit": "N.m",
-            "limiting_contact": limiting.contact,
-            "pseudo_wrench": np.asarray(wrench).tolist(),
-            "facets": len(polytope),
-        }
+        try:
+            return evaluate_balance(
+                file.build_stance(),
+                file.mass_kg,
+                file.com,
+                file.acceleration,
+                file.angular_momentum_rate,
+                friction_model=file.friction_model,
+                reference=file.reference,
+            )
+        except InputError as error:
+            raise ScenarioError(f"{self.source}: {error}") from None
 
 
 def load_stance_file(path: str | Path) -> BalanceQuestion:

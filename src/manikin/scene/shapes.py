@@ -150,4 +150,6 @@ def _unit(vector: ArrayLike, name: str) -> FloatArray:
     length = float(np.linalg.norm(direction))
     if length < 1e-9:
         raise SceneError(f"{name} is {direction.tolist()}; valid: a direction that is not zero")
+    if abs(length - 1.0) <= 4e-16:
+        return direction  # unit to rounding already: a shape built from its own values is the same shape
     return frozen_array(direction / length, name, (3,), SceneError)

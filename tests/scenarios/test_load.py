@@ -1,0 +1,393 @@
+"""Scenario files: what is built from them, and one line for whatever is wrong with them."""
+
+import copy
+import re
+from pathlib import Path
+
+import casadi
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from manikin.contact import ContactKind
+from manikin.errors import ScenarioError
+from manikin.scenarios import json_schema, list_scenarios, load_scenario
+
+MINIMAL = {
+    "name": "test",
+    "supports": {
+        "phases": [
+            {
+                "left_foot": {"position": [0, 0.1, 0], "yaw_deg": 90},
+                "right_foot": {"position": [0, -0.1, 0]},
+                "right_hand": {"position": [0.4, -0.2, 1.1], "max_force_N": 100},
+            },
+            {"left_foot": "same", "min_duration_s": 0.4},
+        ]
+    },
+    "scene": [{"name": "step", "box": [1, 1, 0.2], "position": [2, 0, 0.1]}],
+    "task": {"start": {"com": [0, 0, 0.9]}, "goal": {"com": [0, 0.1, 0.9]}},
+    "com_constraints": [{"height_band": {"lower": "0.5", "upper": "1.0"}}],
+}
+
+
+def write(folder: Path, data, name="test.yaml"):
+    path = folder / name
+    path.write_text(data if isinstance(data, str) else yaml.safe_dump(data, sort_keys=False))
+    return path
+
+
+def changed(path, value):
+    """MINIMAL with the value at a path replaced, or removed when it is ``...``."""
+    data = copy.deepcopy(MINIMAL)
+    place = data
+    for key in path[:-1]:
+        place = place[key]
+    if value is ...:
+        del place[path[-1]]
+    else:
+        place[path[-1]] = value
+    return data
+
+
+FOOT = ("supports", "phases", 0, "left_foot")
+
+BAD_VALUES = [
+    (("name",), ..., "name", "is missing"),
+    (("task",), ..., "task", "is missing"),
+    (("task", "goal", "com"), ..., "task.goal", "com"),
+    (("task", "start"), {"at": [0, 0]}, "task.start.com", "is missing"),
+    (("task", "start", "com"), [0, 0], "task.start.com", "three numbers"),
+    (("task", "start", "com"), [0, 0, float("nan")], "task.start.com[2]", "finite number"),
+    (("task", "start", "com"), [0, 0, "high"], "task.start.com", "three numbers"),
+    (("body",), {"mass_kg": -79}, "body.mass_kg", "> 0"),
+    (("body",), {"mass_kg": "79"}, "body.mass_kg", "a number"),
+    (("body",), {"mass_kg": float("nan")}, "body.mass_kg", "finite"),
+    (("body",), {"mass_kg": float("inf")}, "body.mass_kg", "finite"),
+    (("body",), {"mass_kg": True}, "body.mass_kg", "a number"),
+    (("body",), {"sex": "other"}, "body.sex", "'male' or 'female'"),
+    (("body",), {"model": "insect"}, "body.model", "'human'"),
+    (("body",), {"mass": 79}, "body.mass", "mass_kg"),
+    (("body",), "human", "body", "a mapping"),
+    (("supports", "friction"), 0, "supports.friction", "> 0"),
+    (("supports", "frictoin"), 0.7, "supports.frictoin", "did you mean 'friction'"),
+    (("supports", "sole"), {"length_m": 0.28}, "supports.sole.width_m", "missing"),
+    (("supports", "planning_sole"), {"length_m": 0.3, "width_m": 0.1}, "planning_sole.length_m", "most"),
+    (("supports", "normal_force_cap_N"), 0, "supports.normal_force_cap_N", "> 0"),
+    (("supports", "phases"), [], "supports.phases", "at least 1"),
+    (("supports", "phases"), {"a": 1}, "supports.phases", "a list"),
+    (("supports", "phases", 1, "min_duration_s"), -1, "supports.phases[1].min_duration_s", "> 0"),
+    (("supports", "phases", 1, "max_duration_s"), 0.1, "supports.phases[1].max_duration_s", "at least"),
+    (("supports", "phases", 1), {"min_duration_s": 1}, "supports.phases[1]", "no contact"),
+    (("supports", "phases", 1, "right_hand"), "sam", "supports.phases[1].right_hand", "'same'"),
+    (("supports", "phases", 0, "left_foot"), "same", "supports.phases[0].left_foot", "'same'"),
+    (("supports", "phases", 1, "tail"), "same", "supports.phases[1].tail", "left_foot"),
+    ((*FOOT, "position"), ..., "supports.phases[0].left_foot.position", "missing"),
+    ((*FOOT, "position"), [0, 0, 0, 0], "supports.phases[0].left_foot.position", "three numbers"),
+    ((*FOOT, "yaw_deg"), "north", "supports.phases[0].left_foot.yaw_deg", "a number"),
+    ((*FOOT, "friction"), 0, "supports.phases[0].left_foot.friction", "> 0"),
+    ((*FOOT, "kind"), "foot", "supports.phases[0].left_foot.kind", "'sole'"),
+    ((*FOOT, "normal"), [0, 0, 0], "supports.phases[0].left_foot.normal", "not zero"),
+    ((*FOOT, "max_force_N"), 10, "supports.phases[0].left_foot.max_force_N", "does not belong to a sole"),
+    (("supports", "phases", 0, "right_hand", "max_force_N"), ..., "right_hand.max_force_N", "missing"),
+    (("supports", "phases", 0, "right_hand", "friction"), 0.5, "right_hand.friction", "grasp"),
+    (("scene", 0, "box"), ..., "scene[0]", "exactly one of box"),
+    (("scene", 0, "sphere"), {"radius_m": 1}, "scene[0]", "exactly one"),
+    (("scene", 0, "box"), [1, 0, 1], "scene[0].box[1]", "> 0"),
+    (("scene", 0, "boxx"), [1, 1, 1], "scene[0].boxx", "did you mean 'box'"),
+    (("scene", 0, "scale"), 2.0, "scene[0].scale", "only with mesh"),
+    (("scene",), [MINIMAL["scene"][0]] * 2, "scene[1].name", "unique"),
+    (("scene",), 3, "scene", "a list"),
+    (("com_constraints", 0, "height_band", "lower"), "import os", "height_band.lower", "cannot be read"),
+    (("com_constraints", 0, "height_band", "lower"), "foo(x)", "height_band.lower", "atan"),
+    (("com_constraints", 0, "height_band", "lower"), "1/0", "height_band.lower", "finite height"),
+    (("com_constraints", 0, "height_band", "lower"), "1.1", "height_band", "lower <= upper"),
+    (("com_constraints", 0, "height_band", "lower"), 0.5, "height_band.lower", "a text"),
+    (("com_constraints", 0), {}, "com_constraints[0]", "exactly one"),
+    (("com_constraints",), [{"max_support_distance_m": 1.0}] * 2, "com_constraints", "twice"),
+    (("planning",), {"degree": 2}, "planning.degree", ">= 3"),
+    (("planning",), {"degree": 5.5}, "planning.degree", "whole number"),
+    (("planning",), {"weights": {"speed": 1}}, "planning.weights.speed", "margin"),
+    (("planning",), {"weights": {"jerk": [1, 1, -1]}}, "planning.weights.jerk[2]", ">= 0"),
+    (("push",), {"force_N": 200}, "push.direction_deg", "missing"),
+    (("seed",), -1, "seed", ">= 0"),
+    (("seed",), 1.5, "seed", "whole number"),
+    (("floor_height_m",), "low", "floor_height_m", "a number"),
+    (("colour",), 1, "colour", "not a known key"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "key", "says"), BAD_VALUES, ids=[f"{k}-{s[:12]}" for _, _, k, s in BAD_VALUES]
+)
+def test_bad_value_gives_one_line_with_file_key_and_remedy(tmp_path, path, value, key, says):
+    file = write(tmp_path, changed(path, value))
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(file)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert text.startswith(str(file))
+    assert key in text
+    assert says in text
+    # The line of the file is there as well.
+    assert re.match(re.escape(str(file)) + r":\d+: ", text)
+
+
+def test_line_number_is_that_of_the_key(tmp_path):
+    file = write(
+        tmp_path, "name: a\nbody:\n  stature_m: 1.75\n  mass_kg: -3\ntask: {start: {com: [0,0,1]}}\n"
+    )
+    with pytest.raises(ScenarioError, match=r":4: body.mass_kg is -3; valid: a number > 0 \(and 1 more\)"):
+        load_scenario(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "is empty"),
+        ("# nothing\n", "is empty"),
+        ("name: [1, 2\n", "not valid YAML"),
+        ("name: a\n\tbody: 1\n", "not valid YAML"),
+        ("- 1\n- 2\n", "a mapping"),
+        ("just a text", "a mapping"),
+        ("name: a\nname: b\n", ":2: key 'name' is given twice"),
+        ("a: &x [*x]\n", "alias"),
+        ("name: !!python/object/apply:os.system ['true']\n", "not valid YAML"),
+        ("name: a\n---\nname: b\n", "not valid YAML"),
+        ("x: " + "[" * 3000, "YAML"),
+        ("? [a, b]\n: 1\n", "YAML"),
+    ],
+)
+def test_broken_yaml_gives_one_line(tmp_path, text, says):
+    file = write(tmp_path, text)
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(file)
+    assert "\n" not in str(caught.value)
+    assert str(file) in str(caught.value)
+    assert says in str(caught.value) or "nested too deeply" in str(caught.value)
+
+
+def test_line_of_broken_yaml_is_named(tmp_path):
+    with pytest.raises(ScenarioError, match=r"test\.yaml:3: is not valid YAML"):
+        load_scenario(write(tmp_path, "name: a\nbody: {}\n  x: : :\n"))
+
+
+def test_expanding_aliases_are_refused(tmp_path):
+    """Nine levels of nine aliases each stand for 387 million entries."""
+    lines = ["a0: &a0 [1,1,1,1,1,1,1,1,1]"]
+    lines += [f"a{n}: &a{n} [{','.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 9)]
+    with pytest.raises(ScenarioError, match="more than"):
+        load_scenario(write(tmp_path, "\n".join(lines)))
+
+
+def test_binary_file_is_refused(tmp_path):
+    file = tmp_path / "test.yaml"
+    file.write_bytes(b"\xff\xfe\x00name")
+    with pytest.raises(ScenarioError, match="UTF-8"):
+        load_scenario(file)
+
+
+def test_missing_file_directory_and_other_files_name_the_built_in_scenarios(tmp_path):
+    for name in ("plattform", tmp_path / "none.yaml", tmp_path, ""):
+        with pytest.raises(ScenarioError, match="platform") as caught:
+            load_scenario(name)
+        assert "\n" not in str(caught.value)
+    (tmp_path / "motion.h5").write_bytes(b"x")
+    with pytest.raises(ScenarioError, match=r"\.yaml"):
+        load_scenario(tmp_path / "motion.h5")
+    with pytest.raises(ScenarioError, match="did you mean 'platform'"):
+        load_scenario("plattform")
+
+
+def test_numbers_are_read_as_yaml_1_2_has_them(tmp_path):
+    text = yaml.safe_dump(MINIMAL) + "seed: 010\nbody: {mass_kg: 8e1}\n"
+    text += "push: {force_N: 1e2, direction_deg: -5, duration_s: .1, at_s: 0}\n"
+    with pytest.raises(ScenarioError, match=r"seed is 10\.0"):
+        load_scenario(write(tmp_path, text))
+    scenario = load_scenario(write(tmp_path, text.replace("010", "10")))
+    assert (scenario.seed, scenario.mass, scenario.push.force_N) == (10, 80.0, 100.0)
+
+
+def test_missing_and_broken_meshes_name_the_entry(tmp_path):
+    for content in (None, "not a mesh"):
+        if content is not None:
+            (tmp_path / "car.stl").write_text(content)
+        file = write(tmp_path, changed(("scene", 0), {"name": "car", "mesh": "car.stl"}))
+        with pytest.raises(ScenarioError, match=r"test\.yaml:\d+: scene\[0\].*car\.stl") as caught:
+            load_scenario(file).build_scene()
+        assert "\n" not in str(caught.value)
+
+
+def test_mesh_path_is_relative_to_the_file_and_absolute_in_the_resolved_one(tmp_path):
+    import trimesh
+
+    trimesh.creation.box((100.0, 100.0, 100.0)).export(tmp_path / "cube.stl")
+    entry = {"name": "cube", "mesh": "cube.stl", "unit": "cm", "position": [3, 0, 0.5]}
+    scenario = load_scenario(write(tmp_path, changed(("scene", 0), entry)))
+    low, high = scenario.build_scene()["cube"].bounds
+    np.testing.assert_allclose([low, high], [[2.5, -0.5, 0.0], [3.5, 0.5, 1.0]], atol=1e-6)  # float32 STL
+    (tmp_path / "elsewhere").mkdir()
+    copy_ = load_scenario(write(tmp_path / "elsewhere", scenario.to_yaml()))
+    assert copy_.build_scene().signature == scenario.build_scene().signature
+
+
+def test_every_shape_is_built(tmp_path):
+    round_ = {"radius_m": 0.1, "length_m": 0.5}
+    shapes = [
+        {"cylinder": round_}, {"capsule": round_}, {"sphere": {"radius_m": 0.2}}, {"box": [1, 2, 3]},
+        {"plane": [0, 1, 0]}, {"half_space": [1, 0, 0]},
+    ]  # fmt: skip
+    scene = [
+        {"name": f"o{i}", "position": [5, 5, 5], "rpy_deg": [0, 0, 90], **s} for i, s in enumerate(shapes)
+    ]
+    built = load_scenario(write(tmp_path, changed(("scene",), scene))).build_scene()
+    kinds = [type(obstacle.shape).__name__ for obstacle in built]
+    assert kinds == ["HalfSpace", "Cylinder", "Capsule", "Sphere", "Box", "Plane", "HalfSpace"]
+    np.testing.assert_allclose(built["o4"].world_plane[0], [-1, 0, 0], atol=1e-15)
+
+
+def test_contact_off_every_surface_is_named(tmp_path):
+    scenario = load_scenario(write(tmp_path, changed((*FOOT, "position"), [0, 0.1, 0.05])))
+    with pytest.raises(ScenarioError, match=r"supports\.phases\[0\]\.left_foot.*above") as caught:
+        scenario.check_contacts(scenario.build_scene())
+    assert "\n" not in str(caught.value)
+
+
+def test_foot_that_slides_is_refused(tmp_path):
+    data = changed(("supports", "phases", 1, "left_foot"), {"position": [0, 0.2, 0], "yaw_deg": 90})
+    with pytest.raises(ScenarioError, match="slides"):
+        load_scenario(write(tmp_path, data)).build_sequence()
+
+
+def test_defaults_and_overrides_of_contacts(tmp_path):
+    data = copy.deepcopy(MINIMAL)
+    data["supports"].update(
+        friction=0.6,
+        sole={"length_m": 0.3, "width_m": 0.1},
+        planning_sole={"length_m": 0.2, "width_m": 0.08},
+        normal_force_cap_N=1200,
+    )
+    data["supports"]["phases"][0]["right_foot"].update(
+        friction=0.3, sole={"length_m": 0.25, "width_m": 0.05}, normal_force_cap_N=600
+    )
+    scenario = load_scenario(write(tmp_path, data))
+    stance = scenario.build_sequence()[0].stance
+    left, right, hand = stance["left_foot"], stance["right_foot"], stance["right_hand"]
+    assert (left.kind, right.kind, hand.kind) == (ContactKind.SOLE, ContactKind.SOLE, ContactKind.GRASP)
+    assert (left.friction, left.length, left.width) == pytest.approx((0.6, 0.3, 0.1))
+    assert left.yaw == pytest.approx(np.pi / 2)
+    assert (right.friction, right.length, right.width, right.normal_force_cap) == pytest.approx(
+        (0.3, 0.25, 0.05, 600)
+    )
+    assert hand.max_force == 100.0
+    assert stance.normal_force_cap == 1200.0
+    planned = scenario.build_sequence(planning=True)[0].stance
+    assert (planned["left_foot"].length, planned["left_foot"].width) == pytest.approx((0.2, 0.08))
+    assert (planned["right_foot"].length, planned["right_foot"].width) == pytest.approx((0.2, 0.05))
+
+
+def test_cap_is_three_body_weights_when_none_is_given(tmp_path):
+    stance = load_scenario(write(tmp_path, MINIMAL)).build_sequence()[0].stance
+    assert stance.normal_force_cap == pytest.approx(3 * 79 * 9.81)
+
+
+def test_resolved_scenario_is_the_same_scenario(tmp_path):
+    for source in ("platform", write(tmp_path, changed(("floor_height_m",), None))):
+        scenario = load_scenario(source).with_body(stature_m=1.6, mass_kg=58).with_seed(7)
+        again = load_scenario(write(tmp_path, scenario.to_yaml(), "again.yaml"))
+        assert again.file == scenario.file
+        assert again.to_yaml() == scenario.to_yaml()
+        assert (again.file.body.stature_m, again.mass, again.seed) == (1.6, 58.0, 7)
+
+
+def test_overrides_are_checked():
+    scenario = load_scenario("platform")
+    for change in ({"stature_m": float("nan")}, {"mass_kg": -1.0}, {"sex": "x"}):
+        with pytest.raises(ScenarioError, match="body"):
+            scenario.with_body(**change)
+    with pytest.raises(ScenarioError, match="seed"):
+        scenario.with_seed(-1)
+    with pytest.raises(ScenarioError, match="body"):
+        scenario.with_body(stature_m=9.0).build_body()
+
+
+def test_platform_has_the_published_numbers():
+    """[Qiu2012]_ 5.4.4, Tables 5.2 and 5.3."""
+    scenario = load_scenario("platform")
+    scene, sequence = scenario.build_scene(), scenario.build_sequence()
+    scenario.check_contacts(scene)
+    assert scenario.name in list_scenarios()
+    np.testing.assert_allclose(scene["roof"].bounds, [[0.35, 0.0, 1.475], [1.45, 1.5, 1.525]], atol=1e-12)
+    assert [phase.stance.effectors for phase in sequence] == [
+        ("left_foot", "right_foot"), ("right_foot",), ("left_foot", "right_foot"), ("left_foot",),
+        ("left_foot", "right_foot"), ("right_foot",), ("left_foot", "right_foot"),
+    ]  # fmt: skip
+    assert [phase.min_duration for phase in sequence][1::2] == [0.4, 0.8, 0.8]
+    np.testing.assert_array_equal(scenario.start_com, [0.0, 0.0, 0.92])
+    np.testing.assert_array_equal(scenario.goal_com, [0.6, 0.65, 0.86])
+    assert scenario.max_support_distance == 1.0
+    problem = scenario.build_centroidal_problem()
+    assert (problem.degree, problem.mass, len(problem.geometric)) == (5, 79.0, 2)
+    body = scenario.build_body()
+    assert (body.stature, body.sole_length, body.sole_width) == (1.75, 0.28, 0.12)
+    assert body.mass == pytest.approx(79.0)
+
+
+def test_reference_stature_changes_nothing():
+    scenario = load_scenario("platform")
+    x, y, z = np.random.default_rng(0).uniform(-1, 2, (3, 100))
+    band = scenario.height_band
+    np.testing.assert_array_equal(band.upper(x, y, z), band.upper_expression(x, y, z))
+    np.testing.assert_array_equal(band.lower(x, y, z), band.lower_expression(x, y, z))
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(st.floats(1.55, 1.95), st.floats(-0.5, 1.2), st.floats(-0.5, 1.2))
+def test_heights_scale_about_the_supports(stature, x, y):
+    scenario = load_scenario("platform").with_body(stature_m=stature)
+    s = stature / 1.75
+    assert scenario.start_com[2] == pytest.approx(0.92 * s, rel=1e-12)
+    assert scenario.goal_com[2] == pytest.approx(0.2 + 0.66 * s, rel=1e-12)
+    assert scenario.max_support_distance == pytest.approx(s, rel=1e-12)
+    band = scenario.height_band
+    # The ends stay inside the band, and the band stays a band.
+    for com in (scenario.start_com, scenario.goal_com):
+        assert band.violation(com) < 0
+    assert band.upper(x, y, 0.9) - band.lower(x, y, 0.9) == pytest.approx(0.02 * s, rel=1e-9)
+
+
+def test_support_level_goes_smoothly_from_floor_to_platform():
+    level = load_scenario("platform").support_level()
+    share = np.linspace(-0.5, 1.5, 4001)
+    heights = level(0.6 * share, 0.65 * share)
+    assert heights[0] == 0.0
+    assert heights[-1] == pytest.approx(0.2, abs=1e-15)
+    assert np.all(np.diff(heights) >= -1e-15)
+    # Second differences of a C2 function: bounded by its largest curvature, 5.78 * 0.2 for this blend,
+    # and without a jump from one sample to the next.
+    curvature = np.diff(heights, 2) / np.diff(share)[0] ** 2
+    assert np.abs(curvature).max() < 1.16
+    assert np.abs(np.diff(curvature)).max() < 0.01
+
+
+def test_scaled_band_is_differentiable_for_casadi():
+    band = load_scenario("platform").with_body(stature_m=1.6).height_band
+    symbols = [casadi.SX.sym(name) for name in "xyz"]
+    value = band.upper(*symbols)
+    compiled = casadi.Function("f", symbols, [value, casadi.gradient(value, casadi.vertcat(*symbols))])
+    for point in np.random.default_rng(1).uniform(-0.3, 1.0, (20, 3)):
+        found, slope = compiled(*point)
+        assert float(found) == pytest.approx(float(band.upper(*point)), rel=1e-13)
+        step = 1e-6  # central differences of a function of order one: errors near 1e-10
+        for axis, direction in enumerate(np.eye(3) * step):
+            difference = (band.upper(*(point + direction)) - band.upper(*(point - direction))) / (2 * step)
+            assert float(slope[axis]) == pytest.approx(float(difference), abs=1e-8)
+
+
+def test_json_schema_knows_every_section():
+    schema = json_schema()
+    assert {"SupportsSection", "ContactSection", "ObstacleSection"} <= set(schema["$defs"])
+    assert "same" in str(schema["$defs"]["PhaseSection"])
+    assert set(schema["required"]) == {"name", "task"}
