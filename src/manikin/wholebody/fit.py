@@ -29,6 +29,10 @@ from manikin.wholebody.configuration_spline import (
 from manikin.wholebody.targets import EffectorTarget, FitTargets
 
 
+LEAST_DAMPING = 1.0
+"""Smallest Levenberg damping of the control points."""
+
+
 @dataclass(frozen=True)
 class FitScales:
     """Size at which each residual costs one unit, and the iteration's limits.
@@ -52,6 +56,7 @@ class FitScales:
         max_iterations: Upper bound of Gauss-Newton steps.
         decrease: Relative decrease of the objective below which the iteration stops.
         stages: Factors by which the tasks' scales are loosened, one solution after the other.
+        iterations_per_round: Steps between two updates of the multipliers.
         multiplier_rounds: Most updates of the multipliers of contacts and centre of mass.
         tolerance: Largest error of the contacts at convergence [m]; three times that for the
             centre of mass.
@@ -73,9 +78,10 @@ class FitScales:
     moment: float = 12.0
     rest: float = 1.0e-3
     max_iterations: int = 30
-    decrease: float = 2.0e-3
+    decrease: float = 0.03
     stages: tuple[float, ...] = (3.0, 1.0)
-    multiplier_rounds: int = 5
+    iterations_per_round: int = 6
+    multiplier_rounds: int = 12
     tolerance: float = 3.0e-4
 
     def loosened(self, factor: float) -> "FitScales":
@@ -203,11 +209,11 @@ class MotionFit:
         state = _Linearised()
         for factor in self._final.stages:
             self._scales = self._final.loosened(factor)
-            points, state, taken = self._descend(points, 0.02)
+            points, state, taken = self._descend(points, self._scales.max_iterations)
             iterations += taken
         for _ in range(self._final.multiplier_rounds):
             self._multiplier = self._multiplier + self._exact_rows * state.task_residual
-            points, state, taken = self._descend(points, self._final.decrease)
+            points, state, taken = self._descend(points, self._final.iterations_per_round)
             iterations += taken
             if state.support_error < self._final.tolerance and state.com_error < 3.0 * self._final.tolerance:
                 break
@@ -217,27 +223,34 @@ class MotionFit:
             state.cost,
         )  # fmt: skip
 
-    def _descend(self, points: FloatArray, least_decrease: float) -> tuple[FloatArray, _Linearised, int]:
-        """Levenberg-Marquardt at the current scales, with damping kept from call to call."""
-        current = self._linearise(points)
-        iteration, growth = 0, 2.0
-        for iteration in range(1, self._scales.max_iterations + 1):  # noqa: B007
+    def _descend(self, points: FloatArray, most: int) -> tuple[FloatArray, _Linearised, int]:
+        """Damped Gauss-Newton at the current scales; the damping is kept from call to call.
+
+        A step along the manifold of the contacts leaves it by a second-order amount that only
+        the next step repairs (Maratos effect), so one step may raise the objective before it
+        has to fall below its best.
+        """
+        current = best = self._linearise(points)
+        best_points, taken, uphill = points, 0, False
+        for _ in range(most):
+            taken += 1
             step = self._step(current, self._damping)
             # A step of more than a radian leaves the region where the model holds.
-            step *= min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
-            trial = self._linearise(points + step)
-            if trial.cost < current.cost:
-                decrease = (current.cost - trial.cost) / current.cost
-                points, current, growth = points + step, trial, 2.0
-                self._damping = max(self._damping / 5.0, 1e-2)
-                if decrease < least_decrease:
+            points = points + step * min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
+            current = self._linearise(points)
+            if current.cost < best.cost:
+                decrease = (best.cost - current.cost) / best.cost
+                best, best_points = current, points
+                self._damping = max(self._damping / (2.0 if uphill else 4.0), LEAST_DAMPING)
+                uphill = False
+                if decrease < self._scales.decrease:
                     break
+            elif uphill:
+                points, current, uphill = best_points, best, False
+                self._damping *= 4.0
             else:
-                self._damping *= growth
-                growth *= 2.0
-                if self._damping > 1e7:
-                    break
-        return points, current, iteration
+                uphill = True
+        return best_points, best, taken
 
     def _step(self, state: _Linearised, damping: float) -> FloatArray:
         self._system.reset()
@@ -371,6 +384,7 @@ class MotionFit:
     ) -> tuple[FloatArray, FloatArray] | None:
         scales = self._scales
         reach = scales.safe_distance + 4.0 * scales.softness
+        assert self._proximity is not None
         found = self._proximity.evaluate(q, activation=reach, ignore=self._targets.ignored[s])
         if len(found.distance) == 0:
             return None

@@ -93,7 +93,8 @@ FLIGHT_ROTATION_WEIGHT = 0.02
 def _flight_weight(share: FloatArray, middle: float) -> FloatArray:
     """Importance during a flight: full at its ends, so that contacts are left and met well."""
     blend = np.clip(np.minimum(share, 1.0 - share) / 0.25, 0.0, 1.0)
-    return 1.0 - 1e-9 - (1.0 - middle) * blend**2 * (3.0 - 2.0 * blend)
+    inside = 1.0 - 1e-9 - (1.0 - middle) * blend**2 * (3.0 - 2.0 * blend)
+    return np.where(blend > 0.0, inside, 1.0)
 
 
 def ignored_pairs(

@@ -1,0 +1,315 @@
+"""The pipeline: scenario, centre of mass, whole body, execution, report.
+
+Each stage reads the one before it and its result is written as soon as it is known, so that
+nothing already computed is lost.  A stage that finds nothing ends the run with an
+explanation; only misuse and broken input raise.
+"""
+
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manikin.balance import pseudo_wrench
+from manikin.body import BodyModel
+from manikin.centroidal import CentroidalResult, CentroidalTrajectory, plan_com
+from manikin.contact import ContactSchedule
+from manikin.motion import Motion
+from manikin.motion.file import MotionFile, write_motions
+from manikin.output import MOTION, RunDirectory
+from manikin.scenarios import Scenario, load_scenario
+from manikin.scene import Scene
+from manikin.simulation import Execution, Push, execute
+from manikin.spatial import rotation_from_yaw
+from manikin.wholebody import WholeBodyResult, WholeBodySettings, plan_whole_body
+from manikin.wholebody.configuration_spline import rotation_from_quaternion
+
+Progress = Callable[[str, float], None]
+"""Told the stage and the share of it that is done, in [0, 1]."""
+
+PUSHED_SEGMENT = "thorax"
+"""Segment on whose centre of mass the scenario's push acts."""
+
+
+@dataclass(frozen=True)
+class ExecutionRequirements:
+    """What an executed motion must keep to count as a success.
+
+    Attributes:
+        com_rms_error: Root mean square distance of the CoM from its plan [m].
+        foot_error: Largest distance of an effector from its plan [m].
+        margin: Least margin, exclusive [N.m].
+        penetration: Deepest penetration [m].
+    """
+
+    com_rms_error: float = 0.015
+    foot_error: float = 0.02
+    margin: float = 0.0
+    penetration: float = 0.005
+
+    def violation(self, execution: Execution) -> str | None:
+        """Explain the first requirement that is not kept, or None."""
+        if execution.min_margin <= self.margin:
+            return f"executed margin falls to {execution.min_margin:.2f} N.m; allowed > {self.margin:g}"
+        for value, limit, what in (
+            (execution.com_rms_error_m, self.com_rms_error, "RMS error of the centre of mass"),
+            (execution.max_foot_error_m, self.foot_error, "effector error"),
+            (execution.max_penetration_m, self.penetration, "penetration"),
+        ):
+            if value > limit:
+                return f"{what} is {value:.4f} m; allowed {limit:g} m"
+        return None
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a run ended without success.
+
+    Attributes:
+        stage: ``"centroidal"``, ``"wholebody"`` or ``"execution"``.
+        reason: In one line.
+        time_s: When in the motion [s].
+        where: Phase, contact, limb or pair.
+    """
+
+    stage: str
+    reason: str
+    time_s: float
+    where: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the ``failure`` block of the summary."""
+        return {"stage": self.stage, "reason": self.reason, "time_s": self.time_s, "where": self.where}
+
+
+@dataclass(frozen=True, eq=False)
+class RunResult:
+    """Outcome of one run.
+
+    Attributes:
+        summary: As printed by ``manikin run --json``.
+        planned: Planned whole-body motion, or None when that stage did not run.
+        executed: Executed motion, or None.
+        centroidal: Result of the centre-of-mass stage.
+        wholebody: Result of the whole-body stage, or None.
+        execution: Result of the execution, or None.
+        directory: Where the files are, or None.
+    """
+
+    summary: dict[str, Any]
+    planned: Motion | None
+    executed: Motion | None
+    centroidal: CentroidalResult
+    wholebody: WholeBodyResult | None
+    execution: Execution | None
+    directory: Path | None
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether every stage met its requirements."""
+        return bool(self.summary["succeeded"])
+
+    @property
+    def motion(self) -> Motion | None:
+        """The executed motion, or else the planned one."""
+        return self.executed if self.executed is not None else self.planned
+
+
+def run(
+    scenario: str | Path | Scenario,
+    *,
+    out: str | Path | None = None,
+    seed: int | None = None,
+    settings: WholeBodySettings | None = None,
+    requirements: ExecutionRequirements | None = None,
+    progress: Progress | None = None,
+) -> RunResult:
+    """Plan a scenario, execute it in the physics engine and report.
+
+    Args:
+        scenario: Name of a built-in scenario, a scenario file, or a scenario.
+        out: Run directory; nothing is written when omitted.
+        seed: Seed of every random choice; the scenario's own when omitted.
+        settings: Options of the whole-body stage.
+        requirements: What the execution must keep.
+        progress: Called with the stage and the share of it that is done.
+
+    Returns:
+        The result; an infeasible task is a result with ``succeeded`` False.
+
+    Raises:
+        InputError: If the scenario, or a file it names, is not usable.
+    """
+    job = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
+    if seed is not None:
+        job = job.with_seed(seed)
+    return _Run(job, out, settings, requirements or ExecutionRequirements(), progress).run()
+
+
+class _Run:
+    """One job, with what its stages share."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        out: str | Path | None,
+        settings: WholeBodySettings | None,
+        requirements: ExecutionRequirements,
+        progress: Progress | None,
+    ) -> None:
+        self._began = clock.perf_counter()
+        self._scenario, self._settings, self._requirements = scenario, settings, requirements
+        self._progress = progress or _silent
+        self._body: BodyModel = scenario.build_body()
+        self._scene: Scene = scenario.build_scene()
+        scenario.check_contacts(self._scene)
+        self._problem = scenario.build_centroidal_problem()
+        self._directory = None if out is None else RunDirectory(out)
+        if self._directory is not None:
+            self._directory.write_scenario(scenario.to_yaml())
+        self._summary: dict[str, Any] = {
+            "scenario": scenario.name, "succeeded": False, "failure": None,
+            "centroidal": None, "wholebody": None, "execution": None, "wall_s": 0.0,
+        }  # fmt: skip
+
+    def run(self) -> RunResult:
+        centroidal, trajectory = self._plan_com()
+        wholebody = None if trajectory is None else self._plan_whole_body(trajectory)
+        execution = None
+        if trajectory is not None and wholebody is not None and wholebody.succeeded:
+            execution = self._execute(trajectory, wholebody)
+        self._summary["succeeded"] = self._summary["failure"] is None
+        self._summary["wall_s"] = clock.perf_counter() - self._began
+        if self._directory is not None:
+            self._directory.write_summary(self._summary)
+        return RunResult(
+            summary=self._summary,
+            planned=None if wholebody is None else wholebody.motion,
+            executed=None if execution is None else execution.motion,
+            centroidal=centroidal,
+            wholebody=wholebody,
+            execution=execution,
+            directory=None if self._directory is None else self._directory.path,
+        )
+
+    def _plan_com(self) -> tuple[CentroidalResult, CentroidalTrajectory | None]:
+        self._progress("centroidal", 0.0)
+        result = plan_com(self._problem)
+        self._finish("centroidal", centroidal_summary(result))
+        if result.failure is not None:
+            failure = result.failure
+            self._fail(
+                "centroidal", failure.reason, failure.time or 0.0, _place(failure.phase, failure.where)
+            )
+        if self._directory is not None and result.trajectory is not None:
+            self._directory.write_stage("com_trajectory", result.trajectory.to_dict())
+        self._progress("centroidal", 1.0)
+        if result.trajectory is None:
+            return result, None
+        real = ContactSchedule(self._scenario.build_sequence(), result.trajectory.schedule.instants)
+        return result, replace(result.trajectory, schedule=real)
+
+    def _plan_whole_body(self, trajectory: CentroidalTrajectory) -> WholeBodyResult:
+        result = plan_whole_body(
+            self._body, self._scene, trajectory, rng=np.random.default_rng(self._scenario.seed),
+            settings=self._settings, progress=lambda share: self._progress("wholebody", share),
+        )  # fmt: skip
+        self._finish("wholebody", wholebody_summary(result))
+        if result.failure is not None:
+            self._fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
+        self._keep_motions(trajectory, result.motion, None)
+        return result
+
+    def _execute(self, trajectory: CentroidalTrajectory, planned: WholeBodyResult) -> Execution:
+        result = execute(
+            self._body, self._scene, planned.motion, trajectory.schedule, pushes=self._pushes(planned.motion),
+            progress=lambda share: self._progress("execution", share),
+        )  # fmt: skip
+        self._finish("execution", result.summary())
+        reason = result.failure or self._requirements.violation(result)
+        if reason:
+            worst = float(result.motion.time[int(np.argmin(result.motion.margin))])
+            time = worst if result.failure_time_s is None else result.failure_time_s
+            phase = int(trajectory.schedule.phase_at(time))
+            held = ", ".join(trajectory.schedule.sequence[phase].stance.effectors)
+            self._fail("execution", reason, time, _place(phase, held))
+        self._keep_motions(trajectory, planned.motion, result.motion)
+        return result
+
+    def _pushes(self, motion: Motion) -> tuple[Push, ...]:
+        push = self._scenario.push
+        if push is None:
+            return ()
+        sample = min(int(np.searchsorted(motion.time, push.at_s)), len(motion.time) - 1)
+        forward = rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]
+        heading = float(np.arctan2(forward[1], forward[0]))
+        direction = rotation_from_yaw(heading + np.deg2rad(push.direction_deg))[:, 0]
+        return (Push(PUSHED_SEGMENT, push.force_N * direction, push.at_s, push.duration_s),)
+
+    def _finish(self, stage: str, block: dict[str, Any]) -> None:
+        self._summary[stage] = block
+        if self._directory is not None:
+            self._directory.write_stage(stage, block)
+
+    def _fail(self, stage: str, reason: str, time: float, where: str) -> None:
+        self._summary["failure"] = Failure(stage, reason, float(time), where).as_dict()
+
+    def _keep_motions(
+        self, trajectory: CentroidalTrajectory, planned: Motion, executed: Motion | None
+    ) -> None:
+        if self._directory is not None:
+            content = MotionFile(planned, executed, self._body, self._scene, trajectory.schedule)
+            write_motions(self._directory.path / MOTION, content)
+
+
+def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
+    """Return the ``centroidal`` block of the summary."""
+    trajectory = result.trajectory
+    return {
+        "duration_s": None if trajectory is None else trajectory.duration,
+        "phase_durations_s": None if trajectory is None else trajectory.schedule.durations.tolist(),
+        "min_margin": result.d_min,
+        "margin_unit": result.problem.margin_unit,
+        "limiting_phase": result.limiting_phase,
+        "limiting_contact": limiting_contact(result),
+        "feasibility_radius": result.feasibility_radius,
+        "wall_s": result.wall_time,
+    }
+
+
+def limiting_contact(result: CentroidalResult) -> str | None:
+    """Contact and limit behind the smallest margin, such as ``"left_foot: tipping over ..."``."""
+    certificate, trajectory = result.certificate, result.trajectory
+    if certificate is None or trajectory is None:
+        return None
+    time = certificate.limiting_time
+    wrench = pseudo_wrench(result.problem.mass, trajectory.position(time), trajectory.acceleration(time))
+    return result.polytopes[certificate.limiting_phase].limiting(wrench).description
+
+
+def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
+    """Return the ``wholebody`` block of the summary."""
+    certificate = result.certificate
+    return {
+        "max_support_error_m": certificate.max_support_error_m,
+        "max_com_error_m": certificate.max_com_error_m,
+        "min_clearance_m": certificate.min_clearance_m,
+        "closest_pair": list(certificate.closest_pair),
+        "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
+        "max_velocity_share": certificate.max_velocity_share,
+        "max_torque_share": certificate.max_torque_share,
+        "min_margin": float(result.motion.margin.min()),
+        "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],
+        "wall_s": result.wall_time,
+    }
+
+
+def _place(phase: int | None, where: str) -> str:
+    return where if phase is None else f"phase {phase}" + (f" on {where}" if where else "")
+
+
+def _silent(stage: str, share: float) -> None:
+    """Report progress to nobody."""
