@@ -47,6 +47,9 @@ NEAR = 2e-3
 MAX_TRUST = 0.8
 """Largest trust region [m, rad]."""
 
+COMPARED = 2
+"""Cold starts that must succeed; the better posture is taken, for there are poor local minima."""
+
 PATIENCE = 6
 """Iterations in a row that gain less than half a percent after which a start is given up."""
 
@@ -124,8 +127,8 @@ def generate_posture(
         settings: How hard to try.
 
     Returns:
-        The posture of the first start that meets all requirements, otherwise the best attempt
-        with an explanation.
+        A posture that meets all requirements (without ``start`` the better of the first two
+        found, by its preferences), otherwise the best attempt with an explanation.
 
     Raises:
         BodyError: If ``start`` has another length or is not finite.
@@ -139,9 +142,10 @@ def generate_posture(
         # obstacles would trap it on their wrong side.
         through = q if warm or problem.proximity is None else freely.solve(q).q
         found.append(solver.solve(through))
-        if solver.meets(found[-1]):
+        met = sum(solver.meets(item) for item in found)
+        if met == COMPARED or (met and warm):
             break
-    best = min(found, key=lambda item: (not solver.meets(item), item.violation))
+    best = min(found, key=solver.rank)
     return solver.result(best, solver.iterations + freely.iterations)
 
 
@@ -209,7 +213,7 @@ class PostureSolver:
     def solve(self, q: FloatArray) -> _Iterate:
         """Iterate from one start until the posture settles or nothing improves any more."""
         settings = self.settings
-        iterate = self.linearise(self._inside_limits(q))
+        iterate = self.linearise(q)
         trust, idle = settings.trust, 0
         for _ in range(settings.iterations):
             self.iterations += 1
@@ -265,8 +269,14 @@ class PostureSolver:
             and iterate.intrusion <= self.settings.clearance_tolerance
         )
 
+    def rank(self, iterate: _Iterate) -> tuple[bool, float]:
+        """Order of preference: what meets the requirements, then the better wishes or smaller violation."""
+        met = self.meets(iterate)
+        return not met, self._merit(iterate) if met else iterate.violation
+
     def linearise(self, q: FloatArray) -> _Iterate:
-        """Evaluate every term."""
+        """Evaluate every term, with hinges put back that rounding took out of their ranges."""
+        q = self._inside_limits(q)
         configuration = self._configuration.update(q)
         nv = self.problem.body.nv
         requirements = [term.evaluate(configuration) for term in self.requirements]
