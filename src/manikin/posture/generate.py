@@ -135,18 +135,20 @@ def generate_posture(
     """
     settings = settings or SolverSettings()
     solver = PostureSolver(problem, settings)
-    freely = PostureSolver(replace(problem, proximity=None), settings)
+    freely: PostureSolver | None = None
     found: list[_Iterate] = []
     for q, warm in _starts(problem, start, settings):
         # A cold start goes to its contacts through the obstacles first: from outside, thin
         # obstacles would trap it on their wrong side.
-        through = q if warm or problem.proximity is None else freely.solve(q).q
-        found.append(solver.solve(through))
+        if not warm and problem.proximity is not None:
+            freely = freely or PostureSolver(replace(problem, proximity=None), settings)
+            q = freely.solve(q).q
+        found.append(solver.solve(q))
         met = sum(solver.meets(item) for item in found)
         if met == COMPARED or (met and warm):
             break
     best = min(found, key=solver.rank)
-    return solver.result(best, solver.iterations + freely.iterations)
+    return solver.result(best, solver.iterations + (freely.iterations if freely else 0))
 
 
 class _Move(NamedTuple):

@@ -14,7 +14,7 @@ import pinocchio as pin
 from manikin.body.configuration import Configuration
 from manikin.body.model import BodyModel
 from manikin.scene.distance import Ignored, Pair, Proximity
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, skew
 
 UP: FloatArray = np.array([0.0, 0.0, 1.0])
 UP.setflags(write=False)
@@ -139,7 +139,7 @@ class UprightTerm:
         axis, up = rotation @ self.axis, self.direction
         # d(z x u) = (w x z) x u = z (w.u) - w (z.u)
         turning = np.outer(axis, up) - (axis @ up) * np.eye(3)
-        return Linearised(np.cross(axis, up), turning @ configuration.segment_jacobian(self.segment)[3:])
+        return Linearised(skew(axis) @ up, turning @ configuration.segment_jacobian(self.segment)[3:])
 
     def describe(self, residual: FloatArray) -> str:
         """See :class:`Term`."""
