@@ -1,14 +1,18 @@
 """The set of admissible wrenches as a linear program over contact forces, independent of the polytopes.
 
 Unknowns are the forces at the contact points (and the wrench of a sole with a torsion
-limit, of a grasp); nothing here knows pyramid edges, hulls or facets.
+limit, of a grasp); nothing here knows pyramid edges, hulls or facets. Forces are counted
+in kilonewtons inside, which the solver's absolute tolerances (1e-7) want.
 """
 
 import numpy as np
+import pytest
 from scipy.optimize import linprog
 
-from manikin.contact import ContactKind
+from manikin.contact import ContactKind, Stance, grasp, point, sole
 from manikin.spatial import skew
+
+KILO = 1e3
 
 
 class ContactProgram:
@@ -98,11 +102,18 @@ class ContactProgram:
                 self.A.append((sign * row, at))
                 self.b.append(limit)
 
-    def _solve(self, cost, extra_columns=0, A_eq=None, b_eq=None):
+    def _solve(self, cost, extra_columns=0, A_eq=None, b_eq=None, bounds=(None, None)):
+        b_eq = None if b_eq is None else np.asarray(b_eq) / KILO
         rows = np.array(self.rows).reshape(-1, self.n)
         rows = np.hstack([rows, np.zeros((len(rows), extra_columns))])
         answer = linprog(
-            cost, A_ub=rows, b_ub=self.bounds, A_eq=A_eq, b_eq=b_eq, bounds=(None, None), method="highs"
+            cost,
+            A_ub=rows,
+            b_ub=np.array(self.bounds) / KILO,
+            A_eq=A_eq,
+            b_eq=b_eq,
+            bounds=bounds,
+            method="highs",
         )
         assert answer.status in (0, 2), answer.message
         return answer
@@ -110,14 +121,74 @@ class ContactProgram:
     def support(self, direction):
         """Largest ``direction @ w`` and a wrench that has it."""
         answer = self._solve(-(direction @ self.G))
-        return -answer.fun, self.G @ answer.x
+        return -answer.fun * KILO, KILO * self.G @ answer.x
 
-    def contains(self, wrench):
-        return self._solve(np.zeros(self.n), A_eq=self.G, b_eq=wrench).status == 0
+    def gap(self, wrench):
+        """Smallest sum of |components| of a wrench missing from ``wrench``; 0 when it is admissible."""
+        cost = np.concatenate([np.zeros(self.n), np.ones(12)])
+        A_eq = np.hstack([self.G, np.eye(6), -np.eye(6)])
+        lower = [None] * self.n + [0.0] * 12
+        return self._solve(cost, 12, A_eq, wrench, [(bound, None) for bound in lower]).fun * KILO
 
     def reach(self, start, direction):
-        """Largest t with ``start + t direction`` admissible; start must be."""
-        cost = np.zeros(self.n + 1)
-        cost[-1] = -1.0
-        answer = self._solve(cost, 1, np.hstack([self.G, -direction[:, None]]), start)
-        return -answer.fun if answer.status == 0 else -np.inf
+        """Largest t with ``start + t direction`` admissible; start must be, up to rounding."""
+        # The last twelve unknowns make rounding good, at a price.
+        cost = np.concatenate([np.zeros(self.n), [-1.0], np.full(12, 1e3)])
+        A_eq = np.hstack([self.G, -direction[:, None], np.eye(6), -np.eye(6)])
+        lower = [None] * (self.n + 1) + [0.0] * 12
+        answer = self._solve(cost, 13, A_eq, start, [(bound, None) for bound in lower])
+        return answer.x[self.n] * KILO
+
+
+def make_random_stance(rng, kinds=("sole", "point", "grasp"), most=3, own_caps=False, tilt=0.5):
+    """Make a stance with random poses, one of each four nearly level (1e-9 to 1e-4 off)."""
+    nearly = rng.choice([0.0, 1e-9, 1e-6, 1e-4]) if rng.random() < 0.25 else 1.0
+    contacts = []
+    for i in range(int(rng.integers(1, most + 1))):
+        position = rng.uniform(-0.5, 0.5, 3) * [1.0, 1.0, nearly]
+        limits = {
+            "friction": float(rng.choice([0.3, 0.7, rng.uniform(0.1, 1.2)])),
+            "normal": np.array([0.0, 0.0, 1.0]) + nearly * tilt * rng.normal(size=3),
+        }
+        if own_caps and rng.random() < 0.7:
+            limits["normal_force_cap"] = float(rng.choice([500.0, 800.0]))
+        kind = rng.choice(kinds)
+        if kind == "grasp":
+            contacts.append(
+                grasp(
+                    f"hand_{i}",
+                    position + np.array([0.0, 0.0, 1.0]),
+                    max_force=100.0,
+                    max_moment=float(rng.choice([0.0, 5.0])),
+                )
+            )
+        elif kind == "point":
+            contacts.append(point(f"point_{i}", position, **limits))
+        else:
+            yaw = float(rng.choice([0.0, np.pi / 2, rng.uniform(-3, 3)]))
+            torsion = 10.0 if kind == "torsion" else None
+            contacts.append(
+                sole(f"foot_{i}", position, yaw, length=0.28, width=0.12, torsion_limit=torsion, **limits)
+            )
+    return Stance(contacts, 1000.0)
+
+
+@pytest.fixture(scope="session")
+def contact_program():
+    return ContactProgram
+
+
+@pytest.fixture(scope="session")
+def random_stance():
+    return make_random_stance
+
+
+@pytest.fixture(scope="session")
+def two_soles():
+    return Stance(
+        [
+            sole("left_foot", (0.0, 0.1, 0.0), length=0.28, width=0.12, friction=0.7),
+            sole("right_foot", (0.0, -0.1, 0.0), length=0.28, width=0.12, friction=0.7),
+        ],
+        1500.0,
+    )
