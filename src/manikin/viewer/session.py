@@ -269,7 +269,7 @@ class ViewerSession:
 
     def _build_controls(self) -> None:
         gui = self.server.gui
-        gui.configure_theme(control_layout="collapsible", show_logo=False, show_share_button=False)
+        gui.configure_theme(show_logo=False, show_share_button=False)
         last = max(float(motion.time[-1]) for motion in self.content.motions.values())
         with gui.add_folder("Playback"):
             self._slider = gui.add_slider("time [s]", min=0.0, max=last, step=0.001, initial_value=self.time)

@@ -1,0 +1,47 @@
+"""Values that the tests of several rooms share."""
+
+import numpy as np
+import pytest
+
+from manikin.motion import Motion
+from manikin.motion.file import MotionFile
+
+FEET = ("left_foot", "right_foot")
+
+
+def carried(scenario, body, schedule, time, offset=0.0):
+    """A standing body carried along the straight line from start to goal: no motion, but complete data."""
+    share = np.clip(time / schedule.instants[-1], 0.0, 1.0)[:, None]
+    com = (
+        scenario.start_com
+        + share * (scenario.goal_com - scenario.start_com)
+        + offset * np.sin(9 * time)[:, None]
+    )
+    n = len(time)
+    q = np.tile(body.standing_posture(), (n, 1))
+    q[:, :3] += com - [0.0, 0.0, 0.92]
+    q[:, 3:7] = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
+    support = schedule.support(time, FEET)
+    force = np.zeros((n, 2, 6))
+    force[:, :, 2] = support * (body.mass * 9.81 / support.sum(axis=1))[:, None]
+    zero = np.zeros((n, body.nv))
+    return Motion(
+        time=time, q=q, v=zero, a=zero, tau=zero, com=com, angular_momentum=np.zeros((n, 3)),
+        margin=30.0 + 10.0 * np.cos(5.0 * time) + 1000.0 * offset, support=support, contact_force=force,
+        contact_names=FEET, joint_names=body.joint_names,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def finished_run():
+    """Content of a motion file of the platform scenario, with made-up motions."""
+    from manikin.contact import ContactSchedule
+    from manikin.scenarios import load_scenario
+
+    scenario = load_scenario("platform")
+    body, scene = scenario.build_body(), scenario.build_scene()
+    instants = [0.0, 0.321, 0.721, 0.93, 1.73, 2.837, 3.637, 4.193]  # [Qiu2012]_ Table 5.4
+    schedule = ContactSchedule(scenario.build_sequence(), instants)
+    planned = carried(scenario, body, schedule, np.linspace(0.0, 4.193, 420))
+    executed = carried(scenario, body, schedule, np.arange(0.0, 5.193, 0.005), offset=0.003)
+    return MotionFile(planned, executed, body, scene, schedule)

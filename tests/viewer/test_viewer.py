@@ -1,0 +1,143 @@
+"""The viewer: served on this computer only, scrubbed, switched and closed."""
+
+import builtins
+import http.client
+import socket
+import sys
+import threading
+import urllib.request
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from manikin.body import Configuration
+from manikin.errors import InputError
+from manikin.viewer import serve
+
+pytest.importorskip("viser")
+
+
+@pytest.fixture
+def session(finished_run):
+    from manikin.viewer.session import ViewerSession
+
+    viewer = ViewerSession(finished_run, port=0)
+    yield viewer
+    viewer.close()
+
+
+def test_page_is_served_on_the_loopback_only(session):
+    page = urllib.request.urlopen(session.url, timeout=10).read()
+    assert b"<html" in page.lower()
+    assert session.url.startswith("http://127.0.0.1:")
+    port = session.server.get_port()
+    others = {address[4][0] for address in socket.getaddrinfo(socket.gethostname(), port, socket.AF_INET)}
+    for address in others - {"127.0.0.1", "127.0.1.1"}:
+        with pytest.raises(OSError):
+            socket.create_connection((address, port), timeout=1.0).close()
+
+
+def test_scrubbing_places_the_body_as_the_kinematics_do(session, finished_run):
+    session.show(1.234)
+    motion = finished_run.executed
+    index = int(np.searchsorted(motion.time, 1.234))
+    body = Configuration(finished_run.body, motion.q[index])
+    for name, frame in session._frames.items():
+        rotation, position = body.segment_placement(name)
+        np.testing.assert_allclose(frame.position, position, atol=1e-12)
+        w, x, y, z = frame.wxyz
+        turned = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
+        np.testing.assert_allclose(turned, rotation[:, 0], atol=1e-12)
+    np.testing.assert_allclose(session._com.position, motion.com[index])
+    assert session._slider.value == pytest.approx(1.234)
+    session.show(-5.0)
+    assert session.time == 0.0
+    session.show(1e9)
+    assert session.time == motion.time[-1]
+
+
+def test_forces_are_drawn_at_the_contacts_that_carry_load(session, finished_run):
+    session.show(0.5)  # phase 2: right foot only
+    assert not session._arrows["left_foot"].visible
+    arrow = session._arrows["right_foot"]
+    assert arrow.visible
+    start, end = np.asarray(arrow.points)[0]
+    np.testing.assert_allclose(end - start, [0, 0, finished_run.body.mass * 9.81e-3], rtol=1e-6)
+    session._forces.value = False
+    session.show(0.5)
+    assert not arrow.visible
+
+
+def test_playing_runs_at_the_chosen_speed_and_stops_at_the_end(session):
+    session.advance(1.0)
+    assert session.time == 0.0
+    session.play()
+    session.speed = 0.5
+    session.advance(1.0)
+    assert session.time == pytest.approx(0.5)
+    session.advance(100.0)
+    assert session.time == session.motion.time[-1]
+    assert not session.playing
+    session.play()
+    assert session.time == 0.0
+    session.pause()
+    assert not session.playing
+
+
+def test_motions_can_be_switched(session):
+    session.show(1.0)
+    session.choose("planned")
+    assert session.motion is session.content.planned
+    assert session.time == 1.0
+    with pytest.raises(InputError, match="valid here: planned, executed"):
+        session.choose("recorded")
+
+
+def test_cursor_of_the_plot_stands_at_the_instant_shown(session):
+    session.show(2.0)
+    time, *_, cursor = session._plot.data
+    assert time[np.argmax(cursor)] == pytest.approx(2.0, abs=np.diff(time)[0])
+
+
+def test_closing_twice_is_fine_and_ends_the_service(finished_run):
+    from manikin.viewer.session import ViewerSession
+
+    viewer = ViewerSession(finished_run, port=0)
+    url = viewer.url
+    runner = threading.Thread(target=viewer.run)
+    runner.start()
+    viewer.play()
+    viewer.close()
+    viewer.close()
+    runner.join(timeout=10)
+    assert not runner.is_alive()
+    with pytest.raises((OSError, http.client.HTTPException)):
+        urllib.request.urlopen(url, timeout=2)
+
+
+def test_taken_and_impossible_ports_are_refused_in_one_line(session, finished_run):
+    from manikin.viewer.session import ViewerSession
+
+    for port in (session.server.get_port(), 70000, -1):
+        with pytest.raises(InputError, match="valid: a free port"):
+            ViewerSession(finished_run, port=port)
+
+
+def test_file_without_body_is_refused(finished_run):
+    with pytest.raises(InputError, match="no body"):
+        serve(replace(finished_run, body=None), port=0)
+
+
+def test_missing_extra_says_how_to_install(finished_run, monkeypatch):
+    real = builtins.__import__
+
+    def without_viser(name, *arguments, **keywords):
+        if name == "viser" or name.startswith("viser."):
+            raise ModuleNotFoundError("No module named 'viser'", name="viser")
+        return real(name, *arguments, **keywords)
+
+    monkeypatch.delitem(sys.modules, "manikin.viewer.session", raising=False)
+    monkeypatch.setattr(builtins, "__import__", without_viser)
+    with pytest.raises(InputError, match=r"pip install 'manikin\[viewer\]'"):
+        serve(finished_run)
