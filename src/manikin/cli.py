@@ -11,7 +11,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -45,6 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with _terminated_like_interrupted():
             status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
+        if status == INTERRUPTED:  # typer turns Ctrl-C into this status without a word
+            raise KeyboardInterrupt
         return status if isinstance(status, int) else DONE
     except typer.TyperException as error:
         return _complain(f"{error.format_message().rstrip('.')}; see 'manikin --help'", BAD_INPUT)
@@ -251,14 +253,14 @@ def _terminated_like_interrupted() -> Iterator[None]:
 
 @contextmanager
 def _stdout_kept_clean() -> Iterator[None]:
-    """Send what native libraries print on standard output to standard error meanwhile."""
+    """Send what libraries, native ones too, print on standard output to standard error meanwhile."""
     sys.stdout.flush()
     saved = os.dup(1)
     os.dup2(2, 1)
     try:
-        yield
+        with redirect_stdout(sys.stderr):
+            yield
     finally:
-        sys.stdout.flush()
         ctypes.CDLL(None).fflush(None)  # C's own buffer, which a solver's banner may wait in
         os.dup2(saved, 1)
         os.close(saved)

@@ -1,0 +1,317 @@
+"""The command line: exit status, one line for every mistake, nothing but JSON on standard output."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import types
+
+import pytest
+import yaml
+
+import manikin
+from manikin.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
+from manikin.motion.file import write_motions
+
+SUMMARY = {
+    "scenario": "platform", "succeeded": True, "failure": None,
+    "centroidal": {"duration_s": 4.7, "phase_durations_s": [0.3, 0.4], "min_margin": 33.0},
+    "wholebody": None,
+    "execution": {"fell": False, "peak_torque_Nm": {"left_knee": 120.0, "right_knee": -150.0}},
+    "wall_s": 1.0,
+}  # fmt: skip
+
+STANCE = {
+    "mass_kg": 79,
+    "com": [0, 0, 0.92],
+    "contacts": [
+        {"effector": "left_foot", "position": [0, 0.1, 0]},
+        {"effector": "right_foot", "position": [0, -0.1, 0], "friction": 0.5},
+    ],
+}
+
+
+@pytest.fixture
+def pipeline(monkeypatch, finished_run):
+    """A stand-in that prints, reports progress, writes the motion and remembers how it was called."""
+    calls = []
+
+    def run(scenario, *, out=None, seed=0, progress=None):
+        calls.append((scenario, out, seed))
+        os.write(1, b"a native library's banner\n")
+        print("a chatty library")
+        progress("centroidal", 0.5)
+        progress("centroidal", 1.0)
+        if stand_in.error is not None:
+            raise stand_in.error
+        if out is not None:
+            from manikin.output import RunDirectory
+
+            directory = RunDirectory(out)
+            directory.write_scenario(scenario.to_yaml())
+            write_motions(directory.path / "motion.h5", finished_run)
+            directory.write_summary(stand_in.summary)
+        return types.SimpleNamespace(
+            summary=stand_in.summary,
+            planned=finished_run.planned,
+            executed=finished_run.executed,
+            directory=out,
+        )
+
+    stand_in = types.SimpleNamespace(run=run, calls=calls, summary=SUMMARY, error=None)
+    monkeypatch.setitem(sys.modules, "manikin.pipeline", stand_in)
+    monkeypatch.setattr(manikin, "pipeline", stand_in, raising=False)
+    return stand_in
+
+
+def assert_refused(capfd, arguments, *says):
+    assert main([str(argument) for argument in arguments]) == BAD_INPUT
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.startswith("manikin: ")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    for text in says:
+        assert text in err
+
+
+def test_version_and_help(capfd):
+    assert main(["--version"]) == DONE
+    assert capfd.readouterr().out == f"manikin {manikin.__version__}\n"
+    for arguments in ([], ["--help"], ["run", "--help"]):
+        assert main(arguments) == DONE
+        assert "Usage" in capfd.readouterr().out
+
+
+def test_scenarios_are_listed_with_one_line_each(capfd):
+    assert main(["scenarios"]) == DONE
+    lines = capfd.readouterr().out.splitlines()
+    assert any(line.startswith("platform ") for line in lines)
+    assert main(["scenarios", "--json"]) == DONE
+    assert "platform" in json.loads(capfd.readouterr().out)["scenarios"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["rum"], "No such command 'rum'"),
+        (["run"], "Missing argument"),
+        (["run", "platform", "--sed", "1"], "No such option"),
+        (["run", "platform", "--seed", "one"], "--seed"),
+        (["run", "platform", "--seed", "-1"], "seed is -1"),
+        (["run", "platform", "--stature", "tall"], "--stature"),
+        (["run", "platform", "--stature", "nan"], "body.stature_m is nan"),
+        (["run", "platform", "--mass", "-79"], "body.mass_kg is -79"),
+        (["run", "platform", "--sex", "other"], "'male' or 'female'"),
+        (["run", "plattform"], "did you mean 'platform'"),
+        (["run", "none.yaml"], "no such file"),
+        (["run", "."], "is a directory"),
+        (["run", ""], "is empty"),
+        (["view", "none"], "no such file"),
+        (["view", "none", "--port", "99999"], "--port"),
+        (["export", "none", "--format", "bvh"], "no such file"),
+        (["export", ".", "--format", "gltf"], "valid: bvh, csv"),
+        (["export", ".", "--format", "mp4"], "valid: bvh, csv"),
+        (["export", "."], "--format"),
+        (["balance", "none.yaml"], "no such file"),
+        (["balance", "."], "is a directory"),
+        (["push", "--force", "200"], "No such command"),
+    ],
+)
+def test_mistakes_give_one_line_and_status_2(capfd, tmp_path, monkeypatch, arguments, says):
+    monkeypatch.chdir(tmp_path)
+    assert_refused(capfd, arguments, says)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bad_scenario_file_names_file_line_and_key(capfd, tmp_path):
+    (tmp_path / "bad.yaml").write_text("name: x\nbody: {mass_kg: -1}\ntask: {start: {com: [0, 0, 1]}}\n")
+    assert_refused(capfd, ["run", tmp_path / "bad.yaml", "--json"], "bad.yaml:2: body.mass_kg is -1")
+
+
+@pytest.mark.usefixtures("pipeline")
+def test_run_prints_exactly_one_json_object(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "platform", "--json"]) == DONE
+    out, err = capfd.readouterr()
+    assert json.loads(out) == SUMMARY
+    assert "banner" in err
+    assert "chatty" in err
+    assert "centroidal" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("pipeline")
+def test_run_leaves_a_whole_directory(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "platform", "--out", "result", "--json"]) == DONE
+    assert json.loads(capfd.readouterr().out) == SUMMARY
+    folder = tmp_path / "result"
+    files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert files == {
+        "scenario.yaml", "motion.h5", "motion.bvh", "summary.json", "figures/com.png", "figures/margin.png",
+        "figures/footprints.png", "figures/scene.png", "figures/tracking.png",
+    }  # fmt: skip
+
+
+@pytest.mark.usefixtures("pipeline")
+def test_run_for_people_writes_to_runs_and_prints_a_table(capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "platform", "--no-figures"]) == DONE
+    out, err = capfd.readouterr()
+    assert "centroidal.min_margin" in out
+    assert "largest -150 (right_knee)" in out
+    assert "manikin view" in err
+    assert (tmp_path / "runs" / "platform" / "summary.json").exists()
+    assert not (tmp_path / "runs" / "platform" / "figures").exists()
+
+
+def test_options_reach_the_pipeline_and_the_resolved_scenario(pipeline, tmp_path):
+    options = ["--stature", "1.6", "--mass", "58", "--sex", "female", "--seed", "7"]
+    assert main(["run", "platform", *options, "--out", str(tmp_path / "r"), "--no-figures", "--json"]) == DONE
+    scenario, _, seed = pipeline.calls[0]
+    assert seed == 7
+    resolved = yaml.safe_load((tmp_path / "r" / "scenario.yaml").read_text())
+    assert resolved["body"] == {"model": "human", "stature_m": 1.6, "mass_kg": 58.0, "sex": "female"}
+    assert resolved["seed"] == 7
+    assert scenario.stature_scale == pytest.approx(1.6 / 1.75)
+
+
+def test_explained_failure_is_status_3(capfd, pipeline):
+    failure = {"stage": "centroidal", "reason": "no margin in phase 4", "time_s": 1.2, "where": "left_foot"}
+    pipeline.summary = {**SUMMARY, "succeeded": False, "failure": failure}
+    assert main(["run", "platform", "--json"]) == FAILED
+    assert json.loads(capfd.readouterr().out)["failure"] == failure
+
+
+def test_interruption_is_one_line_and_status_130(capfd, pipeline):
+    pipeline.error = KeyboardInterrupt()
+    assert main(["run", "platform", "--json"]) == INTERRUPTED
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.endswith("manikin: interrupted; the files of finished stages are kept\n")
+
+
+def test_terminated_process_ends_like_an_interrupted_one():
+    """SIGTERM unwinds the program, so that temporary files are removed."""
+    code = (
+        "import sys, time\nimport manikin.cli as cli\n"
+        "def wait(*a):\n print('ready', flush=True)\n time.sleep(60)\n"
+        "cli.app = lambda **k: wait()\nsys.exit(cli.main([]))"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=30) == INTERRUPTED
+        assert process.stderr.read().count("\n") == 1
+
+
+def test_export_writes_beside_the_run(capfd, finished_run, tmp_path):
+    write_motions(tmp_path / "motion.h5", finished_run)
+    assert main(["export", str(tmp_path), "--format", "csv", "--motion", "planned"]) == DONE
+    assert capfd.readouterr().out.strip() == str(tmp_path / "motion.csv")
+    assert len((tmp_path / "motion.csv").read_text().splitlines()) == 421
+    assert main(["export", str(tmp_path / "motion.h5"), "--format", "bvh", "--rate", "50"]) == DONE
+    assert "Frame Time: 0.02\n" in (tmp_path / "motion.bvh").read_text()
+    assert main(["export", str(tmp_path), "--format", "csv", "--motion", "recorded"]) == BAD_INPUT
+    assert main(["export", str(tmp_path), "--format", "csv", "--rate", "-3"]) == BAD_INPUT
+
+
+def test_balance_agrees_with_the_library(capfd, tmp_path):
+    from manikin.balance import pseudo_wrench, wrench_polytope
+    from manikin.contact import Stance, sole
+
+    (tmp_path / "stance.yaml").write_text(yaml.safe_dump(STANCE))
+    assert main(["balance", str(tmp_path / "stance.yaml"), "--json", "--polytope"]) == DONE
+    report = json.loads(capfd.readouterr().out)
+    stance = Stance(
+        [
+            sole("left_foot", (0, 0.1, 0), length=0.28, width=0.12, friction=0.7),
+            sole("right_foot", (0, -0.1, 0), length=0.28, width=0.12, friction=0.5),
+        ],
+        3 * 79 * 9.81,
+    )
+    W = wrench_polytope(stance)
+    wrench = pseudo_wrench(79.0, (0, 0, 0.92), (0, 0, 0))
+    assert report["margin_Nm"] == pytest.approx(float(W.margin(wrench)), rel=1e-12)
+    assert report["balanced"]
+    assert len(report["H"]) == len(report["h"]) == len(W)
+    assert main(["balance", str(tmp_path / "stance.yaml")]) == DONE
+    assert "limiting.description" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"mass_kg": -79}, "mass_kg is -79"),
+        ({"mass_kg": None}, "mass_kg is empty"),
+        ({"com": [0, 0, float("nan")]}, "com[2] is nan"),
+        ({"contacts": []}, "contacts is []"),
+        ({"contacts": [{"position": [0, 0, 0]}]}, "contacts[0].effector is missing"),
+        ({"contacts": [{"effector": "left_foot", "position": [0, 0, 0], "friction": 0}]}, "friction is 0"),
+        ({"contacts": [STANCE["contacts"][0]] * 2}, "contacts[1].effector is 'left_foot' again"),
+        ({"contacts": [{"effector": "left_hand", "position": [0, 0, 1]}]}, "max_force_N is missing"),
+        ({"contacts": [{"effector": "left_foot", "position": [0, 0]}]}, "contacts[0].position is [0, 0]"),
+        ({"acceleration": "up"}, "acceleration is 'up'"),
+        ({"friction_model": "cone"}, "friction_model is 'cone'"),
+        ({"masss_kg": 3}, "did you mean 'mass_kg'"),
+    ],
+)  # fmt: skip
+def test_bad_stance_files_give_one_line(capfd, tmp_path, change, says):
+    (tmp_path / "stance.yaml").write_text(yaml.safe_dump({**STANCE, **change}))
+    assert_refused(capfd, ["balance", tmp_path / "stance.yaml", "--json"], "stance.yaml:", says)
+
+
+def test_degenerate_stances_have_a_report(capfd, tmp_path):
+    """A single point cannot balance a person beside it; a single point below is balanced on an edge."""
+    contact = {"effector": "left_foot", "kind": "point", "position": [0.3, 0, 0]}
+    (tmp_path / "stance.yaml").write_text(yaml.safe_dump({**STANCE, "contacts": [contact]}))
+    assert main(["balance", str(tmp_path / "stance.yaml"), "--json"]) == DONE
+    report = json.loads(capfd.readouterr().out)
+    assert not report["balanced"]
+    assert report["margin_Nm"] < 0
+
+
+def test_help_does_not_load_the_engines():
+    code = (
+        "import sys\nfrom manikin.cli import main\nmain(['--help'])\n"
+        "heavy = {'pinocchio', 'mujoco', 'casadi', 'numpy', 'matplotlib', 'pydantic', 'h5py', 'viser'}\n"
+        "sys.exit(','.join(sorted(heavy & set(sys.modules))) or 0)"
+    )
+    finished = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert finished.returncode == 0, finished.stderr
+
+
+def test_wrong_input_is_refused_before_the_engines_load():
+    code = (
+        "import sys\nfrom manikin.cli import main\nstatus = main(['run', 'platform', '--mass', '-1'])\n"
+        "heavy = {'pinocchio', 'mujoco', 'casadi', 'matplotlib', 'h5py', 'viser'} & set(sys.modules)\n"
+        "sys.exit(','.join(sorted(heavy)) or status)"
+    )
+    finished = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert finished.returncode == BAD_INPUT, finished.stderr
+
+
+def test_viewer_command_serves_and_ends_with_ctrl_c(finished_run, tmp_path):
+    pytest.importorskip("viser")
+    write_motions(tmp_path / "motion.h5", finished_run)
+    command = [sys.executable, "-m", "manikin.cli", "view", str(tmp_path), "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        line = process.stderr.readline()
+        assert "http://127.0.0.1:" in line
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=30) == DONE
+        assert process.stdout.read() == ""
+        assert "Traceback" not in process.stderr.read()
+
+
+def test_closed_pipe_is_no_traceback():
+    command = f"{sys.executable} -m manikin.cli scenarios --json | true"
+    finished = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert "Traceback" not in finished.stderr
+    assert "Exception" not in finished.stderr
