@@ -216,8 +216,10 @@ def _shown(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, dict):
-        top = max(value.items(), key=lambda item: abs(item[1]), default=None)
-        return "-" if top is None else f"largest {top[1]:.4g} ({top[0]})"
+        if value and all(isinstance(item, (int, float)) for item in value.values()):
+            name, top = max(value.items(), key=lambda item: abs(item[1]))
+            return f"largest {top:.4g} ({name})"
+        return " ".join(_shown(item) for item in value.values()) or "-"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(_shown(item) for item in value) + "]"
     return "-" if value is None else str(value)

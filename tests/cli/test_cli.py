@@ -18,7 +18,7 @@ from manikin.motion.file import write_motions
 SUMMARY = {
     "scenario": "platform", "succeeded": True, "failure": None,
     "centroidal": {"duration_s": 4.7, "phase_durations_s": [0.3, 0.4], "min_margin": 33.0},
-    "wholebody": None,
+    "wholebody": {"swings": [{"effector": "left_foot", "method": "curve"}], "closest_pair": ["head", "roof"]},
     "execution": {"fell": False, "peak_torque_Nm": {"left_knee": 120.0, "right_knee": -150.0}},
     "wall_s": 1.0,
 }  # fmt: skip
@@ -163,6 +163,7 @@ def test_run_for_people_writes_to_runs_and_prints_a_table(capfd, tmp_path, monke
     out, err = capfd.readouterr()
     assert "centroidal.min_margin" in out
     assert "largest -150 (right_knee)" in out
+    assert "[left_foot curve]" in out
     assert "manikin view" in err
     assert (tmp_path / "runs" / "platform" / "summary.json").exists()
     assert not (tmp_path / "runs" / "platform" / "figures").exists()
