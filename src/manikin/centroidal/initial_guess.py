@@ -25,7 +25,7 @@ class GuessStyle:
     stretch: float
 
 
-GUESS_STYLES = (GuessStyle(0.7, 1.5), GuessStyle(1.0, 2.5), GuessStyle(0.3, 1.2))
+GUESS_STYLES = (GuessStyle(0.5, 1.5), GuessStyle(0.3, 1.2), GuessStyle(0.7, 2.5))
 
 
 def guess(problem: CentroidalProblem, style: GuessStyle) -> tuple[FloatArray, FloatArray]:

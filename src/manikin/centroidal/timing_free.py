@@ -182,9 +182,9 @@ def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], be
             worst.requirement, f"no trajectory found: {worst} in the best attempt", worst.phase, worst.time
         )
     limit = _limiting(best.trajectory, found, polytopes)
-    unit = problem.margin_unit
+    place = f"in phase {found.limiting_phase} at {found.limiting_time:.3f} s by {limit.description}"
     reason = (
-        f"the largest margin found is {found.min_margin:.2f} {unit}, limited in phase {found.limiting_phase} "
-        f"at {found.limiting_time:.3f} s by {limit.description}; required {problem.required_margin:.2f} {unit}"
+        f"the largest margin found is {found.min_margin:.2f} {problem.margin_unit}, limited {place}; "
+        f"required {problem.required_margin:.2f} {problem.margin_unit}"
     )
     return Failure("balance margin", reason, found.limiting_phase, found.limiting_time, limit.effector)

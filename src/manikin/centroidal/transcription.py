@@ -162,7 +162,7 @@ def _compile(problem: dict[str, ca.SX]) -> ca.Function:
             "print_level": 0,
             "sb": "yes",
             "mu_strategy": "adaptive",
-            "adaptive_mu_globalization": "never-monotone-mode",
+            "adaptive_mu_globalization": "kkt-error",
             "alpha_for_y": "min-dual-infeas",
             "max_iter": 250,
             "tol": 1e-5,
