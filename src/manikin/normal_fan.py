@@ -26,6 +26,9 @@ RANK_TOLERANCE = 1e-9
 INCIDENCE_TOLERANCE = 1e-9
 """A ray lies on a facet when the cosine between them is below this."""
 
+SPLINTER_TOLERANCE = 1e-6
+"""Unit normals closer than this may belong to splinters of one facet."""
+
 QHULL_OPTIONS = ("Qx", "Qx Q12", "Qx Q12 C-1e-10")
 """Tried in turn: merge coplanar facets; then let nearly coplanar ones merge into wide facets."""
 
@@ -82,14 +85,16 @@ class NormalFan:
     def facets(self) -> "Facets":
         """Irredundant facets of the polytope, flats as pairs of rows at the end."""
         real = self._real_facets()
-        normals, side = self.normals[real], self.side[real]
+        normals = self.normals[real]
         H = normals[:, : self.rank] @ self.inverse
         length = np.linalg.norm(H, axis=1)
         H /= length[:, None]
         multipliers = self._tight_multipliers(normals) / length[:, None]
-        h = multipliers.sum(axis=1) + np.abs(H @ self.segments.T * (side != 0)).sum(axis=1)
-        once = _first_of_each(np.column_stack([H, h / (1.0 + np.abs(h))]))
-        return Facets(H[once], h[once], multipliers[once], self._flat_directions())
+        h = multipliers.sum(axis=1) + np.abs(H @ self.segments.T).sum(axis=1)
+        if self._coupled:  # the slices of two facets of the cone may coincide
+            once = _first_of_each(np.column_stack([H, h / (1.0 + np.abs(h))]))
+            H, h, multipliers = H[once], h[once], multipliers[once]
+        return Facets(H, h, multipliers, self._flat_directions())
 
     def _flat_directions(self) -> FloatArray:
         """(d - r, d) orthonormal directions across the polytope's affine hull."""
@@ -251,14 +256,16 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
         normals = polar_rays(rays, np.append(np.zeros(r), np.ones(k)))
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
     cosine = normals @ (rays / np.linalg.norm(rays, axis=1)[:, None]).T
+    on_generator = cosine > -INCIDENCE_TOLERANCE
+    once = _without_splinters(normals, on_generator)
     return NormalFan(
         basis=basis,
         inverse=inverse,
         rays=rays,
-        normals=normals,
-        on_generator=cosine > -INCIDENCE_TOLERANCE,
+        normals=normals[once],
+        on_generator=on_generator[once],
         segments=np.zeros((0, d)),
-        side=np.zeros((len(normals), 0), dtype=np.int8),
+        side=np.zeros((len(once), 0), dtype=np.int8),
         thickness=max(k, 1) * thickness,
     )
 
@@ -346,6 +353,26 @@ def _usable(kinds: FloatArray, present: BoolArray) -> BoolArray:
 
 def _rank(rows: FloatArray) -> int:
     return int(np.linalg.matrix_rank(rows, tol=1e-8 * max(1.0, float(np.abs(rows).max(initial=0.0)))))
+
+
+def _without_splinters(normals: FloatArray, on_generator: BoolArray) -> NDArray[np.intp]:
+    """Indices of the rays left when facets that Qhull did not merge are merged.
+
+    A splinter has (nearly) the normal of another facet and no generator beside that one's.
+    """
+    order = np.argsort(-on_generator.sum(axis=1), kind="stable")
+    n, tight = normals[order], on_generator[order].astype(np.float32)
+    count = tight.sum(axis=1)
+    keep = np.ones(len(order), dtype=np.bool_)
+    step = max(1, _CHUNK // max(1, len(order)))
+    for start in range(0, len(order), step):
+        rows = slice(start, start + step)
+        i, j = np.nonzero(tight[rows] @ tight.T == count[rows, None])
+        i += start
+        before = j < i
+        i, j = i[before], j[before]
+        keep[i[np.abs(n[i] - n[j]).max(axis=1, initial=0.0) < SPLINTER_TOLERANCE]] = False
+    return np.sort(order[keep])
 
 
 def _first_of_each(rows: FloatArray) -> NDArray[np.intp]:
