@@ -160,7 +160,7 @@ def check_clamped(degree: int, knots: ArrayLike, control_points: int) -> FloatAr
         raise SplineError(
             f"spline knots are {times.tolist()}; valid: first and last knot repeated {degree + 1} times"
         )
-    if degree > 0 and np.any(inner[degree:] == inner[: len(inner) - degree]):
+    if degree > 0 and np.any(inner[degree:] == inner[:-degree]):
         raise SplineError(
             f"spline knots are {times.tolist()}; valid: inner knots repeated at most {degree} times"
         )
