@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -82,7 +83,7 @@ def moving(body, duration, com_at, feet_at):
     spline = make_interp_spline(knots, np.array(tangent), k=5, bc_type=(rest, rest))
     time = np.arange(round(duration * 1000) + 1) * 1e-3
     qs = np.array([pin.integrate(model, kinematics.rest, row) for row in spline(time)])
-    difference = np.array([pin.difference(model, a, b) for a, b in zip(qs[:-1], qs[1:], strict=True)])
+    difference = np.array([pin.difference(model, a, b) for a, b in pairwise(qs)])
     v = np.zeros((len(time), model.nv))
     v[1:-1] = 0.5e3 * (difference[1:] + difference[:-1])
     a = np.gradient(v, 1e-3, axis=0)
@@ -142,12 +143,14 @@ def step(body) -> Callable[..., Plan]:
         def com_at(time, k):
             over = np.array([*left.translation[:2], k.com[2] - 0.06])
             final = k.com + 0.5 * np.asarray(stride) - [0.0, 0.0, 0.03]
-            return k.com + smooth(time / lift) * (over - k.com) + smooth((time - land) / shift) * (final - over)
+            return (
+                k.com + smooth(time / lift) * (over - k.com) + smooth((time - land) / shift) * (final - over)
+            )
 
-        def feet_at(time, k):
+        def feet_at(time, _):
             share = np.clip((time - lift) / swing, 0.0, 1.0)
             place = right.translation + smooth(share) * np.asarray(stride)
-            place = place + [0.0, 0.0, height * 64 * (share * (1 - share)) ** 3]
+            place[2] += height * 64 * (share * (1 - share)) ** 3
             return [left, pin.SE3(right.rotation, place)]
 
         return Plan(body, make_motion(body, *moving(body, end, com_at, feet_at), schedule), schedule)

@@ -28,7 +28,7 @@ class TaskWeights:
     posture: float = 10.0
     angular_momentum: float = 0.0
     acceleration: float = 1e-3
-    force: float = 1e-3
+    force: float = 5e-3
 
     def __post_init__(self) -> None:
         for name in ("com", "effectors", "pelvis", "posture", "angular_momentum"):
@@ -58,7 +58,7 @@ class Impedance:
 class Impedances:
     """Feedback gains of each task; the thesis tuned its own by hand and prints none (6.4.2)."""
 
-    com: Impedance = Impedance(100.0, 20.0)
+    com: Impedance = Impedance(225.0, 30.0)
     swing: Impedance = Impedance(400.0, 40.0)
     stance: Impedance = Impedance(100.0, 40.0)
     pelvis: Impedance = Impedance(100.0, 20.0)
@@ -89,7 +89,7 @@ class SupportSettings:
     press_speed: float = 0.1
     press_depth: float = 0.03
     default_cap: float = 3.0
-    sole_inset: float = 0.005
+    sole_inset: float = 0.01
 
     def __post_init__(self) -> None:
         for name in ("unload_time", "load_time", "press_speed", "default_cap"):

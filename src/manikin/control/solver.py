@@ -7,6 +7,7 @@ package inside ``__init__``, and add the class to ``_SOLVERS``.
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -76,27 +77,28 @@ class DaqpSolver(QPSolver):
         upper = np.minimum(np.concatenate((program.upper, program.rows_upper)), _INFINITY)
         lower = np.maximum(np.concatenate((program.lower, program.rows_lower)), -_INFINITY)
         if self._model is None or self._shape != program.rows.shape:
-            flag = self._set_up(program, lower, upper)
+            model, flag = self._set_up(program, lower, upper)
         else:
-            flag = self._model.update(
+            model = self._model
+            flag = model.update(
                 H=program.hessian, f=program.gradient, A=program.rows, bupper=upper, blower=lower
             )
         if flag < 0:
             self._model = None
             return np.zeros(len(program.gradient)), False, f"daqp set-up {flag}", 0
-        x, _, flag, info = self._model.solve()
-        if flag <= 0:
-            self._model = None
+        x, _, flag, info = model.solve()
+        # A failed solve leaves a working set that is not worth starting from.
+        self._model = model if flag > 0 else None
         return np.array(x), flag > 0, f"daqp {flag}", int(info["iterations"])
 
-    def _set_up(self, program: QuadraticProgram, lower: FloatArray, upper: FloatArray) -> int:
+    def _set_up(self, program: QuadraticProgram, lower: FloatArray, upper: FloatArray) -> tuple[Any, int]:
         size = len(program.gradient)
         sense = np.zeros(len(upper), dtype=np.int32)
         sense[size : size + program.equalities] = 5
-        self._model = self._module.Model()
+        model = self._module.Model()
         self._shape = program.rows.shape
-        flag, _ = self._model.setup(program.hessian, program.gradient, program.rows, upper, lower, sense)
-        return flag
+        flag, _ = model.setup(program.hessian, program.gradient, program.rows, upper, lower, sense)
+        return model, flag
 
 
 class ProxqpSolver(QPSolver):

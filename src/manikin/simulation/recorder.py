@@ -101,19 +101,15 @@ class Recorder:
 
     def com_errors(self) -> FloatArray:
         """(n,) distance of the CoM from its plan [m]."""
-        return np.array([np.linalg.norm(s.output.state.com - s.output.reference.com) for s in self.samples])
+        return _lengths([s.output.state.com - s.output.reference.com for s in self.samples])
 
     def effector_errors(self) -> FloatArray:
-        """(n, effectors) distance of each effector's origin from its plan [m]."""
-        return np.array(
+        """(n * effectors,) distance of each effector's origin from its plan [m]."""
+        return _lengths(
             [
-                [
-                    np.linalg.norm(
-                        s.output.state.frames[name].position - s.output.reference.effectors[name].position
-                    )
-                    for name in self.effectors
-                ]
+                s.output.state.frames[name].position - s.output.reference.effectors[name].position
                 for s in self.samples
+                for name in self.effectors
             ]
         )
 
@@ -169,6 +165,10 @@ class Recorder:
             contact_names=tuple(self.effectors),
             joint_names=tuple(joint_names),
         )
+
+
+def _lengths(vectors: list[FloatArray]) -> FloatArray:
+    return np.sqrt(np.sum(np.square(np.array(vectors).reshape(-1, 3)), axis=1))
 
 
 def near(interval: SupportInterval, time: float) -> bool:

@@ -1,5 +1,6 @@
 """A running simulation: state, joint torques, pushes, grips and felt contacts."""
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -137,7 +138,7 @@ class World:
             model: The compiled body and scene.
         """
         self.model = model
-        self._model = model.mujoco
+        self._model = copy.copy(model.mujoco)
         self._data = mujoco.MjData(self._model)
         self._before = (self._data.qpos.copy(), self._data.qvel.copy(), 0.0)
         self._owners = tuple(_owner(model, geom) for geom in range(self._model.ngeom))
@@ -215,14 +216,29 @@ class World:
         )
 
     def grip(self, grip: Grip) -> None:
-        """Let an effector hold on; replaces what it held."""
+        """Let an effector hold on; replaces what it held.
+
+        The gripping segment does not collide with the scene meanwhile: the grip stands for
+        all that the scene does to it.
+        """
         self.model.site_id(grip.effector)
         self._grips[grip.effector] = grip
+        self._set_scene_contact(grip.effector, False)
 
     def release(self, effector: str) -> None:
         """Let go; nothing happens where nothing was held."""
-        self._grips.pop(effector, None)
-        self._grip_forces.pop(effector, None)
+        if self._grips.pop(effector, None) is not None:
+            self._grip_forces.pop(effector, None)
+            self._set_scene_contact(effector, True)
+
+    def _set_scene_contact(self, effector: str, enabled: bool) -> None:
+        """Let the segment of an effector collide with obstacles or not; with the body it does."""
+        mask = self._mask((self.model.body.effector(effector).segment,), True)
+        compiled = self.model.mujoco
+        self._model.geom_contype[mask] = compiled.geom_contype[mask] if enabled else _NO_SCENE_CONTYPE
+        self._model.geom_conaffinity[mask] = (
+            compiled.geom_conaffinity[mask] if enabled else compiled.geom_conaffinity[mask] & 1
+        )
 
     def plan_touches(self, pairs: Sequence[tuple[Sequence[str], str]]) -> None:
         """Say which touches are planned from now on; all others are reported.
@@ -378,6 +394,9 @@ class World:
                 return kind.name.removeprefix("mjWARN_")
         return ""
 
+
+_NO_SCENE_CONTYPE = 4
+"""A collision bit that obstacles do not answer to; segments do through their affinity."""
 
 _FATAL = (
     mujoco.mjtWarning.mjWARN_BADQPOS,

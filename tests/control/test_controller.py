@@ -1,0 +1,173 @@
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from manikin.control import Controller, ControlSettings, SupportMode, TaskWeights
+from manikin.control.solver import QPSolution
+from manikin.errors import InputError
+
+
+def disturbed(body, seed, position=2e-3, speed=2e-2):
+    rng = np.random.default_rng(seed)
+    q = pin.integrate(body.pinocchio, body.standing_posture(), position * rng.normal(size=body.nv))
+    return q, speed * rng.normal(size=body.nv)
+
+
+def force_per_point(problem, solution, controller):
+    """(point in the world, its segment's joint, force) of every contact point."""
+    start = problem.acceleration(solution).size
+    for loaded in problem.contacts:
+        basis = loaded.basis
+        edges = solution[start : start + basis.normal.size].reshape(-1, 4)
+        start += basis.normal.size
+        geometry = controller._geometry[basis.contact.effector]
+        number = 0
+        for patch in geometry.patches:
+            frame = problem.state.frames[f"segment/{patch.segment}"]
+            for point in patch.points:
+                # Rows of the edge map's force part are the same for every point.
+                force = basis.wrench[:3, 4 * number : 4 * number + 4] @ edges[number]
+                yield patch.segment, frame.position + frame.rotation @ point, force, basis.contact
+                number += 1
+
+
+def solve(controller, q, v, time=0.0):
+    output = controller.step(time, q, v)
+    solution = controller._solver.solve(output.problem.program)
+    return output, solution.x
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000))
+def test_solution_obeys_the_equation_of_motion(body, still, schedule, seed):
+    """Torques, accelerations and point forces satisfy Pinocchio's inverse dynamics to 1e-6."""
+    controller = Controller(body, still, schedule)
+    q, v = disturbed(body, seed)
+    output, x = solve(controller, q, v)
+    model, data = body.pinocchio, body.pinocchio.createData()
+    pin.forwardKinematics(model, data, q)
+    external = [pin.Force.Zero() for _ in range(model.njoints)]
+    for segment, point, force, _ in force_per_point(output.problem, x, controller):
+        joint = model.frames[body.segment_frame(segment)].parentJoint
+        world = pin.Force(force, np.cross(point, force))
+        external[joint] = external[joint] + data.oMi[joint].actInv(world)
+    needed = pin.rnea(model, data, q, v, output.acceleration, pin.StdVec_Force(external))
+    assert np.abs(needed[:6]).max() < 1e-6
+    assert np.abs(needed[6:] - output.tau).max() < 1e-6
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000), speed=st.floats(0.0, 1.0))
+def test_forces_stay_in_friction_cones_and_torques_within_limits(body, still, schedule, seed, speed):
+    """Every point pushes, within its cone; torques stay within limits even when hit hard."""
+    controller = Controller(body, still, schedule)
+    q, v = disturbed(body, seed, speed=speed)
+    output, x = solve(controller, q, v)
+    assert np.all(np.abs(output.tau) <= body.torque_limit + 1e-3)
+    for _, _, force, contact in force_per_point(output.problem, x, controller):
+        normal = force @ contact.normal
+        tangent = np.linalg.norm(force - normal * contact.normal)
+        # The solver keeps constraints to 1e-6 relative to forces of 1e3 N.
+        assert normal >= -1e-3
+        assert tangent <= contact.friction * normal + 1e-3
+
+
+def test_tasks_are_met_where_nothing_limits_them(body, still, schedule):
+    """A body at rest on its plan wants no acceleration and gets next to none.
+
+    The regularised forces take a little from the lightest task, the posture.
+    """
+    controller = Controller(body, still, schedule)
+    output = controller.step(0.0, body.standing_posture(), np.zeros(body.nv))
+    weight = np.array([output.wrenches[name][2] for name in output.wrenches]).sum()
+    assert weight == pytest.approx(9.81 * body.mass, rel=1e-3)
+    for task in output.problem.tasks:
+        tolerance = 0.2 if task.name == "posture" else 0.02
+        assert np.abs(task.residual(output.acceleration)).max() < tolerance
+
+
+def test_com_feedback_is_realised(body, still, schedule):
+    """A CoM that is 1 mm off is accelerated back by stiffness times error, within 3 %."""
+    controller = Controller(body, still, schedule)
+    q = body.standing_posture()
+    shifted = pin.integrate(body.pinocchio, q, np.r_[1e-3, np.zeros(body.nv - 1)])
+    output = controller.step(0.0, shifted, np.zeros(body.nv))
+    task = next(task for task in output.problem.tasks if task.name == "com")
+    assert task.target[0] == pytest.approx(-225.0 * 1e-3, rel=1e-6)
+    assert task.matrix[0] @ output.acceleration == pytest.approx(-225.0 * 1e-3, rel=0.03)
+
+
+@pytest.mark.parametrize("solver", ["proxqp", "piqp"])
+def test_solvers_agree(body, still, schedule, solver):
+    """Another solver finds the torques of DAQP, to its own tolerance."""
+    q, v = disturbed(body, 3)
+    reference = Controller(body, still, schedule).step(0.0, q, v)
+    other = Controller(body, still, schedule, ControlSettings(solver=solver)).step(0.0, q, v)
+    assert np.abs(other.tau - reference.tau).max() < 0.05
+    assert not other.fallback
+
+
+def test_same_steps_give_the_same_bits(body, still, schedule):
+    """Two controllers that see the same states give identical torques."""
+    runs = []
+    for _ in range(2):
+        controller = Controller(body, still, schedule)
+        runs.append([controller.step(0.005 * k, *disturbed(body, k)).tau for k in range(10)])
+    assert np.array_equal(runs[0], runs[1])
+
+
+def test_without_contact_nothing_pushes_and_the_body_falls(body, still, schedule):
+    """Feet that are felt to hang in the air carry nothing; the CoM falls with g."""
+    controller = Controller(body, still, schedule)
+    hanging = dict.fromkeys(("left_foot", "right_foot"), False)
+    q, v = body.standing_posture(), np.zeros(body.nv)
+    outputs = [controller.step(0.005 * k, q, v, hanging) for k in range(10)]
+    assert outputs[0].supports["left_foot"].mode is SupportMode.STANCE
+    last = outputs[-1]
+    assert last.supports["left_foot"].mode is SupportMode.LANDING
+    assert not last.wrenches
+    com = next(task for task in last.problem.tasks if task.name == "com")
+    assert com.matrix[2] @ last.acceleration == pytest.approx(-9.81, abs=1e-6)
+
+
+class Failing:
+    """A solver that finds nothing."""
+
+    def solve(self, program):
+        return QPSolution(np.zeros(len(program.gradient)), False, "asked to fail", 0)
+
+
+def test_failed_program_falls_back_and_says_so(body, still, schedule):
+    """First the joint bounds are dropped, then the previous torques are held."""
+    controller = Controller(body, still, schedule)
+    q, v = body.standing_posture(), np.zeros(body.nv)
+    first = controller.step(0.0, q, v)
+    controller._solver = Failing()
+    second = controller.step(0.005, q, v)
+    assert second.fallback.startswith("without joint bounds")
+    assert np.allclose(second.tau, first.tau, atol=1e-6)
+    controller._spare_solver = Failing()
+    third = controller.step(0.010, q, v)
+    assert third.fallback.startswith("previous torques")
+    assert np.array_equal(third.tau, second.tau)
+
+
+def test_angular_momentum_task_is_optional(body, still, schedule):
+    """It is there exactly when it has a weight."""
+    weights = TaskWeights(angular_momentum=1.0)
+    plain = Controller(body, still, schedule)
+    extra = Controller(body, still, schedule, ControlSettings(weights=weights))
+    q, v = disturbed(body, 1)
+    names = [{task.name for task in c.step(0.0, q, v).problem.tasks} for c in (plain, extra)]
+    assert names[1] - names[0] == {"angular_momentum"}
+
+
+def test_bad_input_is_refused(body, still, schedule):
+    with pytest.raises(InputError, match="joint_damping"):
+        Controller(body, still, schedule, joint_damping=[1.0])
+    with pytest.raises(InputError, match="valid: 'daqp', 'proxqp', 'piqp'"):
+        ControlSettings(solver="magic")
+    with pytest.raises(InputError, match="task weight 'com'"):
+        TaskWeights(com=-1.0)

@@ -1,0 +1,83 @@
+import numpy as np
+import pytest
+
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
+from manikin.control import SupportMode, SupportSettings
+from manikin.control.supports import SupportSwitch, support_intervals
+
+LIFT, LAND, END = 1.0, 1.6, 2.6
+
+
+@pytest.fixture
+def stepping(contacts):
+    """Both feet, left only, both feet."""
+    both = Phase(Stance(contacts))
+    sequence = StanceSequence([both, Phase(Stance(contacts[:1])), both])
+    return ContactSchedule(sequence, [0.0, LIFT, LAND, END])
+
+
+def right(switch, time, touching=None):
+    felt = None if touching is None else {"right_foot": touching}
+    return switch.update(time, felt)["right_foot"]
+
+
+def test_schedule_alone_switches_supports(stepping):
+    """Without feeling, a support begins and ends at its planned instants."""
+    switch = SupportSwitch(stepping, SupportSettings())
+    modes = [right(switch, t).mode for t in (0.0, 0.995, 1.0, 1.595, 1.6, 2.6, 5.0)]
+    stance, swing = SupportMode.STANCE, SupportMode.SWING
+    assert modes == [stance, stance, swing, swing, stance, stance, stance]
+
+
+def test_load_ramps_up_and_down(stepping):
+    """Limits fall over the unloading time before lift-off and rise after touch-down."""
+    switch = SupportSwitch(stepping, SupportSettings(unload_time=0.05, load_time=0.04))
+    assert right(switch, 0.9).unload_share == 1.0
+    assert right(switch, 0.975).unload_share == pytest.approx(0.5)
+    assert right(switch, 0.995).unload_share == pytest.approx(0.1)
+    right(switch, LAND - 0.2)
+    shares = [right(switch, LAND + d).load_share for d in (0.0, 0.02, 0.04, 0.1)]
+    assert shares == pytest.approx([0.05, 0.5, 1.0, 1.0])
+
+
+def test_late_touch_down_presses_on_and_then_loads_from_the_touch(stepping):
+    """A foot in the air at its landing time goes on down and carries nothing until it touches."""
+    settings = SupportSettings(press_speed=0.1, press_depth=0.03)
+    switch = SupportSwitch(stepping, settings)
+    right(switch, LAND - 0.005, False)
+    late = right(switch, LAND + 0.1, False)
+    assert late.mode is SupportMode.LANDING
+    assert late.press == pytest.approx(0.01)
+    assert right(switch, LAND + 0.9, False).press == settings.press_depth
+    touched = right(switch, LAND + 0.905, True)
+    assert touched.mode is SupportMode.STANCE
+    assert touched.load_share == pytest.approx(0.05)
+
+
+def test_early_touch_down_counts_within_its_window(stepping):
+    """A touch shortly before the planned landing is the landing; one in mid-flight is not."""
+    switch = SupportSwitch(stepping, SupportSettings(early_window=0.1))
+    assert right(switch, LIFT + 0.1, True).mode is SupportMode.SWING
+    early = right(switch, LAND - 0.05, True)
+    assert early.mode is SupportMode.STANCE
+    assert early.load_share == pytest.approx(0.05)
+    assert right(switch, LAND, True).load_share == pytest.approx(0.05)
+    assert right(switch, LAND + 0.04, True).load_share == pytest.approx(1.0)
+
+
+def test_lost_contact_is_landed_anew(stepping):
+    """A support may bounce for the release time; then it is a landing again."""
+    switch = SupportSwitch(stepping, SupportSettings(release_time=0.03))
+    right(switch, 0.0, True)
+    assert right(switch, 0.03, False).mode is SupportMode.STANCE
+    assert right(switch, 0.04, False).mode is SupportMode.LANDING
+    assert right(switch, 0.05, True).mode is SupportMode.STANCE
+
+
+def test_intervals_cover_the_schedule(stepping):
+    """First and last supports are open-ended; early touches never reach into take-off."""
+    first, second = support_intervals(stepping, "right_foot", 10.0)
+    assert (first.start, first.end) == (-np.inf, LIFT)
+    assert (second.start, second.end) == (LAND, np.inf)
+    assert second.early == pytest.approx(LAND - (LAND - LIFT) / 3)
+    assert len(support_intervals(stepping, "left_foot", 0.1)) == 1

@@ -1,0 +1,131 @@
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from manikin.contact import grasp, sole
+from manikin.control.build_qp import joint_acceleration_bounds
+from manikin.control.contact_forces import contact_force_basis, contact_geometry, pyramid_edges
+from manikin.control.dynamics import Dynamics
+from manikin.control.reference import Reference
+
+
+def frames_of(body):
+    segments = {f"segment/{name}": body.segment_frame(name) for name in ("left_foot", "left_toes")}
+    return {**segments, **{name: body.effector_frame(name) for name in ("left_foot", "right_hand")}}
+
+
+def state_at(body, seed):
+    rng = np.random.default_rng(seed)
+    q = pin.integrate(body.pinocchio, body.standing_posture(), 0.2 * rng.normal(size=body.nv))
+    return q, rng.normal(size=body.nv), rng.normal(size=body.nv)
+
+
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000))
+def test_jacobian_and_drift_give_the_acceleration(body, seed):
+    """``J a + drift`` is the second derivative of a frame and of the CoM along a motion."""
+    q, v, a = state_at(body, seed)
+    dynamics = Dynamics(body, frames_of(body))
+    state = dynamics.evaluate(q, v)
+    h, model = 1e-5, body.pinocchio
+
+    def rates(t):
+        # q(t) = q + v t + a t^2 / 2 on the group, to second order; v(t) = v + a t.
+        later = dynamics.evaluate(pin.integrate(model, q, t * v + 0.5 * t * t * a), v + t * a)
+        return later.frames["left_foot"].twist, later.momentum
+
+    (twist_after, momentum_after), (twist_before, momentum_before) = rates(h), rates(-h)
+    frame = state.frames["left_foot"]
+    # Central differences at 1e-5: truncation 1e-8, rounding 1e-16 * 1e3 / 1e-5 = 1e-8.
+    assert np.allclose(frame.jacobian @ a + frame.drift, (twist_after - twist_before) / (2 * h), atol=1e-5)
+    assert np.allclose(
+        state.centroidal_map @ a + state.momentum_drift,
+        (momentum_after - momentum_before) / (2 * h),
+        atol=1e-3,
+    )
+
+
+def test_dynamics_matches_inverse_dynamics(body):
+    """``M a + bias`` is Pinocchio's inverse dynamics; ``J v`` is the twist."""
+    q, v, a = state_at(body, 5)
+    state = Dynamics(body, frames_of(body)).evaluate(q, v)
+    expected = pin.rnea(body.pinocchio, body.pinocchio.createData(), q, v, a)
+    assert np.allclose(state.mass_matrix @ a + state.bias, expected, atol=1e-9)
+    frame = state.frames["right_hand"]
+    assert np.allclose(frame.jacobian @ v, frame.twist, atol=1e-12)
+
+
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(mu=st.floats(0.05, 1.5), seed=st.integers(0, 1000))
+def test_pyramid_edges_lie_on_the_friction_cone(mu, seed):
+    """Unit normal force, tangential part mu: the inner pyramid, for any orientation."""
+    rotation = pin.exp3(np.random.default_rng(seed).normal(size=3))
+    contact = sole("left_foot", (0, 0, 0), length=0.2, width=0.1, friction=mu, rotation=rotation)
+    edges = pyramid_edges(contact)
+    assert np.allclose(edges @ contact.normal, 1.0)
+    assert np.allclose(np.linalg.norm(edges - contact.normal, axis=1), mu)
+
+
+def test_sole_points_are_shared_between_foot_and_toes(body, contacts):
+    """Heel and toe-hinge points belong to the foot, tips to the toes, all inside the sole."""
+    geometry = contact_geometry(body, contacts[0], inset=0.01)
+    assert geometry.segments == ("left_foot", "left_toes")
+    q = body.standing_posture()
+    state = Dynamics(body, frames_of(body)).evaluate(q, np.zeros(body.nv))
+    points = np.concatenate(
+        [
+            state.frames[f"segment/{p.segment}"].position
+            + p.points @ state.frames[f"segment/{p.segment}"].rotation.T
+            for p in geometry.patches
+        ]
+    )
+    local = points - contacts[0].position
+    assert np.abs(points[:, 2]).max() < 1e-9
+    assert np.ptp(local[:, 0]) == pytest.approx(body.sole_length - 0.02)
+    assert np.abs(local[:, 1]).max() == pytest.approx(body.sole_width / 2 - 0.01)
+
+
+def test_force_maps_have_the_same_power(body, contacts):
+    """Generalised force times velocity is the power of the wrench at a rigid foot."""
+    q, _, _ = state_at(body, 2)
+    v = np.random.default_rng(1).normal(size=body.nv)
+    v[6 + body.joint_index("left_toe_extension")] = 0.0
+    state = Dynamics(body, frames_of(body)).evaluate(q, v)
+    basis = contact_force_basis(contacts[0], contact_geometry(body, contacts[0], 0.01), state)
+    assert np.allclose(basis.generalised.T @ v, basis.wrench.T @ state.frames["left_foot"].twist)
+
+
+def test_grasp_forces_are_bounded_along_world_axes(body):
+    """A grasp has three forces, and three moments where it can hold them."""
+    q, v, _ = state_at(body, 2)
+    state = Dynamics(body, frames_of(body)).evaluate(q, v)
+    for moment, size in ((0.0, 3), (5.0, 6)):
+        contact = grasp("right_hand", (0, 0, 0), max_force=80.0, max_moment=moment)
+        basis = contact_force_basis(contact, contact_geometry(body, contact, 0.01), state)
+        assert basis.generalised.shape == (body.nv, size)
+        assert np.allclose(basis.upper, [80.0] * 3 + [5.0] * (size - 3))
+        assert np.allclose(basis.lower, -basis.upper)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(angle=st.floats(-2, 2), speed=st.floats(-20, 20))
+def test_acceleration_bounds_are_never_contradictory(angle, speed):
+    """Lower never exceeds upper, and a joint inside its range is sent to neither end."""
+    one = np.ones(1)
+    least, greatest = joint_acceleration_bounds(angle * one, speed * one, -one, one, 10.0 * one, 0.05, 500.0)
+    assert least <= greatest
+    if abs(angle + 0.05 * speed) < 1 and abs(speed) < 10:
+        assert least <= 0.0 <= greatest
+
+
+def test_reference_averages_accelerations_over_the_hold(body, still):
+    """The mean acceleration is the change of the planned velocity over the hold."""
+    frames = {"left_foot": body.effector_frame("left_foot")}
+    reference = Reference(body, still, frames, 0.005)
+    sample = reference.sample(0.5)
+    assert np.allclose(sample.q, body.standing_posture())
+    assert np.abs(sample.com_acceleration).max() < 1e-12
+    assert np.array_equal(reference.sample(-1.0).q, still.q[0])
+    assert np.array_equal(reference.sample(7.0).q, still.q[-1])

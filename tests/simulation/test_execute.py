@@ -1,0 +1,181 @@
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from manikin.control import ControlSettings
+from manikin.errors import ContactError, InputError
+from manikin.scene import Box, Obstacle, Scene
+from manikin.simulation import PhysicsOptions, Push, execute
+from manikin.spatial import GRAVITY_VECTOR
+
+
+def smooth(share):
+    s = np.clip(share, 0.0, 1.0)
+    return s**3 * (10 - 15 * s + 6 * s**2)
+
+
+def squat(time):
+    """Down 15 cm and up again in 3 s, swaying 2 cm to the sides."""
+    depth = smooth(time / 1.5) - smooth((time - 1.5) / 1.5)
+    sway = 0.02 * np.sin(np.pi * time / 3) ** 2 * np.sin(2 * np.pi * time / 1.5)
+    return np.array([0.0, sway, -0.15 * depth])
+
+
+@pytest.fixture(scope="module")
+def stepped(body, step):
+    plan = step(shift=1.0, swing=0.6, stride=(0.2, 0.0, 0.0))
+    return plan, execute(body, Scene(), plan.motion, plan.schedule)
+
+
+def test_standing_still(body, stand):
+    """The body stands where it is told, to a tenth of a millimetre, with its weight on its feet."""
+    plan = stand(0.5)
+    result = execute(body, Scene(), plan.motion, plan.schedule, hold=0.5)
+    assert result.succeeded
+    assert result.com_max_error_m < 2e-4
+    assert result.max_penetration_m < 1e-3
+    assert result.min_margin > 50
+    weight = result.motion.contact_force[-1, :, 2].sum()
+    assert weight == pytest.approx(9.81 * body.mass, rel=1e-3)
+
+
+def test_squat_and_sway(body, stand):
+    """A 15 cm squat is followed to 2 mm with the feet on the floor."""
+    plan = stand(3.0, squat)
+    result = execute(body, Scene(), plan.motion, plan.schedule, hold=0.2)
+    assert result.succeeded
+    assert result.com_rms_error_m < 2e-3
+    assert result.max_foot_error_m < 1e-3
+    assert result.min_margin > 20
+    assert not result.fallbacks
+
+
+def test_step_with_weight_shift(stepped):
+    """A 20 cm step in 0.6 s: CoM 5 mm RMS, feet 1 cm, margin positive, nothing else touched."""
+    plan, result = stepped
+    assert result.succeeded, result.failure
+    assert result.com_rms_error_m < 5e-3
+    assert result.max_foot_error_m < 1e-2
+    assert result.min_margin > 0
+    assert result.max_penetration_m < 5e-3
+    assert result.final_com_error_m < 1e-3
+    assert result.motion.duration == pytest.approx(plan.motion.duration + 1.0)
+    flight = result.motion.support[(result.motion.time > 1.05) & (result.motion.time < 1.45)]
+    assert flight[:, 0].all()
+    assert not flight[:, 1].any()
+
+
+def test_executed_motion_obeys_newton_and_euler(body, stepped):
+    """Recorded contact forces equal m (a - g) and Ldot of the recorded states and accelerations."""
+    _, result = stepped
+    motion, data = result.motion, body.pinocchio.createData()
+    for k in range(0, len(motion.time), 10):
+        pin.computeCentroidalMomentumTimeVariation(
+            body.pinocchio, data, motion.q[k], motion.v[k], motion.a[k]
+        )
+        force = motion.contact_force[k, :, :3].sum(axis=0) + body.mass * GRAVITY_VECTOR
+        # Forces of 1e3 N from an iterative contact solver.
+        assert force == pytest.approx(data.dhg.linear, abs=0.05)
+        assert motion.com[k] == pytest.approx(data.com[0], abs=1e-12)
+
+
+def test_summary_has_the_agreed_keys(body, stepped):
+    _, result = stepped
+    assert list(result.summary()) == [
+        "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m",
+        "min_margin", "max_penetration_m", "peak_torque_Nm", "realtime_factor", "wall_s",
+    ]  # fmt: skip
+    assert set(result.peak_torque_Nm) == set(body.joint_names)
+    assert result.max_limit_use <= 1 + 1e-6
+
+
+def test_same_run_gives_the_same_bits(body, stand):
+    plan = stand(0.3)
+    first, second = (execute(body, Scene(), plan.motion, plan.schedule, hold=0.2) for _ in range(2))
+    for name, values in first.motion.arrays().items():
+        assert np.array_equal(values, second.motion.arrays()[name]), name
+
+
+def test_com_beyond_the_feet_falls_and_is_reported(body, stand):
+    """A CoM sent 25 cm forward has no support there."""
+    plan = stand(2.0, lambda t: np.array([0.25, 0.0, -0.05]) * smooth(t))
+    result = execute(body, Scene(), plan.motion, plan.schedule)
+    assert result.fell
+    assert not result.succeeded
+    assert "fell: the CoM is" in result.failure
+    assert 0.5 < result.failure_time_s < 3.0
+    assert result.motion.time[-1] == pytest.approx(result.failure_time_s, abs=0.006)
+
+
+def test_slippery_floor_is_seen_as_slip(body, stand):
+    """Swaying with 0.06 of the weight sideways slides on friction 0.03 and not on 0.7."""
+
+    def sway(time):
+        sideways = 0.03 * np.sin(1.4 * np.pi * time) * smooth(time) * smooth(2.0 - time)
+        return np.array([0.0, sideways, -0.05 * smooth(time)])
+
+    plan = stand(2.0, sway)
+    firm = execute(body, Scene(), plan.motion, plan.schedule, hold=0.0)
+    icy = execute(
+        body, Scene(), plan.motion, plan.schedule, hold=0.0,
+        physics=PhysicsOptions(joint_damping=1.0, friction=0.03),
+    )  # fmt: skip
+    assert firm.max_slip_m < 1e-3
+    assert icy.max_slip_m > 5e-3
+    assert icy.max_foot_error_m > 4e-3
+
+
+def test_push_is_withstood_and_too_strong_a_push_fells(body, stand):
+    """20 N.s on the chest is absorbed, 80 N.s is not."""
+    plan = stand(2.0)
+    for impulse, falls in ((20.0, False), (80.0, True)):
+        push = Push("thorax", np.array([10 * impulse, 0.0, 0.0]), start=0.3, duration=0.1)
+        result = execute(body, Scene(), plan.motion, plan.schedule, pushes=[push])
+        assert result.fell == falls
+        if not falls:
+            assert 1e-3 < result.com_max_error_m < 0.05
+            assert result.final_com_error_m < 1e-3
+
+
+def test_floor_lower_than_planned_is_found(body, step):
+    """With the floor 4 mm below the plan the foot lands late and the step still succeeds."""
+    plan = step(shift=1.0, swing=0.6, stride=(0.1, 0.0, 0.0))
+    result = execute(body, Scene(floor_height=-0.004), plan.motion, plan.schedule)
+    assert result.succeeded, result.failure
+    assert result.com_max_error_m < 0.02
+
+
+def test_obstacle_in_the_way_is_an_unplanned_touch(body, step):
+    """A block under the flying foot is touched, named and timed."""
+    plan = step(shift=1.0, swing=0.6, stride=(0.2, 0.0, 0.0))
+    block = Obstacle("block", Box((0.02, 0.1, 0.06)), translation=(0.25, -0.09, 0.03))
+    result = execute(body, Scene([block]), plan.motion, plan.schedule, hold=0.0)
+    assert not result.succeeded
+    assert any(touch.other == "block" and "right" in touch.segment for touch in result.touches)
+    assert 1.0 < result.touches[0].time < 1.6
+
+
+def test_controller_works_with_any_period_of_whole_steps(body, stand):
+    """A 4 ms period is fine; 4.5 ms of 1 ms steps is refused."""
+    plan = stand(0.2)
+    good = execute(
+        body, Scene(), plan.motion, plan.schedule, settings=ControlSettings(period=0.004), hold=0.1
+    )
+    assert good.succeeded
+    with pytest.raises(InputError, match="valid: a whole multiple"):
+        execute(body, Scene(), plan.motion, plan.schedule, settings=ControlSettings(period=0.0045))
+
+
+def test_support_off_any_surface_is_refused(body, stand):
+    plan = stand(0.2)
+    with pytest.raises(ContactError):
+        execute(body, Scene(floor_height=-0.5), plan.motion, plan.schedule)
+
+
+def test_motion_of_another_body_is_refused(body, stand):
+    plan = stand(0.2)
+    wrong = replace(plan.motion, joint_names=tuple(reversed(plan.motion.joint_names)))
+    with pytest.raises(InputError, match="a motion planned for this body"):
+        execute(body, Scene(), wrong, plan.schedule)
