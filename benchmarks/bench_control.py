@@ -1,0 +1,85 @@
+"""One control step, its parts, and the solvers on the program of a disturbed stand.
+
+Run with ``pytest benchmarks/bench_control.py``; a step has 5 ms of simulated time to beat.
+"""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from manikin.body import human
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
+from manikin.control import Controller, ControlSettings
+from manikin.control.solver import make_solver
+from manikin.motion import Motion
+from manikin.scene import Scene
+from manikin.simulation import execute
+
+PERIOD = 0.005
+
+
+@pytest.fixture(scope="module")
+def standing():
+    body = human()
+    q, data = body.standing_posture(), body.pinocchio.createData()
+    pin.framesForwardKinematics(body.pinocchio, data, q)
+    contacts = [
+        sole(
+            name, data.oMf[body.effector_frame(name)].translation, length=body.sole_length,
+            width=body.sole_width, friction=0.7, normal_force_cap=1500.0,
+        )
+        for name in ("left_foot", "right_foot")
+    ]  # fmt: skip
+    schedule = ContactSchedule(StanceSequence([Phase(Stance(contacts))]), [0.0, 1.0])
+    n, com = 1001, pin.centerOfMass(body.pinocchio, data, q)
+    zeros = np.zeros((n, body.nv))
+    motion = Motion(
+        time=np.arange(n) * 1e-3, q=np.tile(q, (n, 1)), v=zeros, a=zeros, tau=zeros,
+        com=np.tile(com, (n, 1)), angular_momentum=np.zeros((n, 3)), margin=np.zeros(n),
+        support=np.ones((n, 2), dtype=bool), contact_force=np.zeros((n, 2, 6)),
+        contact_names=schedule.sequence.effectors, joint_names=body.joint_names,
+    )  # fmt: skip
+    return body, motion, schedule
+
+
+def disturbed_states(body, count=200):
+    rng = np.random.default_rng(0)
+    q, model = body.standing_posture(), body.pinocchio
+    return [
+        (pin.integrate(model, q, 1e-3 * rng.normal(size=body.nv)), 1e-2 * rng.normal(size=body.nv))
+        for _ in range(count)
+    ]
+
+
+@pytest.mark.parametrize("solver", ["daqp", "proxqp", "piqp"])
+def test_control_step(benchmark, standing, solver):
+    body, motion, schedule = standing
+    controller = Controller(body, motion, schedule, ControlSettings(solver=solver))
+    states = disturbed_states(body)
+    number = iter(range(10**9))
+
+    def step():
+        k = next(number) % len(states)
+        return controller.step(0.5 * k / len(states), *states[k])
+
+    output = benchmark(step)
+    assert not output.fallback
+
+
+@pytest.mark.parametrize("solver", ["daqp", "proxqp", "piqp"])
+def test_program_alone(benchmark, standing, solver):
+    body, motion, schedule = standing
+    controller = Controller(body, motion, schedule)
+    programs = [controller.step(0.0, q, v).problem.program for q, v in disturbed_states(body)]
+    tool = make_solver(solver)
+    number = iter(range(10**9))
+    solution = benchmark(lambda: tool.solve(programs[next(number) % len(programs)]))
+    assert solution.found
+
+
+def test_execution_of_one_second(benchmark, standing):
+    body, motion, schedule = standing
+    result = benchmark.pedantic(
+        lambda: execute(body, Scene(), motion, schedule, hold=0.0), rounds=3, iterations=1
+    )
+    assert result.succeeded
