@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING, Any
 
+from manikin.version import __version__
+
 if TYPE_CHECKING:
     from manikin.pipeline import RunResult
-
-__version__ = "0.1.0"
 
 __all__ = ["__version__", "run"]
 

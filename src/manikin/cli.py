@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manikin import __version__
 from manikin.errors import InputError, ManikinError
+from manikin.version import __version__
 
 if TYPE_CHECKING:
     from manikin.scenarios import Scenario

@@ -21,7 +21,6 @@ from typing import Any, TypeVar
 import h5py
 import numpy as np
 
-from manikin import __version__
 from manikin.atomic import atomic_path
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
@@ -36,6 +35,7 @@ from manikin.motion.description import (
 )
 from manikin.motion.motion import Motion
 from manikin.scene import Scene
+from manikin.version import __version__
 
 FORMAT = "manikin-motion"
 FORMAT_VERSION = 1

@@ -210,7 +210,7 @@ class ViewerSession:
     def _look_at_the_motion(self) -> None:
         middle = self.motion.com.mean(axis=0)
         self.server.initial_camera.look_at = middle
-        self.server.initial_camera.position = middle + np.array([-1.2, -2.3, 0.5])
+        self.server.initial_camera.position = middle + np.array([-1.7, -1.9, 0.5])
         self.server.initial_camera.up = (0.0, 0.0, 1.0)
 
     # --- what moves ----------------------------------------------------------------------
@@ -227,7 +227,7 @@ class ViewerSession:
                 f"/body/{segment.name}/shape",
                 *triangles,
                 color=_side_colour(segment.name),
-                flat_shading=False,
+                opacity=0.7,  # the centre of mass and its path are inside
             )
         self._com = scene.add_icosphere("/com/now", radius=0.03, color=(34, 34, 34))
         names = dict.fromkeys(
