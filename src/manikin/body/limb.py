@@ -21,14 +21,18 @@ def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
     return (own,) if hanging is None else (own, hanging.name)
 
 
+def hinge_line(body: BodyModel, effector: str) -> float | None:
+    """Return where the hinge of the hanging segment crosses the effector's x axis [m], or None."""
+    frame = body.effector(effector)
+    hanging = hanging_segment(body, frame.segment)
+    return None if hanging is None else float((frame.rotation.T @ (hanging.origin - frame.translation))[0])
+
+
 def carrying_segment(body: BodyModel, effector: str, point: FloatArray) -> str:
     """Name of the end segment that carries a point (3,) of the effector frame [m].
 
     What lies beyond the hinge of the hanging segment is carried by it.
     """
-    frame = body.effector(effector)
-    hanging = hanging_segment(body, frame.segment)
-    if hanging is None:
-        return frame.segment
-    line = float((frame.rotation.T @ (hanging.origin - frame.translation))[0])
-    return hanging.name if point[0] > line else frame.segment
+    own = body.effector(effector).segment
+    hanging, line = hanging_segment(body, own), hinge_line(body, effector)
+    return hanging.name if hanging is not None and line is not None and point[0] > line else own

@@ -209,6 +209,7 @@ class _Planner:
             effectors=effector_targets(schedule, swings, time),
             com=self.trajectory.position(time),
             com_acceleration=self.trajectory.acceleration(time),
+            margin=self._margin(time, self._point_mass_wrench(time)),
             reference=reference,
             reference_scale=reference_scale(self.body),
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
@@ -239,6 +240,10 @@ class _Planner:
             com[k], momentum[k], rate[k] = data.com[0], data.hg.angular, data.dhg.vector
         mass = self.body.mass
         return com, momentum, pseudo_wrench(mass, com, rate[:, :3] / mass, rate[:, 3:])
+
+    def _point_mass_wrench(self, time: FloatArray) -> FloatArray:
+        trajectory = self.trajectory
+        return pseudo_wrench(self.body.mass, trajectory.position(time), trajectory.acceleration(time))
 
     def _margin(self, time: FloatArray, wrench: FloatArray) -> FloatArray:
         schedule = self.trajectory.schedule

@@ -41,6 +41,13 @@ class SampledBasis:
         values = np.stack([identity(time, nu=order)[rows, columns] for order in range(3)])
         return cls(first, values, size)
 
+    def gather(self, per_sample: FloatArray) -> FloatArray:
+        """(size,) sum of (n,) values per sample, shared out to the control points around them."""
+        columns = self.first[:, None] + np.arange(self.values.shape[2])
+        return np.bincount(
+            columns.ravel(), weights=(self.values[0] * per_sample[:, None]).ravel(), minlength=self.size
+        )
+
     def evaluate(self, control_points: FloatArray, order: int = 0) -> FloatArray:
         """(n, d) spline values, or derivatives of ``order`` 1 or 2."""
         columns = self.first[:, None] + np.arange(self.values.shape[2])
@@ -99,8 +106,12 @@ class BlockBandedSystem:
                     self._blocks[(row - column) * size + first + column] += hessian[row, :, column].ravel()
             self._right[first : first + width] -= (rows.T @ residual[a:b].ravel()).reshape(width, d)
 
-    def solve(self, damping: float) -> FloatArray:
-        """Return the step of every control point, (size, d), with Levenberg damping."""
+    def solve(self, damping: float | FloatArray) -> FloatArray:
+        """Return the step of every control point, (size, d), with Levenberg damping.
+
+        Args:
+            damping: One number, or one per control point.
+        """
         size, d = self._basis.size, self._dimension
         band = np.zeros((self._bandwidth * d, size * d))
         row, column = np.indices((d, d))
@@ -111,7 +122,7 @@ class BlockBandedSystem:
             columns = np.arange(size - offset)[:, None] * d + column[keep]
             inside = diagonal >= 0
             band[diagonal[inside], columns[:, inside]] = blocks[:, keep][:, inside]
-        band[0] += damping
+        band[0] += np.repeat(np.broadcast_to(damping, size), d)
         return solveh_banded(band, self._right.ravel(), lower=True, check_finite=False).reshape(size, d)
 
     def _pair_products(self, order: int) -> csr_matrix:

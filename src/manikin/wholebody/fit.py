@@ -28,9 +28,14 @@ from manikin.wholebody.configuration_spline import (
 )
 from manikin.wholebody.targets import EffectorTarget, FitTargets
 
-
 LEAST_DAMPING = 1.0
-"""Smallest Levenberg damping of the control points."""
+"""Smallest Levenberg damping of a control point."""
+
+LEAST_MARGIN = 10.0
+"""Planned margins below this do not make the scale of the moments any finer [N.m]."""
+
+MOST_DAMPING = 1.0e6
+"""Largest one."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,8 @@ class FitScales:
         acceleration: Joint acceleration [rad/s^2].
         pelvis_acceleration: Linear [m/s^2] and angular [rad/s^2] pelvis acceleration.
         force: Rate of linear momentum, against the planned one [N].
-        moment: Rate of angular momentum about the centre of mass, against none [N.m].
+        moment_share: Rate of angular momentum about the centre of mass that costs one unit, as
+            a share of the planned margin: where balance is scarce, the body turns less.
         rest: Velocity at both ends [m/s, rad/s].
         max_iterations: Upper bound of Gauss-Newton steps.
         decrease: Relative decrease of the objective below which the iteration stops.
@@ -66,21 +72,21 @@ class FitScales:
     rotation: float = 4.0e-3
     com: float = 3.0e-3
     clearance: float = 1.0e-3
-    safe_distance: float = 0.02
+    safe_distance: float = 0.028
     softness: float = 0.006
-    joint_limit: float = 5.0e-3
-    joint_buffer: float = 0.02
+    joint_limit: float = 3.0e-3
+    joint_buffer: float = 0.03
     joint_velocity: float = 0.1
     velocity_share: float = 0.9
     acceleration: float = 8.0
     pelvis_acceleration: float = 4.0
     force: float = 20.0
-    moment: float = 12.0
+    moment_share: float = 0.15
     rest: float = 1.0e-3
     max_iterations: int = 30
     decrease: float = 0.03
-    stages: tuple[float, ...] = (3.0, 1.0)
-    iterations_per_round: int = 6
+    stages: tuple[float, ...] = (3.0, 1.0, 0.3)
+    iterations_per_round: int = 3
     multiplier_rounds: int = 12
     tolerance: float = 3.0e-4
 
@@ -121,7 +127,7 @@ class FitResult:
 class _Linearised:
     """Residuals of all samples with their Gauss-Newton terms, by derivative order."""
 
-    cost: float = 0.0
+    sample_cost: FloatArray
     task_residual: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     hessian: dict[int, FloatArray] = field(default_factory=dict)
     gradient: dict[int, FloatArray] = field(default_factory=dict)
@@ -131,6 +137,11 @@ class _Linearised:
     com_error: float = 0.0
     clearance: float = np.inf
     closest: tuple[str, str] = ("", "")
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of all squared residuals."""
+        return float(self.sample_cost.sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,12 +183,12 @@ class MotionFit:
         self._targets = targets
         self._final = scales or FitScales()
         self._scales = self._final
-        self._damping = 1.0
         held = [np.repeat(target.weight[:, None] >= 1.0, 6, axis=1) for target in targets.effectors.values()]
         self._exact_rows = np.hstack([*held, np.ones((len(targets.time), 3), dtype=bool)])
         self._multiplier = np.zeros((len(targets.time), 6 * len(targets.effectors) + 3))
         self._knots, self._degree = knots, degree
         self._basis = SampledBasis.at(targets.time, knots, degree)
+        self._damping = np.ones(self._basis.size)
         self._system = BlockBandedSystem(self._basis, body.nq)
         self._frames = {name: body.effector_frame(name) for name in targets.effectors}
         # Weights make the sum over samples an integral over time, normalised by one sample.
@@ -206,7 +217,7 @@ class MotionFit:
         """
         points = np.array(start.control_points)
         iterations = 0
-        state = _Linearised()
+        state = _Linearised(np.zeros(0))
         for factor in self._final.stages:
             self._scales = self._final.loosened(factor)
             points, state, taken = self._descend(points, self._scales.max_iterations)
@@ -226,33 +237,30 @@ class MotionFit:
     def _descend(self, points: FloatArray, most: int) -> tuple[FloatArray, _Linearised, int]:
         """Damped Gauss-Newton at the current scales; the damping is kept from call to call.
 
-        A step along the manifold of the contacts leaves it by a second-order amount that only
-        the next step repairs (Maratos effect), so one step may raise the objective before it
-        has to fall below its best.
+        Each control point has its own damping: where the objective around it rises, as at a
+        leg that is almost straight, it grows, and the rest of the motion is not held up.
         """
-        current = best = self._linearise(points)
-        best_points, taken, uphill = points, 0, False
-        for _ in range(most):
-            taken += 1
+        current = self._linearise(points)
+        taken = 0
+        for taken in range(1, most + 1):  # noqa: B007
             step = self._step(current, self._damping)
             # A step of more than a radian leaves the region where the model holds.
-            points = points + step * min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
-            current = self._linearise(points)
-            if current.cost < best.cost:
-                decrease = (best.cost - current.cost) / best.cost
-                best, best_points = current, points
-                self._damping = max(self._damping / (2.0 if uphill else 4.0), LEAST_DAMPING)
-                uphill = False
+            trial_points = points + step * min(1.0, 1.0 / max(float(np.abs(step).max()), 1e-12))
+            trial = self._linearise(trial_points)
+            self._adapt_damping(current, trial)
+            if trial.cost < current.cost:
+                decrease = (current.cost - trial.cost) / current.cost
+                points, current = trial_points, trial
                 if decrease < self._scales.decrease:
                     break
-            elif uphill:
-                points, current, uphill = best_points, best, False
-                self._damping *= 4.0
-            else:
-                uphill = True
-        return best_points, best, taken
+        return points, current, taken
 
-    def _step(self, state: _Linearised, damping: float) -> FloatArray:
+    def _adapt_damping(self, before: _Linearised, after: _Linearised) -> None:
+        old, new = (self._basis.gather(state.sample_cost) for state in (before, after))
+        factor = np.where(new > 1.02 * old + 0.1, 8.0, np.where(new < old, 0.4, 1.0))
+        self._damping = np.clip(self._damping * factor, LEAST_DAMPING, MOST_DAMPING)
+
+    def _step(self, state: _Linearised, damping: FloatArray) -> FloatArray:
         self._system.reset()
         for order, gradient in state.gradient.items():
             self._system.add(state.hessian[order], gradient, order)
@@ -264,7 +272,7 @@ class MotionFit:
         raw, rate, second = (self._basis.evaluate(points, order) for order in range(3))
         states = states_from_raw(raw, rate, second)
         tangent = tangent_map(raw)
-        out = _Linearised()
+        out = _Linearised(np.zeros(len(raw)))
         task_jacobian, task_residual, momentum, offset, turn_jacobian = self._kinematics(states, out)
         task_residual = np.concatenate([task_residual, self._reference_residual(offset)], axis=1)
         task_jacobian = np.concatenate([task_jacobian, self._reference_jacobian(turn_jacobian)], axis=1)
@@ -303,11 +311,12 @@ class MotionFit:
         jacobians[1][:, :, 3:7] = omega @ turn.omega_by_rate + alpha @ turn.alpha_by_rate
         jacobians[2][:, :, 3:7] = alpha @ turn.alpha_by_second
         jacobians[2][:, :3, :3] = mass * np.eye(3)
-        scale = np.repeat([self._scales.force, self._scales.moment], 3)
+        scale = np.repeat([[self._scales.force, 1.0]], 3, axis=1) * np.ones((len(turning), 1))
+        scale[:, 3:] = self._scales.moment_share * np.maximum(self._targets.margin, LEAST_MARGIN)[:, None]
         wanted = np.hstack([mass * self._targets.com_acceleration, np.zeros((len(turning), 3))])
-        out.momentum_jacobians = tuple(jacobian / scale[:, None] for jacobian in jacobians)
+        out.momentum_jacobians = tuple(jacobian / scale[:, :, None] for jacobian in jacobians)
         out.momentum_residual = (momentum.value - wanted) / scale
-        out.cost += 0.5 * float(np.sum(out.momentum_residual**2))
+        out.sample_cost += 0.5 * np.sum(out.momentum_residual**2, axis=1)
 
     def _kinematics(self, states, out: _Linearised):  # noqa: ANN001, ANN202
         n, nv = len(states.q), self._model.nv
@@ -416,7 +425,7 @@ class MotionFit:
     def _accumulate(self, out: _Linearised, order: int, jacobian: FloatArray, residual: FloatArray) -> None:
         transposed = jacobian.transpose(0, 2, 1)
         self._add(out, order, transposed @ jacobian, (transposed @ residual[:, :, None])[:, :, 0])
-        out.cost += 0.5 * float(np.sum(residual**2))
+        out.sample_cost += 0.5 * np.sum(residual**2, axis=1)
 
     def _add_diagonal(self, out: _Linearised, order: int, weight: FloatArray, residual: FloatArray) -> None:
         """Add residuals ``weight * (x - x0)`` given as weights and weighted residuals (n, nq)."""
@@ -424,7 +433,7 @@ class MotionFit:
         hessian = np.zeros((n, nq, nq))
         hessian[:, np.arange(nq), np.arange(nq)] = weight**2
         self._add(out, order, hessian, weight * residual)
-        out.cost += 0.5 * float(np.sum(residual**2))
+        out.sample_cost += 0.5 * np.sum(residual**2, axis=1)
 
     @staticmethod
     def _add(out: _Linearised, order: int, hessian: FloatArray, gradient: FloatArray) -> None:

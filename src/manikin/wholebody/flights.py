@@ -18,6 +18,15 @@ from manikin.wholebody.path import Pose
 from manikin.wholebody.swing import SwingLimits, plan_swing
 from manikin.wholebody.swing_curve import SwingCurve
 
+LEVEL_BEHIND = 0.08
+"""A foot this far behind the centre of mass at lift-off is still swung level [m]."""
+
+PITCH_PER_METRE = 3.0
+"""Further behind than that, its toes are turned down by this much [rad/m]."""
+
+MOST_PITCH = 0.9
+"""Largest such turn [rad]."""
+
 
 @dataclass(frozen=True, eq=False)
 class PlannedSwing:
@@ -78,7 +87,7 @@ class FlightPlanner:
         start, end = self.schedule.swing_interval(swing)
         plan = plan_swing(
             _pose(swing.start), _pose(swing.end), start, end, self._clearance(swing), limits=self._limits,
-            start_normal=swing.start.normal, end_normal=swing.end.normal,
+            start_normal=swing.start.normal, end_normal=swing.end.normal, pitch=self._pitch(swing, start),
         )  # fmt: skip
         smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure)
         return smooth if plan.succeeded else self.search(swing, smooth)
@@ -102,6 +111,14 @@ class FlightPlanner:
             reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
             return PlannedSwing(swing, fallback.curve, fallback.method, reason)
         return PlannedSwing(swing, found.curve, "bi-rrt")
+
+    def _pitch(self, swing: Swing, lift_off: float) -> float:
+        """Turn the toes down where the foot is left far behind: a level foot has no posture there [rad]."""
+        assert swing.start is not None
+        forward = swing.start.rotation_contact_to_world[:, 0]
+        com = self._trajectory.position(lift_off)
+        behind = float(forward @ (com - swing.start.position))
+        return float(np.clip(PITCH_PER_METRE * (behind - LEVEL_BEHIND), 0.0, MOST_PITCH))
 
     def _clearance(self, swing: Swing) -> EffectorClearance:
         return EffectorClearance(

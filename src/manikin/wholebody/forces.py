@@ -13,7 +13,7 @@ import pinocchio as pin
 from scipy.optimize import nnls
 
 from manikin.body import BodyModel
-from manikin.body.limb import carrying_segment
+from manikin.body.limb import carrying_segment, hinge_line
 from manikin.contact import Contact, ContactKind, ContactSchedule, Stance
 from manikin.spatial import FloatArray, skew
 from manikin.wholebody.configuration_spline import rotation_from_quaternion
@@ -23,6 +23,10 @@ _RAMP = 0.08
 
 _WRENCH_WEIGHT = 1.0e3
 """Cost of missing the wrench relative to the cost of force."""
+
+
+_HANGING_COST = 3.0
+"""Cost of a force on a hanging segment (toes) relative to one on the effector's own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +55,14 @@ class _Generators:
         direction: (g, 3) unit normal force plus friction.
         contact: (g,) index into the contact names.
         carrier: (g,) joint of the segment that it acts on.
+        cost: (g,) cost of its magnitude, more where it bends the toes.
     """
 
     point: FloatArray
     direction: FloatArray
     contact: np.ndarray
     carrier: np.ndarray
+    cost: FloatArray
 
 
 def plan_forces(
@@ -114,18 +120,32 @@ def load_shares(schedule: ContactSchedule, time: FloatArray, names: tuple[str, .
 
 
 def _generators(body: BodyModel, stance: Stance, names: tuple[str, ...]) -> _Generators:
-    points, directions, contacts, carriers = [], [], [], []
+    points, directions, contacts, carriers, costs = [], [], [], [], []
     for contact in stance:
         edges = _edges(contact)
-        for local, world in zip(contact.points, contact.points_in_world, strict=True):
+        for local in _force_points(body, contact):
             segment = carrying_segment(body, contact.effector, local)
             carrier = body.pinocchio.frames[body.segment_frame(segment)].parentJoint
+            hanging = segment != body.effector(contact.effector).segment
             for edge in edges:
-                points.append(world)
+                points.append(contact.position + contact.rotation_contact_to_world @ local)
                 directions.append(edge)
                 contacts.append(names.index(contact.effector))
                 carriers.append(carrier)
-    return _Generators(np.array(points), np.array(directions), np.array(contacts), np.array(carriers))
+                costs.append(_HANGING_COST if hanging else 1.0)
+    return _Generators(
+        np.array(points), np.array(directions), np.array(contacts), np.array(carriers), np.array(costs)
+    )
+
+
+def _force_points(body: BodyModel, contact: Contact) -> FloatArray:
+    """(k, 3) points of the contact frame that carry force: corners, and the ends of the toes' hinge."""
+    line = hinge_line(body, contact.effector)
+    inside = line is not None and abs(line) < 0.5 * contact.length
+    if contact.kind is not ContactKind.SOLE or line is None or not inside:
+        return contact.points
+    half = 0.5 * contact.width
+    return np.vstack([contact.points, [[line, half, 0.0], [line, -half, 0.0]]])
 
 
 def _edges(contact: Contact) -> FloatArray:
@@ -151,7 +171,7 @@ def _share_wrench(generators: _Generators, wrench: FloatArray, shares: FloatArra
     arm = generators.point - centre
     matrix = np.hstack([generators.direction, np.cross(arm, generators.direction) / 0.1])
     target = np.concatenate([wrench[:3], (wrench[3:] - np.cross(centre, wrench[:3])) / 0.1])
-    cost = np.diag(1.0 / shares[generators.contact])
+    cost = np.diag(generators.cost / shares[generators.contact])
     stacked = np.vstack([_WRENCH_WEIGHT * matrix.T, cost])
     return nnls(stacked, np.concatenate([_WRENCH_WEIGHT * target, np.zeros(len(cost))]))[0]
 

@@ -95,9 +95,13 @@ def plan_guide(
     settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False)
     for k, instant in enumerate(time):
         contacts, placements = _requirements(schedule, float(instant), effectors, k)
+        # Half way to the posture before: neighbouring postures must not jump.
+        wanted = (
+            reference[k] if k == 0 else np.concatenate([reference[k][:7], 0.5 * (reference[k][7:] + q[7:])])
+        )
         problem = PostureProblem(
             body, contacts, placements, com=com[k], proximity=proximity, clearance=clearance,
-            self_clearance=clearance, ignore=ignored[k], reference=reference[k],
+            self_clearance=clearance, ignore=ignored[k], reference=wanted,
         )  # fmt: skip
         result = generate_posture(problem, q, settings=settings)
         if not result.succeeded:

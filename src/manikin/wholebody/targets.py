@@ -41,6 +41,7 @@ class FitTargets:
         effectors: Target of each controlled effector.
         com: (n, 3) centre of mass [m].
         com_acceleration: (n, 3) its acceleration [m/s^2].
+        margin: (n,) balance margin of the planned centre of mass [N.m].
         reference: (n, nq) preferred configuration.
         reference_scale: (nv,) deviation of the tangent [m, rad] that costs as much as one
             unit of every other residual; infinite entries are free.
@@ -51,6 +52,7 @@ class FitTargets:
     effectors: Mapping[str, EffectorTarget]
     com: FloatArray
     com_acceleration: FloatArray
+    margin: FloatArray
     reference: FloatArray
     reference_scale: FloatArray
     ignored: tuple[Ignored, ...]
@@ -86,7 +88,7 @@ def effector_targets(
 FLIGHT_POSITION_WEIGHT = 0.1
 """Importance of an effector's position in the middle of a flight."""
 
-FLIGHT_ROTATION_WEIGHT = 0.02
+FLIGHT_ROTATION_WEIGHT = 0.05
 """Importance of its orientation there: a hint, so that the ankle may follow the shank."""
 
 
