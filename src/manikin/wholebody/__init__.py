@@ -8,7 +8,7 @@ from manikin.wholebody.assemble import (
 )
 from manikin.wholebody.certificate import WholeBodyRequirements, WholeBodyResiduals
 from manikin.wholebody.configuration_spline import ConfigurationSpline
-from manikin.wholebody.fit import FitScales
+from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import PlannedSwing
 
 __all__ = [

@@ -21,7 +21,8 @@ from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.certificate import WholeBodyRequirements, WholeBodyResiduals, certify
 from manikin.wholebody.configuration_spline import ConfigurationSpline
-from manikin.wholebody.fit import FitResult, FitScales, MotionFit
+from manikin.wholebody.fit import FitResult, MotionFit
+from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
 from manikin.wholebody.forces import plan_forces
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
@@ -215,7 +216,7 @@ class _Planner:
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
         )
         fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, settings.fit)
-        return fit.solve(fit.initial_spline(time, reference))
+        return fit.solve(fit.initial_spline(reference))
 
     def _sample(self, spline: ConfigurationSpline) -> Motion:
         schedule = self.trajectory.schedule

@@ -44,9 +44,8 @@ class SampledBasis:
     def gather(self, per_sample: FloatArray) -> FloatArray:
         """(size,) sum of (n,) values per sample, shared out to the control points around them."""
         columns = self.first[:, None] + np.arange(self.values.shape[2])
-        return np.bincount(
-            columns.ravel(), weights=(self.values[0] * per_sample[:, None]).ravel(), minlength=self.size
-        )
+        shares = (self.values[0] * per_sample[:, None]).ravel()
+        return np.asarray(np.bincount(columns.ravel(), shares, self.size), dtype=np.float64)
 
     def evaluate(self, control_points: FloatArray, order: int = 0) -> FloatArray:
         """(n, d) spline values, or derivatives of ``order`` 1 or 2."""
