@@ -29,8 +29,8 @@ INCIDENCE_TOLERANCE = 1e-9
 SPLINTER_TOLERANCE = 1e-6
 """Unit normals closer than this may belong to splinters of one facet."""
 
-QHULL_OPTIONS = ("Qx", "Qx Q12", "Qx Q12 C-1e-10")
-"""Tried in turn: merge coplanar facets; then let nearly coplanar ones merge into wide facets."""
+QHULL_OPTIONS = ("Qx", "Qx Q12", "Qx Q12 C-1e-10", "Qx Q12 C-1e-8", "Qx Q12 C-1e-7")
+"""Tried in turn: merge coplanar facets; allow wide merges; merge ever less coplanar ones."""
 
 _CHUNK = 4_000_000
 """Entries of one adjacency table (pairs x rays)."""

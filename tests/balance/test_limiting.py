@@ -116,6 +116,15 @@ def test_turning_on_one_foot_is_named():
     assert found.description == "left_foot: turning clockwise on its sole"
 
 
+def test_a_torsion_limit_and_the_stance_cap_are_told_apart():
+    foot = sole("left_foot", (0, 0, 0), length=0.28, width=0.12, friction=0.7, torsion_limit=10.0)
+    W = wrench_polytope(Stance([foot], 1000.0))
+    turning = W.limiting([0, 0, 700, 0, 0, -9.0])
+    assert turning.description == "left_foot: turning counter-clockwise on its sole"
+    assert turning.margin == pytest.approx(1.0 / np.sqrt(1 + 2 * 0.7**2))
+    assert W.limiting([0, 0, 999.9, 0, 0, 0]).kind is LimitKind.NORMAL_FORCE_CAP
+
+
 def test_malformed_wrenches_are_refused(two_soles):
     with pytest.raises(ContactError, match="wrench"):
         wrench_polytope(two_soles).limiting([0, 0, 1])

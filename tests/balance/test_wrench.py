@@ -83,6 +83,20 @@ def test_membership_of_random_wrenches_agrees_with_the_program(random_stance, co
         assert margin < 0 or gap < SOLVER
 
 
+def test_a_facet_that_qhull_left_in_splinters_does_not_hide_others(contact_program):
+    """Found by random search: a split facet of a thin sole made the sum with two grasps too large."""
+    foot = sole(
+        "foot", (0.27, -0.24, 0.0), 0.4, length=0.28, width=1e-3, friction=1.0, torsion_limit=10.0,
+        normal=(-8e-5, -8e-5, 1.0), normal_force_cap=500.0,
+    )  # fmt: skip
+    hands = [
+        grasp("right_hand", (-0.05, -0.1, 1.0), max_force=100.0),
+        grasp("left_hand", (-0.5, -0.07, 1.0), max_force=100.0),
+    ]
+    stance = Stance([foot, *hands], 1000.0)
+    assert_same_set(wrench_polytope(stance), contact_program(stance), np.random.default_rng(0), 40, 20)
+
+
 def test_walls_hold_four_feet_with_own_caps(contact_program):
     """Quadruped between walls: each normal force up to 500 N, mu 1 ([Qiu2012]_ 5.4.4)."""
     feet = [

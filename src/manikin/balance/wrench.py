@@ -11,12 +11,18 @@ margin of a wrench is then 0 at best, and negative as soon as the equality is br
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.balance.friction import FrictionModel, contact_to_world, cross, edge_wrenches
+from manikin.balance.friction import (
+    FrictionModel,
+    contact_to_world,
+    cross,
+    edge_wrenches,
+    pyramid_friction,
+)
 from manikin.balance.limiting import LimitingConstraint, limiting_constraint
 from manikin.balance.limits import contact_limits
 from manikin.contact import Contact, ContactKind, Stance
@@ -172,26 +178,27 @@ def _own_cap(contact: Contact, total: float | None) -> float | None:
             f"nothing bounds the normal force of {contact.effector!r}; "
             "valid: a normal_force_cap [N] for this contact or for the stance"
         )
-    if contact.torsion_limit is not None:
-        return min(cap for cap in (own, total) if cap is not None)
     return own if total is None or own is None or own < total else None
 
 
 def _generators(
     stance: Stance, caps: _Caps, friction_model: FrictionModel, reference: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Generators (n, 6) and the share of each cap that each one uses (n, caps)."""
+    """Generators (n, 6) and the share of each level that each one uses (n, k).
+
+    The levels are one per contact with a cap or a torsion limit of its own, then the
+    stance's cap.
+    """
     frictional = [c for c in stance if c.kind is not ContactKind.GRASP]
-    with_own = [i for i, cap in enumerate(caps.own) if cap is not None]
-    columns = len(with_own) + (caps.total is not None)
+    pairs = list(zip(frictional, caps.own, strict=True))
+    has_level = [own is not None or contact.torsion_limit is not None for contact, own in pairs]
+    columns = sum(has_level) + (caps.total is not None)
     generators, levels = [np.zeros((0, 6))], [np.zeros((0, columns))]
-    for i, contact in enumerate(frictional):
-        own = caps.own[i]
-        cap = own if own is not None else caps.total
-        local = _extreme_wrenches(contact, cap if cap is not None else np.inf, friction_model)
+    for i, (contact, own) in enumerate(pairs):
+        local, bounded = _extreme_wrenches(contact, own, caps.total, friction_model)
         level = np.zeros((len(local), columns))
-        if own is not None:
-            level[:, with_own.index(i)] = 1.0
+        if has_level[i]:
+            level[:, sum(has_level[:i])] = bounded
         if caps.total is not None:
             level[:, -1] = local[:, 2] / caps.total
         generators.append(contact_to_world(contact, local, reference))
@@ -199,16 +206,37 @@ def _generators(
     return np.vstack(generators), np.vstack(levels)
 
 
-def _extreme_wrenches(contact: Contact, cap: float, friction_model: FrictionModel) -> FloatArray:
-    """(n, 6) wrenches in the contact frame whose hull with 0 is the contact's set up to the cap."""
+def _extreme_wrenches(
+    contact: Contact, own: float | None, total: float | None, friction_model: FrictionModel
+) -> tuple[FloatArray, FloatArray]:
+    """Wrenches (n, 6) in the contact frame that generate the contact's set, and their weights.
+
+    With combinations of non-negative multipliers, weighted sum at most 1, they make the
+    contact's set up to its own cap; weights of 0 mark rays, left to the stance's cap.
+    """
+    cap = own if own is not None else total
     if contact.torsion_limit is None:
-        return cap * edge_wrenches(contact, friction_model)
-    limits = contact_limits(contact, friction_model)
-    top = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+        wrenches = (1.0 if cap is None else cap) * edge_wrenches(contact, friction_model)
+        return wrenches, np.ones(len(wrenches))
+    if own is not None:
+        vertices = _torsion_vertices(contact, own, friction_model)
+        return vertices, np.ones(len(vertices))
+    friction = pyramid_friction(contact, friction_model)
+    # Above this normal force the torsion limit alone bounds the moment: no vertex is left.
+    highest = contact.torsion_limit / (friction * min(contact.length, contact.width) / 2)
+    vertices = _torsion_vertices(contact, 2.0 * highest, friction_model)
+    vertices = vertices[vertices[:, 2] < 1.5 * highest]
+    rays = np.zeros((4, 6))
+    rays[:, :3] = (1.0 if total is None else total) * edge_wrenches(contact, friction_model)[:4, :3]
+    return np.vstack([vertices, rays]), np.append(np.ones(len(vertices)), np.zeros(4))
+
+
+def _torsion_vertices(contact: Contact, cap: float, friction_model: FrictionModel) -> FloatArray:
+    """Vertices (n, 6), but for 0, of a sole with a torsion limit up to a normal force."""
+    limits = contact_limits(replace(contact, normal_force_cap=cap), friction_model)
     unit = np.array([cap] * 3 + [cap * contact.length] * 3)
-    vertices = vertices_around(
-        np.vstack([limits.A, top]) * unit, np.append(limits.b, cap), np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.0])
-    )
+    inside = np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.0])
+    vertices = vertices_around(limits.A * unit, limits.b, inside)
     return vertices[np.abs(vertices).max(axis=1) > 1e-9] * unit
 
 
