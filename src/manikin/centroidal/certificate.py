@@ -18,6 +18,8 @@ TOLERANCE = 1e-6
 """Violation up to which a requirement counts as met [SI unit of the requirement]."""
 
 
+_BLOCK = 1024
+
 UNIT_SCALE = {"m": 0.01, "m/s": 0.01, "m/s^2": 0.1, "s": 0.01, "N.m": 10.0, "N": 100.0}
 """Violations that are about equally bad, to compare requirements of different units."""
 
@@ -107,13 +109,25 @@ def phase_margins(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
 ) -> list[FloatArray]:
     """Margin at the instants of :func:`phase_times`; at key instants in both polytopes [N.m] or [N]."""
-    margins = []
-    for polytope, times in zip(polytopes, phase_times(trajectory), strict=True):
-        distances = polytope.distances(trajectory.pseudo_wrench(times))
+    return [
+        np.concatenate([block.min(axis=1) for block in facet_margins(problem, trajectory, polytope, times)])
+        for polytope, times in zip(polytopes, phase_times(trajectory), strict=True)
+    ]
+
+
+def facet_margins(
+    problem: CentroidalProblem,
+    trajectory: CentroidalTrajectory,
+    polytope: WrenchPolytope,
+    times: FloatArray,
+) -> Iterator[FloatArray]:
+    """(up to 1024, facets) distances to every facet at the given times, in blocks [N.m] or [N]."""
+    for start in range(0, len(times), _BLOCK):
+        part = times[start : start + _BLOCK]
+        distances = polytope.distances(trajectory.pseudo_wrench(part))
         if problem.margin_space == "force":
-            distances = distances / row_slopes(polytope, problem, trajectory.position(times))
-        margins.append(distances.min(axis=-1))
-    return margins
+            distances = distances / row_slopes(polytope, problem, trajectory.position(part))
+        yield distances
 
 
 def measure(

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.balance import WrenchPolytope
-from manikin.centroidal.certificate import phase_times
-from manikin.centroidal.feasibility import row_slopes
+from manikin.centroidal.certificate import facet_margins, phase_times
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.centroidal.trajectory import CentroidalTrajectory
 from manikin.spatial import FloatArray
@@ -29,11 +28,10 @@ def facet_distances(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
 ) -> list[FloatArray]:
     """Least distance of the pseudo-wrench from every facet of each phase [N.m] or [N]."""
-    distances = []
-    for polytope, times in zip(polytopes, phase_times(trajectory), strict=True):
-        values = polytope.distances(trajectory.pseudo_wrench(times))
-        distances.append((values / row_slopes(polytope, problem, trajectory.position(times))).min(axis=0))
-    return distances
+    return [
+        np.min([block.min(axis=0) for block in facet_margins(problem, trajectory, polytope, times)], axis=0)
+        for polytope, times in zip(polytopes, phase_times(trajectory), strict=True)
+    ]
 
 
 def nearest_facets(distances: Sequence[FloatArray], count: int = FIRST_COUNT) -> FacetIndices:

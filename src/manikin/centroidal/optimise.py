@@ -23,6 +23,9 @@ from manikin.spatial import FloatArray
 SHORTFALL_WEIGHT = 20.0
 """First exact penalty of a margin below the required one [1/(N.m)] or [1/N]."""
 
+LONGEST_PHASE = 20.0
+"""Bound of a phase's duration where the problem gives none [s]; without it waiting has no end."""
+
 
 @dataclass(frozen=True)
 class Targets:
@@ -166,7 +169,8 @@ def _unknown_bounds(programme: Programme, problem: CentroidalProblem) -> tuple[F
     for bound in (low, high):
         bound[0, 0], bound[-1, -1] = problem.start_com, problem.goal_com
     lower = programme.pack_unknowns(low, problem.min_durations, -np.inf, 0.0)
-    upper = programme.pack_unknowns(high, problem.max_durations, np.inf, np.inf)
+    longest = np.maximum(LONGEST_PHASE, 2.0 * problem.min_durations)
+    upper = programme.pack_unknowns(high, np.minimum(problem.max_durations, longest), np.inf, np.inf)
     return lower, upper
 
 
