@@ -7,9 +7,7 @@ JSON object; everything else goes to standard error.
 
 import ctypes
 import os
-import signal
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
@@ -18,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from manikin.errors import InputError, ManikinError
+from manikin.interruption import Interruption
 from manikin.version import __version__
 
 if TYPE_CHECKING:
@@ -43,8 +42,9 @@ RunArgument = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Run direc
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status; no traceback for a user's mistake."""
     try:
-        with _terminated_like_interrupted():
-            status = app(args=None if arguments is None else list(arguments), standalone_mode=False)
+        with Interruption() as interruption:
+            given = None if arguments is None else list(arguments)
+            status = app(args=given, standalone_mode=False, obj=interruption)
         if status == INTERRUPTED:  # typer turns Ctrl-C into this status without a word
             raise KeyboardInterrupt
         return status if isinstance(status, int) else DONE
@@ -89,6 +89,7 @@ def scenarios(json: JsonOption = False) -> None:
 
 @app.command()
 def run(
+    context: typer.Context,
     scenario: ScenarioArgument,
     out: Annotated[
         Path | None,
@@ -109,7 +110,7 @@ def run(
     if seed is not None:
         job = job.with_seed(seed)
     directory = out if out is not None else None if json else Path("runs") / job.name
-    summary = _run(job, directory, draw=figures)
+    summary = _run(job, directory, context.obj, draw=figures)
     if json:
         _print_json(summary)
     else:
@@ -172,13 +173,20 @@ def export(
     typer.echo(str(written))
 
 
-def _run(job: "Scenario", directory: Path | None, *, draw: bool) -> dict[str, Any]:
+def _run(
+    job: "Scenario", directory: Path | None, interruption: Interruption, *, draw: bool
+) -> dict[str, Any]:
     from manikin.progress import StageProgress
 
-    with _stdout_kept_clean(), StageProgress() as progress:
+    with _stdout_kept_clean(), StageProgress() as bars:
         from manikin import pipeline
 
+        def progress(stage: str, share: float) -> None:
+            interruption.check()
+            bars(stage, share)
+
         result = pipeline.run(job, out=directory, seed=job.seed, progress=progress)
+        interruption.check()
         if directory is not None and draw and (result.planned is not None or result.executed is not None):
             from manikin.products import write_products
 
@@ -234,23 +242,6 @@ def _print_json(value: dict[str, Any]) -> None:
 def _complain(message: str, status: int) -> int:
     typer.echo(f"manikin: {' '.join(message.split())}", err=True)
     return status
-
-
-@contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
-    """Let SIGTERM unwind like Ctrl-C, so that temporary files are removed."""
-
-    def stop(_signal: int, _frame: object) -> None:
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield  # the host program decides about its signals
-        return
-    before = signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 """The command line: exit status, one line for every mistake, nothing but JSON on standard output."""
 
+import contextlib
 import json
 import os
 import signal
@@ -195,10 +196,27 @@ def test_interruption_is_one_line_and_status_130(capfd, pipeline):
     assert err.endswith("manikin: interrupted; the files of finished stages are kept\n")
 
 
-def test_terminated_process_ends_like_an_interrupted_one():
-    """SIGTERM unwinds the program, so that temporary files are removed."""
+def test_interruption_that_a_solver_swallows_comes_back(capfd, pipeline, monkeypatch):
+    """CasADi's IPOPT takes the exception for its own stop signal and returns normally."""
+    inner = pipeline.run
+
+    def swallowing(scenario, **options):
+        with contextlib.suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+        return inner(scenario, **options)
+
+    monkeypatch.setattr(pipeline, "run", swallowing)
+    assert main(["run", "platform", "--json"]) == INTERRUPTED
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err.endswith("manikin: interrupted; the files of finished stages are kept\n")
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_terminated_process_ends_like_an_interrupted_one(number):
+    """SIGTERM unwinds the program, and SIGINT does where a shell has set it to be ignored."""
     code = (
-        "import sys, time\nimport manikin.cli as cli\n"
+        "import signal, sys, time\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nimport manikin.cli as cli\n"
         "def wait(*a):\n print('ready', flush=True)\n time.sleep(60)\n"
         "cli.app = lambda **k: wait()\nsys.exit(cli.main([]))"
     )
@@ -206,7 +224,7 @@ def test_terminated_process_ends_like_an_interrupted_one():
         [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout.readline() == "ready\n"
-        process.send_signal(signal.SIGTERM)
+        process.send_signal(number)
         assert process.wait(timeout=30) == INTERRUPTED
         assert process.stderr.read().count("\n") == 1
 
