@@ -116,12 +116,12 @@ def body() -> BodyModel:
 def stand(body) -> Callable[..., Plan]:
     """Both feet hold; the CoM follows ``offset(t)`` from where it stands (3,)."""
 
-    def make(duration, offset=lambda _: np.zeros(3), friction=0.7) -> Plan:
-        kinematics = Kinematics(body)
-        contacts = [foot(body, *item, friction) for item in zip(FEET, kinematics.feet, strict=True)]
+    def make(duration, offset=lambda _: np.zeros(3), friction=0.7, person=body) -> Plan:
+        kinematics = Kinematics(person)
+        contacts = [foot(person, *item, friction) for item in zip(FEET, kinematics.feet, strict=True)]
         schedule = ContactSchedule(StanceSequence([Phase(Stance(contacts))]), [0.0, duration])
-        states = moving(body, duration, lambda t, k: k.com + offset(t), lambda _, k: k.feet)
-        return Plan(body, make_motion(body, *states, schedule), schedule)
+        states = moving(person, duration, lambda t, k: k.com + offset(t), lambda _, k: k.feet)
+        return Plan(person, make_motion(person, *states, schedule), schedule)
 
     return make
 

@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from manikin.body import human
 from manikin.control import ControlSettings
 from manikin.errors import ContactError, InputError
 from manikin.scene import Box, Obstacle, Scene
@@ -50,6 +51,18 @@ def test_squat_and_sway(body, stand):
     assert result.max_foot_error_m < 1e-3
     assert result.min_margin > 20
     assert not result.fallbacks
+
+
+@pytest.mark.parametrize(("stature", "mass"), [(1.55, 50.0), (1.95, 110.0)])
+def test_small_and_large_people_crouch_without_chatter(stand, stature, mass):
+    """Light toes under load neither sink nor let the foot creep."""
+    person = human(stature, mass)
+    plan = stand(1.0, lambda t: np.array([0.01, 0.03, -0.08]) * smooth(t), person=person)
+    result = execute(person, Scene(), plan.motion, plan.schedule, hold=0.5)
+    assert result.succeeded
+    assert result.com_max_error_m < 3e-3
+    assert result.max_foot_error_m < 1e-3
+    assert result.max_slip_m < 1e-3
 
 
 def test_step_with_weight_shift(stepped):

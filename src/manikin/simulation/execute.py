@@ -21,9 +21,11 @@ from manikin.simulation.recorder import SWITCHING, Recorder, near
 from manikin.simulation.world import Grip, Push, World
 from manikin.spatial import finite_number
 
-JOINT_DAMPING = 1.0
-"""Passive damping of every joint in the default physics [N.m.s/rad]; of the order measured on
-relaxed human joints (about 0.5 at the elbow to 2 at the hip). The controller overcomes it."""
+JOINT_DAMPING = 0.1
+"""Passive damping of every joint in the default physics [N.m.s/rad]. Relaxed human joints have
+about 0.1 to 2; the engine's contact solver does not see damping, so that a light segment under
+load (toes: 3e-4 kg.m^2) sinks and chatters where damping times time step exceeds its inertia.
+The controller overcomes the damping."""
 
 CONTACT_TIME = 3e-3
 """Time constant of the contacts in the default physics [s]: a stiff floor, three time steps.

@@ -125,7 +125,8 @@ class Recorder:
         samples: dict[tuple[int, tuple[str, ...]], list[int]] = {}
         for number, sample in enumerate(self.samples):
             phase = int(self._schedule.phase_at(sample.sensed.time))
-            samples.setdefault((phase, self._unscheduled(sample, phase)), []).append(number)
+            extra = self._unscheduled(self.samples[number : number + 2], phase)
+            samples.setdefault((phase, extra), []).append(number)
         margins = np.empty(len(self.samples))
         for (phase, extra), rows in samples.items():
             stance = self._schedule.sequence[phase].stance
@@ -135,14 +136,20 @@ class Recorder:
             margins[rows] = wrench_polytope(whole).margin(totals)
         return margins
 
-    def _unscheduled(self, sample: Sample, phase: int) -> tuple[str, ...]:
-        """Effectors that press near, but outside, the time for which they are planned."""
-        stance, time = self._schedule.sequence[phase].stance, sample.sensed.time
+    def _unscheduled(self, step: Sequence[Sample], phase: int) -> tuple[str, ...]:
+        """Effectors that press near, but outside, the time for which they are planned.
+
+        Args:
+            step: The sample at the beginning of a control step and, if any, that at its end.
+            phase: Planned phase.
+        """
+        stance, time = self._schedule.sequence[phase].stance, step[0].sensed.time
+        pressed = np.max([np.linalg.norm(sample.wrenches[:, :3], axis=1) for sample in step], axis=0)
         return tuple(
             name
-            for name, wrench in zip(self.effectors, sample.wrenches, strict=True)
+            for name, force in zip(self.effectors, pressed, strict=True)
             if name not in stance
-            and np.linalg.norm(wrench[:3]) > _PRESSES
+            and force > _PRESSES
             and any(near(interval, time) for interval in self._intervals[name])
         )
 
