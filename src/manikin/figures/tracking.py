@@ -48,7 +48,7 @@ def tracking_figure(content: MotionFile) -> Figure:
         axes.plot(executed.time, error[:, index], color=_AXIS_COLOURS[index], linewidth=1.0, label=axis)
     size = np.linalg.norm(error, axis=1)
     root_mean_square = float(np.sqrt(np.mean(size**2)))
-    label = f"distance (RMS {root_mean_square:.1f} mm, largest {size.max():.1f} mm)"
+    label = f"distance (RMS {root_mean_square:.2g} mm, largest {size.max():.2g} mm)"
     axes.plot(executed.time, size, color=COLOURS["ink"], linewidth=1.4, label=label)
     dress(axes, "centre of mass [mm]")
     axes.tick_params(labelbottom=False)
@@ -59,7 +59,7 @@ def tracking_figure(content: MotionFile) -> Figure:
     wanted, found = effector_positions(body, planned, names), effector_positions(body, executed, names)
     for name in names:
         gap = 1000.0 * np.linalg.norm(found[name] - _at(executed.time, planned.time, wanted[name]), axis=1)
-        label = f"{readable(name)} (largest {gap.max():.1f} mm)"
+        label = f"{readable(name)} (largest {gap.max():.2g} mm)"
         feet.plot(executed.time, gap, color=COLOURS[name], linewidth=1.2, label=label)
     dress(feet, "feet [mm]", "time [s]")
     legend_above(feet)
