@@ -12,7 +12,8 @@ def standing(body, n, **changes):
     zero = np.zeros((n, body.nv))
     values = {
         "time": np.arange(n) * 0.1, "q": np.tile(body.standing_posture(), (n, 1)),
-        "v": zero, "a": zero, "tau": zero, "com": np.zeros((n, 3)), "angular_momentum": np.zeros((n, 3)), "margin": np.zeros(n),
+        "v": zero, "a": zero, "tau": zero, "com": np.zeros((n, 3)),
+        "angular_momentum": np.zeros((n, 3)), "margin": np.zeros(n),
         "support": np.ones((n, 2), dtype=bool), "contact_force": np.zeros((n, 2, 6)),
         "contact_names": ("left_foot", "right_foot"), "joint_names": body.joint_names,
     }  # fmt: skip
