@@ -1,0 +1,112 @@
+"""A planned whole-body motion keeps what it promises, measured apart from its certificate."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from manikin.scene import Box, Obstacle, Scene
+from manikin.wholebody import WholeBodyRequirements, WholeBodySettings, plan_whole_body
+from manikin.wholebody.assemble import phase_knots, sample_times
+
+
+def test_knots_hold_every_key_instant_and_are_dense_enough():
+    instants = np.array([0.0, 0.33, 0.75, 1.2])
+    knots = phase_knots(instants, 0.1, 5)
+    assert set(instants) <= set(knots)
+    assert np.diff(np.unique(knots)).max() <= 0.1 + 1e-12
+    assert np.all(knots[:6] == 0.0)
+    assert np.all(knots[-6:] == 1.2)
+    times = sample_times(knots, 3)
+    assert len(times) == 3 * (len(np.unique(knots)) - 1) + 1
+
+
+def test_the_step_succeeds_and_its_feet_stay_where_they_stand(step_motion, person, step_com):
+    assert step_motion.succeeded, step_motion.failure
+    motion, schedule = step_motion.motion, step_com.schedule
+    data = person.pinocchio.createData()
+    for k in range(0, len(motion.time), 7):
+        pin.framesForwardKinematics(person.pinocchio, data, motion.q[k])
+        for contact in schedule.stance_at(float(motion.time[k])):
+            placement = data.oMf[person.effector_frame(contact.effector)]
+            # 1 mm is the requirement; the certificate must not be more generous than this.
+            assert np.linalg.norm(placement.translation - contact.position) <= 1.0e-3
+    worst = np.linalg.norm(motion.com - step_com.position(motion.time), axis=1).max()
+    assert worst <= 2.0e-3
+    assert worst <= step_motion.certificate.max_com_error_m + 1e-12
+
+
+def test_velocities_and_accelerations_are_those_of_the_configurations(step_motion, person):
+    """Trapezoidal integration over 1 ms: the error is of order 1e-9 rad for jerks of 1e3 rad/s^3."""
+    motion = step_motion.motion
+    h = np.diff(motion.time)
+    for k in range(0, len(h), 13):
+        moved = pin.difference(person.pinocchio, motion.q[k], motion.q[k + 1])
+        np.testing.assert_allclose(moved, 0.5 * h[k] * (motion.v[k] + motion.v[k + 1]), atol=2e-6)
+        np.testing.assert_allclose(
+            motion.v[k + 1] - motion.v[k], 0.5 * h[k] * (motion.a[k] + motion.a[k + 1]), atol=2e-4
+        )
+
+
+def test_planned_forces_obey_newton_and_euler(step_motion, person, step_com):
+    """Contact forces and torques together satisfy the equation of motion of the whole body."""
+    motion = step_motion.motion
+    model, data = person.pinocchio, person.pinocchio.createData()
+    schedule = step_com.schedule
+    for k in range(0, len(motion.time), 29):
+        pin.computeCentroidalMomentumTimeVariation(model, data, motion.q[k], motion.v[k], motion.a[k])
+        force = motion.contact_force[k, :, :3].sum(axis=0)
+        # 0.01 N in 775 N: the least-squares sharing of the forces weighs the wrench 1e6 times.
+        weight = np.array([0.0, 0.0, 9.81 * person.mass])
+        np.testing.assert_allclose(force, data.dhg.linear + weight, atol=0.05)
+        moment = np.zeros(3)
+        for c, name in enumerate(motion.contact_names):
+            if motion.support[k, c]:
+                contact = schedule.stance_at(float(motion.time[k]))[name]
+                moment += motion.contact_force[k, c, 3:]
+                moment += np.cross(contact.position - data.com[0], motion.contact_force[k, c, :3])
+            else:
+                assert not motion.contact_force[k, c].any()
+        np.testing.assert_allclose(moment, data.dhg.angular, atol=0.05)
+    assert np.abs(motion.tau[:, :6]).max() < 0.05
+
+
+def test_no_contact_pulls_or_slips_in_the_plan(step_motion):
+    force = step_motion.motion.contact_force[:, :, :3]
+    assert force[..., 2].min() >= -1e-9
+    # Friction pyramid of the flat soles, mu = 0.7.
+    assert np.all(np.abs(force[..., :2]).max(axis=2) <= 0.7 * force[..., 2] + 1e-9)
+
+
+def test_swinging_limbs_keep_the_whole_body_in_balance(step_motion):
+    """The margin of the whole-body wrench (with angular momentum) stays positive."""
+    assert step_motion.motion.margin.min() > 0.0
+
+
+def test_the_motion_begins_and_ends_at_rest(step_motion):
+    assert np.abs(step_motion.motion.v[[0, -1]]).max() < 5e-3
+
+
+def test_the_same_seed_gives_the_same_bits(step_motion, person, flat_ground, step_com):
+    again = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
+    for name, array in step_motion.motion.arrays().items():
+        assert np.array_equal(array, getattr(again.motion, name)), name
+
+
+def test_a_motion_that_breaks_its_requirement_is_a_failure_that_says_so(person, flat_ground, step_com):
+    strict = replace(WholeBodySettings(), requirements=WholeBodyRequirements(com_error=1e-9))
+    result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0), settings=strict)
+    assert not result.succeeded
+    assert "centre-of-mass error" in result.failure.reason
+    assert result.failure.where.startswith("phase ")
+
+
+@pytest.mark.slow
+def test_a_ceiling_below_the_head_is_reported_with_its_pair(person, step_com):
+    """No person of 1.75 m keeps the centre of mass at 0.93 m below a ceiling at 1.1 m."""
+    scene = Scene([Obstacle("ceiling", Box((4.0, 4.0, 0.1)), translation=(0.0, 0.0, 1.15))])
+    result = plan_whole_body(person, scene, step_com, rng=np.random.default_rng(0))
+    assert not result.succeeded
+    assert result.certificate.min_clearance_m < 0.01
+    assert "ceiling" in str(result.certificate.closest_pair) or "error" in result.failure.reason
