@@ -1,0 +1,120 @@
+"""The main job, end to end on the real scenario, and what it does when a stage fails."""
+
+import json
+
+import numpy as np
+import pytest
+
+import manikin
+from manikin.motion.file import read_motions
+from manikin.pipeline import ExecutionRequirements, run
+from manikin.scenarios import load_scenario
+
+KEYS = {
+    "centroidal": {
+        "duration_s", "phase_durations_s", "min_margin", "margin_unit", "limiting_phase", "limiting_contact",
+        "feasibility_radius", "wall_s",
+    },
+    "wholebody": {
+        "max_support_error_m", "max_com_error_m", "min_clearance_m", "closest_pair",
+        "max_joint_limit_violation_rad", "wall_s",
+    },
+    "execution": {
+        "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m", "min_margin",
+        "max_penetration_m", "peak_torque_Nm", "realtime_factor", "wall_s",
+    },
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def platform(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("runs") / "platform"
+    return run("platform", out=directory, seed=0)
+
+
+@pytest.mark.slow
+def test_the_platform_is_planned_and_stood_on(platform):
+    """Every threshold is a requirement of the scenario (metres, newton metres, seconds)."""
+    summary = platform.summary
+    assert summary["succeeded"], summary["failure"]
+    com, body, executed = summary["centroidal"], summary["wholebody"], summary["execution"]
+    assert com["min_margin"] >= 20.0
+    assert com["duration_s"] <= 5.0
+    assert body["max_support_error_m"] <= 1e-3
+    assert body["max_com_error_m"] <= 2e-3
+    assert body["min_clearance_m"] >= 0.01
+    assert body["max_joint_limit_violation_rad"] <= 1e-9
+    assert not executed["fell"]
+    assert executed["com_rms_error_m"] <= 0.015
+    assert executed["max_foot_error_m"] <= 0.02
+    assert executed["min_margin"] > 0.0
+    assert executed["max_penetration_m"] <= 0.005
+
+
+@pytest.mark.slow
+def test_the_body_stands_for_a_second_after_the_end(platform):
+    executed, planned = platform.executed, platform.planned
+    assert executed.time[-1] >= planned.time[-1] + 0.99
+    rest = executed.time > planned.time[-1] + 0.5
+    np.testing.assert_allclose(executed.com[rest], planned.com[-1] * np.ones((rest.sum(), 1)), atol=5e-3)
+    assert np.all(executed.support[rest])
+
+
+@pytest.mark.slow
+def test_executed_forces_carry_the_weight_at_the_end(platform):
+    """Standing still, the measured contact forces sum to the weight (within 1 %)."""
+    vertical = platform.executed.contact_force[-1, :, 2].sum()
+    assert vertical == pytest.approx(79.0 * 9.81, rel=0.01)
+
+
+@pytest.mark.slow
+def test_the_summary_has_the_documented_keys_and_is_on_disk(platform):
+    for stage, keys in KEYS.items():
+        assert keys <= set(platform.summary[stage])
+    on_disk = json.loads((platform.directory / "summary.json").read_text())
+    assert on_disk["succeeded"] is True
+    assert on_disk["centroidal"] == json.loads(json.dumps(platform.summary["centroidal"]))
+
+
+@pytest.mark.slow
+def test_the_motion_file_holds_both_motions(platform):
+    content = read_motions(platform.directory / "motion.h5")
+    assert np.array_equal(content.planned.q, platform.planned.q)
+    assert np.array_equal(content.executed.margin, platform.executed.margin)
+    assert content.body.mass == pytest.approx(79.0)
+
+
+@pytest.mark.slow
+def test_the_resolved_scenario_runs_again_to_the_same_bits(platform):
+    again = run(platform.directory / "scenario.yaml")
+    assert np.array_equal(again.planned.q, platform.planned.q)
+    assert np.array_equal(again.executed.q, platform.executed.q)
+    assert np.array_equal(again.executed.contact_force, platform.executed.contact_force)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("stature", "mass"), [(1.60, 58.0), (1.90, 95.0)])
+def test_other_bodies_run_the_same_scenario(stature, mass):
+    result = manikin.run(load_scenario("platform").with_body(stature, mass), seed=3)
+    assert result.succeeded, result.summary["failure"]
+
+
+def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_path):
+    text = load_scenario("platform").to_yaml().replace("min_margin: 20.0", "min_margin: 60.0")
+    file = tmp_path / "greedy.yaml"
+    file.write_text(text)
+    result = run(file, out=tmp_path / "out")
+    failure = result.summary["failure"]
+    assert not result.succeeded
+    assert failure["stage"] == "centroidal"
+    assert "margin" in failure["reason"]
+    assert "phase" in failure["where"]
+    assert result.summary["wholebody"] is None
+    assert result.summary["execution"] is None
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["failure"] == failure
+
+
+@pytest.mark.slow
+def test_an_execution_that_misses_its_requirement_is_a_failure(platform):
+    requirements = ExecutionRequirements(margin=1e6)
+    assert "executed margin" in requirements.violation(platform.execution)
