@@ -9,6 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
+from manikin.body import human, random_configuration
 from manikin.errors import SceneError
 from manikin.scene import (
     Box,
@@ -431,3 +432,19 @@ def test_a_real_truck_is_cleared_above_and_hit_inside(scene_files, free_body, po
     assert above >= 0.8 - TIGHT
     heights = np.linspace(high[2] + 0.5, low[2] - 0.5, 60)
     assert min(near.minimum(pose((top[0], top[1], z))).distance for z in heights) < 0.0
+
+
+def test_many_configurations_at_once_are_measured_as_one_by_one():
+    """The two ways share their arithmetic, so the numbers agree to rounding."""
+    body = human()
+    rng = np.random.default_rng(12)
+    scene = Scene([Obstacle("table", Box((0.5, 0.5, 0.4)), translation=(0.2, 0.1, 0.3))])
+    proximity = Proximity(body, scene)
+    samples = np.array([random_configuration(body, rng) for _ in range(6)])
+    ignored = [frozenset({("left_foot", "floor")}) if k % 2 else frozenset() for k in range(6)]
+    together = proximity.evaluate_over(samples, 0.1, ignored)
+    for k, q in enumerate(samples):
+        alone, mine = proximity.evaluate(q, 0.1, ignored[k]), together.sample == k
+        assert tuple(np.array(together.pairs, dtype=object)[mine].tolist()) or not len(alone)
+        np.testing.assert_array_equal(together.distance[mine], alone.distance)
+        np.testing.assert_allclose(together.gradient[mine], alone.gradient, atol=1e-12)

@@ -63,6 +63,23 @@ class ProximityResult:
         return len(self.distance)
 
 
+@dataclass(frozen=True, eq=False)
+class ProximitySamples:
+    """Close pairs of many configurations, ordered by sample.
+
+    Attributes:
+        sample: (k,) index of the configuration.
+        distance: (k,) signed distances [m].
+        gradient: (k, nv) derivatives of the distances by the tangent of the configuration.
+        pairs: k names, (body shape, obstacle or other body shape).
+    """
+
+    sample: NDArray[np.int64]
+    distance: FloatArray
+    gradient: FloatArray
+    pairs: tuple[Pair, ...]
+
+
 @dataclass(frozen=True)
 class Clearance:
     """The smallest distance found.
@@ -161,6 +178,54 @@ class Proximity:
         gradient = (wrench @ jacobian) * self._sensitivity[rows]
         names = tuple(self.pairs[row] for row in rows)
         return ProximityResult(distance, gradient, names, on_body, on_other, normal)
+
+    def evaluate_over(
+        self,
+        q_samples: FloatArray,
+        activation: float = 0.1,
+        ignore: Ignored | Sequence[Ignored] = NOTHING,
+    ) -> ProximitySamples:
+        """Measure every close pair of many configurations; like :meth:`evaluate`, with one broad phase.
+
+        Args:
+            q_samples: (n, nq).
+            activation: [m]; farther pairs are left out.
+            ignore: One set for all samples, or n sets.
+
+        Raises:
+            SceneError: If the number of ignore sets is not n, or a sample is not a finite
+                vector of the body's size.
+        """
+        n = len(q_samples)
+        considered = self._considered_over(ignore, n)
+        jacobians = np.empty((n, 6, self.nv))
+        placements = np.empty((n, self._count, 4, 4))
+        for sample, q in enumerate(q_samples):
+            jacobians[sample] = pin.computeJointJacobians(
+                self._model, self._data, checked_configuration(self._model, q)
+            )
+            pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
+            placements[sample] = self._placements()
+        lower = self._bounds.lower(placements[..., :3, :3], placements[..., :3, 3])
+        near = (lower < activation) & considered
+        found = [
+            # The measurements' vectors are buffers that the next sample overwrites.
+            (sample, pair, item[0], np.array(item[1]), np.array(item[2]))
+            for sample in range(n)
+            for pair, item in self._measured(np.flatnonzero(near[sample]), placements[sample])
+            if item[0] < activation
+        ]
+        samples, pairs = (np.array([row[part] for row in found], dtype=np.int64) for part in (0, 1))
+        normal, on_body = (np.array([row[part] for row in found]).reshape(-1, 3) for part in (3, 4))
+        wrench = np.hstack([normal, np.cross(on_body, normal)])
+        gradient = (wrench[:, None, :] @ jacobians[samples])[:, 0] * self._sensitivity[pairs]
+        return ProximitySamples(
+            samples, np.array([row[2] for row in found]), gradient, tuple(self.pairs[pair] for pair in pairs)
+        )
+
+    def _measured(self, indices: NDArray[np.int64], placements: FloatArray) -> list[tuple[int, Measured]]:
+        rows = indices.tolist()
+        return list(zip(rows, self._measure(rows, placements), strict=True))
 
     def minimum(self, q: FloatArray, ignore: Ignored = NOTHING) -> Clearance:
         """Smallest signed distance of all pairs at ``q``; see :meth:`evaluate` for ``ignore``."""

@@ -23,6 +23,12 @@ from manikin.wholebody.path import Pose
 CentreOfMass = Callable[[float], FloatArray]
 """Planned centre of mass (3,) [m] at a time [s]."""
 
+Placed = tuple[Any, Any]
+"""A Coal geometry and its transform to the world."""
+
+_ENDLESS = 1.0e9
+"""Half the extent of what has no end (a floor) [m]."""
+
 _LIMB_SHARE = 0.75
 """Share of the standing limb's last long segment that is kept clear of."""
 
@@ -56,22 +62,46 @@ class EffectorClearance:
             limb = _last_long_segment(body, contact)
             if limb is not None:
                 self._limbs.append(limb)
+        boxes = [_world_box(geometry, placement) for geometry, placement in self._fixed]
+        self._low, self._high = (np.array([box[side] for box in boxes]).reshape(-1, 3) for side in (0, 1))
+        balls = [_ball(geometry) for geometry, _, _ in self._own]
+        self._centres = np.array(
+            [offset + turn @ ball[0] for (_, turn, offset), ball in zip(self._own, balls, strict=True)]
+        )
+        self._radii = np.array([ball[1] for ball in balls])
         self._com = com
+        self._placed: dict[float, list[Placed]] = {}
         self._request = coal.DistanceRequest()
         self._result = coal.DistanceResult()
 
     def __call__(self, time: float, pose: Pose) -> float:
         """Return the signed distance at a pose [m]; negative means penetration."""
-        com = self._com(time)
-        limbs = [limb.placed(com) for limb in self._limbs]
-        smallest = np.inf
-        for geometry, turn, offset in self._own:
-            placement = coal.Transform3s(pose.rotation @ turn, pose.position + pose.rotation @ offset)
-            for other, where in [*self._fixed, *limbs]:
-                self._result.clear()
-                distance = coal.distance(geometry, placement, other, where, self._request, self._result)
-                smallest = min(smallest, distance)
+        own = [
+            (geometry, coal.Transform3s(pose.rotation @ turn, pose.position + pose.rotation @ offset))
+            for geometry, turn, offset in self._own
+        ]
+        smallest = min((self._distance(mine, limb) for limb in self._placed_limbs(time) for mine in own),
+                       default=np.inf)  # fmt: skip
+        # Far obstacles are told by the box around them and the ball around the own shape.
+        centres = pose.position + self._centres @ pose.rotation.T
+        beyond = np.maximum(np.maximum(self._low - centres[:, None], centres[:, None] - self._high), 0.0)
+        lower = np.sqrt(np.einsum("ijk,ijk->ij", beyond, beyond)) - self._radii[:, None]
+        for index in np.argsort(lower, axis=None, kind="stable"):
+            mine, other = divmod(int(index), lower.shape[1])
+            if lower[mine, other] > smallest:
+                break
+            smallest = min(smallest, self._distance(own[mine], self._fixed[other]))
         return float(smallest)
+
+    def _placed_limbs(self, time: float) -> list[Placed]:
+        if time not in self._placed:
+            com = self._com(time) if self._limbs else np.zeros(3)
+            self._placed[time] = [limb.placed(com) for limb in self._limbs]
+        return self._placed[time]
+
+    def _distance(self, mine: Placed, other: Placed) -> float:
+        self._result.clear()
+        return coal.distance(*mine, *other, self._request, self._result)
 
 
 def end_shapes(body: BodyModel, effector: str) -> list[tuple[Any, FloatArray, FloatArray]]:
@@ -92,6 +122,24 @@ def end_shapes(body: BodyModel, effector: str) -> list[tuple[Any, FloatArray, Fl
             geometry = geometries[f"{name}/{shape.name}"]
             shapes.append((geometry, frame.rotation.T @ shape.rotation, translation))
     return shapes
+
+
+def _ball(geometry: Any) -> tuple[FloatArray, float]:
+    """Centre (3,) and radius of a ball around a geometry, in its own frame [m]."""
+    geometry.computeLocalAABB()
+    low, high = np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
+    return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+
+
+def _world_box(geometry: Any, placement: Any) -> tuple[FloatArray, FloatArray]:
+    """Corners (3,) of an axis-aligned box around a placed geometry [m]; boundless for half-spaces."""
+    if isinstance(geometry, (coal.Halfspace, coal.Plane)):
+        return np.full(3, -_ENDLESS), np.full(3, _ENDLESS)
+    geometry.computeLocalAABB()
+    low, high = np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
+    rotation, translation = np.array(placement.getRotation()), np.array(placement.getTranslation())
+    centre, half = rotation @ (0.5 * (low + high)) + translation, np.abs(rotation) @ (0.5 * (high - low))
+    return centre - half, centre + half
 
 
 class _StandingLimb:

@@ -7,6 +7,7 @@ left, cost more, so that load passes smoothly from one to the next.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -24,6 +25,9 @@ _RAMP = 0.08
 _WRENCH_WEIGHT = 1.0e3
 """Cost of missing the wrench relative to the cost of force."""
 
+
+_ARM = 0.1
+"""Length that makes moments comparable with forces [m]."""
 
 _HANGING_COST = 3.0
 """Cost of a force on a hanging segment (toes) relative to one on the effector's own."""
@@ -63,6 +67,30 @@ class _Generators:
     contact: np.ndarray
     carrier: np.ndarray
     cost: FloatArray
+
+    @cached_property
+    def wrenches(self) -> FloatArray:
+        """(6, g) wrench of each unit magnitude about the world origin."""
+        return np.vstack([self.direction.T, np.cross(self.point, self.direction).T])
+
+    @cached_property
+    def balance(self) -> tuple[FloatArray, FloatArray]:
+        """Mean contact point (3,) and the (6, g) wrenches about it, moments in units of force."""
+        centre = self.point.mean(axis=0)
+        moment = np.cross(self.point - centre, self.direction) / _ARM
+        return centre, np.vstack([self.direction.T, moment.T])
+
+    @cached_property
+    def by_carrier(self) -> tuple[tuple[int, FloatArray], ...]:
+        """Joint and (6, g) wrenches of the generators that act on it, zero for the others."""
+        return tuple(
+            (int(joint), self.wrenches * (self.carrier == joint)) for joint in np.unique(self.carrier)
+        )
+
+    @cached_property
+    def by_contact(self) -> dict[int, FloatArray]:
+        """(6, g) wrenches of the generators of each contact, zero for the others."""
+        return {int(index): self.wrenches * (self.contact == index) for index in np.unique(self.contact)}
 
 
 def plan_forces(
@@ -159,7 +187,7 @@ def _edges(contact: Contact) -> FloatArray:
 def _base_wrench_in_world(base: FloatArray, q: FloatArray, rotation: FloatArray) -> FloatArray:
     """Wrench about the world origin of the pelvis part of a generalised force."""
     force = rotation @ base[:3]
-    return np.concatenate([force, rotation @ base[3:6] + np.cross(q[:3], force)])
+    return np.concatenate([force, rotation @ base[3:6] + skew(q[:3]) @ force])
 
 
 def _share_wrench(generators: _Generators, wrench: FloatArray, shares: FloatArray) -> FloatArray:
@@ -167,25 +195,25 @@ def _share_wrench(generators: _Generators, wrench: FloatArray, shares: FloatArra
 
     The wrench is taken about the mean contact point, in units of its force, for conditioning.
     """
-    centre = generators.point.mean(axis=0)
-    arm = generators.point - centre
-    matrix = np.hstack([generators.direction, np.cross(arm, generators.direction) / 0.1])
-    target = np.concatenate([wrench[:3], (wrench[3:] - np.cross(centre, wrench[:3])) / 0.1])
+    centre, matrix = generators.balance
+    force, moment = wrench[:3], wrench[3:]
+    turned = np.array([
+        centre[1] * force[2] - centre[2] * force[1],
+        centre[2] * force[0] - centre[0] * force[2],
+        centre[0] * force[1] - centre[1] * force[0],
+    ])  # fmt: skip
+    target = np.concatenate([force, (moment - turned) / _ARM])
     cost = np.diag(generators.cost / shares[generators.contact])
-    stacked = np.vstack([_WRENCH_WEIGHT * matrix.T, cost])
+    stacked = np.vstack([_WRENCH_WEIGHT * matrix, cost])
     return nnls(stacked, np.concatenate([_WRENCH_WEIGHT * target, np.zeros(len(cost))]))[0]
 
 
 def _apply(model: pin.Model, data: pin.Data, generators: _Generators, magnitude: FloatArray) -> FloatArray:
     """Generalised force of the contact forces."""
     total = np.zeros(model.nv)
-    force = generators.direction * magnitude[:, None]
-    for joint in np.unique(generators.carrier):
-        mine = generators.carrier == joint
-        jacobian = pin.getJointJacobian(model, data, int(joint), pin.WORLD)
-        resultant = force[mine].sum(axis=0)
-        moment = np.cross(generators.point[mine], force[mine]).sum(axis=0)
-        total += jacobian.T @ np.concatenate([resultant, moment])
+    for joint, wrenches in generators.by_carrier:
+        jacobian = pin.getJointJacobian(model, data, joint, pin.WORLD)
+        total += jacobian.T @ (wrenches @ magnitude)
     return total
 
 
@@ -193,10 +221,9 @@ def _by_contact(
     generators: _Generators, magnitude: FloatArray, stance: Stance, names: tuple[str, ...]
 ) -> FloatArray:
     out = np.zeros((len(names), 6))
-    force = generators.direction * magnitude[:, None]
     for contact in stance:
-        mine = generators.contact == names.index(contact.effector)
-        out[names.index(contact.effector), :3] = force[mine].sum(axis=0)
-        moment = (skew(generators.point[mine] - contact.position) @ force[mine][:, :, None])[:, :, 0]
-        out[names.index(contact.effector), 3:] = moment.sum(axis=0)
+        index = names.index(contact.effector)
+        resultant = generators.by_contact[index] @ magnitude
+        out[index, :3] = resultant[:3]
+        out[index, 3:] = resultant[3:] - skew(contact.position) @ resultant[:3]
     return out

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 from scipy.special import expit
 
 from manikin.body import BodyModel
@@ -151,20 +152,14 @@ class MotionObjective:
         n, nv = len(states.q), self._model.nv
         jacobian, residual = np.zeros((n, self.task_rows, nv)), np.zeros((n, self.task_rows))
         momentum = MomentumRateSamples(self._model, n)
-        near: list[tuple[int, FloatArray, FloatArray]] = []
         for s in range(n):
             momentum.record(s, self._data, states)
             pin.computeJointJacobians(self._model, self._data, states.q[s])
             pin.updateFramePlacements(self._model, self._data)
             self._task_rows(s, states.q[s], jacobian[s], residual[s], scales, out)
-            found = self._clearance_rows(s, states.q[s], scales, out)
-            if found is not None:
-                near.append((s, *found))
         out.task_residual, out.task_jacobian = residual, _to_raw(jacobian, tangent)
         out.add(0, out.task_jacobian, residual + shift)
-        if near:
-            rows, values = _padded(near, n, nv)
-            out.add(0, _to_raw(rows, tangent), values)
+        self._add_clearance(out, states, tangent, scales)
         self._add_reference(out, states, tangent)
         return momentum
 
@@ -198,22 +193,23 @@ class MotionObjective:
             jacobian[3:] = weight * pin.Jlog3(relative) @ relative.T @ full[3:]
             residual[3:] = weight * pin.log3(relative)
 
-    def _clearance_rows(
-        self, s: int, q: FloatArray, scales: FitScales, out: Linearised
-    ) -> tuple[FloatArray, FloatArray] | None:
+    def _add_clearance(
+        self, out: Linearised, states: StateSamples, tangent: FloatArray, scales: FitScales
+    ) -> None:
         if self._proximity is None:
-            return None
+            return
         reach = scales.safe_distance + 4.0 * scales.softness
-        found = self._proximity.evaluate(q, activation=reach, ignore=self._targets.ignored[s])
+        found = self._proximity.evaluate_over(states.q, reach, self._targets.ignored)
         if len(found.distance) == 0:
-            return None
+            return
         worst = int(np.argmin(found.distance))
-        if found.distance[worst] < out.clearance:
-            out.clearance, out.closest = float(found.distance[worst]), found.pairs[worst]
+        out.clearance, out.closest = float(found.distance[worst]), found.pairs[worst]
         # A softened hinge: it also holds back what is about to come too close.
         missing = (scales.safe_distance - found.distance) / scales.softness
-        value = scales.softness * np.logaddexp(0.0, missing)
-        return -expit(missing)[:, None] * found.gradient / scales.clearance, value / scales.clearance
+        value = scales.softness * np.logaddexp(0.0, missing) / scales.clearance
+        rows = -expit(missing)[:, None] * found.gradient / scales.clearance
+        jacobian, residual = _padded(found.sample, rows, value, len(states.q))
+        out.add(0, _to_raw(jacobian, tangent), residual)
 
     def _add_reference(self, out: Linearised, states: StateSamples, tangent: FloatArray) -> None:
         """Deviation from the reference posture; the pelvis' place does not count."""
@@ -279,10 +275,13 @@ def _to_raw(jacobian: FloatArray, tangent: FloatArray) -> FloatArray:
     return np.concatenate([jacobian[:, :, :6] @ tangent[:, :6, :], jacobian[:, :, 6:]], axis=2)
 
 
-def _padded(near: list[tuple[int, FloatArray, FloatArray]], n: int, nv: int) -> tuple[FloatArray, FloatArray]:
-    """Stack a varying number of rows per sample, padded with zeros."""
-    most = max(len(values) for _, _, values in near)
-    jacobian, residual = np.zeros((n, most, nv)), np.zeros((n, most))
-    for s, rows, values in near:
-        jacobian[s, : len(values)], residual[s, : len(values)] = rows, values
+def _padded(
+    sample: NDArray[np.int64], rows: FloatArray, values: FloatArray, n: int
+) -> tuple[FloatArray, FloatArray]:
+    """Lay out rows (k, nv) and values (k,), ordered by sample, as (n, most, ...), padded with zeros."""
+    start = np.searchsorted(sample, np.arange(n))
+    place = np.arange(len(sample)) - start[sample]
+    jacobian = np.zeros((n, int(place.max()) + 1, rows.shape[1]))
+    residual = np.zeros(jacobian.shape[:2])
+    jacobian[sample, place], residual[sample, place] = rows, values
     return jacobian, residual
