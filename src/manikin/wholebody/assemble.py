@@ -200,23 +200,27 @@ class _Planner:
             reference_motion(self.body, self.trajectory, time), self.settings.fit.safe_distance,
         )  # fmt: skip
 
-    def _fit(self, swings: tuple[PlannedSwing, ...], guide: Guide) -> FitResult:
+    def _targets(self, swings: tuple[PlannedSwing, ...], guide: Guide) -> tuple[FitTargets, FloatArray]:
+        """What the fit has to do, and the knots of its spline."""
         schedule, settings = self.trajectory.schedule, self.settings
         knots = phase_knots(schedule.instants, settings.knot_spacing, DEGREE)
         time = sample_times(knots, settings.samples_per_span)
-        reference = guide.at(time)
         targets = FitTargets(
             time=time,
             effectors=effector_targets(schedule, swings, time),
             com=self.trajectory.position(time),
             com_acceleration=self.trajectory.acceleration(time),
             margin=self._margin(time, self._point_mass_wrench(time)),
-            reference=reference,
+            reference=guide.at(time),
             reference_scale=reference_scale(self.body),
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
         )
-        fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, settings.fit)
-        return fit.solve(fit.initial_spline(reference))
+        return targets, knots
+
+    def _fit(self, swings: tuple[PlannedSwing, ...], guide: Guide) -> FitResult:
+        targets, knots = self._targets(swings, guide)
+        fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, self.settings.fit)
+        return fit.solve(fit.initial_spline(targets.reference))
 
     def _sample(self, spline: ConfigurationSpline) -> Motion:
         schedule = self.trajectory.schedule
