@@ -185,8 +185,10 @@ def test_folder_that_does_not_exist_gives_one_line(content, tmp_path):
 
 
 WRITER = """
+import signal
 import sys
-import numpy as np
+# A background shell starts its children with SIGINT ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from manikin.motion.file import MotionFile, read_motions, write_motions
 content = read_motions(sys.argv[1])
 print("ready", flush=True)
@@ -206,7 +208,10 @@ def test_killed_writer_leaves_a_whole_file(content, tmp_path, number, times):
             process.stdout.readline()
             time.sleep(0.05 + 0.013 * attempt)
             process.send_signal(number)
-            process.wait(timeout=30)
+            try:
+                process.wait(timeout=30)
+            finally:
+                process.kill()
         if target.exists():
             found = read_motions(target)
             assert len(found.planned.time) == 2000
