@@ -5,7 +5,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from manikin.body import BodyModel, Segment
+from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind
 from manikin.control.dynamics import DynamicsState
 from manikin.spatial import FloatArray, skew
@@ -85,15 +85,6 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
 def segment_key(segment: str) -> str:
     """Name of a segment among the frames of a :class:`DynamicsState`, apart from effectors."""
     return f"segment/{segment}"
-
-
-def hanging_segment(body: BodyModel, segment: str) -> Segment | None:
-    """Return the last segment of a limb when it hangs on ``segment``, as toes on a foot, or None."""
-    children = [candidate for candidate in body.segments if candidate.parent == segment]
-    if len(children) != 1 or not children[0].hinges:
-        return None
-    leaf = all(candidate.parent != children[0].name for candidate in body.segments)
-    return children[0] if leaf else None
 
 
 def _rectangle(lengths: tuple[float, ...], half_width: float) -> FloatArray:

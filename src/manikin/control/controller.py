@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel
+from manikin.body.limb import hanging_segment
 from manikin.contact import Contact, ContactSchedule
 from manikin.control.build_qp import (
     ControlProblem,
@@ -19,7 +20,6 @@ from manikin.control.contact_forces import (
     ContactGeometry,
     contact_force_basis,
     contact_geometry,
-    hanging_segment,
     segment_key,
 )
 from manikin.control.dynamics import Dynamics, DynamicsState

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from manikin.body import BodyModel
+from manikin.body.limb import end_segments
 from manikin.contact import Contact, ContactKind, ContactSchedule
 from manikin.control import Controller, ControlOutput, ControlSettings
-from manikin.control.contact_forces import hanging_segment
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.errors import InputError
 from manikin.motion import Motion
@@ -125,7 +125,7 @@ class _Run:
         self.world = World(compile_model(body, scene, physics))
         for push in pushes:
             self.world.apply_push(push.segment, push.force, push.start, push.duration)
-        segments = {name: contact_segments(body, name) for name in schedule.sequence.effectors}
+        segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self.recorder = Recorder(schedule, segments)
         self.failure, self.failure_time = "", None
         self._planned_now: tuple[int, ...] = ()
@@ -229,13 +229,6 @@ class _Run:
         )
 
 
-def contact_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
-    """Segments with which an effector touches: its own and the one hanging on it (toes)."""
-    own = body.effector(effector).segment
-    hanging = hanging_segment(body, own)
-    return (own,) if hanging is None else (own, hanging.name)
-
-
 def _substeps(period: float, timestep: float) -> int:
     count = round(period / timestep)
     if count < 1 or abs(count * timestep - period) > 1e-9:
@@ -249,7 +242,7 @@ def _holds(body: BodyModel, scene: Scene, schedule: ContactSchedule) -> tuple[_H
     return tuple(
         _Hold(
             effector,
-            contact_segments(body, effector),
+            end_segments(body, effector),
             interval,
             scene.supporting_surface(interval.contact).obstacle,
         )
