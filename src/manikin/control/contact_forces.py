@@ -6,6 +6,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from manikin.body import BodyModel
+from manikin.body.limb import hanging_segment
 from manikin.contact import Contact, ContactKind
 from manikin.control.dynamics import DynamicsState
 from manikin.spatial import FloatArray, skew
