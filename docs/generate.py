@@ -1,0 +1,153 @@
+"""Write what the documentation takes from the code: the JSON schema and the generated tables.
+
+Run ``python docs/generate.py`` after a change; a test compares the result with the files.
+A page marks a generated table with ``<!-- generated: NAME -->`` ... ``<!-- end generated -->``.
+"""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manikin.body import human
+from manikin.body.range_of_motion import HUMAN_HINGES
+from manikin.motion.file import DATASETS
+from manikin.scenarios import json_schema
+from manikin.scenarios.stance_file import StanceFile
+
+DOCS = Path(__file__).parent
+SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
+    "scenario.schema.json": json_schema,
+    "stance.schema.json": StanceFile.model_json_schema,
+}
+_BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end generated -->)", re.DOTALL)
+
+
+def files() -> dict[Path, str]:
+    """Every generated file with the text it should have."""
+    texts = {DOCS / name: json.dumps(schema(), indent=2) + "\n" for name, schema in SCHEMAS.items()}
+    for page in sorted(DOCS.glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        if _BLOCK.search(text):
+            texts[page] = _BLOCK.sub(lambda m: f"{m[1]}\n{TABLES[m[2]]()}\n{m[3]}", text)
+    return texts
+
+
+# --- schemas ---------------------------------------------------------------------------------
+
+
+def schema_tables(schema: dict[str, Any]) -> str:
+    """One table per section of a file, the file itself first."""
+    sections = [("The file", schema)]
+    sections += [(f"`{_label(name)}`", part) for name, part in schema["$defs"].items()]
+    return "\n".join(_section(title, part) for title, part in sections if "properties" in part)
+
+
+def _section(title: str, part: dict[str, Any]) -> str:
+    required = part.get("required", [])
+    rows = [
+        f"| `{key}` | {_type(value)} | {_default(value, key in required)} | {value.get('description', '')} |"
+        for key, value in part["properties"].items()
+    ]
+    note = " ".join(part.get("description", "").split())
+    head = ["| key | type | default | meaning |", "|---|---|---|---|"]
+    return "\n".join([f"### {title}", "", note, "", *head, *rows, ""])
+
+
+def _label(name: str) -> str:
+    """Name of a section for the reader: ``ObstacleSection`` becomes ``obstacle``."""
+    return re.sub(r"(?<!^)(?=[A-Z])", " ", name.removesuffix("Section")).lower()
+
+
+def _type(value: dict[str, Any]) -> str:
+    if "$ref" in value:
+        label = _label(value["$ref"].rsplit("/", 1)[-1])
+        return f"[{label}](#{label.replace(' ', '-')})"
+    for key in ("anyOf", "oneOf"):
+        if key in value:
+            kinds = [_type(item) for item in value[key] if item.get("type") != "null"]
+            return " or ".join(dict.fromkeys(kinds))
+    if "const" in value:
+        return f"`{value['const']}`"
+    if "enum" in value:
+        return " or ".join(f"`{item}`" for item in value["enum"])
+    if value.get("type") == "array" and "prefixItems" in value:
+        return f"{len(value['prefixItems'])} × {_type(value['prefixItems'][0])}"
+    if value.get("type") == "array":
+        return f"list of {_type(value['items'])}"
+    return _number(value)
+
+
+def _number(value: dict[str, Any]) -> str:
+    names = {"string": "text", "boolean": "true or false"}
+    text = names.get(value.get("type", ""), value.get("type", "any"))
+    signs = {"exclusiveMinimum": "&gt;", "minimum": "≥", "exclusiveMaximum": "&lt;", "maximum": "≤"}
+    bounds = [f"{sign} {value[key]:g}" for key, sign in signs.items() if key in value]
+    return " ".join([text, *([", ".join(bounds)] if bounds else [])])
+
+
+def _default(value: dict[str, Any], required: bool) -> str:
+    if required:
+        return "required"
+    default = value.get("default")
+    if isinstance(default, dict):
+        shown = {key: item for key, item in default.items() if item is not None}
+        return f"`{json.dumps(shown)}`" if shown and len(json.dumps(shown)) < 60 else "see there"
+    return "" if default in (None, "", []) else f"`{json.dumps(default)}`"
+
+
+# --- body and motion file --------------------------------------------------------------------
+
+
+def segment_table() -> str:
+    """Segments of the reference body."""
+    body = human()
+    rows = ["| segment | parent | mass [kg] | hinges |", "|---|---|---|---|"]
+    for segment in body.segments:
+        if not segment.name.startswith("right"):
+            hinges = ", ".join(hinge.name.removeprefix("left_") for hinge in segment.hinges)
+            name = re.sub(r"^left_", "left, right ", segment.name)
+            parent = (segment.parent or "free: 6 degrees of freedom").removeprefix("left_")
+            rows.append(f"| {name} | {parent} | {segment.mass:.2f} | {hinges} |")
+    return "\n".join(rows) + "\n"
+
+
+def hinge_table() -> str:
+    """Hinges with their ranges, speeds and torques."""
+    rows = [
+        "| hinge | axis (left side) | range [deg] | speed [rad/s] | torque [N·m] |",
+        "|---|---|---|---|---|",
+    ]
+    for hinge in (entry for entries in HUMAN_HINGES.values() for entry in entries):
+        axis = ", ".join(f"{value:.3g}" for value in np.array(hinge.axis) + 0.0)
+        span = f"{hinge.lower_deg:g} to {hinge.upper_deg:g}"
+        rows.append(f"| {hinge.name} | {axis} | {span} | {hinge.speed:g} | {hinge.torque:g} |")
+    return "\n".join(rows) + "\n"
+
+
+def dataset_table() -> str:
+    """Datasets of a motion."""
+    shapes = {
+        "time": "(n,)", "q": "(n, nq)", "v": "(n, nv)", "a": "(n, nv)", "tau": "(n, nv)", "com": "(n, 3)",
+        "angular_momentum": "(n, 3)", "margin": "(n,)", "support": "(n, c)", "contact_force": "(n, c, 6)",
+    }  # fmt: skip
+    rows = ["| dataset | shape | unit | meaning |", "|---|---|---|---|"]
+    rows += [f"| `{name}` | {shapes[name]} | {unit} | {text} |" for name, (unit, text) in DATASETS.items()]
+    return "\n".join(rows) + "\n"
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "scenario": lambda: schema_tables(json_schema()),
+    "stance": lambda: schema_tables(StanceFile.model_json_schema()),
+    "segments": segment_table,
+    "hinges": hinge_table,
+    "datasets": dataset_table,
+}
+
+
+if __name__ == "__main__":
+    for path, text in files().items():
+        path.write_text(text, encoding="utf-8")

@@ -1,0 +1,140 @@
+"""The documentation: what is taken from the code is up to date, examples run, commands exist."""
+
+import importlib.util
+import json
+import re
+from pathlib import Path
+
+import pytest
+import typer
+
+import manikin
+from manikin.cli import app
+from manikin.motion.file import write_motions
+from manikin.scenarios.stance_file import load_stance_file
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("*.md"))}
+COMMANDS = typer.main.get_command(app).commands
+EXAMPLE = re.compile(r"(<!-- example: slow -->\n)?```python\n(.*?)```", re.DOTALL)
+PYTHON = [
+    pytest.param(match[2], id=f"{name}-{number}", marks=[pytest.mark.slow] if match[1] else [])
+    for name, text in PAGES.items()
+    for number, match in enumerate(EXAMPLE.finditer(text))
+]
+
+
+def yaml_examples(kind):
+    pattern = re.compile(rf"<!-- example: {kind} -->\n```yaml\n(.*?)```", re.DOTALL)
+    return [match[1] for text in PAGES.values() for match in pattern.finditer(text)]
+
+
+def keys_of(value):
+    """Every key of nested mappings; those of the torques are joint names."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield key
+            if key != "peak_torque_Nm":
+                yield from keys_of(item)
+    elif isinstance(value, list):
+        for item in value:
+            yield from keys_of(item)
+
+
+@pytest.fixture(scope="module")
+def generated():
+    """What ``docs/generate.py`` would write."""
+    spec = importlib.util.spec_from_file_location("generate_docs", DOCS / "generate.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.files()
+
+
+def test_schemas_and_tables_are_up_to_date(generated):
+    """After a change: ``python docs/generate.py``."""
+    assert [path.name for path, text in generated.items() if path.read_text(encoding="utf-8") != text] == []
+
+
+def test_every_generated_block_was_found(generated):
+    marked = {DOCS / name for name, text in PAGES.items() if "<!-- generated:" in text}
+    assert marked <= set(generated)
+
+
+@pytest.mark.parametrize("source", PYTHON)
+def test_python_examples_run(source, tmp_path, monkeypatch, finished_run):
+    run = tmp_path / "runs/platform"
+    run.mkdir(parents=True)
+    write_motions(run / "motion.h5", finished_run)
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(compile(source, "<documentation>", "exec"), names)
+    if "result" in names and hasattr(names["result"], "summary"):
+        missing = {key for key in keys_of(names["result"].summary) if f"`{key}`" not in PAGES["json.md"]}
+        assert missing == set()
+
+
+def test_the_motion_file_is_read_in_ten_lines_without_manikin():
+    (example,) = EXAMPLE.findall(PAGES["motion-file.md"])
+    lines = [line for line in example[1].splitlines() if line and not line.startswith("import")]
+    assert len(lines) <= 10
+    assert "manikin" not in example[1]
+
+
+@pytest.mark.slow
+def test_scenario_examples_succeed(tmp_path):
+    examples = yaml_examples("scenario")
+    assert examples
+    for text in examples:
+        (tmp_path / "example.yaml").write_text(text)
+        result = manikin.run(tmp_path / "example.yaml")
+        assert result.succeeded, result.summary["failure"]
+
+
+def test_stance_examples_give_every_documented_key(tmp_path):
+    examples = yaml_examples("stance")
+    assert examples
+    for text in examples:
+        (tmp_path / "stance.yaml").write_text(text)
+        report = load_stance_file(tmp_path / "stance.yaml").evaluate().as_dict(polytope=True)
+        assert {key for key in keys_of(report) if f"`{key}`" not in PAGES["json.md"]} == set()
+        json.dumps(report, allow_nan=False)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_commands_and_options_exist(name):
+    blocks = "".join(re.findall(r"```bash\n(.*?)```", PAGES[name], re.DOTALL))
+    for line in re.findall(r"^(?:\.venv/bin/)?manikin .*$", blocks, re.MULTILINE):
+        words = line.split()
+        assert words[1] in COMMANDS, line
+        known = {
+            option for item in COMMANDS[words[1]].params for option in (*item.opts, *item.secondary_opts)
+        }
+        assert {word for word in words if word.startswith("--")} <= known, line
+    for command in re.findall(r"`manikin (\w+)", PAGES[name]):
+        assert command in COMMANDS
+
+
+def test_every_module_is_in_the_api_reference():
+    """Modules of one file and modules of rooms; ``__init__`` only hands names on."""
+    listed = re.findall(
+        r"^::: (manikin[\w.]*)", "\n".join(p.read_text() for p in (DOCS / "api").glob("*.md")), re.M
+    )
+    source = ROOT / "src"
+    modules = {
+        ".".join(path.relative_to(source).with_suffix("").parts)
+        for path in (source / "manikin").rglob("*.py")
+        if path.name not in ("__init__.py", "version.py")
+    }
+    assert set(listed) - {"manikin"} == modules
+    assert len(listed) == len(set(listed))
+
+
+def test_every_page_is_in_the_navigation():
+    navigation = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    pages = [page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")]
+    assert [page for page in pages if f" {page}" not in navigation] == []
+
+
+def test_ci_builds_the_documentation_strictly():
+    assert "mkdocs build --strict" in (ROOT / ".ci/run").read_text(encoding="utf-8")

@@ -1,0 +1,81 @@
+"""The README: its commands are the ones that are checked, its example runs, its tables are true."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+from manikin.cli import app
+
+ROOT = Path(__file__).resolve().parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+COMMANDS = typer.main.get_command(app).commands
+
+
+def marked_command(name):
+    """Lines of the block after ``<!-- command: NAME -->``, as ``.ci/run`` takes them."""
+    block = re.search(rf"<!-- command: {name} -->\n```bash\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+    return block[1].splitlines()
+
+
+@pytest.mark.parametrize(
+    ("name", "last"), [("run", "manikin run platform"), ("test", "python -m pytest -n 2")]
+)
+def test_each_fresh_machine_command_is_one_line(name, last):
+    (line,) = marked_command(name)
+    assert line.startswith("python3 -m venv .venv && ")
+    assert line.endswith(f".venv/bin/{last}")
+
+
+@pytest.mark.parametrize("name", ["run", "test"])
+def test_ci_extracts_the_same_commands(name):
+    """The shell function of ``.ci/run`` itself, run on the README."""
+    function = next(
+        line for line in (ROOT / ".ci/run").read_text().splitlines() if line.startswith("readme_command()")
+    )
+    found = subprocess.run(
+        ["bash", "-c", f"{function}; readme_command {name}"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert found.stdout.splitlines() == marked_command(name)
+
+
+def test_the_command_table_lists_every_command_and_option():
+    """Every command of the program has a row, every row is a command, and its options exist."""
+    rows = {row[1]: row[0] for row in re.finditer(r"^\| `manikin (\w+).*$", README, re.MULTILINE)}
+    assert set(rows) == set(COMMANDS)
+    for name, row in rows.items():
+        known = {option for parameter in COMMANDS[name].params for option in _options(parameter)}
+        assert set(re.findall(r"--[\w-]+", row)) <= known
+
+
+def _options(parameter):
+    return [*parameter.opts, *parameter.secondary_opts]
+
+
+def test_the_example_prints_what_the_readme_says():
+    """The margins follow from the example's numbers alone, so they are compared to the printed digit."""
+    example = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", README, re.DOTALL)
+    assert len(example[1].splitlines()) <= 10
+    found = subprocess.run(
+        [sys.executable, "-c", example[1]], capture_output=True, text=True, check=True, env={**os.environ}
+    )
+    assert found.stdout == example[2]
+
+
+def test_every_linked_file_exists():
+    links = re.findall(r"\]\((?!https?:)([^)#]+)", README)
+    assert links
+    assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+def test_the_picture_is_small():
+    """A page that loads fast: the picture stays below 400 kB."""
+    assert (ROOT / "docs/images/platform.png").stat().st_size < 400_000
