@@ -100,7 +100,8 @@ class RunDirectory:
         # The summary goes first: without it the directory is known to be incomplete.
         for name in (SUMMARY, MOTION, BVH):
             (self.path / name).unlink(missing_ok=True)
-        for pattern in (f"{STAGES}/*.json", f"{FIGURES}/*.png"):
+        # What a killed run was about to write stays behind as a hidden .NAME.*.tmp file.
+        for pattern in (f"{STAGES}/*.json", f"{FIGURES}/*.png", ".*.tmp", "*/.*.tmp"):
             for file in self.path.glob(pattern):
                 file.unlink()
 

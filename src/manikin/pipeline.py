@@ -243,6 +243,7 @@ class _Run:
         push = self._scenario.push
         if push is None:
             return ()
+        self._scenario.check_push(float(motion.time[-1]))
         sample = min(int(np.searchsorted(motion.time, push.at_s)), len(motion.time) - 1)
         forward = rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]
         heading = float(np.arctan2(forward[1], forward[0]))

@@ -116,6 +116,15 @@ BAD_VALUES = [
     (("push",), {"force_N": 200}, "push.direction_deg", "missing"),
     (("seed",), -1, "seed", ">= 0"),
     (("seed",), 1.5, "seed", "whole number"),
+    (("name",), "../../elsewhere", "name", "letters"),
+    (("name",), "n" * 101, "name", "at most 100"),
+    (("task", "start", "at"), [0, 0], "task.start.at", "only com"),
+    (("task", "goal", "posture"), "seated", "task.goal.posture", "only com"),
+    (("task", "goal", "heading_deg"), 90, "task.goal.heading_deg", "only com"),
+    (("task", "goal", "com"), [1e160, 0, 0.9], "task.goal.com[0]", "<= 1e+06"),
+    (("body",), {"mass_kg": 1e300}, "body.mass_kg", "<= 1e+06"),
+    (("supports", "normal_force_cap_N"), 1e-300, "supports.normal_force_cap_N", ">= 1e-06"),
+    (("supports", "phases", 1, "min_duration_s"), 1e5, "supports.phases[1].min_duration_s", "<= 60"),
     (("floor_height_m",), "low", "floor_height_m", "a number"),
     (("colour",), 1, "colour", "not a known key"),
 ]  # fmt: skip
@@ -143,6 +152,37 @@ def test_line_number_is_that_of_the_key(tmp_path):
     )
     with pytest.raises(ScenarioError, match=r":4: body.mass_kg is -3; valid: a number > 0 \(and 1 more\)"):
         load_scenario(file)
+
+
+def test_a_missing_key_is_described_and_a_rule_of_two_keys_has_its_line(tmp_path):
+    file = write(tmp_path, changed(("supports", "sole"), {"length_m": 0.28}))
+    with pytest.raises(ScenarioError, match=r"sole\.width_m is missing; valid: across it \[m\]"):
+        load_scenario(file)
+    task = "name: a\ntask:\n  start: {com: [0, 0, 1]}\n  goal: {com: [0, 0, 1]}\n"
+    text = task + "supports:\n  phases:\n  - left_foot: same\n"
+    with pytest.raises(ScenarioError, match=r":7: supports\.phases\[0\]\.left_foot is 'same'"):
+        load_scenario(write(tmp_path, text))
+
+
+def test_missing_supports_come_before_everything_else_about_them(tmp_path):
+    data = changed(("supports",), ...) | {"task": {"start": {"at": [0, 0]}, "goal": {"at": [1, 0]}}}
+    job = load_scenario(write(tmp_path, data))
+    with pytest.raises(ScenarioError, match=r"supports is missing; valid: .*not planned yet"):
+        job.build_sequence()
+
+
+def test_a_sole_that_no_body_has_is_refused_where_it_is_given(tmp_path):
+    job = load_scenario(write(tmp_path, changed(("supports", "sole"), {"length_m": 3.0, "width_m": 0.1})))
+    with pytest.raises(ScenarioError, match=r"supports\.sole: .*sole_length"):
+        job.build_body()
+
+
+def test_a_push_after_the_motion_is_refused(tmp_path):
+    push = {"force_N": 10, "direction_deg": 0, "duration_s": 0.1, "at_s": 5}
+    job = load_scenario(write(tmp_path, MINIMAL | {"push": push}))
+    job.check_push(5.1)
+    with pytest.raises(ScenarioError, match=r"push\.at_s is 5; valid: before the motion ends at 4\.900 s"):
+        job.check_push(4.9)
 
 
 @pytest.mark.parametrize(

@@ -168,10 +168,14 @@ def _end_balance_failure(problem: CentroidalProblem, polytopes: Sequence[Polytop
         margin = best_margin_at(polytopes[phase], problem, com, acceleration)
         if margin <= max(problem.required_margin, VANISHING_MARGIN):
             held = ", ".join(problem.sequence[phase].stance.effectors)
+            what = (
+                "cannot be balanced" if margin <= VANISHING_MARGIN
+                else f"reaches a margin of at most {margin:.2f} {problem.margin_unit}"
+            )  # fmt: skip
             return Failure(
                 f"{name} balance",
-                f"{name} CoM {np.round(com, 3).tolist()} reaches a margin of at most {margin:.2f} "
-                f"{problem.margin_unit} on {held or 'no contact'}; required {problem.required_margin:.2f}",
+                f"{name} CoM {np.round(com, 3).tolist()} {what} on {held or 'no contact'}; "
+                f"required {problem.required_margin:g} {problem.margin_unit}",
                 phase, where=held,
             )  # fmt: skip
     return None

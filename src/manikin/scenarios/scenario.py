@@ -171,7 +171,8 @@ class Scenario:
         try:
             return human(data.stature_m, data.mass_kg, data.sex, **soles)
         except InputError as error:
-            raise self._error(("body",), str(error)) from None
+            path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)
+            raise self._refused(path, error) from None
 
     def build_scene(self) -> Scene:
         """Build the obstacles and the floor.
@@ -187,7 +188,7 @@ class Scenario:
             try:
                 obstacles.append(build_obstacle(entry, self.folder))
             except InputError as error:
-                raise self._error(("scene", index), str(error)) from None
+                raise self._refused(("scene", index), error) from None
         return Scene(obstacles, floor_height=self.file.floor_height_m)
 
     def build_sequence(self, *, planning: bool = False) -> StanceSequence:
@@ -215,7 +216,7 @@ class Scenario:
                 phases.append(Phase(stance, section.min_duration_s, section.max_duration_s))
             return StanceSequence(phases)
         except InputError as error:
-            raise self._error(("supports", "phases"), str(error)) from None
+            raise self._refused(("supports", "phases"), error) from None
 
     def build_centroidal_problem(self) -> CentroidalProblem:
         """Build the problem of the centre-of-mass planner, with every height scaled to the body.
@@ -248,7 +249,7 @@ class Scenario:
         except ScenarioError:
             raise
         except InputError as error:
-            raise self._error(("planning",), str(error)) from None
+            raise self._refused(("planning",), error) from None
 
     def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
         """Check that every contact of the supports lies on a surface of the scene.
@@ -266,7 +267,21 @@ class Scenario:
                     scene.supporting_surface(contact, tolerance)
                 except InputError as error:
                     path: KeyPath = ("supports", "phases", number, contact.effector)
-                    raise self._error(path, str(error)) from None
+                    raise self._refused(path, error) from None
+
+    def check_push(self, duration: float) -> None:
+        """Check that the push begins during the motion.
+
+        Args:
+            duration: Of the planned motion [s].
+
+        Raises:
+            ScenarioError: If it begins later.
+        """
+        if self.push is not None and self.push.at_s >= duration:
+            raise self._error(
+                ("push", "at_s"), f"is {self.push.at_s:g}; valid: before the motion ends at {duration:.3f} s"
+            )
 
     def support_level(self) -> SupportLevel:
         """Height of the supports below the CoM, from the start to the goal."""
@@ -301,7 +316,10 @@ class Scenario:
 
     def _supports(self) -> SupportsSection:
         if self.file.supports is None:
-            raise self._error(("supports",), "is missing; valid: an explicit sequence of phases")
+            raise self._error(
+                ("supports",),
+                "is missing; valid: an explicit sequence of phases, contacts are not planned yet",
+            )
         return self.file.supports
 
     def _constraint(self, key: str) -> ComConstraintSection | None:
@@ -323,8 +341,10 @@ class Scenario:
 
     def _check_numbers_of_band(self) -> None:
         index = next((i for i, c in enumerate(self.file.com_constraints) if c.height_band is not None), None)
+        if index is None or self.file.supports is None:
+            return
         band = self.height_band
-        if band is None or index is None:
+        if band is None:
             return
         path: KeyPath = ("com_constraints", index, "height_band")
         for end in ("start", "goal"):
@@ -341,6 +361,9 @@ class Scenario:
                     path,
                     f"has lower {low:.4g} above upper {high:.4g} at the {end} CoM; valid: lower <= upper",
                 )
+
+    def _refused(self, path: KeyPath, error: InputError) -> ScenarioError:
+        return ScenarioError(f"{place(self.source, path, self.lines)}: {error}")
 
     def _error(self, path: KeyPath, text: str) -> ScenarioError:
         return ScenarioError(f"{place(self.source, path, self.lines)} {text}")

@@ -11,6 +11,8 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from manikin.errors import ScenarioError
 from manikin.scenarios.expressions import Expression
 from manikin.scenarios.validation import (
+    Duration,
+    Name,
     NonNegative,
     Number,
     Positive,
@@ -185,8 +187,8 @@ class PhaseSection(Section):
     right_foot: ContactEntry | None = Field(default=None, description="contact of the right foot, or 'same'")
     left_hand: ContactEntry | None = Field(default=None, description="contact of the left hand, or 'same'")
     right_hand: ContactEntry | None = Field(default=None, description="contact of the right hand, or 'same'")
-    min_duration_s: Positive = Field(default=0.1, description="shortest duration [s]")
-    max_duration_s: Positive | None = Field(default=None, description="longest duration [s]")
+    min_duration_s: Duration = Field(default=0.1, description="shortest duration [s]")
+    max_duration_s: Duration | None = Field(default=None, description="longest duration [s]")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -349,14 +351,14 @@ class PushSection(Section):
     direction_deg: Number = Field(
         description="of the force, counter-clockwise from the body's forward axis [deg]"
     )
-    duration_s: Positive = Field(description="how long [s]")
+    duration_s: Duration = Field(description="how long [s]")
     at_s: NonNegative = Field(description="when it begins [s]")
 
 
 class ScenarioFile(Section):
     """A whole scenario file."""
 
-    name: Text = Field(description="short name")
+    name: Name = Field(description="short name, also that of the run directory")
     description: str = Field(default="", description="one line for the list of scenarios")
     body: BodySection = Field(default=BodySection(), description="whose motion it is")
     reference_stature_m: Positive | None = Field(
@@ -390,11 +392,17 @@ class ScenarioFile(Section):
         for key in type(self.com_constraints[0])._keys() if self.com_constraints else ():
             if sum(getattr(c, key) is not None for c in self.com_constraints) > 1:
                 raise refuse("com_constraints", f"holds {key} twice; valid: at most once")
-        if self.supports is not None:
-            for end in ("start", "goal"):
-                if getattr(self.task, end).com is None:
+        for end in ("start", "goal") if self.supports is not None else ():
+            state = getattr(self.task, end)
+            if state.com is None:
+                raise refuse(
+                    f"task.{end}.com", "is missing; valid: [x, y, z] in metres when supports are given"
+                )
+            for key in ("at", "heading_deg", "posture"):
+                if getattr(state, key) is not None:
                     raise refuse(
-                        f"task.{end}.com", "is missing; valid: [x, y, z] in metres when supports are given"
+                        f"task.{end}.{key}",
+                        "has no meaning beside explicit supports; valid: only com, [x, y, z]",
                     )
         return self
 

@@ -120,5 +120,5 @@ def load_stance_file(path: str | Path) -> BalanceQuestion:
     try:
         file.build_stance()
     except InputError as error:
-        raise ScenarioError(f"{place(str(file_path), ('contacts',), lines)} {error}") from None
+        raise ScenarioError(f"{place(str(file_path), ('contacts',), lines)}: {error}") from None
     return BalanceQuestion(file, str(file_path))

@@ -1,10 +1,19 @@
 """Checked building blocks of the file formats, and their one-line error messages."""
 
 import difflib
+import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from manikin.errors import ScenarioError
@@ -59,10 +68,40 @@ def _vector(length: int, meaning: str) -> Callable[[Any], Any]:
     return check
 
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]
+LARGEST = 1e6
+"""Largest size of any number of a file; beyond it sums of squares and the solvers lose their digits."""
+SMALLEST = 1e-6
+"""Smallest number that has to be positive."""
+LONGEST_PHASE = 60.0
+"""Longest duration [s]; a motion has a thousand samples per second."""
+LONGEST_NAME = 100
+"""Longest name [characters]."""
+
+
+def _not_tiny(value: float) -> float:
+    if value < SMALLEST:
+        raise rule_error(f"a number >= {SMALLEST:g}")
+    return value
+
+
+def _file_name(value: str) -> str:
+    if len(value) > LONGEST_NAME or value.startswith(".") or not re.fullmatch(r"[\w .+-]+", value):
+        rule = "letters, digits, spaces and . _ + -, not starting with a dot"
+        raise rule_error(f"at most {LONGEST_NAME} {rule}")
+    return value
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[
+    float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST), AfterValidator(_not_tiny)
+]
+NonNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0, le=LARGEST)]
+Duration = Annotated[
+    float, Field(strict=True, allow_inf_nan=False, gt=0, le=LONGEST_PHASE), AfterValidator(_not_tiny)
+]
 Text = Annotated[str, Field(strict=True, min_length=1)]
+Name = Annotated[Text, AfterValidator(_file_name)]
+"""A name that can also be that of a directory."""
 Vector2 = Annotated[tuple[Number, Number], BeforeValidator(_vector(2, "two numbers [x, y]"))]
 Vector3 = Annotated[tuple[Number, Number, Number], BeforeValidator(_vector(3, "three numbers [x, y, z]"))]
 Size3 = Annotated[
@@ -105,12 +144,14 @@ def validate(
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(_first_problem(error, data, source, lines or {})) from None
+        raise ScenarioError(_first_problem(error, data, model, source, lines or {})) from None
 
 
-def _first_problem(error: ValidationError, data: Any, source: str, lines: Mapping[Path, int]) -> str:
+def _first_problem(
+    error: ValidationError, data: Any, model: type[Section], source: str, lines: Mapping[Path, int]
+) -> str:
     problems = error.errors(include_url=False)
-    path, text = _describe(problems[0], data)
+    path, text = _describe(problems[0], data, model)
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return f"{place(source, path, lines)} {text}{more}".replace("\n", " ")
 
@@ -130,18 +171,40 @@ def path_text(path: Path) -> str:
     return text
 
 
-def _describe(problem: ErrorDetails, data: Any) -> tuple[Path, str]:
+def _describe(problem: ErrorDetails, data: Any, model: type[Section]) -> tuple[Path, str]:
     path, context, kind = _real_path(problem["loc"], data), problem.get("ctx", {}), problem["type"]
     value = _shown(problem["input"])
     if kind == "unknown_key":
         return (*path, context["key"]), f"is not a known key; {context['rule']}"
     if kind == "missing":
-        return (*path, str(problem["loc"][-1])), "is missing"
+        return (*path, str(problem["loc"][-1])), f"is missing; valid: {_meaning(model, problem['loc'])}"
     if kind == "refused":
-        return ((*path, context["key"]) if context["key"] else path), context["problem"]
+        return (*path, *_key_path(context["key"])), context["problem"]
     if kind in ("rule", "section", "vector"):
         return path, f"is {value}; valid: {context['rule']}"
     return path, f"is {value}; valid: {_rule(kind, context, problem['msg'])}"
+
+
+def _meaning(model: type[Section], location: tuple[str | int, ...]) -> str:
+    """What a missing key should hold: the description of its field."""
+    for part in location[:-1]:
+        if part in model.model_fields:
+            model = _section_of(model.model_fields[str(part)].annotation) or model
+    field = model.model_fields.get(str(location[-1]))
+    return (field.description if field is not None else None) or f"the key {location[-1]}"
+
+
+def _section_of(annotation: Any) -> Any:
+    """The section inside an annotation such as ``list[X]`` or ``X | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _section_of(part)) is not None), None)
+
+
+def _key_path(key: str) -> Path:
+    """Inverse of :func:`path_text`."""
+    parts = re.findall(r"[^.\[\]]+", key)
+    return tuple(int(part) if part.isdigit() else part for part in parts)
 
 
 def _real_path(location: tuple[str | int, ...], data: Any) -> Path:
