@@ -23,6 +23,9 @@ Pair = tuple[str, str]
 Ignored = frozenset[Pair]
 NOTHING: Ignored = frozenset()
 
+WINDOW = 200
+"""Neighbouring samples whose lower bounds one measured distance raises."""
+
 
 class BodyGeometry(Protocol):
     """What a body must offer: kinematics, shapes named ``"segment/shape"``, pairs to check."""
@@ -275,8 +278,11 @@ class Proximity:
             distance = self._measure([pair], placements[sample])[0][0]
             if distance < best.distance:
                 best = Clearance(distance, self.pairs[pair], sample)
-            moved = self._bounds.displacement(pair, sample, rotations, translations)
-            np.maximum(column, distance - moved, out=column)
+            # Far from the sample the shape has moved too much for the bound to say anything.
+            start = max(0, sample - WINDOW)
+            rows = slice(start, sample + WINDOW + 1)
+            moved = self._bounds.displacement(pair, sample - start, rotations[rows], translations[rows])
+            np.maximum(column[rows], distance - moved, out=column[rows])
             column[sample] = np.inf
             heapq.heappush(queue, (float(column.min()), pair))
         return best
