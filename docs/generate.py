@@ -23,6 +23,8 @@ SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
     "scenario.schema.json": json_schema,
     "stance.schema.json": StanceFile.model_json_schema,
 }
+FAR = 1e5
+"""Bounds beyond this only refuse nonsense and are not shown."""
 _BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end generated -->)", re.DOTALL)
 
 
@@ -85,7 +87,7 @@ def _number(value: dict[str, Any]) -> str:
     names = {"string": "text", "boolean": "true or false"}
     text = names.get(value.get("type", ""), value.get("type", "any"))
     signs = {"exclusiveMinimum": "&gt;", "minimum": "≥", "exclusiveMaximum": "&lt;", "maximum": "≤"}
-    bounds = [f"{sign} {value[key]:g}" for key, sign in signs.items() if key in value]
+    bounds = [f"{sign} {value[key]:g}" for key, sign in signs.items() if abs(value.get(key, FAR)) < FAR]
     return " ".join([text, *([", ".join(bounds)] if bounds else [])])
 
 
