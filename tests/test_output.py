@@ -55,6 +55,16 @@ def test_missing_and_damaged_summaries_give_one_line(tmp_path):
         assert "\n" not in str(caught.value)
 
 
+def test_leftovers_of_a_killed_run_are_removed_by_the_next(tmp_path):
+    first = RunDirectory(tmp_path)
+    first.write_scenario("name: a")
+    first.write_stage("centroidal", {})
+    for folder in (tmp_path, tmp_path / "stages"):
+        (folder / ".motion.h5.0a1b.tmp").write_bytes(b"half")
+    RunDirectory(tmp_path)
+    assert sorted(item.name for item in tmp_path.rglob("*")) == ["scenario.yaml", "stages"]
+
+
 def test_json_has_no_nan():
     value = {"a": np.nan, "b": [np.inf, np.int64(3), True], "c": np.array([[1.5]]), "d": ("x", None)}
     assert json.loads(to_json(value)) == {"a": None, "b": [None, 3, True], "c": [[1.5]], "d": ["x", None]}

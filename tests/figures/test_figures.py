@@ -68,7 +68,7 @@ def test_com_figure_shows_both_motions_on_six_labelled_axes(finished_run):
 def test_margin_figure_names_the_limiting_phase(finished_run):
     motion = finished_run.planned
     lowest = int(np.argmin(motion.margin))
-    phase = int(finished_run.schedule.phase_at(motion.time[lowest])) + 1
+    phase = int(finished_run.schedule.phase_at(motion.time[lowest]))
     text = " ".join(labels(margin_figure(finished_run)))
     assert (
         f"planned (lowest {motion.margin[lowest]:.1f} N.m in phase {phase}, {motion.time[lowest]:.2f} s)"

@@ -46,7 +46,7 @@ def margin_figure(content: MotionFile) -> Figure:
 
 def _lowest(motion: Motion, phases: PhaseTable) -> str:
     index = int(np.argmin(motion.margin))
-    phase = int(phases.phase_at(motion.time[index : index + 1])[0]) + 1
+    phase = int(phases.phase_at(motion.time[index : index + 1])[0])
     where = f"in phase {phase}" if motion.time[index] <= phases.instants[-1] else "at rest"
     return f"lowest {motion.margin[index]:.1f} N.m {where}, {motion.time[index]:.2f} s"
 

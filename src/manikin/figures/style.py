@@ -76,7 +76,7 @@ def draw_phases(axes: Axes, phases: PhaseTable, end: float) -> None:
 
 
 def draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
-    """One bar per effector while it is in contact, and the number of each phase above."""
+    """One bar per effector while it is in contact, and the number of each phase, from 0, above."""
     effectors = list(dict.fromkeys(name for supports in phases.supports for name in supports))
     for row, effector in enumerate(effectors):
         bars = [(start, stop - start) for start, stop, on in _spans(phases, end) if effector in on]
@@ -84,7 +84,7 @@ def draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
         axes.broken_barh(bars, (row + 0.15, 0.7), facecolors=colour, alpha=0.85)
     for number, (start, stop) in enumerate(zip(phases.instants, phases.instants[1:], strict=False)):
         axes.text(
-            (float(start) + float(stop)) / 2, -0.08, f"{number + 1}", ha="center", va="bottom", fontsize=8,
+            (float(start) + float(stop)) / 2, -0.08, f"{number}", ha="center", va="bottom", fontsize=8,
             color=COLOURS["ink"],
         )  # fmt: skip
     if end > phases.instants[-1] + 0.2:
