@@ -49,11 +49,11 @@ class FitScales:
     moment_share: float = 0.15
     rest: float = 1.0e-3
     max_iterations: int = 30
-    decrease: float = 0.03
+    decrease: float = 0.06
     stages: tuple[float, ...] = (3.0, 1.0, 0.3)
     iterations_per_round: int = 3
     multiplier_rounds: int = 12
-    tolerance: float = 3.0e-4
+    tolerance: float = 5.0e-4
 
     def loosened(self, factor: float) -> "FitScales":
         """Return the same scales with contacts and centre of mass ``factor`` times looser."""
