@@ -228,3 +228,18 @@ def test_maximum_phase_durations_are_kept(platform_stances):
     durations = result.trajectory.schedule.durations
     assert np.all(durations <= result.problem.max_durations + 1e-9)
     assert np.all(durations >= result.problem.min_durations - 1e-9)
+
+
+def test_a_start_on_the_edge_of_the_height_band_is_no_obstacle():
+    """The planner keeps 0.3 mm from the band, but not where the problem itself begins closer to it."""
+    from manikin.scenarios import load_scenario
+
+    scenario = load_scenario("platform")
+    problem = scenario.build_centroidal_problem()
+    x, y, _ = problem.start_com
+    edge = float(scenario.height_band.lower(x, y, 0.0)) + 1e-5
+    changed = dict(vars(problem), start_com=np.array([x, y, edge]))
+    arguments = {key: changed.pop(key) for key in ("mass", "sequence", "start_com", "goal_com")}
+    result = plan_com(CentroidalProblem(**arguments, **changed))
+    assert result.succeeded, result.failure
+    assert result.d_min >= 20.0

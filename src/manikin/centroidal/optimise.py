@@ -45,8 +45,17 @@ class Targets:
 
     @classmethod
     def of(cls, problem: CentroidalProblem) -> "Targets":
-        """Targets of the first round."""
-        return cls(problem.required_margin + 1e-3)
+        """Targets of the first round; the ends may lie closer to the constraints than the rest."""
+        ends = ((problem.sequence[0], problem.start_com), (problem.sequence[-1], problem.goal_com))
+        room = [-float(item.violation(com)) for item in problem.geometric for _, com in ends]
+        if problem.support_distance is not None:
+            room += [
+                problem.support_distance - float(np.linalg.norm(com - contact.position))
+                for phase, com in ends
+                for contact in phase.stance
+            ]
+        position = min(cls.position, *(0.5 * max(slack, 0.0) for slack in room)) if room else cls.position
+        return cls(problem.required_margin + 1e-3, position)
 
     def grown(self, problem: CentroidalProblem, certificate: Residuals) -> "Targets":
         """Targets that make up for what the last solution broke between its samples."""
