@@ -1,5 +1,9 @@
 """Values that the tests of several rooms share."""
 
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
+
 import numpy as np
 import pytest
 

@@ -41,6 +41,9 @@ RunArgument = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Run direc
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status; no traceback for a user's mistake."""
+    # Before numpy is loaded: threads make its small products several times slower, and the last
+    # bits of a result depend on their number.  Whoever sets the variable has the last word.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
         with Interruption() as interruption:
             given = None if arguments is None else list(arguments)

@@ -86,6 +86,15 @@ def test_version_and_help(capfd):
         assert "Usage" in capfd.readouterr().out
 
 
+def test_one_thread_unless_the_user_says_otherwise(monkeypatch):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    main(["--version"])
+    assert os.environ["OMP_NUM_THREADS"] == "1"
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    main(["--version"])
+    assert os.environ["OMP_NUM_THREADS"] == "2"
+
+
 def test_scenarios_are_listed_with_one_line_each(capfd):
     assert main(["scenarios"]) == DONE
     lines = capfd.readouterr().out.splitlines()
