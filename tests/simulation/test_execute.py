@@ -75,6 +75,8 @@ def test_step_with_weight_shift(stepped):
     assert result.max_penetration_m < 5e-3
     assert result.final_com_error_m < 1e-3
     assert result.motion.duration == pytest.approx(plan.motion.duration + 1.0)
+    # Whole control steps from exactly 0, whatever the engine's own clock added up.
+    np.testing.assert_array_equal(result.motion.time, np.round(0.005 * np.arange(len(result.motion.time)), 9))
     flight = result.motion.support[(result.motion.time > 1.05) & (result.motion.time < 1.45)]
     assert flight[:, 0].all()
     assert not flight[:, 1].any()

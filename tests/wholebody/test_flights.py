@@ -36,9 +36,10 @@ def test_every_step_of_the_platform_has_a_smooth_curve_that_keeps_clear(planner)
 
 
 @pytest.mark.slow
-def test_the_bi_rrt_takes_over_where_no_smooth_curve_is_found(planner, monkeypatch):
-    """With the smooth family made to fail, the last step over the threshold is searched instead."""
-    swing = planner.flights()[-1]
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_the_bi_rrt_takes_over_where_no_smooth_curve_is_found(planner, monkeypatch, number):
+    """With the smooth family made to fail, every step of the platform is searched instead."""
+    swing = planner.flights()[number]
     real = flights.plan_swing
 
     def fails(*args, **kwargs):

@@ -159,7 +159,7 @@ class Recorder:
         wrenches = np.array([s.wrenches for s in self.samples])
         tau = np.array([s.output.tau for s in self.samples])
         return Motion(
-            time=np.array([s.sensed.time for s in self.samples]),
+            time=np.round([s.sensed.time for s in self.samples], 9) + 0.0,  # the engine adds up its steps
             q=np.array([state.q for state in states]),
             v=np.array([state.v for state in states]),
             a=np.array([s.sensed.a for s in self.samples]),

@@ -12,6 +12,7 @@ from manikin.contact import Contact, ContactSchedule, Swing
 from manikin.posture import PostureProblem
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
+from manikin.wholebody.birrt import FlightLimits
 from manikin.wholebody.effector_clearance import EffectorClearance
 from manikin.wholebody.flight_search import ClearFlight, PostureCheck, search_swing
 from manikin.wholebody.path import Pose
@@ -106,7 +107,9 @@ class FlightPlanner:
                 swing.effector, lambda time: self._problem(swing, time), screen, rotation_weight=0.3
             )
 
-        found = search_swing(*ends, start, end, check(0.0), self._rng, roomy=check(0.01))
+        # What a smooth swing may do, its substitute may do too.
+        limits = FlightLimits(speed=self._limits.speed, angular_speed=self._limits.angular_speed)
+        found = search_swing(*ends, start, end, check(0.0), self._rng, roomy=check(0.01), limits=limits)
         if found.curve is None:
             reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
             return PlannedSwing(swing, fallback.curve, fallback.method, reason)
