@@ -48,7 +48,8 @@ def test_guide_postures(benchmark, planner, swings):
 
 def test_fit(benchmark, planner, swings):
     guide = planner._guide(swings)
-    benchmark.pedantic(planner._fit, args=(swings, guide), rounds=3, iterations=1)
+    scales = WholeBodySettings().fit
+    benchmark.pedantic(planner._fit, args=(swings, guide, scales), rounds=3, iterations=1)
 
 
 def test_dense_clearance(benchmark, platform):

@@ -8,7 +8,7 @@ and centre of mass as one spline, and the result is certified at 1 kHz.
 import itertools
 import time as clock
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
@@ -126,8 +126,9 @@ def plan_whole_body(
         progress: Called now and then with the share done.
 
     Returns:
-        The motion with its certificate; when it breaks a requirement, the flight in which it
-        does is searched again with the Bi-RRT before the result is called a failure.
+        The motion with its certificate. When the motion comes too close to something, clearance
+        is given more weight; when it still breaks a requirement, the flight in which it does is
+        searched again with the Bi-RRT before the result is called a failure.
     """
     began = clock.perf_counter()
     planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), progress)
@@ -158,10 +159,11 @@ class _Planner:
         swings = tuple(self.flights.plan(swing) for swing in self.flights.flights())
         self._report(0.2)
         result = self._attempt(swings, began)
+        if not result.succeeded and result.certificate.min_clearance_m < self.settings.requirements.clearance:
+            result = _better(result, self._attempt(swings, began, self._more_clearance()))
         searched = self._search_again(swings, result)
         if searched is not None:
-            again = self._attempt(searched, began)
-            result = again if again.succeeded else result
+            result = _better(result, self._attempt(searched, began))
         self._report(1.0)
         return result
 
@@ -179,10 +181,16 @@ class _Planner:
                     return (*swings[:index], other, *swings[index + 1 :])
         return None
 
-    def _attempt(self, swings: tuple[PlannedSwing, ...], began: float) -> WholeBodyResult:
+    def _more_clearance(self) -> FitScales:
+        """Scales at which a missing clearance weighs more, at the expense of the rest."""
+        return replace(self.settings.fit, clearance=0.5 * self.settings.fit.clearance)
+
+    def _attempt(
+        self, swings: tuple[PlannedSwing, ...], began: float, scales: FitScales | None = None
+    ) -> WholeBodyResult:
         guide = self._guide(swings)
         self._report(0.4)
-        fit = self._fit(swings, guide)
+        fit = self._fit(swings, guide, scales or self.settings.fit)
         self._report(0.8)
         motion = self._sample(fit.spline)
         ignored = ignored_pairs(self.body, self.scene, self.trajectory.schedule, motion.time)
@@ -217,9 +225,9 @@ class _Planner:
         )
         return targets, knots
 
-    def _fit(self, swings: tuple[PlannedSwing, ...], guide: Guide) -> FitResult:
+    def _fit(self, swings: tuple[PlannedSwing, ...], guide: Guide, scales: FitScales) -> FitResult:
         targets, knots = self._targets(swings, guide)
-        fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, self.settings.fit)
+        fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, scales)
         return fit.solve(fit.initial_spline(targets.reference))
 
     def _sample(self, spline: ConfigurationSpline) -> Motion:
@@ -283,6 +291,11 @@ class _Planner:
     def _report(self, share: float) -> None:
         if self._progress is not None:
             self._progress(share)
+
+
+def _better(first: WholeBodyResult, second: WholeBodyResult) -> WholeBodyResult:
+    """Prefer a success; of two failures, the first."""
+    return second if second.succeeded and not first.succeeded else first
 
 
 def phase_knots(instants: FloatArray, spacing: float, degree: int) -> FloatArray:
