@@ -93,10 +93,20 @@ def test_the_resolved_scenario_runs_again_to_the_same_bits(platform):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("stature", "mass"), [(1.60, 58.0), (1.90, 95.0)])
-def test_other_bodies_run_the_same_scenario(stature, mass):
-    result = manikin.run(load_scenario("platform").with_body(stature, mass), seed=3)
+@pytest.mark.parametrize(
+    ("stature", "mass", "sex"),
+    [
+        (1.60, 58.0, "male"),
+        (1.90, 95.0, "male"),
+        # Here the first fit leaves a shank 7 mm from the threshold; the second one makes room.
+        (1.60, 55.0, "female"),
+    ],
+)
+def test_other_bodies_run_the_same_scenario(stature, mass, sex):
+    result = manikin.run(load_scenario("platform").with_body(stature, mass, sex), seed=3)
     assert result.succeeded, result.summary["failure"]
+    assert result.summary["wholebody"]["min_clearance_m"] >= 0.01
+    assert result.summary["execution"]["min_margin"] > 0.0
 
 
 def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_path):
