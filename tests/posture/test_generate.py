@@ -17,7 +17,7 @@ from manikin.posture import (
     place_over_contacts,
     touching_pairs,
 )
-from manikin.scene import Box, Obstacle, Proximity, Scene
+from manikin.scene import Box, Obstacle, Proximity, Scene, SphereProximity
 from manikin.spatial import rotation_from_rpy
 
 
@@ -151,6 +151,19 @@ def test_a_roof_forces_a_crouch(body, on_the_floor):
     near = problem.proximity.evaluate(configuration.q, 0.5)
     roof_distances = [d for d, (_, other) in zip(near.distance, near.pairs, strict=True) if other == "roof"]
     assert min(roof_distances) >= 0.03 - 1e-4
+
+
+def test_bounding_spheres_may_stand_in_for_the_exact_shapes(body, on_the_floor):
+    """Spheres cover the shapes: what is clear of them is clear of the shapes ([Qiu2012]_ 6.2.2)."""
+    pole = Scene([Obstacle("pole", Box((0.06, 0.06, 1.0)), translation=(0.05, 0.42, 1.0))], None)
+    spheres = SphereProximity(body, pole, self_collision=False, count={"pole": 24})
+    assert spheres.minimum(body.standing_posture(), frozenset()).distance < 0.02
+    problem = on_the_floor(com=com_target(0.02, 0.0), proximity=spheres, clearance=0.02)
+    result = generate_posture(problem)
+    assert result.succeeded, result.failure
+    exact = Proximity(body, pole, self_collision=False)
+    # 1e-4 m is the tolerance of the generator's own clearance.
+    assert exact.minimum(result.q, problem.ignore).distance >= 0.02 - 1e-4
 
 
 def test_arms_go_around_the_body(on_the_floor):

@@ -21,6 +21,7 @@ from manikin.posture.terms import (
     UprightTerm,
 )
 from manikin.scene.distance import NOTHING, Ignored, Proximity
+from manikin.scene.spheres import SphereProximity
 from manikin.spatial import FloatArray, check_rotation, finite_number, frozen_array
 
 
@@ -88,7 +89,8 @@ class PostureProblem:
         contacts: Contacts held: a sole's whole pose, a point's or grasp's position.
         placements: Further effectors that must be somewhere, by name.
         com: (3,) centre of mass [m]; NaN leaves an axis free; None leaves it wholly free.
-        proximity: Measures distances of this body in a scene, or None without obstacles.
+        proximity: Measures distances of this body in a scene, exactly or between bounding
+            spheres ([Qiu2012]_ 6.2.2, Appendix F); None without obstacles.
         clearance: Distance to keep to obstacles [m].
         self_clearance: Distance to keep between body parts [m].
         ignore: Pairs (segment, obstacle) or (segment, segment) that may touch.
@@ -101,7 +103,7 @@ class PostureProblem:
     contacts: tuple[Contact, ...] = ()
     placements: Mapping[str, Placement] = field(default_factory=dict)
     com: FloatArray | None = None
-    proximity: Proximity | None = None
+    proximity: Proximity | SphereProximity | None = None
     clearance: float = 0.02
     self_clearance: float = 0.005
     ignore: Ignored = NOTHING

@@ -14,6 +14,7 @@ import pinocchio as pin
 from manikin.body.configuration import Configuration
 from manikin.body.model import BodyModel
 from manikin.scene.distance import Ignored, Pair, Proximity
+from manikin.scene.spheres import SphereProximity
 from manikin.spatial import FloatArray, skew
 
 UP: FloatArray = np.array([0.0, 0.0, 1.0])
@@ -232,7 +233,7 @@ class ClearanceTerm:
         ignore: Pairs of names that may touch.
     """
 
-    proximity: Proximity
+    proximity: Proximity | SphereProximity
     safety: float
     self_safety: float
     activation: float
