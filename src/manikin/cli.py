@@ -100,8 +100,12 @@ def run(
     ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed; default: the scenario's.")] = None,
     json: JsonOption = False,
-    stature: Annotated[float | None, typer.Option(metavar="M", help="Other stature [m].")] = None,
-    mass: Annotated[float | None, typer.Option(metavar="KG", help="Other body mass [kg].")] = None,
+    stature: Annotated[
+        float | None, typer.Option(metavar="M", min=1.4, max=2.1, help="Other stature, 1.4 to 2.1 m.")
+    ] = None,
+    mass: Annotated[
+        float | None, typer.Option(metavar="KG", min=35.0, max=160.0, help="Other mass, 35 to 160 kg.")
+    ] = None,
     sex: Annotated[str | None, typer.Option(metavar="male|female", help="Other sex.")] = None,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the run directory.")] = True,
 ) -> int:

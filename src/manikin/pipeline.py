@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from manikin.balance import pseudo_wrench
 from manikin.body import BodyModel
@@ -146,7 +147,9 @@ def run(
     job = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
     if seed is not None:
         job = job.with_seed(seed)
-    return _Run(job, out, settings, requirements or ExecutionRequirements(), progress).run()
+    # Threads make the many small products slower, and the last bits depend on their number.
+    with threadpool_limits(1):
+        return _Run(job, out, settings, requirements or ExecutionRequirements(), progress).run()
 
 
 class _Run:

@@ -1,6 +1,6 @@
 """Contacts, stances and their sequences: plain data, no geometry engine."""
 
-from manikin.contact.contact import Contact, ContactKind, grasp, point, sole
+from manikin.contact.contact import Contact, ContactKind, grasp, point, sole, soles_overlap
 from manikin.contact.schedule import ContactSchedule
 from manikin.contact.sequence import Phase, StanceSequence, Swing
 from manikin.contact.stance import Stance
@@ -16,4 +16,5 @@ __all__ = [
     "grasp",
     "point",
     "sole",
+    "soles_overlap",
 ]

@@ -239,3 +239,24 @@ def _frictional(
 
 def _optional_limit(value: float | None, name: str) -> float | None:
     return None if value is None else finite_number(value, name, above=0.0, error=ContactError)
+
+
+def soles_overlap(first: Contact, second: Contact, thickness: float = 0.03) -> bool:
+    """Whether two soles would be in the same place (separating axes of their rectangles).
+
+    Args:
+        first: A contact.
+        second: Another one; what is no sole overlaps nothing.
+        thickness: Soles farther apart than this along the normal do not meet [m].
+    """
+    if first.kind is not ContactKind.SOLE or second.kind is not ContactKind.SOLE:
+        return False
+    axes = (*first.rotation_contact_to_world[:, :2].T, *second.rotation_contact_to_world[:, :2].T)
+    one, other = first.points_in_world, second.points_in_world
+    if np.abs((other - first.position) @ first.normal).min() > thickness:
+        return False
+    for axis in axes:
+        a, b = one @ axis, other @ axis
+        if a.max() <= b.min() or b.max() <= a.min():
+            return False
+    return True

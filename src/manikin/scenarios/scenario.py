@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
 
-from manikin.contact import Contact, Phase, Stance, StanceSequence, grasp, point, sole
+from manikin.contact import Contact, Phase, Stance, StanceSequence, grasp, point, sole, soles_overlap
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios.expressions import Expression
 from manikin.scenarios.heights import HeightBand, SupportLevel
@@ -259,9 +260,15 @@ class Scenario:
             tolerance: Largest gap and overhang of a contact point [m].
 
         Raises:
-            ScenarioError: For the first contact that is off every surface.
+            ScenarioError: For the first contact that is off every surface or overlaps another.
         """
         for number, stance in enumerate(phase.stance for phase in self.build_sequence()):
+            for first, second in combinations(stance, 2):
+                if soles_overlap(first, second):
+                    raise self._error(
+                        ("supports", "phases", number, second.effector),
+                        f"overlaps {first.effector}; valid: soles that lie side by side",
+                    )
             for contact in stance:
                 try:
                     scene.supporting_surface(contact, tolerance)
