@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from manikin.scene import Box, Obstacle, Scene
-from manikin.wholebody import WholeBodyRequirements, WholeBodySettings, plan_whole_body
+from manikin.wholebody import WholeBodyRequirements, WholeBodySettings, flights, plan_whole_body
 from manikin.wholebody.assemble import phase_knots, sample_times
 
 
@@ -100,6 +100,21 @@ def test_a_motion_that_breaks_its_requirement_is_a_failure_that_says_so(person, 
     assert not result.succeeded
     assert "centre-of-mass error" in result.failure.reason
     assert result.failure.where.startswith("phase ")
+
+
+@pytest.mark.slow
+def test_a_step_found_by_the_bi_rrt_is_followed_like_any_other(person, flat_ground, step_com, monkeypatch):
+    """With smooth curves made to fail, the whole motion still keeps every requirement."""
+    real = flights.plan_swing
+
+    def fails(*args, **kwargs):
+        plan = real(*args, **kwargs)
+        return replace(plan, check=replace(plan.check, failure="made to fail"))
+
+    monkeypatch.setattr(flights, "plan_swing", fails)
+    result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
+    assert [item.method for item in result.swings] == ["bi-rrt"]
+    assert result.succeeded, result.failure
 
 
 @pytest.mark.slow

@@ -33,6 +33,12 @@ from manikin.wholebody.targets import FitTargets, effector_targets, ignored_pair
 DEGREE = 5
 """Degree of the whole-body spline: four continuous derivatives."""
 
+NEAR_FLIGHT = 0.05
+"""A requirement that breaks this close to a flight is put down to it [s]."""
+
+SECOND_SEARCH = 600
+"""Random points of the Bi-RRT where a smooth curve exists but the body cannot follow it."""
+
 Progress = Callable[[float], None]
 """Told the share of the work that is done, in [0, 1]."""
 
@@ -175,8 +181,9 @@ class _Planner:
             return None
         for index, item in enumerate(swings):
             start, end = self.trajectory.schedule.swing_interval(item.swing)
-            if item.method == "smooth" and item.failure is None and start <= result.failure.time <= end:
-                other = self.flights.search(item.swing, item)
+            near = start - NEAR_FLIGHT <= result.failure.time <= end + NEAR_FLIGHT
+            if item.method == "smooth" and item.failure is None and near:
+                other = self.flights.search(item.swing, item, iterations=SECOND_SEARCH)
                 if other.method != item.method:
                     return (*swings[:index], other, *swings[index + 1 :])
         return None

@@ -70,6 +70,7 @@ class FlightPlanner:
         self._body, self._scene, self._trajectory = body, scene, trajectory
         self._limits, self._rng, self._reference = limits, rng, reference
         self._proximity = Proximity(body, scene)
+        self._touching: dict[int, frozenset[tuple[str, str]]] = {}  # by identity of the schedule's contacts
 
     @property
     def schedule(self) -> ContactSchedule:
@@ -93,7 +94,7 @@ class FlightPlanner:
         smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure)
         return smooth if plan.succeeded else self.search(swing, smooth)
 
-    def search(self, swing: Swing, fallback: PlannedSwing) -> PlannedSwing:
+    def search(self, swing: Swing, fallback: PlannedSwing, iterations: int = 2000) -> PlannedSwing:
         """Search a curve with the Bi-RRT and posture checks; ``fallback`` when there is none."""
         assert swing.start is not None
         assert swing.end is not None
@@ -109,7 +110,9 @@ class FlightPlanner:
 
         # What a smooth swing may do, its substitute may do too.
         limits = FlightLimits(speed=self._limits.speed, angular_speed=self._limits.angular_speed)
-        found = search_swing(*ends, start, end, check(0.0), self._rng, roomy=check(0.01), limits=limits)
+        found = search_swing(
+            *ends, start, end, check(0.0), self._rng, roomy=check(0.01), limits=limits, iterations=iterations
+        )
         if found.curve is None:
             reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
             return PlannedSwing(swing, fallback.curve, fallback.method, reason)
@@ -129,13 +132,18 @@ class FlightPlanner:
             self._trajectory.position,
         )  # fmt: skip
 
+    def _touch_pairs(self, contact: Contact) -> frozenset[tuple[str, str]]:
+        if id(contact) not in self._touching:
+            self._touching[id(contact)] = touch_pairs(self._body, self._scene, contact)
+        return self._touching[id(contact)]
+
     def _problem(self, swing: Swing, time: float) -> PostureProblem:
         stance = self.schedule.stance_at(time)
         others = [contact for contact in stance if contact.effector != swing.effector]
         touching = [*others, *(contact for contact in (swing.start, swing.end) if contact is not None)]
         return PostureProblem(
             self._body, tuple(others), com=self._trajectory.position(time), proximity=self._proximity,
-            ignore=frozenset().union(*(touch_pairs(self._body, self._scene, item) for item in touching)),
+            ignore=frozenset().union(*(self._touch_pairs(item) for item in touching)),
             reference=self._reference(time),
         )  # fmt: skip
 
