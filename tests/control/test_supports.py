@@ -42,16 +42,34 @@ def test_load_ramps_up_and_down(stepping):
 
 def test_late_touch_down_presses_on_and_then_loads_from_the_touch(stepping):
     """A foot in the air at its landing time goes on down and carries nothing until it touches."""
-    settings = SupportSettings(press_speed=0.1, press_depth=0.03)
+    settings = SupportSettings(press_speed=0.1, press_depth=0.03, hover=0.002)
     switch = SupportSwitch(stepping, settings)
     right(switch, LAND - 0.005, False)
     late = right(switch, LAND + 0.1, False)
     assert late.mode is SupportMode.LANDING
-    assert late.press == pytest.approx(0.01)
+    # 0.1 s at 0.1 m/s, down from the hovering height.
+    assert late.press == pytest.approx(0.01 - 0.002)
     assert right(switch, LAND + 0.9, False).press == settings.press_depth
     touched = right(switch, LAND + 0.905, True)
     assert touched.mode is SupportMode.STANCE
     assert touched.load_share == pytest.approx(0.05)
+
+
+def test_a_flight_ends_hovering_above_its_support(stepping, contacts):
+    """The lift grows smoothly from nothing to the hovering height, where the landing takes over."""
+    hover, h = 0.0015, 1e-5
+    settings = SupportSettings(hover=hover, early_window=0.1)
+
+    def lift(time):
+        return right(SupportSwitch(stepping, settings), time, False)
+
+    up = contacts[1].normal
+    np.testing.assert_allclose(lift(LAND - 0.1 + 1e-9).lift, 0.0, atol=1e-12)
+    np.testing.assert_allclose(lift(LAND - 0.005).lift, hover * up, atol=1e-15)
+    for time in (LAND - 0.09, LAND - 0.07, LAND - 0.05):
+        numeric = (lift(time + h).lift - lift(time - h).lift) / (2 * h)
+        np.testing.assert_allclose(lift(time).lift_rate, numeric, atol=1e-7)
+    assert lift(LAND).press == pytest.approx(-hover)
 
 
 def test_early_touch_down_counts_within_its_window(stepping):

@@ -32,6 +32,7 @@ from manikin.control.tasks import (
     angular_momentum_task,
     com_task,
     landing_reference,
+    lifted,
     orientation_task,
     posture_task,
     stance_task,
@@ -203,7 +204,7 @@ class Controller:
         if support.mode is SupportMode.LANDING:
             target = landing_reference(support, self.settings.supports.press_speed)
             return swing_task(name, frame, target, gains.swing, weight)
-        return swing_task(name, frame, reference.effectors[name], gains.swing, weight)
+        return swing_task(name, frame, lifted(reference.effectors[name], support), gains.swing, weight)
 
     def _posture_weight(self, supports: Mapping[str, SupportState]) -> FloatArray:
         weight = np.full(self.body.nv - 6, self.settings.weights.posture)

@@ -75,8 +75,9 @@ class SupportSettings:
         load_time: It rises from zero over this time after touch-down [s].
         early_window: A touch this long before the planned landing counts as the landing [s].
         release_time: A support that has not touched for this long is landed anew [s].
-        press_speed: A foot that misses the ground at its landing time goes on down at this
-            speed [m/s] ...
+        hover: Before its landing a foot is held this far above its support, so that it does
+            not touch, and load the leg, ahead of time [m].
+        press_speed: From its landing time on it goes down at this speed [m/s] ...
         press_depth: ... until it is this far below the planned support [m].
         default_cap: Normal force limit of a contact that states none [body weights].
         sole_inset: The controller keeps its forces this far inside the edge of the sole [m].
@@ -86,6 +87,7 @@ class SupportSettings:
     load_time: float = 0.04
     early_window: float = 0.1
     release_time: float = 0.03
+    hover: float = 0.0015
     press_speed: float = 0.1
     press_depth: float = 0.03
     default_cap: float = 3.0
@@ -94,7 +96,7 @@ class SupportSettings:
     def __post_init__(self) -> None:
         for name in ("unload_time", "load_time", "press_speed", "default_cap"):
             finite_number(getattr(self, name), f"support setting {name!r}", above=0.0)
-        for name in ("early_window", "release_time", "press_depth", "sole_inset"):
+        for name in ("early_window", "release_time", "hover", "press_depth", "sole_inset"):
             finite_number(getattr(self, name), f"support setting {name!r}", at_least=0.0)
 
 

@@ -2,16 +2,24 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
 
 from manikin.contact import Contact, ContactSchedule
 from manikin.control.settings import SupportSettings
+from manikin.spatial import FloatArray
 
 _FIRST_SHARE = 0.05
 """Load share at touch-down, and of a foot that lands early until its planned landing."""
+
+
+_NO_LIFT: FloatArray = np.zeros(3)
+_NO_LIFT.setflags(write=False)
+
+_LIFTING_SHARE = 0.6
+"""Share of the early window in which the hovering height is reached."""
 
 
 class SupportMode(StrEnum):
@@ -37,7 +45,9 @@ class SupportState:
             rising to 1.
         unload_share: Share of the load it carried when its unloading began that it may
             still carry, falling to 0 at lift-off; 1 before that.
-        press: How far below the planned contact a landing effector is sent [m].
+        press: How far below the planned contact a landing effector is sent [m]; negative above.
+        lift: (3,) offset of a flying effector from its planned path [m].
+        lift_rate: (3,) rate of that offset [m/s].
     """
 
     effector: str
@@ -46,6 +56,8 @@ class SupportState:
     load_share: float = 0.0
     unload_share: float = 1.0
     press: float = 0.0
+    lift: FloatArray = field(default_factory=lambda: _NO_LIFT)
+    lift_rate: FloatArray = field(default_factory=lambda: _NO_LIFT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,10 +164,24 @@ class SupportSwitch:
                 unload_share=float(np.clip(falling, 0.0, 1.0)),
             )
         if not planned:
-            return SupportState(name, SupportMode.SWING, None)
+            return self._hovering(name, interval, time)
         late = time - max(interval.start, memory.touched)
-        press = min(self._settings.press_depth, self._settings.press_speed * late)
+        height = self._settings.hover if memory.touched < interval.start else 0.0
+        press = min(self._settings.press_depth, self._settings.press_speed * late - height)
         return SupportState(name, SupportMode.LANDING, interval.contact, press=press)
+
+    def _hovering(self, name: str, interval: SupportInterval, time: float) -> SupportState:
+        """Lift the end of a flight smoothly, in the first part of the time in which it might touch."""
+        duration = _LIFTING_SHARE * (interval.start - interval.early)
+        share = float(np.clip((time - interval.early) / duration, 0.0, 1.0))
+        up = self._settings.hover * interval.contact.normal
+        return SupportState(
+            name,
+            SupportMode.SWING,
+            None,
+            lift=share**2 * (3.0 - 2.0 * share) * up,
+            lift_rate=6.0 * share * (1.0 - share) / duration * up,
+        )
 
     def _interval(self, name: str, time: float) -> tuple[int, SupportInterval | None]:
         for number, interval in enumerate(self._intervals[name]):

@@ -4,7 +4,7 @@ Each function turns a reference and the current state into an :class:`Accelerati
 by the impedance law ``reference acceleration + stiffness * error + damping * error rate``.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -91,6 +91,13 @@ def swing_task(
         reference.acceleration + gains.stiffness * error + gains.damping * (reference.twist - frame.twist)
     )
     return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
+
+
+def lifted(reference: EffectorReference, support: SupportState) -> EffectorReference:
+    """Reference of a flying effector with the support's lift on top."""
+    twist = reference.twist.copy()
+    twist[:3] += support.lift_rate
+    return replace(reference, position=reference.position + support.lift, twist=twist)
 
 
 def landing_reference(support: SupportState, press_speed: float) -> EffectorReference:

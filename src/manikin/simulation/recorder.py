@@ -116,42 +116,20 @@ class Recorder:
     def margins(self, mass: float) -> FloatArray:
         """(n,) wrench margin of the mean measured wrenches [N.m].
 
-        The stance is the planned one and those contacts that press although they are planned
-        for a little later or earlier, all at their planned placements.
+        The stance is the one planned for the beginning of the step, at its planned placements:
+        a foot that presses before its time or after it is no support.
 
         Args:
             mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
         """
-        samples: dict[tuple[int, tuple[str, ...]], list[int]] = {}
-        for number, sample in enumerate(self.samples):
-            phase = int(self._schedule.phase_at(sample.sensed.time))
-            extra = self._unscheduled(self.samples[number : number + 2], phase)
-            samples.setdefault((phase, extra), []).append(number)
+        totals = np.array([sample.total for sample in self.samples])
+        phases = self._schedule.phase_at([sample.sensed.time for sample in self.samples])
         margins = np.empty(len(self.samples))
-        for (phase, extra), rows in samples.items():
-            stance = self._schedule.sequence[phase].stance
-            contacts = [self._nearest_contact(name, self.samples[rows[0]].sensed.time) for name in extra]
-            totals = np.array([self.samples[row].total for row in rows])
-            whole = _bounded(Stance([*stance, *contacts], stance.normal_force_cap), mass)
-            margins[rows] = wrench_polytope(whole).margin(totals)
+        for index, phase in enumerate(self._schedule.sequence):
+            rows = phases == index
+            if np.any(rows):
+                margins[rows] = wrench_polytope(_bounded(phase.stance, mass)).margin(totals[rows])
         return margins
-
-    def _unscheduled(self, step: Sequence[Sample], phase: int) -> tuple[str, ...]:
-        """Effectors that press near, but outside, the time for which they are planned.
-
-        Args:
-            step: The sample at the beginning of a control step and, if any, that at its end.
-            phase: Planned phase.
-        """
-        stance, time = self._schedule.sequence[phase].stance, step[0].sensed.time
-        pressed = np.max([np.linalg.norm(sample.wrenches[:, :3], axis=1) for sample in step], axis=0)
-        return tuple(
-            name
-            for name, force in zip(self.effectors, pressed, strict=True)
-            if name not in stance
-            and force > _PRESSES
-            and any(near(interval, time) for interval in self._intervals[name])
-        )
 
     def motion(self, joint_names: Sequence[str], mass: float) -> Motion:
         """Turn the samples into a motion."""
