@@ -125,3 +125,16 @@ def test_a_ceiling_below_the_head_is_reported_with_its_pair(person, step_com):
     assert not result.succeeded
     assert result.certificate.min_clearance_m < 0.01
     assert "ceiling" in str(result.certificate.closest_pair) or "error" in result.failure.reason
+
+
+@pytest.mark.parametrize(
+    ("name", "what"), [("torque_share", "share of a torque limit"), ("missing_wrench", "missing wrench")]
+)
+def test_the_certificate_refuses_forces_beyond_the_body_or_its_contacts(step_motion, name, what):
+    residuals = step_motion.certificate
+    assert residuals.violation(WholeBodyRequirements()) is None
+    excess = replace(residuals, **{f"max_{name}": 1.01})
+    found = excess.violation(WholeBodyRequirements())
+    assert found is not None
+    assert found[0].startswith(what)
+    assert found[1] == residuals.worst_times_s[f"max_{name}"]

@@ -28,6 +28,8 @@ class WholeBodyRequirements:
         clearance: Least distance to obstacles and between body parts [m].
         joint_limit: Largest violation of a joint range [rad].
         velocity_share: Largest share of a joint's velocity limit.
+        missing_wrench: Largest part of the dynamics left without a contact force [N, N.m].
+        torque_share: Largest share of a joint's torque limit.
     """
 
     support_error: float = 1.0e-3
@@ -36,6 +38,8 @@ class WholeBodyRequirements:
     clearance: float = 0.01
     joint_limit: float = 1.0e-9
     velocity_share: float = 1.0
+    missing_wrench: float = 1.0
+    torque_share: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,8 @@ class WholeBodyResiduals:
             ("max_joint_limit_violation_rad", self.max_joint_limit_violation_rad, r.joint_limit,
              "joint range violation [rad]"),
             ("max_velocity_share", self.max_velocity_share, r.velocity_share, "share of a velocity limit"),
+            ("max_missing_wrench", self.max_missing_wrench, r.missing_wrench, "missing wrench [N, N.m]"),
+            ("max_torque_share", self.max_torque_share, r.torque_share, "share of a torque limit"),
         ]  # fmt: skip
         for name, value, limit, what in checks:
             if value > limit:
