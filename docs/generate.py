@@ -49,12 +49,13 @@ def schema_tables(schema: dict[str, Any]) -> str:
 
 
 def _section(title: str, part: dict[str, Any]) -> str:
-    required = part.get("required", [])
+    # Only the file as a whole has alternatives: it may extend another one instead.
+    required = part.get("required") or [k for either in part.get("anyOf", ())[1:] for k in either["required"]]
     rows = [
         f"| `{key}` | {_type(value)} | {_default(value, key in required)} | {value.get('description', '')} |"
         for key, value in part["properties"].items()
     ]
-    note = " ".join(part.get("description", "").split())
+    note = " ".join(part.get("description", "").replace("``", "`").split())
     head = ["| key | type | default | meaning |", "|---|---|---|---|"]
     return "\n".join([f"### {title}", "", note, "", *head, *rows, ""])
 
@@ -84,7 +85,7 @@ def _type(value: dict[str, Any]) -> str:
 
 
 def _number(value: dict[str, Any]) -> str:
-    names = {"string": "text", "boolean": "true or false"}
+    names = {"string": "text", "boolean": "true or false", "object": "mapping"}
     text = names.get(value.get("type", ""), value.get("type", "any"))
     signs = {"exclusiveMinimum": "&gt;", "minimum": "≥", "exclusiveMaximum": "&lt;", "maximum": "≤"}
     bounds = [f"{sign} {value[key]:g}" for key, sign in signs.items() if abs(value.get(key, FAR)) < FAR]

@@ -11,6 +11,7 @@ import typer
 import manikin
 from manikin.cli import app
 from manikin.motion.file import write_motions
+from manikin.scenarios import list_variants, load_scenario
 from manikin.scenarios.stance_file import load_stance_file
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -89,6 +90,15 @@ def test_scenario_examples_succeed(tmp_path):
         (tmp_path / "example.yaml").write_text(text)
         result = manikin.run(tmp_path / "example.yaml")
         assert result.succeeded, result.summary["failure"]
+
+
+def test_examples_that_extend_a_scenario_are_valid_with_every_variant(tmp_path):
+    examples = yaml_examples("extends")
+    assert examples
+    for text in examples:
+        (tmp_path / "example.yaml").write_text(text)
+        assert load_scenario(tmp_path / "example.yaml").name
+        assert list_variants(tmp_path / "example.yaml")
 
 
 def test_stance_examples_give_every_documented_key(tmp_path):

@@ -34,7 +34,10 @@ app = typer.Typer(
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 ScenarioArgument = Annotated[
-    str, typer.Argument(metavar="NAME|FILE.yaml", help="Built-in scenario or scenario file.")
+    str,
+    typer.Argument(
+        metavar="NAME|FILE.yaml", help="Built-in scenario or scenario file; NAME@V is its variant V."
+    ),
 ]
 RunArgument = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Run directory or motion file (.h5).")]
 
@@ -78,15 +81,20 @@ def _root(
 
 @app.command()
 def scenarios(json: JsonOption = False) -> None:
-    """List the built-in scenarios."""
-    from manikin.scenarios import list_scenarios
+    """List the built-in scenarios and their variants."""
+    from manikin.scenarios import list_scenarios, list_variants
 
     found = list_scenarios()
+    variants = {name: list_variants(name) for name in found}
     if json:
-        _print_json({"scenarios": found})
+        _print_json({"scenarios": found, "variants": variants})
         return
-    width = max(len(name) for name in found)
+    rows: dict[str, str] = {}
     for name, description in found.items():
+        rows[name] = description
+        rows |= {f"{name}@{variant}": text for variant, text in variants[name].items()}
+    width = max(len(name) for name in rows)
+    for name, description in rows.items():
         typer.echo(f"{name:{width}}  {description}")
 
 
@@ -107,12 +115,23 @@ def run(
         float | None, typer.Option(metavar="KG", min=35.0, max=160.0, help="Other mass, 35 to 160 kg.")
     ] = None,
     sex: Annotated[str | None, typer.Option(metavar="male|female", help="Other sex.")] = None,
+    variant: Annotated[
+        str | None, typer.Option(metavar="V", help="One of the scenario's variants; also NAME@V.")
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable.",
+        ),
+    ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the run directory.")] = True,
 ) -> int:
     """Plan a scenario, execute it in the physics engine and report."""
     from manikin.scenarios import load_scenario
 
-    job = load_scenario(scenario)
+    job = load_scenario(scenario, variant, overrides or ())
     job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex)
     if seed is not None:
         job = job.with_seed(seed)

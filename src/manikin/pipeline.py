@@ -6,7 +6,7 @@ explanation; only misuse and broken input raise.
 """
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from manikin.balance import pseudo_wrench
 from manikin.body import BodyModel
 from manikin.centroidal import CentroidalResult, CentroidalTrajectory, plan_com
 from manikin.contact import ContactSchedule
+from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
 from manikin.output import MOTION, RunDirectory
@@ -122,6 +123,8 @@ class RunResult:
 def run(
     scenario: str | Path | Scenario,
     *,
+    variant: str | None = None,
+    overrides: Sequence[str] = (),
     out: str | Path | None = None,
     seed: int | None = None,
     settings: WholeBodySettings | None = None,
@@ -132,6 +135,8 @@ def run(
 
     Args:
         scenario: Name of a built-in scenario, a scenario file, or a scenario.
+        variant: Name of one of the scenario's variants.
+        overrides: Values to set, ``"supports.friction=0.5"`` each.
         out: Run directory; nothing is written when omitted.
         seed: Seed of every random choice; the scenario's own when omitted.
         settings: Options of the whole-body stage.
@@ -144,12 +149,22 @@ def run(
     Raises:
         InputError: If the scenario, or a file it names, is not usable.
     """
-    job = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
+    job = _job(scenario, variant, overrides)
     if seed is not None:
         job = job.with_seed(seed)
     # Threads make the many small products slower, and the last bits depend on their number.
     with threadpool_limits(1):
         return _Run(job, out, settings, requirements or ExecutionRequirements(), progress).run()
+
+
+def _job(scenario: str | Path | Scenario, variant: str | None, overrides: Sequence[str]) -> Scenario:
+    if not isinstance(scenario, Scenario):
+        return load_scenario(str(scenario), variant, overrides)
+    if variant is not None:
+        raise ScenarioError(
+            f"variant {variant!r} is given beside a scenario that is already loaded; valid: its name or file"
+        )
+    return scenario.with_overrides(overrides)
 
 
 class _Run:

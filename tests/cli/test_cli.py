@@ -100,7 +100,9 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
     lines = capfd.readouterr().out.splitlines()
     assert any(line.startswith("platform ") for line in lines)
     assert main(["scenarios", "--json"]) == DONE
-    assert "platform" in json.loads(capfd.readouterr().out)["scenarios"]
+    listed = json.loads(capfd.readouterr().out)
+    assert "platform" in listed["scenarios"]
+    assert set(listed["variants"]) == set(listed["scenarios"])
 
 
 @pytest.mark.parametrize(
@@ -121,6 +123,13 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
         (["run", "none.yaml"], "no such file"),
         (["run", "."], "is a directory"),
         (["run", ""], "is empty"),
+        (["run", "platform", "--variant", "low"], "has no variant 'low'; valid: none"),
+        (["run", "platform@low"], "has no variant 'low'; valid: none"),
+        (
+            ["run", "platform", "--set", "supports.frictoin=1"],
+            "did you mean 'friction'? valid: ",
+        ),
+        (["run", "platform", "--set", "scene.rof.box.0=1"], "or roof, threshold, platform"),
         (["view", "none"], "no such file"),
         (["view", "none", "--port", "99999"], "--port"),
         (["export", "none", "--format", "bvh"], "no such file"),
@@ -190,6 +199,24 @@ def test_options_reach_the_pipeline_and_the_resolved_scenario(pipeline, tmp_path
     assert resolved["body"] == {"model": "human", "stature_m": 1.6, "mass_kg": 58.0, "sex": "female"}
     assert resolved["seed"] == 7
     assert scenario.stature_scale == pytest.approx(1.6 / 1.75)
+
+
+def test_variants_and_single_values_reach_the_pipeline(pipeline, tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("extends: platform\nname: mine\nvariants: {light: {body: {mass_kg: 60}}}\n")
+    options = [
+        "--set",
+        "supports.friction=0.4",
+        "--set",
+        "scene.roof.position.2=1.6",
+        "--no-figures",
+        "--json",
+    ]
+    for source in ([str(file), "--variant", "light"], [f"{file}@light"]):
+        assert main(["run", *source, *options]) == DONE
+        scenario = pipeline.calls[-1][0]
+        assert (scenario.name, scenario.mass, scenario.file.supports.friction) == ("mine@light", 60.0, 0.4)
+        assert scenario.file.scene[0].position[2] == 1.6
 
 
 def test_explained_failure_is_status_3(capfd, pipeline):

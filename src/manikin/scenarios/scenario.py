@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -16,6 +16,7 @@ from manikin.contact import Contact, Phase, Stance, StanceSequence, grasp, point
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios.expressions import Expression
 from manikin.scenarios.heights import HeightBand, SupportLevel
+from manikin.scenarios.overrides import override
 from manikin.scenarios.schema import (
     ComConstraintSection,
     ContactSection,
@@ -25,6 +26,7 @@ from manikin.scenarios.schema import (
     SoleSection,
     SupportsSection,
 )
+from manikin.scenarios.tree import Tree
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.validation import place, validate
 from manikin.spatial import GRAVITY, FloatArray, frozen_array, rotation_from_rpy
@@ -46,13 +48,13 @@ class Scenario:
         file: The checked content of the scenario file.
         source: Name of the file, for messages.
         folder: Folder that relative mesh paths start from.
-        lines: Line of each key of the file, for messages.
+        lines: Place (file and line) of each key, for messages.
     """
 
     file: ScenarioFile
     source: str = "scenario"
     folder: Path = Path()
-    lines: Mapping[KeyPath, int] = field(default_factory=dict)
+    lines: Mapping[KeyPath, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._check_numbers_of_band()
@@ -156,6 +158,21 @@ class Scenario:
             ScenarioError: If the seed is negative.
         """
         return self._changed(seed=seed)
+
+    def with_overrides(self, settings: Sequence[str]) -> Scenario:
+        """Return the same scenario with single values set.
+
+        Args:
+            settings: ``"supports.friction=0.5"`` each; see :func:`manikin.scenarios.overrides.override`.
+
+        Raises:
+            ScenarioError: One line, if a key is not known or a value is not valid.
+        """
+        if not settings:
+            return self
+        changed = override(Tree(self._data(), self.lines), settings)
+        file = validate(ScenarioFile, changed.data, self.source, changed.lines)
+        return Scenario(file, self.source, self.folder, changed.lines)
 
     def build_body(self) -> BodyModel:
         """Build the body; its soles have the size that the supports give.
@@ -304,22 +321,25 @@ class Scenario:
 
         Mesh paths become absolute, so that the file can be kept elsewhere.
         """
-        data = self.file.model_dump(mode="json", exclude_none=True)
-        if self.file.floor_height_m is None:
-            data["floor_height_m"] = None
+        data = self._data()
         for obstacle in data["scene"]:
             if "mesh" in obstacle:
                 obstacle["mesh"] = str((self.folder / obstacle["mesh"]).resolve())
         return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100, default_flow_style=None)
 
     def _changed(self, **changes: Any) -> Scenario:
-        data = self.file.model_dump(exclude_none=True)
-        if self.file.floor_height_m is None:
-            data["floor_height_m"] = None
+        data = self._data()
         for key, change in changes.items():
             data[key] = {**data[key], **change} if isinstance(change, dict) else change
         file = validate(ScenarioFile, data, self.source)
         return Scenario(file, self.source, self.folder, self.lines)
+
+    def _data(self) -> dict[str, Any]:
+        """Content of the file in plain values, with every default."""
+        data = self.file.model_dump(mode="json", exclude_none=True)
+        if self.file.floor_height_m is None:
+            data["floor_height_m"] = None
+        return data
 
     def _supports(self) -> SupportsSection:
         if self.file.supports is None:

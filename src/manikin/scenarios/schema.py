@@ -356,8 +356,16 @@ class PushSection(Section):
 
 
 class ScenarioFile(Section):
-    """A whole scenario file."""
+    """A whole scenario file.
 
+    ``extends`` and ``variants`` are resolved before the file is checked against this section, so a
+    scenario that was loaded has neither.
+    """
+
+    extends: Text | None = Field(
+        default=None, exclude=True,
+        description="first key of the file: a built-in scenario or a file that this one is laid over",
+    )  # fmt: skip
     name: Name = Field(description="short name, also that of the run directory")
     description: str = Field(default="", description="one line for the list of scenarios")
     body: BodySection = Field(default=BodySection(), description="whose motion it is")
@@ -382,6 +390,9 @@ class ScenarioFile(Section):
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
         default=0, description="seed of every random choice"
     )
+    variants: dict[str, dict[str, Any]] | None = Field(
+        default=None, exclude=True, description="named changes of this scenario: what each lays over it"
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -410,4 +421,6 @@ class ScenarioFile(Section):
 def json_schema() -> dict[str, Any]:
     """JSON schema of a scenario file, for editors and the documentation."""
     schema = ScenarioFile.model_json_schema(by_alias=True)
+    # A file that extends another one may leave out what that one gives.
+    schema["anyOf"] = [{"required": ["extends"]}, {"required": schema.pop("required")}]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

@@ -85,8 +85,8 @@ def _not_tiny(value: float) -> float:
 
 
 def _file_name(value: str) -> str:
-    if len(value) > LONGEST_NAME or value.startswith(".") or not re.fullmatch(r"[\w .+-]+", value):
-        rule = "letters, digits, spaces and . _ + -, not starting with a dot"
+    if len(value) > LONGEST_NAME or value.startswith(".") or not re.fullmatch(r"[\w .+@-]+", value):
+        rule = "letters, digits, spaces and . _ + - @, not starting with a dot"
         raise rule_error(f"at most {LONGEST_NAME} {rule}")
     return value
 
@@ -128,7 +128,7 @@ _Section = TypeVar("_Section", bound=Section)
 
 
 def validate(
-    model: type[_Section], data: Any, source: str, lines: Mapping[Path, int] | None = None
+    model: type[_Section], data: Any, source: str, lines: Mapping[Path, str] | None = None
 ) -> _Section:
     """Check ``data`` against ``model``.
 
@@ -136,7 +136,7 @@ def validate(
         model: The section at the root of the file.
         data: What the YAML reader returned.
         source: Name of the file for messages.
-        lines: Line of each key, from the YAML reader.
+        lines: Place (file and line) of each key, from the YAML reader.
 
     Raises:
         ScenarioError: One line: file, key path, what was wrong, what is valid.
@@ -148,7 +148,7 @@ def validate(
 
 
 def _first_problem(
-    error: ValidationError, data: Any, model: type[Section], source: str, lines: Mapping[Path, int]
+    error: ValidationError, data: Any, model: type[Section], source: str, lines: Mapping[Path, str]
 ) -> str:
     problems = error.errors(include_url=False)
     path, text = _describe(problems[0], data, model)
@@ -156,11 +156,11 @@ def _first_problem(
     return f"{place(source, path, lines)} {text}{more}".replace("\n", " ")
 
 
-def place(source: str, path: Path, lines: Mapping[Path, int]) -> str:
-    """Text ``file:line: key.path`` of a place in a file; the line of the nearest known parent."""
+def place(source: str, path: Path, lines: Mapping[Path, str]) -> str:
+    """Text ``file:line: key.path`` of a key; the file and line of the nearest known parent."""
     known = next((path[:n] for n in range(len(path), -1, -1) if path[:n] in lines), None)
-    line = f":{lines[known]}" if known is not None else ""
-    return f"{source}{line}: {path_text(path)}" if path else f"{source}:"
+    where = lines[known] if known is not None else source
+    return f"{where}: {path_text(path)}" if path else f"{source}:"
 
 
 def path_text(path: Path) -> str:

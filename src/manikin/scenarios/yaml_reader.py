@@ -47,14 +47,15 @@ _Loader.add_implicit_resolver(
 )
 
 
-def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, int]]:
+def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, str]]:
     """Read one YAML document.
 
     Args:
         path: The file.
 
     Returns:
-        Its content in plain Python values, and the line (from 1) of every key and list entry.
+        Its content in plain Python values, and the place of every key and list entry: the file
+        and its line from 1, such as ``"file.yaml:3"``.
 
     Raises:
         ScenarioError: If the file cannot be read, is not YAML or is empty.
@@ -62,13 +63,31 @@ def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, int]]:
     return parse_yaml(_read_text(path), str(path))
 
 
-def parse_yaml(text: str, source: str) -> tuple[Any, dict[KeyPath, int]]:
+def parse_yaml(text: str, source: str) -> tuple[Any, dict[KeyPath, str]]:
     """Parse YAML ``text``; ``source`` names it in messages.  See :func:`read_yaml`."""
+    data, lines = _parse(text, source, "key: value lines")
+    if data is None:
+        raise ScenarioError(f"{source}: is empty; valid: a YAML mapping, see 'manikin scenarios'")
+    return data, {path: f"{source}:{line}" for path, line in lines.items()}
+
+
+def parse_value(text: str, source: str) -> Any:
+    """Parse one YAML value, ``null`` included; ``source`` names it in messages.
+
+    Raises:
+        ScenarioError: If it is not YAML or there is nothing.
+    """
+    if not text.strip():
+        raise ScenarioError(f"{source}: has no value; valid: a YAML value, null removes the key")
+    return _parse(text, source, "a YAML value")[0]
+
+
+def _parse(text: str, source: str, valid: str) -> tuple[Any, dict[KeyPath, int]]:
+    lines: dict[KeyPath, int] = {}
     try:
         loader = _Loader(text)
         try:
             node = loader.get_single_node()
-            lines: dict[KeyPath, int] = {}
             if node is not None:
                 _walk(node, (), lines, source, set())
             data = None if node is None else loader.construct_document(node)
@@ -78,16 +97,12 @@ def parse_yaml(text: str, source: str) -> tuple[Any, dict[KeyPath, int]]:
         mark = error.problem_mark or error.context_mark
         line = f":{mark.line + 1}" if mark is not None else ""
         problem = " ".join(str(error.problem or error.context).split())
-        raise ScenarioError(
-            f"{source}{line}: is not valid YAML ({problem}); valid: key: value lines"
-        ) from None
+        raise ScenarioError(f"{source}{line}: is not valid YAML ({problem}); valid: {valid}") from None
     except (yaml.YAMLError, ValueError, TypeError) as error:
         problem = " ".join(str(error).split())[:120]
-        raise ScenarioError(f"{source}: is not valid YAML ({problem}); valid: key: value lines") from None
+        raise ScenarioError(f"{source}: is not valid YAML ({problem}); valid: {valid}") from None
     except RecursionError:
         raise ScenarioError(f"{source}: is nested too deeply; valid: a few levels") from None
-    if data is None:
-        raise ScenarioError(f"{source}: is empty; valid: a YAML mapping, see 'manikin scenarios'")
     return data, lines
 
 
