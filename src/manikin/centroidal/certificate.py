@@ -175,9 +175,10 @@ def _end_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory)
                 yield Residual(f"{end} {name}", error, unit, phase, time)
 
 
-def _position_residuals(
-    problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: list[FloatArray]
-) -> Iterator[Residual]:
+def position_excess(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: Sequence[FloatArray]
+) -> Iterator[tuple[str, list[FloatArray]]]:
+    """Name of each constraint on the position and its violation at the instants of each phase [m]."""
     positions = [trajectory.position(instants) for instants in times]
     if problem.support_distance is not None:
         excess = [
@@ -187,9 +188,16 @@ def _position_residuals(
             - problem.support_distance
             for p, phase in zip(positions, problem.sequence, strict=True)
         ]
-        yield _worst("support distance", excess, times)
+        yield "support distance", excess
     for constraint in problem.geometric:
-        yield _worst(constraint.name, [constraint.violation(p) for p in positions], times)
+        yield constraint.name, [constraint.violation(p) for p in positions]
+
+
+def _position_residuals(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: list[FloatArray]
+) -> Iterator[Residual]:
+    for requirement, excess in position_excess(problem, trajectory, times):
+        yield _worst(requirement, excess, times)
 
 
 def _worst(requirement: str, values: list[FloatArray], times: list[FloatArray]) -> Residual:

@@ -1,0 +1,115 @@
+"""A recorded CoM with the stances it was recorded on ([Qiu2012]_ 3.2.2, 5.3.1)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.contact import ContactSchedule, Phase, StanceSequence
+from manikin.errors import InputError
+from manikin.spatial import FloatArray, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Samples of a CoM from the first key frame to the last, on a known sequence of stances.
+
+    A key frame is a sample at which the support changes; the first and the last sample are
+    key frames as well ([Qiu2012]_ Definition 3).
+
+    Attributes:
+        time: (n,) increasing [s]; 0 at the first key frame.
+        com: (n, 3) [m].
+        key_frames: (phases + 1,) indices of the key frames among the samples.
+        sequence: Stances, one per phase, whose duration bounds are both the recorded duration.
+    """
+
+    time: FloatArray
+    com: FloatArray
+    key_frames: NDArray[np.int64]
+    sequence: StanceSequence
+
+    def __init__(
+        self, time: ArrayLike, com: ArrayLike, sequence: StanceSequence, key_times: ArrayLike
+    ) -> None:
+        """Take over the samples from the first to the last key frame.
+
+        Args:
+            time: (n,) [s], increasing; any origin.
+            com: (n, 3) [m].
+            sequence: Stances, one per phase, each with at least one contact.
+            key_times: (phases + 1,) [s], where the support changes, with both ends; each is
+                moved to the nearest sample.
+
+        Raises:
+            InputError: If a number is not finite, times do not increase, or a phase has no
+                contact or fewer than one sample interval.
+        """
+        times = frozen_array(time, "recording time [s]", (None,))
+        positions = frozen_array(com, "recording com [m]", (len(times), 3))
+        wanted = frozen_array(key_times, "recording key times [s]", (len(sequence) + 1,))
+        _check_increasing(times, "recording time")
+        _check_increasing(wanted, "recording key times")
+        _check_supported(sequence)
+        _check_inside(times, wanted)
+        frames = np.array([int(np.argmin(np.abs(times - instant))) for instant in wanted])
+        for index in np.flatnonzero(np.diff(frames) < 1):
+            raise InputError(
+                f"recording has no sample between its key times {wanted[index]:g} and "
+                f"{wanted[index + 1]:g} s; valid: samples that are closer than the shortest phase"
+            )
+        kept = slice(frames[0], frames[-1] + 1)
+        instants = times[frames] - times[frames[0]]
+        values = {
+            "time": frozen_array(times[kept] - times[frames[0]], "recording time [s]"),
+            "com": frozen_array(positions[kept], "recording com [m]"),
+            "key_frames": _frozen_indices(frames - frames[0]),
+            "sequence": _with_durations(sequence, np.diff(instants)),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def key_times(self) -> FloatArray:
+        """(phases + 1,) time of each key frame [s]; the first is 0."""
+        return self.time[self.key_frames]
+
+    @property
+    def schedule(self) -> ContactSchedule:
+        """The stances with the key times."""
+        return ContactSchedule(self.sequence, self.key_times)
+
+
+def _check_increasing(times: FloatArray, name: str) -> None:
+    steps = np.flatnonzero(np.diff(times) <= 0)
+    if len(times) < 2 or len(steps):
+        found = f"have {len(times)} entries" if len(times) < 2 else f"fall or stay at entry {steps[0] + 1}"
+        raise InputError(f"{name} values {found}; valid: at least two, strictly increasing seconds")
+
+
+def _check_supported(sequence: StanceSequence) -> None:
+    for number, phase in enumerate(sequence):
+        if not len(phase.stance):
+            raise InputError(
+                f"recording has no support in phase {number}; valid: at least one contact in every phase"
+            )
+
+
+def _check_inside(times: FloatArray, key_times: FloatArray) -> None:
+    slack = float(np.median(np.diff(times)))
+    if key_times[0] < times[0] - slack or key_times[-1] > times[-1] + slack:
+        raise InputError(
+            f"recording lasts from {times[0]:g} to {times[-1]:g} s but its key times from "
+            f"{key_times[0]:g} to {key_times[-1]:g} s; valid: key times inside the recording"
+        )
+
+
+def _with_durations(sequence: StanceSequence, durations: FloatArray) -> StanceSequence:
+    pairs = zip(sequence, durations.tolist(), strict=True)
+    return StanceSequence([Phase(phase.stance, duration, duration) for phase, duration in pairs])
+
+
+def _frozen_indices(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    values = np.array(values, dtype=np.int64)
+    values.setflags(write=False)
+    return values
