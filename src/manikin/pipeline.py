@@ -16,7 +16,13 @@ from threadpoolctl import threadpool_limits
 
 from manikin.balance import pseudo_wrench
 from manikin.body import BodyModel
-from manikin.centroidal import CentroidalResult, CentroidalTrajectory, plan_com
+from manikin.centroidal import (
+    CentroidalResult,
+    CentroidalTrajectory,
+    KeyframeResult,
+    plan_com,
+    plan_com_through_key_frames,
+)
 from manikin.contact import ContactSchedule
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
@@ -185,6 +191,7 @@ class _Run:
         self._scene: Scene = scenario.build_scene()
         scenario.check_contacts(self._scene)
         self._problem = scenario.build_centroidal_problem()
+        self._keyframes = scenario.build_keyframe_problem()
         self._directory = None if out is None else RunDirectory(out)
         if self._directory is not None:
             self._directory.write_scenario(scenario.to_yaml())
@@ -215,7 +222,8 @@ class _Run:
 
     def _plan_com(self) -> tuple[CentroidalResult, CentroidalTrajectory | None]:
         self._progress("centroidal", 0.0)
-        result = plan_com(self._problem)
+        keyframes = self._keyframes
+        result = plan_com(self._problem) if keyframes is None else plan_com_through_key_frames(keyframes)
         self._finish("centroidal", centroidal_summary(result))
         if result.failure is not None:
             failure = result.failure
@@ -287,7 +295,10 @@ class _Run:
 def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
     """Return the ``centroidal`` block of the summary."""
     trajectory = result.trajectory
+    recorded = isinstance(result, KeyframeResult)
     return {
+        "method": "keyframes" if recorded else "timing-free",
+        "added_key_frames_s": sorted(result.added_times) if recorded else None,
         "duration_s": None if trajectory is None else trajectory.duration,
         "phase_durations_s": None if trajectory is None else trajectory.schedule.durations.tolist(),
         "min_margin": result.d_min,

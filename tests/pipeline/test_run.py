@@ -12,8 +12,8 @@ from manikin.scenarios import load_scenario
 
 KEYS = {
     "centroidal": {
-        "duration_s", "phase_durations_s", "min_margin", "margin_unit", "limiting_phase", "limiting_contact",
-        "feasibility_radius", "wall_s",
+        "method", "duration_s", "phase_durations_s", "min_margin", "margin_unit", "limiting_phase",
+        "limiting_contact", "feasibility_radius", "wall_s",
     },
     "wholebody": {
         "max_support_error_m", "max_com_error_m", "min_clearance_m", "closest_pair",
@@ -106,6 +106,26 @@ def test_other_bodies_run_the_same_scenario(stature, mass, sex):
     result = manikin.run(load_scenario("platform").with_body(stature, mass, sex), seed=3)
     assert result.succeeded, result.summary["failure"]
     assert result.summary["wholebody"]["min_clearance_m"] >= 0.01
+    assert result.summary["execution"]["min_margin"] > 0.0
+
+
+@pytest.mark.slow
+def test_an_executed_run_is_a_recording_for_the_keyframe_method(platform, tmp_path):
+    """Same timing to half a control step, same CoM at the key frames, executed without falling."""
+    file = tmp_path / "again.yaml"
+    file.write_text(
+        f"extends: platform\nname: again\nplanning: {{method: keyframes, recording: {platform.directory}}}\n"
+    )
+    result = run(file, out=tmp_path / "again")
+    assert result.succeeded, result.summary["failure"]
+    instants = result.centroidal.key_instants
+    np.testing.assert_allclose(instants, platform.centroidal.key_instants, atol=2.5e-3)
+    samples = np.searchsorted(platform.executed.time, instants - 1e-9)
+    np.testing.assert_allclose(
+        result.centroidal.trajectory.position(instants), platform.executed.com[samples], rtol=0, atol=1e-9
+    )
+    assert result.summary["centroidal"]["method"] == "keyframes"
+    assert result.summary["centroidal"]["min_margin"] >= 20.0
     assert result.summary["execution"]["min_margin"] > 0.0
 
 

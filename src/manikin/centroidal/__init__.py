@@ -3,7 +3,10 @@
 from manikin.centroidal.certificate import Residual, Residuals
 from manikin.centroidal.constraints import BentSurface, GeometricConstraint, height_band
 from manikin.centroidal.feasibility import Failure, Feasibility, assess_feasibility, intersection_radii
+from manikin.centroidal.keyframe_problem import KeyframeProblem
+from manikin.centroidal.keyframes import KeyframeResult, plan_com_through_key_frames
 from manikin.centroidal.problem import CentroidalProblem, MarginSpace, Weights
+from manikin.centroidal.recording import Recording
 from manikin.centroidal.timing_free import CentroidalResult, plan_com
 from manikin.centroidal.trajectory import CentroidalTrajectory
 
@@ -15,7 +18,10 @@ __all__ = [
     "Failure",
     "Feasibility",
     "GeometricConstraint",
+    "KeyframeProblem",
+    "KeyframeResult",
     "MarginSpace",
+    "Recording",
     "Residual",
     "Residuals",
     "Weights",
@@ -23,4 +29,5 @@ __all__ = [
     "height_band",
     "intersection_radii",
     "plan_com",
+    "plan_com_through_key_frames",
 ]

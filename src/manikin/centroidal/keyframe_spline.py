@@ -77,8 +77,9 @@ class KeyframeProgramme:
         it says so, or its working set cycles.
         """
         room = self._room()
+        limits = room.bounds - room.slopes * (margin + TIGHTENING)
         found, _, flag, info = daqp.solve(
-            np.eye(room.basis.shape[1]), room.gradient, room.rows, room.bounds - room.slopes * (margin + TIGHTENING),
+            np.eye(room.basis.shape[1]), room.gradient, room.rows, limits,
             np.full(len(room.rows), -_NO_BOUND), np.zeros(len(room.rows), dtype=np.int32), primal_tol=1e-9,
         )  # fmt: skip
         if flag != 1:
@@ -101,9 +102,10 @@ class KeyframeProgramme:
 
     def _room(self) -> "_Room":
         """Eliminate the equalities and scale what is left."""
-        particular = np.linalg.lstsq(self.equalities, self.values, rcond=None)[0]
+        particular = np.linalg.pinv(self.equalities) @ self.values
         kernel = null_space(self.equalities)
-        free, gram = block_diag(kernel, kernel, kernel), block_diag(*self.grams)
+        free = np.kron(np.eye(3), kernel)
+        gram = np.asarray(block_diag(*self.grams), dtype=np.float64)
         factor = np.linalg.cholesky(2.0 * free.T @ gram @ free)
         basis = free @ solve_triangular(factor, np.eye(len(factor)), lower=True).T
         rows = self.rows.reshape(len(self.rows), -1, 3).transpose(0, 2, 1).reshape(len(self.rows), -1) @ basis
@@ -226,7 +228,7 @@ def keyframe_knots(
         widest = int(np.argmax(np.round(np.diff(sites), 12)))
         sites.insert(widest + 1, 0.5 * (sites[widest] + sites[widest + 1]))
     sites = [0.0] * start_derivatives + sites + [1.0] * goal_derivatives
-    inner = [np.mean(sites[j : j + degree]) for j in range(1, control_points - degree)]
+    inner = [float(np.mean(sites[j : j + degree])) for j in range(1, control_points - degree)]
     return clamped_knots(degree, [0.0, *inner, 1.0])
 
 
@@ -297,4 +299,3 @@ def phases_touching(schedule: ContactSchedule, time: float) -> tuple[int, ...]:
     """Phases whose closed interval holds ``time`` [s]: two at a key instant inside the motion."""
     later = int(schedule.phase_at(time))
     return (later - 1, later) if later > 0 and time == schedule.instants[later] else (later,)
-

@@ -33,7 +33,7 @@ from manikin.spatial import GRAVITY, FloatArray, frozen_array, rotation_from_rpy
 
 if TYPE_CHECKING:
     from manikin.body import BodyModel
-    from manikin.centroidal import CentroidalProblem
+    from manikin.centroidal import CentroidalProblem, KeyframeProblem
     from manikin.scene import Scene
 
 BODY_WEIGHTS_CAP = 3.0
@@ -47,7 +47,7 @@ class Scenario:
     Attributes:
         file: The checked content of the scenario file.
         source: Name of the file, for messages.
-        folder: Folder that relative mesh paths start from.
+        folder: Folder that relative paths start from.
         lines: Place (file and line) of each key, for messages.
     """
 
@@ -269,6 +269,34 @@ class Scenario:
         except InputError as error:
             raise self._refused(("planning",), error) from None
 
+    def build_keyframe_problem(self) -> KeyframeProblem | None:
+        """Build the problem of the keyframe-based planner; None when the file asks for another one.
+
+        Raises:
+            ScenarioError: If the recording cannot be read or was made on other supports.
+        """
+        from manikin.centroidal import KeyframeProblem
+        from manikin.scenarios.recordings import load_recording
+
+        options = self.planning
+        if options.method != "keyframes" or options.recording is None:
+            return None
+        try:
+            recording = load_recording(
+                self.find_file(options.recording), self.build_sequence(planning=True),
+                self.file.body.stature_m, self.support_level(),
+            )  # fmt: skip
+            return KeyframeProblem.of(self.build_centroidal_problem(), recording, options.control_points)
+        except ScenarioError:
+            raise
+        except InputError as error:
+            raise self._refused(("planning", "recording"), error) from None
+
+    def find_file(self, name: str) -> Path:
+        """Path of a file that the scenario names: in its folder, or else from the current one."""
+        inside = self.folder / name
+        return inside if inside.exists() else Path(name)
+
     def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
         """Check that every contact of the supports lies on a surface of the scene.
 
@@ -319,12 +347,14 @@ class Scenario:
     def to_yaml(self) -> str:
         """Return the scenario with every default and override written out, ready to run again.
 
-        Mesh paths become absolute, so that the file can be kept elsewhere.
+        Paths of meshes and recordings become absolute, so that the file can be kept elsewhere.
         """
         data = self._data()
         for obstacle in data["scene"]:
             if "mesh" in obstacle:
                 obstacle["mesh"] = str((self.folder / obstacle["mesh"]).resolve())
+        if "recording" in data["planning"]:
+            data["planning"]["recording"] = str(self.find_file(data["planning"]["recording"]).resolve())
         return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100, default_flow_style=None)
 
     def _changed(self, **changes: Any) -> Scenario:

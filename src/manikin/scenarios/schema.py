@@ -324,6 +324,18 @@ class WeightsSection(Section):
 class PlanningSection(Section):
     """Options of the centre-of-mass planner; what is left out has the planner's default."""
 
+    method: Literal["timing-free", "keyframes"] = Field(
+        default="timing-free",
+        description="durations as unknowns, or a smooth path through the key frames of a recording",
+    )
+    recording: Text | None = Field(
+        default=None,
+        description="keyframes: run directory or motion file of the same supports, relative to this file's "
+        "folder or else to the current one",
+    )
+    control_points: Annotated[int, Field(strict=True, ge=4, le=1000)] | None = Field(
+        default=None, description="keyframes: of the B-spline (default: key frames plus 7)"
+    )
     degree: Annotated[int, Field(strict=True, ge=3, le=9)] | None = Field(
         default=None, description="of the B-spline"
     )
@@ -342,6 +354,15 @@ class PlanningSection(Section):
         default=False, description="whether the CoM starts and ends without acceleration"
     )
     weights: WeightsSection = Field(default=WeightsSection(), description="of the objectives")
+
+    @model_validator(mode="after")
+    def _recorded(self) -> Self:
+        if self.method == "keyframes" and self.recording is None:
+            raise refuse("recording", "is missing; valid: a run directory or motion file for keyframes")
+        for key in ("recording", "control_points"):
+            if self.method != "keyframes" and getattr(self, key) is not None:
+                raise refuse(key, f"is given for the method {self.method}; valid: only with keyframes")
+        return self
 
 
 class PushSection(Section):
@@ -389,6 +410,11 @@ class ScenarioFile(Section):
     push: PushSection | None = Field(default=None, description="disturbance during the execution")
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
         default=0, description="seed of every random choice"
+    )
+    expect: Literal["success", "failure"] = Field(
+        default="success",
+        description="how a run should end; 'manikin run all' counts an explained failure as right where one "
+        "is expected",
     )
     variants: dict[str, dict[str, Any]] | None = Field(
         default=None, exclude=True, description="named changes of this scenario: what each lays over it"
