@@ -213,7 +213,7 @@ def _run(
 
         result = pipeline.run(job, out=directory, seed=job.seed, progress=progress)
         interruption.check()
-        if directory is not None and draw and (result.planned is not None or result.executed is not None):
+        if directory is not None and draw:
             from manikin.products import write_products
 
             write_products(directory, progress)

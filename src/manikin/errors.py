@@ -37,6 +37,10 @@ class MotionFileError(InputError):
     """A motion file or run directory cannot be read or written."""
 
 
+class FigureError(InputError):
+    """A run lacks what a figure shows; the message names it."""
+
+
 class PolytopeError(ManikinError):
     """A polytope is empty, unbounded or numerically degenerate beyond repair."""
 

@@ -1,4 +1,4 @@
-"""Footprints, centre of pressure and projected centre of mass seen from above."""
+"""Footprints, zero moment point and projected centre of mass seen from above."""
 
 from typing import Any
 
@@ -7,70 +7,72 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from manikin.contact import Contact, ContactKind, ContactSchedule
-from manikin.figures.style import COLOURS, STYLES, dress, new_figure, readable, white_edge
-from manikin.motion.derived import centre_of_pressure
-from manikin.motion.file import MotionFile
+from manikin.contact import Contact, ContactKind
+from manikin.figures.style import (
+    COLOURS,
+    STYLES,
+    colours_of,
+    dress,
+    need,
+    new_figure,
+    readable,
+    white_edge,
+)
+from manikin.figures.views import ABOVE, distinct_contacts, draw_contact
+from manikin.record import RunRecord
 from manikin.scene import HalfSpace, Plane, Scene
 
 OVERHEAD = 1.0
 """An obstacle that begins above this height [m] is something to walk under."""
 
+LEVEL = 0.3
+"""Contacts whose normal has a smaller vertical part are on a wall."""
 
-def footprint_figure(content: MotionFile) -> Figure:
-    """Draw the soles in their order, the ZMP path and the CoM's projection.
+
+def footprint_figure(record: RunRecord) -> Figure:
+    """Draw the soles in their order, the ZMP path and the CoM's projection ([Qiu2012]_ Fig. 5.13, 5.19).
 
     Args:
-        content: At least one motion, and the body.
+        record: With a planned CoM, or at least one motion, and something to stand on.
+
+    Raises:
+        FigureError: If nothing moves, or all contacts are on walls.
     """
+    tracks = need(record.tracks, "a motion of the centre of mass")
+    contacts = [] if record.schedule is None else distinct_contacts(record.schedule)
+    if contacts and all(abs(contact.normal[2]) < LEVEL for contact in contacts):
+        need(None, "a contact that is not on a wall")
     figure = new_figure(8.6, 8.2, "Footprints, zero moment point and centre of mass from above")
     axes = figure.add_subplot()
-    seen = next(iter(content.motions.values())).com[:, :2]
-    if content.schedule is not None:
-        corners = _draw_contacts(axes, content.schedule)
-        seen = np.vstack([seen, corners])
-    for name, motion in content.motions.items():
-        if content.body is not None:
-            pressure = centre_of_pressure(content.body, motion)
-            axes.plot(pressure[:, 0], pressure[:, 1], label=f"ZMP, {name}", **STYLES[name])
+    colours = colours_of(contact.effector for contact in contacts)
+    for number, contact in enumerate(contacts):
+        _draw_contact(axes, contact, number + 1, colours[contact.effector])
+    seen = [next(iter(tracks.values())).position[:, :2], *(c.points_in_world[:, :2] for c in contacts)]
+    for name, track in tracks.items():
+        if name in record.zmp:
+            point = record.zmp[name].point
+            axes.plot(point[:, 0], point[:, 1], label=f"ZMP, {name}", **STYLES[name])
         dotted = {**STYLES[name], "linestyle": (0, (1.2, 1.6)), "linewidth": 1.6}
-        axes.plot(motion.com[:, 0], motion.com[:, 1], label=f"centre of mass, {name}", **dotted)
-    _mark_ends(axes, next(iter(content.motions.values())).com)
-    low, high = seen.min(axis=0) - 0.18, seen.max(axis=0) + 0.18
+        axes.plot(*track.position[:, :2].T, label=f"centre of mass, {name}", **dotted)
+    _mark_ends(axes, next(iter(tracks.values())).position)
+    everything = np.vstack(seen)
+    low, high = everything.min(axis=0) - 0.18, everything.max(axis=0) + 0.18
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    if content.scene is not None:
-        _draw_obstacles(axes, content.scene)
+    if record.scene is not None:
+        _draw_obstacles(axes, record.scene)
     dress(axes, "y [m]", "x [m]")
     axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
     return figure
 
 
-def _draw_contacts(axes: Axes, schedule: ContactSchedule) -> np.ndarray:
-    """Draw each contact once, numbered in the order it is made; return every corner."""
-    drawn: list[Contact] = []
-    for phase in schedule.sequence:
-        for contact in phase.stance:
-            if any(contact.same_place(other) for other in drawn):
-                continue
-            drawn.append(contact)
-            _draw_contact(axes, contact, len(drawn))
-    return np.vstack([contact.points_in_world[:, :2] for contact in drawn])
-
-
-def _draw_contact(axes: Axes, contact: Contact, number: int) -> None:
-    colour = COLOURS.get(contact.effector, COLOURS["soft"])
-    x, y, z = contact.position
+def _draw_contact(axes: Axes, contact: Contact, number: int, colour: str) -> None:
+    draw_contact(axes, contact, ABOVE, colour)
     if contact.kind is ContactKind.SOLE:
-        axes.add_patch(Polygon(contact.points_in_world[:, :2], facecolor=colour, alpha=0.18, zorder=1.5))
-        axes.add_patch(
-            Polygon(contact.points_in_world[:, :2], fill=False, edgecolor=colour, linewidth=1.3, zorder=2)
-        )
         toes = contact.points_in_world[:2, :2]  # the first two corners are the front ones
         axes.plot(toes[:, 0], toes[:, 1], color=colour, linewidth=3.2, solid_capstyle="butt", zorder=2)
-    else:
-        axes.plot(x, y, "s", color=colour, markersize=7, zorder=2)
     heel = contact.position - contact.rotation_contact_to_world[:, 0] * (contact.length / 2 + 0.03)
-    height = f"\nz = {z:g} m" if z else ""
+    z = contact.position[2]
+    height = f"\nz = {z:.3g} m" if z else ""
     axes.text(
         heel[0], heel[1], f"{number}: {readable(contact.effector)}{height}", fontsize=7.5, ha="center",
         va="center", color=colour, zorder=8, path_effects=[white_edge()],

@@ -11,62 +11,120 @@ from manikin.figures.style import (
     draw_phases,
     dress,
     end_of,
+    label_room,
     legend_in_title,
-    new_figure,
+    need,
+    new_grid,
 )
-from manikin.motion import Motion
-from manikin.motion.derived import PhaseTable, phases_of
-from manikin.motion.file import MotionFile
+from manikin.motion.derived import PhaseTable
+from manikin.record import ComTrack, RunRecord
+
+POINT_MASS = "planned point mass"
+ZOOM_FROM = 4.0
+"""A second panel shows the lower part when some phase peaks this many times higher than another."""
 
 
-def margin_figure(content: MotionFile) -> Figure:
-    """Draw the margin, planned and executed, with the minimum of each phase and of the whole.
+def margin_figure(record: RunRecord) -> Figure:
+    """Draw the margins with the minimum of each phase ([Qiu2012]_ Fig. 5.13, 5.16, 5.23, 7.9).
 
     Args:
-        content: At least one motion.
+        record: With a planned CoM, or at least one motion.
+
+    Raises:
+        FigureError: If it has neither.
     """
-    phases = phases_of(next(iter(content.motions.values())), content.schedule)
-    end = end_of(content, phases)
-    figure = new_figure(11.0, 4.8, "Stability margin")
-    grid = figure.add_gridspec(2, 1, height_ratios=[0.16, 1])
+    curves = need(margin_curves(record), "a motion of the centre of mass")
+    phases = need(record.phases, "phases")
+    units = list(dict.fromkeys(curve.margin_unit for curve in curves.values()))
+    panels = [(unit, None) for unit in units]
+    ceiling = _zoom_ceiling(curves, phases)
+    if len(units) == 1 and ceiling is not None:
+        panels.append((units[0], ceiling))
+    figure, grid = new_grid(
+        13.5, 4.8 + 2.6 * (len(panels) - 1), "Stability margin", 1 + len(panels), 1,
+        left=label_room(record.effectors), between=0.15,
+        height_ratios=[0.075 * max(len(record.effectors), 2)] + [1.0] * len(panels),
+    )  # fmt: skip
+    end = end_of(record)
     draw_contact_strip(figure.add_subplot(grid[0]), phases, end)
-    axes = figure.add_subplot(grid[1])
-    draw_phases(axes, phases, end)
-    axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
-    for number, (name, motion) in enumerate(content.motions.items()):
-        axes.plot(motion.time, motion.margin, label=f"{name} ({_lowest(motion, phases)})", **STYLES[name])
-        _mark_minima(axes, motion, phases, name, below=number > 0)
-    dress(axes, "margin [N.m]", "time [s]")
-    low = min(0.0, *(float(motion.margin.min()) for motion in content.motions.values()))
-    high = max(float(motion.margin.max()) for motion in content.motions.values())
-    axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
-    legend_in_title(figure, axes)
+    for row, (unit, top) in enumerate(panels):
+        axes = figure.add_subplot(grid[row + 1])
+        shown = {name: curve for name, curve in curves.items() if curve.margin_unit == unit}
+        _draw_curves(axes, shown, phases, end, top)
+        last = row == len(panels) - 1
+        zoomed = "" if top is None else ", lower part"
+        dress(axes, f"margin{zoomed} [{unit}]", "time [s]" if last else "")
+        axes.tick_params(labelbottom=last)
+    legend_in_title(figure, *figure.axes[1 : 1 + len(units)])
     return figure
 
 
-def _lowest(motion: Motion, phases: PhaseTable) -> str:
-    index = int(np.argmin(motion.margin))
-    phase = int(phases.phase_at(motion.time[index : index + 1])[0])
-    where = f"in phase {phase}" if motion.time[index] <= phases.instants[-1] else "at rest"
-    return f"lowest {motion.margin[index]:.1f} N.m {where}, {motion.time[index]:.2f} s"
+def margin_curves(record: RunRecord) -> dict[str, ComTrack]:
+    """Margins by name: of the planned point mass, then of each whole-body motion."""
+    if not record.motions:
+        return dict(record.tracks)
+    curves = {} if record.plan is None else {POINT_MASS: record.plan}
+    return {**curves, **record.tracks}
 
 
-def _mark_minima(axes: Axes, motion: Motion, phases: PhaseTable, name: str, *, below: bool) -> None:
-    inside = phases.phase_at(motion.time)
+def phase_minima(curve: ComTrack, phases: PhaseTable) -> list[int | None]:
+    """Sample with the smallest margin of each phase, None where the curve has no sample."""
+    inside = phases.phase_at(curve.time)
+    found: list[int | None] = []
     for phase in range(len(phases)):
         samples = np.flatnonzero(inside == phase)
-        if not len(samples):
+        found.append(int(samples[np.argmin(curve.margin[samples])]) if len(samples) else None)
+    return found
+
+
+def _zoom_ceiling(curves: dict[str, ComTrack], phases: PhaseTable) -> float | None:
+    """Upper end of the zoomed panel, or None when one panel shows everything well."""
+    peaks = [
+        float(curve.margin[phases.phase_at(curve.time) == phase].max(initial=-np.inf))
+        for curve in curves.values()
+        for phase in range(len(phases))
+    ]
+    lowest = min((peak for peak in peaks if peak > 0.0), default=0.0)
+    return 1.6 * lowest if lowest > 0.0 and max(peaks) > ZOOM_FROM * lowest else None
+
+
+def _draw_curves(
+    axes: Axes, curves: dict[str, ComTrack], phases: PhaseTable, end: float, top: float | None
+) -> None:
+    draw_phases(axes, phases, end)
+    axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
+    for name, curve in curves.items():
+        label = f"{name} ({_lowest(curve, phases)})"
+        axes.plot(curve.time, curve.margin, label=label, **STYLES[name])
+        if name != POINT_MASS:
+            _mark_minima(axes, curve, phases, name, below=name == "executed", top=top)
+    low = min(0.0, *(float(curve.margin.min()) for curve in curves.values()))
+    high = max(float(curve.margin.max()) for curve in curves.values()) if top is None else top
+    axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
+
+
+def _lowest(curve: ComTrack, phases: PhaseTable) -> str:
+    index = int(np.argmin(curve.margin))
+    phase = int(phases.phase_at(curve.time[index : index + 1])[0])
+    where = f"in phase {phase}" if curve.time[index] <= phases.instants[-1] else "at rest"
+    return f"lowest {curve.margin[index]:.1f} {curve.margin_unit} {where}, {curve.time[index]:.2f} s"
+
+
+def _mark_minima(
+    axes: Axes, curve: ComTrack, phases: PhaseTable, name: str, *, below: bool, top: float | None
+) -> None:
+    for index in phase_minima(curve, phases):
+        if index is None or (top is not None and curve.margin[index] > top):
             continue
-        index = samples[np.argmin(motion.margin[samples])]
-        time, margin = float(motion.time[index]), float(motion.margin[index])
+        time, margin = float(curve.time[index]), float(curve.margin[index])
         axes.plot(time, margin, "o", markersize=3.5, color=COLOURS[name], zorder=5)
         axes.annotate(
             f"{margin:.0f}", (time, margin), (0, -11 if below else 5), textcoords="offset points", fontsize=7,
             ha=_alignment(time, phases), color=COLOURS[name], zorder=6,
         )  # fmt: skip
-    index = int(np.argmin(motion.margin))
+    index = int(np.argmin(curve.margin))
     axes.plot(
-        motion.time[index], motion.margin[index], "o", markersize=9, markerfacecolor="none",
+        curve.time[index], curve.margin[index], "o", markersize=9, markerfacecolor="none",
         markeredgecolor=COLOURS[name], markeredgewidth=1.4, zorder=6,
     )  # fmt: skip
 

@@ -10,36 +10,47 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
-from manikin.figures.style import COLOURS, new_figure, white_edge
+from manikin.figures.style import COLOURS, colours_of, need, new_figure, white_edge
+from manikin.figures.views import distinct_contacts
 from manikin.motion import Motion
 from manikin.motion.derived import phases_of, segment_positions
-from manikin.motion.file import MotionFile
+from manikin.record import RunRecord
 from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
 from manikin.spatial import FloatArray
 
 
-def scene_figure(content: MotionFile, elevation_deg: float = 14.0, azimuth_deg: float = -62.0) -> Figure:
-    """Draw the CoM's path, the obstacles, the supports and the body at every key instant.
+def scene_figure(record: RunRecord, elevation_deg: float = 14.0, azimuth_deg: float = -62.0) -> Figure:
+    """Draw the CoM's path, the obstacles, the supports and the body ([Qiu2012]_ Fig. 5.21, 7.7, 7.8).
 
     Args:
-        content: At least one motion; body, scene and schedule are drawn when they are there.
+        record: With a planned CoM, or at least one motion; body, scene and schedule are drawn
+            when they are there.
         elevation_deg: Height of the eye above the horizon [deg].
         azimuth_deg: Direction of the eye about the vertical [deg].
+
+    Raises:
+        FigureError: If there is nothing that moves.
     """
-    name, motion = list(content.motions.items())[-1]
+    name, track = list(need(record.tracks, "a motion of the centre of mass").items())[-1]
+    motion = record.motions.get(name)
     figure = new_figure(9.5, 8.0, f"Motion in the scene ({name})")
     axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
-    seen = [motion.com]
-    corners = _draw_scene(axes, content.scene) if content.scene is not None else np.zeros((0, 3))
-    if content.schedule is not None:
-        seen.append(_draw_soles(axes, content.schedule))
-    if content.body is not None:
-        seen.append(_draw_figures(axes, content.body, motion, content.schedule))
-    axes.plot(*motion.com.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
-    _frame(axes, np.vstack(seen), corners)
+    seen = [track.position]
+    corners = draw_scene(axes, record.scene) if record.scene is not None else np.zeros((0, 3))
+    if record.schedule is not None:
+        seen.append(draw_soles(axes, record.schedule))
+    if record.body is not None and motion is not None:
+        seen.append(_draw_figures(axes, record.body, motion, record.schedule))
+    axes.plot(*track.position.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
+    if record.phases is not None:
+        places = track.at(record.phases.instants)
+        axes.scatter(
+            *places.T, s=18, color=COLOURS["ink"], zorder=9, depthshade=False, label="at the key instants"
+        )
+    frame(axes, np.vstack(seen), corners)
     axes.view_init(elevation_deg, azimuth_deg)
-    if content.body is not None:
-        _label_heads(axes, content.body, motion, content.schedule)
+    if record.body is not None and motion is not None:
+        _label_heads(axes, record.body, motion, record.schedule)
     axes.legend(loc="upper left", fontsize=8, frameon=False)
     return figure
 
@@ -63,14 +74,6 @@ def _draw_figures(
                 zorder=6,
             )
         )
-    axes.scatter(
-        *motion.com[samples].T,
-        s=18,
-        color=COLOURS["ink"],
-        zorder=9,
-        depthshade=False,
-        label="at the key instants",
-    )
     return np.vstack([list(places.values()) for places in postures])
 
 
@@ -108,7 +111,7 @@ def _stick_colour(start: str, end: str) -> str:
     return COLOURS["ink"]
 
 
-def _draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
+def draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
     """Draw every finite obstacle; return the corners of their bounds."""
     corners = [np.zeros((0, 3))]
     for obstacle in scene:
@@ -143,22 +146,22 @@ def _triangles(obstacle: Obstacle) -> FloatArray:
     return np.asarray(obstacle.to_trimesh().triangles)
 
 
-def _draw_soles(axes: Axes3D, schedule: ContactSchedule) -> FloatArray:
-    corners = []
-    for phase in schedule.sequence:
-        for contact in phase.stance:
-            colour = COLOURS.get(contact.effector, COLOURS["soft"])
-            if len(contact.points) > 2:
-                sole = Poly3DCollection(
-                    [contact.points_in_world], facecolor=colour, edgecolor=colour, alpha=0.15
-                )
-                sole.set_zorder(4)
-                axes.add_collection3d(sole)
-            corners.append(contact.points_in_world)
-    return np.vstack(corners)
+def draw_soles(axes: Axes3D, schedule: ContactSchedule) -> FloatArray:
+    """Draw every contact of a schedule in three dimensions; return its points."""
+    contacts = distinct_contacts(schedule)
+    colours = colours_of(contact.effector for contact in contacts)
+    for contact in contacts:
+        colour = colours[contact.effector]
+        if len(contact.points) > 2:
+            sole = Poly3DCollection([contact.points_in_world], facecolor=colour, edgecolor=colour, alpha=0.4)
+            sole.set_zorder(4)
+            axes.add_collection3d(sole)
+        else:
+            axes.scatter(*contact.position, s=22, marker="s", color=colour, zorder=4, depthshade=False)
+    return np.vstack([contact.points_in_world for contact in contacts])
 
 
-def _frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
+def frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
     """Limit the axes to the motion and to the obstacles within a metre of it."""
     low, high = seen.min(axis=0) - 0.1, seen.max(axis=0) + 0.1
     if len(corners):

@@ -3,47 +3,47 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.errors import MotionFileError
 from manikin.figures.style import (
     COLOURS,
+    colours_of,
     draw_contact_strip,
     draw_phases,
     dress,
     end_of,
+    label_room,
     legend_above,
-    new_figure,
+    need,
+    new_grid,
     readable,
 )
-from manikin.motion.derived import effector_positions, phases_of
-from manikin.motion.file import MotionFile
+from manikin.record import RunRecord
 from manikin.spatial import FloatArray
 
 _AXIS_COLOURS = ("#0072B2", "#009E73", "#E69F00")
-_FEET = ("left_foot", "right_foot")
 
 
-def tracking_figure(content: MotionFile) -> Figure:
-    """Draw the errors of the CoM and of the feet [mm].
+def tracking_figure(record: RunRecord) -> Figure:
+    """Draw the errors of the CoM, the feet and the hands in contact [mm] ([Qiu2012]_ Fig. 6.9, 6.10).
 
     Args:
-        content: Both motions, and the body.
+        record: With both motions, and the body.
 
     Raises:
-        MotionFileError: If one of them is missing.
+        FigureError: If one of them is missing.
     """
-    planned, executed, body = content.planned, content.executed, content.body
-    if planned is None or executed is None or body is None:
-        raise MotionFileError(
-            "tracking needs a planned and an executed motion and the body; valid: all three"
-        )
-    phases = phases_of(planned, content.schedule)
-    end = end_of(content, phases)
-    figure = new_figure(11.0, 6.0, "Tracking errors of the execution")
-    grid = figure.add_gridspec(3, 1, height_ratios=[0.22, 1, 1])
+    planned = need(record.motions.get("planned"), "a planned motion")
+    executed = need(record.motions.get("executed"), "an executed motion")
+    phases = need(record.phases, "phases")
+    paths = need(record.effector_paths, "a body")
+    end = end_of(record)
+    figure, grid = new_grid(
+        11.0, 6.0, "Tracking errors of the execution", 3, 1, left=label_room(record.effectors),
+        height_ratios=[0.1 * max(len(record.effectors), 2), 1, 1],
+    )  # fmt: skip
     draw_contact_strip(figure.add_subplot(grid[0]), phases, end)
     axes = figure.add_subplot(grid[1])
     draw_phases(axes, phases, end)
-    error = 1000.0 * (executed.com - _at(executed.time, planned.time, planned.com))
+    error = 1000.0 * (executed.com - interpolated(executed.time, planned.time, planned.com))
     for index, axis in enumerate("xyz"):
         axes.plot(executed.time, error[:, index], color=_AXIS_COLOURS[index], linewidth=1.0, label=axis)
     size = np.linalg.norm(error, axis=1)
@@ -55,17 +55,18 @@ def tracking_figure(content: MotionFile) -> Figure:
     legend_above(axes)
     feet = figure.add_subplot(grid[2])
     draw_phases(feet, phases, end)
-    names = tuple(name for name in _FEET if name in body.effectors)
-    wanted, found = effector_positions(body, planned, names), effector_positions(body, executed, names)
-    for name in names:
-        gap = 1000.0 * np.linalg.norm(found[name] - _at(executed.time, planned.time, wanted[name]), axis=1)
+    wanted, found = paths["planned"], paths["executed"]
+    colours = colours_of(found)
+    for name in found:
+        plan = interpolated(executed.time, planned.time, wanted[name])
+        gap = 1000.0 * np.linalg.norm(found[name] - plan, axis=1)
         label = f"{readable(name)} (largest {gap.max():.2g} mm)"
-        feet.plot(executed.time, gap, color=COLOURS[name], linewidth=1.2, label=label)
-    dress(feet, "feet [mm]", "time [s]")
+        feet.plot(executed.time, gap, color=colours[name], linewidth=1.2, label=label)
+    dress(feet, "effectors [mm]", "time [s]")
     legend_above(feet)
     return figure
 
 
-def _at(times: FloatArray, known_times: FloatArray, values: FloatArray) -> FloatArray:
+def interpolated(times: FloatArray, known_times: FloatArray, values: FloatArray) -> FloatArray:
     """(n, 3) values interpolated at other times; held before the first and after the last."""
     return np.column_stack([np.interp(times, known_times, column) for column in values.T])

@@ -1,27 +1,55 @@
-"""Writing every figure that a motion file has the data for."""
+"""Writing every figure that a run has the data for."""
 
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 from manikin.atomic import atomic_path
-from manikin.errors import MotionFileError
+from manikin.errors import FigureError, MotionFileError
 from manikin.figures.com import com_figure
+from manikin.figures.contacts import contacts_figure
+from manikin.figures.effectors import effectors_figure
+from manikin.figures.flights import flights_figure
 from manikin.figures.footprints import footprint_figure
 from manikin.figures.margin import margin_figure
+from manikin.figures.planes import planes_figure
+from manikin.figures.postures import postures_figure
 from manikin.figures.scene import scene_figure
+from manikin.figures.timing import timing_figure
 from manikin.figures.tracking import tracking_figure
-from manikin.motion.file import MotionFile
+from manikin.figures.zmp import zmp_figure
+from manikin.record import RunRecord
+
+FIGURES: dict[str, Callable[[RunRecord], Figure]] = {
+    "com": com_figure,
+    "margin": margin_figure,
+    "footprints": footprint_figure,
+    "zmp": zmp_figure,
+    "planes": planes_figure,
+    "contacts": contacts_figure,
+    "timing": timing_figure,
+    "scene": scene_figure,
+    "postures": postures_figure,
+    "flights": flights_figure,
+    "effectors": effectors_figure,
+    "tracking": tracking_figure,
+}
+"""Every figure of a run by the name of its file."""
 
 
 def write_figures(
-    content: MotionFile, folder: str | Path, on_done: Callable[[float], None] | None = None
+    record: RunRecord, folder: str | Path, on_done: Callable[[float], None] | None = None
 ) -> list[Path]:
-    """Draw the figures and write them as PNG files, each atomically.
+    """Draw the figures that apply and write them as PNG files, each atomically.
+
+    A figure that the run has no data for (no execution, no hand, a wall) is left out.
 
     Args:
-        content: At least one motion.
+        record: A run.
         folder: Existing folder.
         on_done: Told the share of figures done after each.
 
@@ -31,29 +59,34 @@ def write_figures(
     Raises:
         MotionFileError: If the folder cannot be written to.
     """
-    figures: dict[str, Callable[[MotionFile], Figure]] = {
-        "com": com_figure,
-        "margin": margin_figure,
-        "footprints": footprint_figure,
-        "scene": scene_figure,
-    }
-    if content.planned is not None and content.executed is not None and content.body is not None:
-        figures["tracking"] = tracking_figure
     written = []
-    for number, (name, draw) in enumerate(figures.items()):
-        path = Path(folder) / f"{name}.png"
-        _save(draw(content), path)
-        written.append(path)
+    for number, (name, draw) in enumerate(FIGURES.items()):
+        try:
+            figure = draw(record)
+        except FigureError:
+            figure = None
+        if figure is not None:
+            path = Path(folder) / f"{name}.png"
+            save_figure(figure, path)
+            written.append(path)
         if on_done is not None:
-            on_done((number + 1) / len(figures))
+            on_done((number + 1) / len(FIGURES))
     return written
 
 
-def _save(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure as a PNG file, atomically.
+
+    Raises:
+        MotionFileError: If it cannot be written.
+    """
     try:
         with atomic_path(path) as temporary:
-            # Without the version text the same data always gives the same bytes.
-            figure.savefig(temporary, format="png", metadata={"Software": None})
+            # One drawing instead of the two of savefig; and the same data gives the same bytes.
+            canvas = FigureCanvasAgg(figure)
+            canvas.draw()
+            image = Image.fromarray(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
+            image.save(temporary, format="png", compress_level=4, dpi=(figure.dpi, figure.dpi))
     except OSError as error:
         problem = f"{path}: cannot be written ({error.strerror})"
         raise MotionFileError(f"{problem}; valid: a writable folder") from None

@@ -1,0 +1,82 @@
+"""The path of the centre of mass on the three coordinate planes, with the supports."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from manikin.figures.style import (
+    COLOURS,
+    STYLES,
+    colours_of,
+    dress,
+    legend_in_title,
+    need,
+    new_figure,
+    readable,
+    white_edge,
+)
+from manikin.figures.views import VIEWS, View, distinct_contacts, draw_contact, draw_obstacles
+from manikin.record import ComTrack, RunRecord
+from manikin.spatial import FloatArray
+
+
+def planes_figure(record: RunRecord) -> Figure:
+    """Draw the CoM's path with supports and obstacles on xy, xz and yz ([Qiu2012]_ Fig. 5.16, 7.8, 7.18).
+
+    Args:
+        record: With a planned CoM, or at least one motion.
+
+    Raises:
+        FigureError: If it has neither.
+    """
+    tracks = need(record.tracks, "a motion of the centre of mass")
+    phases = need(record.phases, "phases")
+    contacts = [] if record.schedule is None else distinct_contacts(record.schedule)
+    colours = colours_of(contact.effector for contact in contacts)
+    seen = np.vstack([t.position for t in tracks.values()] + [c.points_in_world for c in contacts])
+    low, high = seen.min(axis=0) - 0.12, seen.max(axis=0) + 0.12
+    spans = high - low
+    figure = new_figure(15.0, 5.8, "Centre of mass on the coordinate planes")
+    grid = figure.add_gridspec(1, 3, width_ratios=[max(view(spans)[0], 0.35) for view in VIEWS])
+    first = next(iter(tracks.values()))
+    for column, view in enumerate(VIEWS):
+        axes = figure.add_subplot(grid[column])
+        if record.scene is not None:
+            draw_obstacles(axes, record.scene, view, low, high)
+        for contact in contacts:
+            draw_contact(axes, contact, view, colours[contact.effector])
+        draw_paths(axes, view, tracks, STYLES)
+        mark_instants(axes, view, first.at(phases.instants), COLOURS["ink"])
+        for name, colour in colours.items():
+            axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
+        (left, bottom), (right, top) = view(low), view(high)
+        axes.set(xlim=(left, right), ylim=(bottom, top))
+        axes.set_aspect("equal", adjustable="box")
+        horizontal, vertical = view.labels
+        dress(axes, vertical, horizontal, f"{view.name[0]}-{view.name[1]}, {view.words}")
+    legend_in_title(figure, axes)
+    return figure
+
+
+def draw_paths(
+    axes: Axes, view: View, tracks: Mapping[str, ComTrack], styles: Mapping[str, Mapping[str, object]]
+) -> None:
+    """Draw the projected path of each track in its own style."""
+    for name, track in tracks.items():
+        axes.plot(*view(track.position).T, label=f"centre of mass, {name}", **styles[name])
+
+
+def mark_instants(axes: Axes, view: View, places: FloatArray, colour: str) -> None:
+    """Mark (n, 3) places of the key instants, numbered from 0 where there is room."""
+    points = view(places)
+    axes.plot(*points.T, "o", color=colour, markersize=3.5, zorder=6)
+    room = 0.04 * float(np.ptp(points, axis=0).max())
+    written: list[FloatArray] = []
+    for number, point in enumerate(points):
+        if any(np.linalg.norm(point - other) < room for other in written):
+            continue
+        written.append(point)
+        axes.annotate(f"{number}", point, (4, 4), textcoords="offset points", fontsize=7.5, color=colour,
+                      zorder=7, path_effects=[white_edge()])  # fmt: skip

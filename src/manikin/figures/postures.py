@@ -1,0 +1,104 @@
+"""The postures at the key instants, side by side."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from manikin.figures.style import COLOURS, dress, need, new_grid
+from manikin.figures.views import (
+    ALONG_X,
+    ALONG_Y,
+    View,
+    draw_body,
+    draw_contact,
+    draw_obstacles,
+    panel_ticks,
+    side_colour,
+)
+from manikin.record import RunRecord
+from manikin.spatial import FloatArray
+
+MOST = 9
+"""With more key instants than this some are left out, evenly."""
+
+GAP = 0.12
+"""Between two panels [m]."""
+
+
+def postures_figure(record: RunRecord) -> Figure:
+    """Draw the body at the key instants, seen along y and along x ([Qiu2012]_ Fig. 5.14, 6.8, 7.10, 7.13).
+
+    The executed motion is drawn, or else the planned one; grey, the path of the CoM.
+
+    Args:
+        record: With a whole-body motion and the body.
+
+    Raises:
+        FigureError: If one is missing.
+    """
+    motions = need(record.motions, "a whole-body motion")
+    need(record.body, "a body")
+    phases = need(record.phases, "phases")
+    name, motion = list(motions.items())[-1]
+    instants = chosen_instants(phases.instants)
+    samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
+    low, high = _frame(record, motion.com)
+    spans = high - low
+    widths = np.array([spans[0], spans[1]])
+    scale = 1.85 / widths.max()
+    figure, grid = new_grid(
+        (widths.max() + GAP) * scale * len(samples) + 0.75, 2.0 * spans[2] * scale + 1.7,
+        f"Postures at the key instants ({name})", 2, 1, top=0.65, between=0.5,
+    )  # fmt: skip
+    for row, view in enumerate((ALONG_Y, ALONG_X)):
+        axes = figure.add_subplot(grid[row, 0])
+        left, right = view(np.array([low, high]))[:, 0]
+        offsets = [(widths.max() + GAP) * column for column in range(len(samples))]
+        for offset, sample in zip(offsets, samples, strict=True):
+            _draw_posture(axes, record, view.moved(offset, 0.0), name, sample, (low, high))
+            if row == 0:
+                middle, top = offset + (left + right) / 2, high[2]
+                axes.annotate(f"{motion.time[sample]:.2f} s", (middle, top), (0, 4),
+                              textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
+        horizontal, vertical = view.labels
+        dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
+        axes.grid(False, axis="x")
+        axes.set_xticks(*panel_ticks(left, right, offsets))
+        axes.set(xlim=(left, right + offsets[-1]), ylim=(low[2], high[2]))
+        axes.set_aspect("equal", adjustable="box", anchor="W")
+    return figure
+
+
+def _draw_posture(
+    axes: Axes, record: RunRecord, view: View, name: str, sample: int, box: tuple[FloatArray, FloatArray]
+) -> None:
+    motion = record.motions[name]
+    if record.scene is not None:
+        draw_obstacles(axes, record.scene, view, *box)
+    if record.body is not None:
+        draw_body(axes, record.body, motion.q[sample], view)
+    if record.schedule is not None:
+        end = float(record.schedule.instants[-1])
+        for contact in record.schedule.stance_at(min(float(motion.time[sample]), end)):
+            draw_contact(axes, contact, view, side_colour(contact.effector))
+    axes.plot(*view(motion.com).T, color=COLOURS["soft"], linewidth=0.8, zorder=4)
+    axes.plot(*view(motion.com[sample]), "o", color=COLOURS["ink"], markersize=4, zorder=5)
+
+
+def chosen_instants(instants: FloatArray) -> FloatArray:
+    """At most :data:`MOST` of the key instants, the first and the last among them."""
+    if len(instants) <= MOST:
+        return instants
+    return instants[np.unique(np.linspace(0, len(instants) - 1, MOST).round().astype(int))]
+
+
+def _frame(record: RunRecord, com: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Corners of a box around the body during the whole motion [m]."""
+    reach = np.array([0.55, 0.55, 1.05])
+    low, high = com.min(axis=0) - reach, com.max(axis=0) + reach
+    if record.schedule is not None:
+        soles = np.vstack([c.points_in_world for phase in record.schedule.sequence for c in phase.stance])
+        low = np.minimum(low, soles.min(axis=0) - 0.05)
+        low[2] = min(float(soles[:, 2].min()) - 0.05, float(com[:, 2].min()) - 0.3)
+        high = np.maximum(high, soles.max(axis=0) + 0.05)
+    return low, high

@@ -1,0 +1,115 @@
+"""How long each phase lasts, and when the supports are really loaded."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from manikin.contact import ContactSchedule
+from manikin.figures.style import (
+    COLOURS,
+    colours_of,
+    draw_phases,
+    dress,
+    end_of,
+    label_room,
+    need,
+    new_grid,
+    readable,
+    support_colour,
+)
+from manikin.motion import Motion
+from manikin.record import RunRecord
+
+AT_LIMIT = 1e-3
+"""A duration this close to its bound is at it [s]."""
+
+
+def timing_figure(record: RunRecord) -> Figure:
+    """Draw the durations of the phases with their bounds, and the supports in time ([Qiu2012]_ Fig. 5.16).
+
+    Args:
+        record: With a schedule; loaded contacts are drawn when there is an execution.
+
+    Raises:
+        FigureError: If there is no schedule.
+    """
+    schedule = need(record.schedule, "a contact schedule")
+    phases = need(record.phases, "phases")
+    executed = record.motions.get("executed")
+    rows = 0.4 * len(record.effectors)
+    most = max(len(phase.stance) for phase in schedule.sequence)
+    figure, grid = new_grid(
+        11.0, 3.9 + 0.13 * most + rows, "Timing of the phases", 2, 1, left=label_room(record.effectors),
+        top=0.7, between=0.5 + 0.13 * most, height_ratios=[2.2, rows],
+    )  # fmt: skip
+    _draw_durations(figure.add_subplot(grid[0]), schedule)
+    axes = figure.add_subplot(grid[1])
+    end = end_of(record)
+    draw_phases(axes, phases, end)
+    colours = colours_of(record.effectors)
+    for row, name in enumerate(record.effectors):
+        bars = _bars(schedule, name, end)
+        axes.broken_barh(bars, (row + 0.12, 0.40), facecolors=colours[name], alpha=0.9)
+        if executed is not None and name in executed.contact_names:
+            axes.broken_barh(_loaded(executed, name), (row + 0.56, 0.26), facecolors=COLOURS["ink"], alpha=0.75)
+    axes.set_yticks(np.arange(len(record.effectors)) + 0.5, [readable(n) for n in record.effectors])
+    axes.set_ylim(len(record.effectors), 0.0)
+    note = "planned supports (wide bars) and loaded contacts of the execution (narrow bars)"
+    dress(axes, "", "time [s]", note if executed is not None else "planned supports")
+    axes.grid(False)
+    return figure
+
+
+def _draw_durations(axes: Axes, schedule: ContactSchedule) -> None:
+    durations = schedule.durations
+    for number, (phase, duration) in enumerate(zip(schedule.sequence, durations, strict=True)):
+        least, most = phase.min_duration, phase.max_duration
+        at_limit = duration <= least + AT_LIMIT
+        axes.bar(number, duration, width=0.62, color=support_colour(len(phase.stance)), alpha=0.8,
+                 hatch="///" if at_limit else None, edgecolor="white", linewidth=0.0)  # fmt: skip
+        for bound, style in ((least, "solid"), (most, "dotted")):
+            if bound is not None and bound < 3.0 * float(durations.max()):
+                axes.hlines(bound, number - 0.38, number + 0.38, color=COLOURS["ink"], linewidth=1.2,
+                            linestyle=style, zorder=4)  # fmt: skip
+        axes.annotate(f"{duration:.2f}", (number, max(duration, least)), (0, 3), textcoords="offset points",
+                      ha="center", fontsize=8)  # fmt: skip
+    axes.set_xticks(range(len(durations)), [_supports(phase.stance.effectors) for phase in schedule.sequence])
+    dress(axes, "duration [s]", "", f"total {float(durations.sum()):.2f} s")
+    axes.tick_params(axis="x", labelsize=7 if len(durations) <= 12 else 5.5)
+    axes.set_ylim(0.0, 1.14 * max(float(durations.max()), max(p.min_duration for p in schedule.sequence)))
+    axes.grid(False, axis="x")
+    axes.legend(handles=_keys(schedule), fontsize=8, frameon=False, loc="lower right",
+                bbox_to_anchor=(1.0, 1.0), ncols=6, borderaxespad=0.1)  # fmt: skip
+
+
+def _keys(schedule: ContactSchedule) -> list[Patch]:
+    counts = sorted({min(len(phase.stance), 3) for phase in schedule.sequence})
+    words = {0: "flight", 1: "one support", 2: "two supports", 3: "three or more"}
+    keys = [Patch(color=support_colour(count), alpha=0.8, label=words[count]) for count in counts]
+    shortest = Patch(facecolor=COLOURS["soft"], hatch="///", edgecolor="white", label="as short as allowed")
+    return [*keys, shortest, Patch(color=COLOURS["ink"], label="bound")]
+
+
+def _supports(effectors: tuple[str, ...]) -> str:
+    return "\n".join(readable(name) for name in effectors) or "flight"
+
+
+def _bars(schedule: ContactSchedule, name: str, end: float) -> list[tuple[float, float]]:
+    stops = np.append(schedule.instants[1:-1], end)
+    return [
+        (float(start), float(stop - start))
+        for start, stop, phase in zip(schedule.instants[:-1], stops, schedule.sequence, strict=True)
+        if name in phase.stance
+    ]
+
+
+def _loaded(motion: Motion, name: str) -> list[tuple[float, float]]:
+    """Start and length of each interval in which the contact presses."""
+    on = np.concatenate([[False], motion.support[:, motion.contact_names.index(name)], [False]])
+    starts, stops = np.flatnonzero(on[1:] & ~on[:-1]), np.flatnonzero(on[:-1] & ~on[1:])
+    last = len(motion.time) - 1
+    return [
+        (float(motion.time[a]), float(motion.time[min(b, last)] - motion.time[a]))
+        for a, b in zip(starts, stops, strict=True)
+    ]

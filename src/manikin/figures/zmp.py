@@ -1,0 +1,116 @@
+"""The zero moment point in the support polygons, and how far it stays inside."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from manikin.balance.zmp_path import ZmpPath
+from manikin.contact import ContactSchedule
+from manikin.figures.style import (
+    COLOURS,
+    STYLES,
+    colours_of,
+    draw_contact_strip,
+    draw_phases,
+    dress,
+    end_of,
+    label_room,
+    need,
+    new_grid,
+    support_colour,
+    white_edge,
+)
+from manikin.figures.views import ABOVE, distinct_contacts, draw_contact, sections
+from manikin.record import RunRecord
+
+_COUNTS = {1: "one support", 2: "two supports", 3: "three or more"}
+
+
+def zmp_figure(record: RunRecord) -> Figure:
+    """Draw the ZMP over the soles, and its distance to the support polygon ([Qiu2012]_ Fig. 5.13).
+
+    The distance is drawn firm where it decides about balance: all supports in one plane, no
+    grasp. Elsewhere it is dotted, measured in the level plane at their mean height.
+
+    Args:
+        record: With a schedule and a motion or a planned CoM.
+
+    Raises:
+        FigureError: If there is no phase in which the ZMP decides about balance.
+    """
+    schedule = need(record.schedule, "a contact schedule")
+    paths = need(record.zmp, "a motion of the centre of mass")
+    if not any(np.any(path.decisive) for path in paths.values()):
+        need(None, "a phase that stands on one plane without grasping")
+    phases = need(record.phases, "phases")
+    end = end_of(record)
+    figure, grid = new_grid(
+        14.0, 6.4, "Zero moment point", 2, 2, across=label_room(record.effectors) + 0.15, between=0.1, top=0.65,
+        height_ratios=[0.07 * max(len(record.effectors), 2), 1], width_ratios=[1, 1.15],
+    )  # fmt: skip
+    name, path = next(iter(paths.items()))
+    _draw_plan(figure.add_subplot(grid[:, 0]), schedule, name, path)
+    draw_contact_strip(figure.add_subplot(grid[0, 1]), phases, end)
+    axes = figure.add_subplot(grid[1, 1])
+    draw_phases(axes, phases, end)
+    axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
+    for kind, one in paths.items():
+        _draw_distance(axes, kind, one)
+    dress(axes, "distance to the edge of the support polygon [mm]", "time [s]")
+    _frame_distance(axes, list(paths.values()))
+    axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
+    return figure
+
+
+def _draw_plan(axes: Axes, schedule: ContactSchedule, name: str, path: ZmpPath) -> None:
+    contacts = distinct_contacts(schedule)
+    colours = colours_of(contact.effector for contact in contacts)
+    for contact in contacts:
+        draw_contact(axes, contact, ABOVE, colours[contact.effector])
+    for plane in path.planes:
+        if plane is not None and len(plane.polygon) > 1:
+            axes.fill(*plane.corners_in_world[:, :2].T, fill=False, edgecolor="#AEB4BE", linewidth=0.8,
+                      linestyle=(0, (5, 3)), zorder=1)  # fmt: skip
+    counts = np.array([len(phase.stance) for phase in schedule.sequence])
+    shown = sorted({min(int(count), 3) for count in counts})
+    for part in sections(path.phase):
+        count = int(counts[path.phase[part.start]])
+        axes.plot(*path.point[part, :2].T, color=support_colour(count), linewidth=1.6, zorder=4)
+    for number, instant in enumerate(schedule.instants[1:-1]):
+        sample = min(int(np.searchsorted(path.time, instant)), len(path.time) - 1)
+        place = path.point[sample, :2]
+        if np.all(np.isfinite(place)):
+            axes.plot(*place, "*", color=COLOURS["ink"], markersize=8, zorder=6)
+            axes.annotate(f"{number}|{number + 1}", place, (5, 5), textcoords="offset points", fontsize=7.5,
+                          zorder=7, path_effects=[white_edge()])  # fmt: skip
+    handles = [Line2D([], [], color=support_colour(c), label=f"ZMP, {_COUNTS[max(c, 1)]}") for c in shown]
+    handles.append(Line2D([], [], color=COLOURS["ink"], marker="*", linestyle="", label="change of phase"))
+    handles.append(Line2D([], [], color="#AEB4BE", linestyle=(0, (5, 3)), label="support polygon"))
+    points = np.vstack([contact.points_in_world[:, :2] for contact in contacts])
+    low, high = points.min(axis=0) - 0.15, points.max(axis=0) + 0.15
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_aspect("equal", adjustable="box", anchor="NW")
+    dress(axes, "y [m]", "x [m]", f"{name.capitalize()}, from above")
+    axes.legend(handles=handles, fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
+
+
+def _draw_distance(axes: Axes, name: str, path: ZmpPath) -> None:
+    millimetres = 1000.0 * path.distance
+    firm = np.where(path.decisive, millimetres, np.nan)
+    least = int(np.nanargmin(firm)) if np.any(path.decisive) else None
+    label = name if least is None else f"{name} (least {firm[least]:.1f} mm, {path.time[least]:.2f} s)"
+    axes.plot(path.time, firm, label=label, **STYLES[name])
+    if np.any(~path.decisive & np.isfinite(millimetres)):
+        dotted = {**STYLES[name], "linestyle": (0, (1, 2)), "linewidth": 1.0}
+        loose = np.where(path.decisive, np.nan, millimetres)
+        axes.plot(path.time, loose, label=f"{name}, supports not in one plane", **dotted)
+
+
+def _frame_distance(axes: Axes, paths: list[ZmpPath]) -> None:
+    values = np.concatenate([1000.0 * path.distance[np.isfinite(path.distance)] for path in paths])
+    low, high = (float(v) for v in np.percentile(values, (0.2, 100.0)))
+    decisive = [1000.0 * float(p.distance[p.decisive].min()) for p in paths if np.any(p.decisive)]
+    low = min([low, 0.0, *(max(value, -200.0) for value in decisive)])
+    room = 0.08 * (high - low)
+    axes.set_ylim(low - room, high + 3.0 * room)  # with room for the legend

@@ -1,0 +1,236 @@
+"""A run read back from its directory: plan, motions, and what follows from them."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manikin.balance import pseudo_wrench
+from manikin.balance.zmp_path import ZmpPath, contact_wrench, zmp_path
+from manikin.body import BodyModel
+from manikin.centroidal import CentroidalTrajectory
+from manikin.centroidal.certificate import phase_margins, phase_times
+from manikin.centroidal.feasibility import polytopes_of
+from manikin.contact import ContactSchedule, StanceSequence
+from manikin.errors import InputError, MotionFileError
+from manikin.motion import Motion
+from manikin.motion.derived import PhaseTable, com_velocity, effector_positions, phases_of
+from manikin.motion.file import MotionFile, read_motions
+from manikin.output import MOTION, SCENARIO, STAGES, SUMMARY, read_summary
+from manikin.scenarios import Scenario, load_scenario
+from manikin.scene import Scene
+from manikin.spatial import FloatArray
+
+COM_TRAJECTORY = "com_trajectory.json"
+
+
+@dataclass(frozen=True, eq=False)
+class ComTrack:
+    """The centre of mass in time, with its margin.
+
+    Attributes:
+        time: (n,) not decreasing [s].
+        position: (n, 3) [m].
+        velocity: (n, 3) [m/s].
+        acceleration: (n, 3) [m/s^2].
+        margin: (n,) in :attr:`margin_unit`.
+        margin_unit: ``"N.m"``, or ``"N"`` when the margin is a force at the CoM.
+    """
+
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    margin: FloatArray
+    margin_unit: str = "N.m"
+
+    @classmethod
+    def of_motion(cls, motion: Motion) -> "ComTrack":
+        """Track of a whole-body motion, its derivatives by central differences."""
+        velocity = com_velocity(motion)
+        still = len(motion.time) < 2
+        acceleration = np.zeros_like(velocity) if still else np.gradient(velocity, motion.time, axis=0)
+        return cls(motion.time, motion.com, velocity, acceleration, motion.margin)
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """(n, 3) position at other times [m]; held before the first and after the last."""
+        return np.column_stack([np.interp(times, self.time, column) for column in self.position.T])
+
+
+@dataclass(frozen=True, eq=False)
+class RunRecord:
+    """Everything that a run left behind; what it does not have is None or empty.
+
+    Attributes:
+        label: What to call the run in figures.
+        content: Motions, body, scene and schedule with the real soles.
+        summary: As written by the run.
+        mass: Of the body [kg].
+        plan: The CoM as planned for a point mass, its margin with the planning soles.
+    """
+
+    label: str
+    content: MotionFile
+    summary: Mapping[str, Any] = field(default_factory=dict)
+    mass: float | None = None
+    plan: ComTrack | None = None
+
+    @property
+    def scenario(self) -> str:
+        """Name of the scenario."""
+        return str(self.summary.get("scenario", self.label))
+
+    @property
+    def body(self) -> BodyModel | None:
+        """Who moved."""
+        return self.content.body
+
+    @property
+    def scene(self) -> Scene | None:
+        """Where."""
+        return self.content.scene
+
+    @property
+    def schedule(self) -> ContactSchedule | None:
+        """With which contacts, when."""
+        return self.content.schedule
+
+    @property
+    def motions(self) -> dict[str, Motion]:
+        """Whole-body motions by name, ``"planned"`` before ``"executed"``."""
+        return self.content.motions
+
+    @cached_property
+    def tracks(self) -> dict[str, ComTrack]:
+        """The CoM of each motion; without any, the planned point mass under ``"planned"``."""
+        if self.motions:
+            return {name: ComTrack.of_motion(motion) for name, motion in self.motions.items()}
+        return {} if self.plan is None else {"planned": self.plan}
+
+    @cached_property
+    def phases(self) -> PhaseTable | None:
+        """Phases of the schedule, or else of the first motion."""
+        if self.motions:
+            return phases_of(next(iter(self.motions.values())), self.schedule)
+        if self.schedule is None:
+            return None
+        supports = tuple(tuple(phase.stance.effectors) for phase in self.schedule.sequence)
+        return PhaseTable(self.schedule.instants, supports)
+
+    @property
+    def effectors(self) -> tuple[str, ...]:
+        """Every effector that is ever in contact, in order of first use."""
+        if self.phases is None:
+            return ()
+        return tuple(dict.fromkeys(name for supports in self.phases.supports for name in supports))
+
+    @cached_property
+    def effector_paths(self) -> dict[str, dict[str, FloatArray]]:
+        """(n, 3) origin of each effector in contact, by motion and effector [m]; none without a body."""
+        if self.body is None:
+            return {}
+        names = tuple(name for name in self.effectors if name in self.body.effectors)
+        return {kind: effector_positions(self.body, motion, names) for kind, motion in self.motions.items()}
+
+    @cached_property
+    def zmp(self) -> dict[str, ZmpPath]:
+        """The ZMP of each motion; without any, of the planned point mass."""
+        if self.schedule is None:
+            return {}
+        if not self.motions and self.plan is not None and self.mass is not None:
+            wrench = pseudo_wrench(self.mass, self.plan.position, self.plan.acceleration)
+            return {"planned": zmp_path(self.schedule, self.plan.time, wrench)}
+        return {
+            name: zmp_path(self.schedule, motion.time, contact_wrench(motion, self.schedule))
+            for name, motion in self.motions.items()
+        }
+
+
+def read_run(directory: str | Path) -> RunRecord:
+    """Read a run directory, however far the run got.
+
+    Args:
+        directory: Written by ``manikin run``.
+
+    Raises:
+        InputError: If it is missing, is not a run directory, or one of its files is damaged.
+    """
+    folder = Path(directory)
+    _check_is_run(folder)
+    summary = read_summary(folder)
+    has_motion = (folder / MOTION).is_file()
+    content = read_motions(folder / MOTION) if has_motion else MotionFile()
+    data = _read_trajectory(folder / STAGES / COM_TRAJECTORY)
+    if data is None:
+        mass = None if content.body is None else content.body.mass
+        return RunRecord(_label(folder), content, summary, mass)
+    scenario = load_scenario(folder / SCENARIO)
+    trajectory = _trajectory(data, scenario.build_sequence(planning=True), folder)
+    if not has_motion:
+        real = _first_phases(scenario.build_sequence(), len(trajectory.schedule.sequence))
+        schedule = ContactSchedule(real, trajectory.schedule.instants)
+        content = MotionFile(scene=scenario.build_scene(), schedule=schedule)
+    plan = point_mass_track(scenario, trajectory)
+    return RunRecord(_label(folder), content, summary, trajectory.mass, plan)
+
+
+def point_mass_track(scenario: Scenario, trajectory: CentroidalTrajectory) -> ComTrack:
+    """The planned CoM every millisecond, its margin measured as the scenario asks."""
+    problem = scenario.build_centroidal_problem()
+    polytopes = polytopes_of(problem)[: len(trajectory.schedule.sequence)]
+    time = np.concatenate(phase_times(trajectory))
+    return ComTrack(
+        time,
+        trajectory.position(time),
+        trajectory.velocity(time),
+        trajectory.acceleration(time),
+        np.concatenate(phase_margins(problem, trajectory, polytopes)),
+        problem.margin_unit,
+    )
+
+
+def _label(folder: Path) -> str:
+    return folder.resolve().name
+
+
+def _check_is_run(folder: Path) -> None:
+    valid = "valid: a directory written by manikin run"
+    if not folder.exists():
+        raise MotionFileError(f"{folder}: there is no such directory; {valid}")
+    if not folder.is_dir():
+        raise MotionFileError(f"{folder}: is a file; {valid}")
+    if not (folder / SCENARIO).is_file():
+        raise MotionFileError(f"{folder}: is not a run directory, it has no {SCENARIO}; {valid}")
+    if not (folder / SUMMARY).is_file():
+        raise MotionFileError(f"{folder}: has no {SUMMARY}, its run did not finish; {valid} to its end")
+
+
+def _read_trajectory(path: Path) -> dict[str, Any] | None:
+    if not path.is_file():
+        return None
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise MotionFileError(f"{path}: cannot be read ({error}); valid: as written by manikin") from None
+    if not isinstance(data, dict):
+        raise MotionFileError(f"{path}: is not a JSON object; valid: as written by manikin")
+    return data
+
+
+def _trajectory(data: dict[str, Any], sequence: StanceSequence, folder: Path) -> CentroidalTrajectory:
+    try:
+        phases = len(data["key_instants_s"]) - 1
+        return CentroidalTrajectory.from_dict(data, _first_phases(sequence, phases))
+    except (InputError, KeyError, TypeError, ValueError) as error:
+        path = folder / STAGES / COM_TRAJECTORY
+        problem = " ".join(str(error).split())[:160]
+        raise MotionFileError(f"{path}: is damaged ({problem}); valid: as written by manikin") from None
+
+
+def _first_phases(sequence: StanceSequence, count: int) -> StanceSequence:
+    """The planned CoM may end before the last phases, which then rest on something else."""
+    return sequence if count == len(sequence) else StanceSequence(sequence.phases[:count])
