@@ -1,4 +1,4 @@
-"""The command line: ``manikin scenarios | run | view | balance | export``.
+"""The command line: ``manikin scenarios | run | compare | view | balance | export``.
 
 Exit status: 0 done, 2 bad input (one line on standard error), 3 a run that ended in an
 explained failure, 130 interrupted.  With ``--json`` standard output holds exactly one
@@ -142,6 +142,38 @@ def run(
     else:
         _print_summary(summary, directory)
     return DONE if summary["succeeded"] else FAILED
+
+
+@app.command()
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory.")],
+    second: Annotated[Path, typer.Argument(metavar="RUN", help="Run directory to compare with it.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Draw figures of both and write comparison.json there.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Timing, centre of mass, margins and postures of two runs side by side."""
+    from manikin.record import read_run
+
+    records = read_run(first), read_run(second)
+    from manikin.comparison import compare_runs
+
+    comparison = compare_runs(*records)
+    if out is not None:
+        from manikin.products import write_comparison_products
+        from manikin.progress import StageProgress
+
+        with _stdout_kept_clean(), StageProgress() as bars:
+            write_comparison_products(comparison, out, bars)
+    if json:
+        _print_json(comparison.as_dict())
+        return
+    from manikin.comparison.report import report, report_console
+
+    report_console().print(report(comparison))
+    if out is not None:
+        typer.echo(f"figures in {out}", err=True)
 
 
 @app.command()

@@ -1,12 +1,17 @@
-"""What is drawn from a finished run: figures and the BVH file in its directory."""
+"""What is drawn from finished runs: figures and the BVH file of one, the comparison of two."""
 
 from collections.abc import Callable
 from pathlib import Path
 
+from manikin.atomic import write_text
+from manikin.comparison import RunComparison
+from manikin.errors import MotionFileError
 from manikin.export import export_motion
-from manikin.figures import write_figures
-from manikin.output import FIGURES
+from manikin.figures import write_comparison, write_figures
+from manikin.output import FIGURES, to_json
 from manikin.record import read_run
+
+COMPARISON = "comparison.json"
 
 
 def write_products(directory: str | Path, progress: Callable[[str, float], None] | None = None) -> list[Path]:
@@ -31,6 +36,35 @@ def write_products(directory: str | Path, progress: Callable[[str, float], None]
         written.append(export_motion(record.content, folder, "bvh"))
     report("figures", 1.0)
     return written
+
+
+def write_comparison_products(
+    comparison: RunComparison, directory: str | Path, progress: Callable[[str, float], None] | None = None
+) -> list[Path]:
+    """Draw the figures of two runs and write ``comparison.json``.
+
+    Args:
+        comparison: Two runs.
+        directory: Created when it is missing; other files in it are left alone.
+        progress: Told the stage ``"figures"`` and the share that is done.
+
+    Returns:
+        The files written.
+
+    Raises:
+        MotionFileError: If the directory cannot be written to.
+    """
+    folder = Path(directory)
+    file = folder / COMPARISON
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(file, to_json(comparison.as_dict()) + "\n")
+    except OSError as error:
+        raise MotionFileError(
+            f"{folder}: cannot be written ({error.strerror}); valid: a writable directory"
+        ) from None
+    report = progress or _silent
+    return [file, *write_comparison(comparison, folder, lambda share: report("figures", share))]
 
 
 def _silent(_stage: str, _share: float) -> None:

@@ -14,6 +14,7 @@ import yaml
 
 import manikin
 from manikin.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
+from manikin.figures import FIGURES
 from manikin.motion.file import write_motions
 
 SUMMARY = {
@@ -130,6 +131,9 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
             "did you mean 'friction'? valid: ",
         ),
         (["run", "platform", "--set", "scene.rof.box.0=1"], "or roof, threshold, platform"),
+        (["compare", "none"], "Missing argument"),
+        (["compare", "none", "none"], "no such directory"),
+        (["compare", ".", "."], "is not a run directory"),
         (["view", "none"], "no such file"),
         (["view", "none", "--port", "99999"], "--port"),
         (["export", "none", "--format", "bvh"], "no such file"),
@@ -172,8 +176,8 @@ def test_run_leaves_a_whole_directory(capfd, tmp_path, monkeypatch):
     folder = tmp_path / "result"
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert files == {
-        "scenario.yaml", "motion.h5", "motion.bvh", "summary.json", "figures/com.png", "figures/margin.png",
-        "figures/footprints.png", "figures/scene.png", "figures/tracking.png",
+        "scenario.yaml", "motion.h5", "motion.bvh", "summary.json",
+        *(f"figures/{name}.png" for name in FIGURES),
     }  # fmt: skip
 
 

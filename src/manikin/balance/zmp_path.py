@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.balance.criteria import support_height, zero_moment_point
+from manikin.balance.friction import cross
 from manikin.balance.polygon import convex_polygon, signed_distance
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.motion import Motion
@@ -55,7 +56,7 @@ class SupportPlane:
             :data:`LEAST_LOAD`.
         """
         force = wrench[:, :3] @ self.axes
-        moment = (wrench[:, 3:] - np.cross(self.origin, wrench[:, :3])) @ self.axes
+        moment = (wrench[:, 3:] - cross(self.origin, wrench[:, :3])) @ self.axes
         found = zero_moment_point(np.hstack([force, moment]))
         found[force[:, 2] < LEAST_LOAD] = np.nan
         return found
@@ -142,7 +143,7 @@ def contact_wrench(motion: Motion, schedule: ContactSchedule, switching: float =
         place = _contact_origins(schedule, name, motion.time - switching, motion.time)
         force = motion.contact_force[:, column, :3]
         total[:, :3] += force
-        total[:, 3:] += motion.contact_force[:, column, 3:] + np.cross(place, force)
+        total[:, 3:] += motion.contact_force[:, column, 3:] + cross(place, force)
     return total
 
 
@@ -150,7 +151,8 @@ def _contact_origins(
     schedule: ContactSchedule, effector: str, shortly_before: FloatArray, now: FloatArray
 ) -> FloatArray:
     """(n, 3) origin of the contact held now, or left shortly before, or else made next, or last."""
-    held = [phase.stance[effector] if effector in phase.stance else None for phase in schedule.sequence]
+    stances = [phase.stance for phase in schedule.sequence]
+    held = [next((c for c in stance if c.effector == effector), None) for stance in stances]
     pairs = np.column_stack([schedule.phase_at(shortly_before), schedule.phase_at(now)])
     places = np.zeros((len(now), 3))
     for before, current in np.unique(pairs, axis=0):
@@ -163,9 +165,10 @@ def _contact_origins(
 
 def _common_normal(points: FloatArray, mean_normal: FloatArray) -> FloatArray:
     """Unit normal of the plane through the points; of points on a line, the contacts' mean normal."""
-    _, sizes, directions = np.linalg.svd(points - points.mean(axis=0), full_matrices=True)
-    spread = len(sizes) > 1 and sizes[1] > 2 * COPLANAR
-    normal = directions[2] if spread else mean_normal / max(np.linalg.norm(mean_normal), 1e-12)
+    _, sizes, directions = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    if len(sizes) < 3 or sizes[1] <= 2 * COPLANAR:
+        return mean_normal / max(float(np.linalg.norm(mean_normal)), 1e-12)
+    normal = directions[2]
     return normal if normal @ mean_normal >= 0.0 else -normal
 
 
@@ -173,4 +176,4 @@ def _axes(normal: FloatArray) -> FloatArray:
     """(3, 3) rotation whose columns are: nearly x, nearly y, ``normal`` (which is not horizontal)."""
     first = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
     first /= np.linalg.norm(first)
-    return np.column_stack([first, np.cross(normal, first), normal])
+    return np.column_stack([first, cross(normal, first), normal])

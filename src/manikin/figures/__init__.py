@@ -1,6 +1,10 @@
-"""Figures of a finished run, one function each; no window and no global state is used."""
+"""Figures of a finished run or of two, one function each; no window and no global state is used."""
 
 from manikin.figures.com import com_figure
+from manikin.figures.compare_com import compare_planes_figure, compare_scene_figure
+from manikin.figures.compare_margin import compare_margin_figure
+from manikin.figures.compare_postures import compare_postures_figure
+from manikin.figures.compare_timing import compare_timing_figure
 from manikin.figures.contacts import contacts_figure
 from manikin.figures.effectors import effectors_figure
 from manikin.figures.flights import flights_figure
@@ -11,12 +15,18 @@ from manikin.figures.postures import postures_figure
 from manikin.figures.scene import scene_figure
 from manikin.figures.timing import timing_figure
 from manikin.figures.tracking import tracking_figure
-from manikin.figures.write import FIGURES, write_figures
+from manikin.figures.write import COMPARISONS, FIGURES, write_comparison, write_figures
 from manikin.figures.zmp import zmp_figure
 
 __all__ = [
+    "COMPARISONS",
     "FIGURES",
     "com_figure",
+    "compare_margin_figure",
+    "compare_planes_figure",
+    "compare_postures_figure",
+    "compare_scene_figure",
+    "compare_timing_figure",
     "contacts_figure",
     "effectors_figure",
     "flights_figure",
@@ -27,6 +37,7 @@ __all__ = [
     "scene_figure",
     "timing_figure",
     "tracking_figure",
+    "write_comparison",
     "write_figures",
     "zmp_figure",
 ]

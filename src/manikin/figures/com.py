@@ -34,7 +34,7 @@ def com_figure(record: RunRecord) -> Figure:
     end = end_of(record)
     figure, grid = new_grid(
         14.0, 7.0, "Centre of mass", 4, 3, left=label_room(record.effectors), top=0.75, between=0.22,
-        height_ratios=[0.14 * max(len(record.effectors), 2), 1, 1, 1],
+        across=0.75, height_ratios=[0.14 * max(len(record.effectors), 2), 1, 1, 1],
     )  # fmt: skip
     for column, (quantity, unit) in enumerate(QUANTITIES):
         strip = figure.add_subplot(grid[0, column])
@@ -61,5 +61,5 @@ def com_figure(record: RunRecord) -> Figure:
 def _without_spikes(values: FloatArray) -> tuple[float, float]:
     """Limits that hold all but the impacts of some milliseconds."""
     low, high = (float(v) for v in np.percentile(values, (0.5, 99.5)))
-    room = 0.15 * max(high - low, 1e-6)
+    room = 0.15 * max(high - low, 0.02)
     return max(low - room, float(values.min()) - room), min(high + room, float(values.max()) + room)

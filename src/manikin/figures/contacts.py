@@ -116,5 +116,12 @@ def _legend(figure: Figure, schedule: ContactSchedule) -> None:
         axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
     handles, labels = axes.get_legend_handles_labels()
     handles += [Line2D([], [], color=COLOURS["ink"], linewidth=2.0), Patch(fill=False, linestyle="--")]
-    labels += ["centre of mass", "left, or made next"]
-    figure.legend(handles, labels, fontsize=8, frameon=False, loc="upper right", ncols=min(len(labels), 5))
+    labels += ["centre of mass", "dashed or pale: left, or made next"]
+    figure.legend(
+        handles,
+        labels,
+        fontsize=8,
+        frameon=False,
+        loc="upper right",
+        ncols=max(2, int((figure.get_figwidth() - 3.5) / 1.35)),
+    )

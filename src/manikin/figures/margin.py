@@ -36,7 +36,7 @@ def margin_figure(record: RunRecord) -> Figure:
     curves = need(margin_curves(record), "a motion of the centre of mass")
     phases = need(record.phases, "phases")
     units = list(dict.fromkeys(curve.margin_unit for curve in curves.values()))
-    panels = [(unit, None) for unit in units]
+    panels: list[tuple[str, float | None]] = [(unit, None) for unit in units]
     ceiling = _zoom_ceiling(curves, phases)
     if len(units) == 1 and ceiling is not None:
         panels.append((units[0], ceiling))

@@ -1,10 +1,12 @@
 """The path of the centre of mass on the three coordinate planes, with the supports."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 
 from manikin.figures.style import (
     COLOURS,
@@ -13,7 +15,7 @@ from manikin.figures.style import (
     dress,
     legend_in_title,
     need,
-    new_figure,
+    new_grid,
     readable,
     white_edge,
 )
@@ -37,9 +39,7 @@ def planes_figure(record: RunRecord) -> Figure:
     colours = colours_of(contact.effector for contact in contacts)
     seen = np.vstack([t.position for t in tracks.values()] + [c.points_in_world for c in contacts])
     low, high = seen.min(axis=0) - 0.12, seen.max(axis=0) + 0.12
-    spans = high - low
-    figure = new_figure(15.0, 5.8, "Centre of mass on the coordinate planes")
-    grid = figure.add_gridspec(1, 3, width_ratios=[max(view(spans)[0], 0.35) for view in VIEWS])
+    figure, grid = planes_grid("Centre of mass on the coordinate planes", high - low)
     first = next(iter(tracks.values()))
     for column, view in enumerate(VIEWS):
         axes = figure.add_subplot(grid[column])
@@ -53,15 +53,28 @@ def planes_figure(record: RunRecord) -> Figure:
             axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
         (left, bottom), (right, top) = view(low), view(high)
         axes.set(xlim=(left, right), ylim=(bottom, top))
-        axes.set_aspect("equal", adjustable="box")
+        axes.set_aspect("equal", adjustable="box", anchor="SW")
         horizontal, vertical = view.labels
         dress(axes, vertical, horizontal, f"{view.name[0]}-{view.name[1]}, {view.words}")
     legend_in_title(figure, axes)
     return figure
 
 
+def planes_grid(title: str, spans: FloatArray) -> tuple[Figure, GridSpec]:
+    """Figure with a panel for each view, all to one scale as far as that is legible.
+
+    Args:
+        title: Of the figure.
+        spans: (3,) what is shown along each axis [m].
+    """
+    widths = [max(float(view(spans)[0]), 0.3 * float(spans.max())) for view in VIEWS]
+    heights = [float(view(spans)[1]) for view in VIEWS]
+    height = float(np.clip(max(heights) * 12.8 / sum(widths), 2.5, 6.0))
+    return new_grid(15.0, height + 1.4, title, 1, 3, top=0.85, width_ratios=widths)
+
+
 def draw_paths(
-    axes: Axes, view: View, tracks: Mapping[str, ComTrack], styles: Mapping[str, Mapping[str, object]]
+    axes: Axes, view: View, tracks: Mapping[str, ComTrack], styles: Mapping[str, Mapping[str, Any]]
 ) -> None:
     """Draw the projected path of each track in its own style."""
     for name, track in tracks.items():

@@ -54,11 +54,11 @@ def postures_figure(record: RunRecord) -> Figure:
         axes = figure.add_subplot(grid[row, 0])
         left, right = view(np.array([low, high]))[:, 0]
         offsets = [(widths.max() + GAP) * column for column in range(len(samples))]
-        for offset, sample in zip(offsets, samples, strict=True):
+        for offset, sample, instant in zip(offsets, samples, instants, strict=True):
             _draw_posture(axes, record, view.moved(offset, 0.0), name, sample, (low, high))
             if row == 0:
                 middle, top = offset + (left + right) / 2, high[2]
-                axes.annotate(f"{motion.time[sample]:.2f} s", (middle, top), (0, 4),
+                axes.annotate(f"{instant:.2f} s", (middle, top), (0, 4),
                               textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
         horizontal, vertical = view.labels
         dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")

@@ -51,7 +51,7 @@ def scene_figure(record: RunRecord, elevation_deg: float = 14.0, azimuth_deg: fl
     axes.view_init(elevation_deg, azimuth_deg)
     if record.body is not None and motion is not None:
         _label_heads(axes, record.body, motion, record.schedule)
-    axes.legend(loc="upper left", fontsize=8, frameon=False)
+    axes.legend(loc="upper right", fontsize=8, frameon=False)
     return figure
 
 

@@ -52,7 +52,9 @@ def timing_figure(record: RunRecord) -> Figure:
         bars = _bars(schedule, name, end)
         axes.broken_barh(bars, (row + 0.12, 0.40), facecolors=colours[name], alpha=0.9)
         if executed is not None and name in executed.contact_names:
-            axes.broken_barh(_loaded(executed, name), (row + 0.56, 0.26), facecolors=COLOURS["ink"], alpha=0.75)
+            axes.broken_barh(
+                _loaded(executed, name), (row + 0.56, 0.26), facecolors=COLOURS["ink"], alpha=0.75
+            )
     axes.set_yticks(np.arange(len(record.effectors)) + 0.5, [readable(n) for n in record.effectors])
     axes.set_ylim(len(record.effectors), 0.0)
     note = "planned supports (wide bars) and loaded contacts of the execution (narrow bars)"

@@ -112,8 +112,8 @@ def draw_contact(axes: Axes, contact: Contact, view: View, colour: str, *, held:
         axes.fill(*corners.T, fill=False, edgecolor=colour, linewidth=1.2, linestyle=style, zorder=2.1)
     elif len(contact.points) > 1:
         ends = corners[[0, int(np.argmax(np.linalg.norm(corners - corners[0], axis=1)))]]
-        width = 5.0 if held else 1.2
-        axes.plot(*ends.T, color=colour, linewidth=width, linestyle=style, solid_capstyle="butt", zorder=2)
+        strength = 1.0 if held else 0.3
+        axes.plot(*ends.T, color=colour, linewidth=5.0, alpha=strength, solid_capstyle="butt", zorder=2)
     else:
         place = view(contact.position)
         face = colour if held else "none"
@@ -206,7 +206,9 @@ def panel_ticks(low: float, high: float, offsets: Sequence[float]) -> tuple[list
         offsets: Where the zero of each panel is drawn [m].
     """
     span = high - low
-    step = next((s for s in (0.1, 0.2, 0.25, 0.5, 1.0, 2.0) if span / s <= 4.0), 10.0 ** np.ceil(np.log10(span)))
+    step = next(
+        (s for s in (0.1, 0.2, 0.25, 0.5, 1.0, 2.0) if span / s <= 4.0), 10.0 ** np.ceil(np.log10(span))
+    )
     values = step * np.arange(np.ceil((low + 0.04 * span) / step), np.floor((high - 0.04 * span) / step) + 1)
     places = [float(offset + value) for offset in offsets for value in values]
     return places, [f"{value + 0.0:.3g}" for _ in offsets for value in values]

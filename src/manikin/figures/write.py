@@ -1,7 +1,8 @@
 """Writing every figure that a run has the data for."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -9,8 +10,13 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from manikin.atomic import atomic_path
+from manikin.comparison import RunComparison
 from manikin.errors import FigureError, MotionFileError
 from manikin.figures.com import com_figure
+from manikin.figures.compare_com import compare_planes_figure, compare_scene_figure
+from manikin.figures.compare_margin import compare_margin_figure
+from manikin.figures.compare_postures import compare_postures_figure
+from manikin.figures.compare_timing import compare_timing_figure
 from manikin.figures.contacts import contacts_figure
 from manikin.figures.effectors import effectors_figure
 from manikin.figures.flights import flights_figure
@@ -41,6 +47,18 @@ FIGURES: dict[str, Callable[[RunRecord], Figure]] = {
 """Every figure of a run by the name of its file."""
 
 
+COMPARISONS: dict[str, Callable[[RunComparison], Figure]] = {
+    "compare_timing": compare_timing_figure,
+    "compare_planes": compare_planes_figure,
+    "compare_scene": compare_scene_figure,
+    "compare_margin": compare_margin_figure,
+    "compare_postures": compare_postures_figure,
+}
+"""Every figure of two runs by the name of its file."""
+
+T = TypeVar("T")
+
+
 def write_figures(
     record: RunRecord, folder: str | Path, on_done: Callable[[float], None] | None = None
 ) -> list[Path]:
@@ -59,18 +77,38 @@ def write_figures(
     Raises:
         MotionFileError: If the folder cannot be written to.
     """
+    return _write(FIGURES, record, Path(folder), on_done)
+
+
+def write_comparison(
+    comparison: RunComparison, folder: str | Path, on_done: Callable[[float], None] | None = None
+) -> list[Path]:
+    """Draw the figures of two runs that apply, as :func:`write_figures` does for one.
+
+    Raises:
+        MotionFileError: If the folder cannot be written to.
+    """
+    return _write(COMPARISONS, comparison, Path(folder), on_done)
+
+
+def _write(
+    figures: Mapping[str, Callable[[T], Figure]],
+    data: T,
+    folder: Path,
+    on_done: Callable[[float], None] | None,
+) -> list[Path]:
     written = []
-    for number, (name, draw) in enumerate(FIGURES.items()):
+    for number, (name, draw) in enumerate(figures.items()):
         try:
-            figure = draw(record)
+            figure = draw(data)
         except FigureError:
             figure = None
         if figure is not None:
-            path = Path(folder) / f"{name}.png"
+            path = folder / f"{name}.png"
             save_figure(figure, path)
             written.append(path)
         if on_done is not None:
-            on_done((number + 1) / len(FIGURES))
+            on_done((number + 1) / len(figures))
     return written
 
 

@@ -46,8 +46,8 @@ def zmp_figure(record: RunRecord) -> Figure:
     phases = need(record.phases, "phases")
     end = end_of(record)
     figure, grid = new_grid(
-        14.0, 6.4, "Zero moment point", 2, 2, across=label_room(record.effectors) + 0.15, between=0.1, top=0.65,
-        height_ratios=[0.07 * max(len(record.effectors), 2), 1], width_ratios=[1, 1.15],
+        14.0, 6.4, "Zero moment point", 2, 2, across=label_room(record.effectors) + 0.15, between=0.1,
+        top=0.65, height_ratios=[0.07 * max(len(record.effectors), 2), 1], width_ratios=[1, 1.15],
     )  # fmt: skip
     name, path = next(iter(paths.items()))
     _draw_plan(figure.add_subplot(grid[:, 0]), schedule, name, path)
@@ -82,8 +82,8 @@ def _draw_plan(axes: Axes, schedule: ContactSchedule, name: str, path: ZmpPath) 
         place = path.point[sample, :2]
         if np.all(np.isfinite(place)):
             axes.plot(*place, "*", color=COLOURS["ink"], markersize=8, zorder=6)
-            axes.annotate(f"{number}|{number + 1}", place, (5, 5), textcoords="offset points", fontsize=7.5,
-                          zorder=7, path_effects=[white_edge()])  # fmt: skip
+            axes.annotate(f"{number}|{number + 1}", (place[0], place[1]), (5, 5), fontsize=7.5, zorder=7,
+                          textcoords="offset points", path_effects=[white_edge()])  # fmt: skip
     handles = [Line2D([], [], color=support_colour(c), label=f"ZMP, {_COUNTS[max(c, 1)]}") for c in shown]
     handles.append(Line2D([], [], color=COLOURS["ink"], marker="*", linestyle="", label="change of phase"))
     handles.append(Line2D([], [], color="#AEB4BE", linestyle=(0, (5, 3)), label="support polygon"))
@@ -104,7 +104,7 @@ def _draw_distance(axes: Axes, name: str, path: ZmpPath) -> None:
     if np.any(~path.decisive & np.isfinite(millimetres)):
         dotted = {**STYLES[name], "linestyle": (0, (1, 2)), "linewidth": 1.0}
         loose = np.where(path.decisive, np.nan, millimetres)
-        axes.plot(path.time, loose, label=f"{name}, supports not in one plane", **dotted)
+        axes.plot(path.time, loose, label=f"{name}, no criterion: several planes or a grasp", **dotted)
 
 
 def _frame_distance(axes: Axes, paths: list[ZmpPath]) -> None:
