@@ -1,11 +1,14 @@
 """Write what the documentation takes from the code: the JSON schema and the generated tables.
 
 Run ``python docs/generate.py`` after a change; a test compares the result with the files.
+``python docs/generate.py REPORT.json`` first takes over new results: what ``manikin run all --json``
+printed, reduced to what the page shows.
 A page marks a generated table with ``<!-- generated: NAME -->`` ... ``<!-- end generated -->``.
 """
 
 import json
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +18,7 @@ import numpy as np
 from manikin.body import human
 from manikin.body.range_of_motion import HUMAN_HINGES
 from manikin.motion.file import DATASETS
+from manikin.results import markdown_table, reduced
 from manikin.scenarios import json_schema
 from manikin.scenarios.stance_file import StanceFile
 
@@ -23,6 +27,7 @@ SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
     "scenario.schema.json": json_schema,
     "stance.schema.json": StanceFile.model_json_schema,
 }
+RESULTS = DOCS / "results.json"
 FAR = 1e5
 """Bounds beyond this only refuse nonsense and are not shown."""
 _BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end generated -->)", re.DOTALL)
@@ -142,15 +147,34 @@ def dataset_table() -> str:
     return "\n".join(rows) + "\n"
 
 
+# --- results ---------------------------------------------------------------------------------
+
+
+def take_over_results(report: Path) -> None:
+    """Keep the numbers of a report that the table of results shows."""
+    data = reduced(json.loads(report.read_text(encoding="utf-8")))
+    RESULTS.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+
+
+def results_table() -> str:
+    """The kept results, with their summary."""
+    report = json.loads(RESULTS.read_text(encoding="utf-8"))
+    total = f"{report['succeeded']} of {len(report['runs'])} runs ended as expected."
+    return f"{markdown_table(report)}\n{total}\n"
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "scenario": lambda: schema_tables(json_schema()),
     "stance": lambda: schema_tables(StanceFile.model_json_schema()),
     "segments": segment_table,
     "hinges": hinge_table,
     "datasets": dataset_table,
+    "results": results_table,
 }
 
 
 if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        take_over_results(Path(name))
     for path, text in files().items():
         path.write_text(text, encoding="utf-8")

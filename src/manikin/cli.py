@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 
 DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
 
+ALL = "all"
+"""In place of a scenario: every built-in one with its variants."""
+
+RESULTS = "results.json"
+"""What ``manikin run all --out DIR`` found, in DIR."""
+
 app = typer.Typer(
     name="manikin",
     help="Plans how a person moves through a cluttered scene and proves it in a physics engine.",
@@ -36,7 +42,8 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object 
 ScenarioArgument = Annotated[
     str,
     typer.Argument(
-        metavar="NAME|FILE.yaml", help="Built-in scenario or scenario file; NAME@V is its variant V."
+        metavar="NAME|FILE.yaml|all",
+        help="Built-in scenario or scenario file; NAME@V is its variant V; all: every one of them.",
     ),
 ]
 RunArgument = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Run directory or motion file (.h5).")]
@@ -127,8 +134,20 @@ def run(
         ),
     ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the run directory.")] = True,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Runs at a time with 'all'; default: one per core.")
+    ] = None,
 ) -> int:
     """Plan a scenario, execute it in the physics engine and report."""
+    if scenario == ALL:
+        _refuse(variant is not None, "--variant", "every variant is run")
+        _refuse(bool(overrides), "--set", "it belongs to one scenario")
+        given = {"--seed": seed, "--stature": stature, "--mass": mass, "--sex": sex}
+        words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
+        _check_values(seed, stature, mass, sex)
+        directory = out if out is not None else None if json else Path("runs")
+        return _run_all(directory, tuple(words), context.obj, draw=figures, workers=jobs, json=json)
+    _refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
     from manikin.scenarios import load_scenario
 
     job = load_scenario(scenario, variant, overrides or ())
@@ -250,6 +269,57 @@ def _run(
 
             write_products(directory, progress)
         return dict(result.summary)
+
+
+def _refuse(given: bool, option: str, because: str) -> None:
+    if given:
+        raise InputError(f"{option} does not go with this run: {because}; valid: leave it out")
+
+
+def _check_values(seed: int | None, stature: float | None, mass: float | None, sex: str | None) -> None:
+    """Refuse a value once, and not once per run."""
+    from manikin.scenarios import list_scenarios, load_scenario
+
+    job = load_scenario(next(iter(list_scenarios()))).with_body(stature_m=stature, mass_kg=mass, sex=sex)
+    if seed is not None:
+        job.with_seed(seed)
+
+
+def _run_all(
+    out: Path | None,
+    arguments: tuple[str, ...],
+    interruption: Interruption,
+    *,
+    draw: bool,
+    workers: int | None,
+    json: bool,
+) -> int:
+    from manikin import batch
+    from manikin.atomic import write_text
+    from manikin.output import make_directory, to_json
+    from manikin.results import text_table
+
+    runs = batch.built_in_jobs()
+    if out is not None:
+        make_directory(out)
+
+    def report(entry: dict[str, Any], done: int) -> None:
+        interruption.check()
+        word = "as expected" if entry["as_expected"] else "NOT as expected"
+        what = "succeeded" if entry["succeeded"] else "failed"
+        name = entry["scenario"]
+        typer.echo(f"[{done}/{len(runs)}] {name}: {what}, {word}, {entry['wall_s']:.1f} s", err=True)
+
+    options = batch.RunOptions(out, draw and out is not None, arguments)
+    found = batch.run_jobs(runs, options.command, workers=workers, report=report)
+    if out is not None:
+        write_text(out / RESULTS, to_json(found) + "\n")
+    if json:
+        _print_json(found)
+    else:
+        typer.echo(text_table(found))
+        typer.echo(f"{found['succeeded']} as expected, {found['failed']} not, {found['wall_s']:.0f} s")
+    return FAILED if found["failed"] else DONE
 
 
 def _print_summary(summary: dict[str, Any], directory: Path | None) -> None:

@@ -110,6 +110,20 @@ class RunDirectory:
         return MotionFileError(f"{path}: cannot be written ({error.strerror}); valid: a writable directory")
 
 
+def make_directory(path: Path) -> None:
+    """Create a directory that several runs share, unless it is there.
+
+    Raises:
+        MotionFileError: If it cannot be created.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MotionFileError(
+            f"{path}: cannot be made ({error.strerror}); valid: a directory for the runs"
+        ) from None
+
+
 def read_summary(path: str | Path) -> dict[str, Any]:
     """Summary of a run directory.
 

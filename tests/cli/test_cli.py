@@ -124,8 +124,8 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
         (["run", "none.yaml"], "no such file"),
         (["run", "."], "is a directory"),
         (["run", ""], "is empty"),
-        (["run", "platform", "--variant", "low"], "has no variant 'low'; valid: none"),
-        (["run", "platform@low"], "has no variant 'low'; valid: none"),
+        (["run", "platform", "--variant", "low"], "has no variant 'low'; valid: slippery"),
+        (["run", "platform@low"], "has no variant 'low'; valid: slippery"),
         (
             ["run", "platform", "--set", "supports.frictoin=1"],
             "did you mean 'friction'? valid: ",
@@ -134,6 +134,11 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
         (["compare", "none"], "Missing argument"),
         (["compare", "none", "none"], "no such directory"),
         (["compare", ".", "."], "is not a run directory"),
+        (["run", "all", "--variant", "slippery"], "--variant does not go with this run"),
+        (["run", "all", "--set", "seed=1"], "--set does not go with this run"),
+        (["run", "all", "--seed", "-1"], "seed is -1"),
+        (["run", "all", "--jobs", "0"], "--jobs"),
+        (["run", "platform", "--jobs", "2"], "--jobs does not go with this run"),
         (["view", "none"], "no such file"),
         (["view", "none", "--port", "99999"], "--port"),
         (["export", "none", "--format", "bvh"], "no such file"),
@@ -228,6 +233,51 @@ def test_explained_failure_is_status_3(capfd, pipeline):
     pipeline.summary = {**SUMMARY, "succeeded": False, "failure": failure}
     assert main(["run", "platform", "--json"]) == FAILED
     assert json.loads(capfd.readouterr().out)["failure"] == failure
+
+
+@pytest.fixture
+def two_runs(monkeypatch):
+    """Every run of ``run all`` replaced by a process that prints a made-up summary."""
+    from manikin import batch
+
+    failure = {"stage": "centroidal", "reason": "no margin", "time_s": 0.0, "where": ""}
+    stages = dict.fromkeys(("centroidal", "wholebody", "execution"))
+    summaries = {
+        "one": {"scenario": "one", "succeeded": True, "failure": None, **stages, "wall_s": 1.0},
+        "two": {"scenario": "two@bad", "succeeded": False, "failure": failure, **stages, "wall_s": 1.0},
+    }
+
+    def command(_options, job):
+        summary = summaries[job.scenario]
+        status = 0 if summary["succeeded"] else 3
+        return [sys.executable, "-c", f"print({json.dumps(summary)!r}); raise SystemExit({status})"]
+
+    def expect(outcome):
+        jobs = (batch.Job("one"), batch.Job("two", "bad", outcome))
+        monkeypatch.setattr(batch, "built_in_jobs", lambda: jobs)
+
+    monkeypatch.setattr(batch.RunOptions, "command", command)
+    return expect
+
+
+def test_run_all_prints_one_json_object_and_status_0_when_all_is_as_expected(capfd, two_runs):
+    two_runs("failure")
+    assert main(["run", "all", "--json"]) == DONE
+    out, err = capfd.readouterr()
+    report = json.loads(out)
+    assert [run["scenario"] for run in report["runs"]] == ["one", "two@bad"]
+    assert (report["succeeded"], report["failed"]) == (2, 0)
+    assert report["wall_s"] > 0
+    assert "[2/2]" in err
+
+
+def test_run_all_is_status_3_and_a_table_when_one_fails(capfd, two_runs, tmp_path):
+    two_runs("success")
+    assert main(["run", "all", "--out", str(tmp_path / "runs"), "--jobs", "1"]) == FAILED
+    out = capfd.readouterr().out
+    assert "FAILED (centroidal): no margin" in out
+    assert "1 as expected, 1 not" in out
+    assert json.loads((tmp_path / "runs" / "results.json").read_text())["failed"] == 1
 
 
 def test_interruption_is_one_line_and_status_130(capfd, pipeline):

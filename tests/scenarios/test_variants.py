@@ -78,14 +78,15 @@ def test_variants_are_laid_over_the_file(tmp_path):
     assert bare.file.com_constraints == []
     assert bare.planning.weights.margin is None
     assert bare.planning.min_margin == plain.planning.min_margin
-    assert list_variants(path) == {"slow": "slower", "bare": plain.description}
+    inherited = list_variants("platform")
+    assert list_variants(path) == inherited | {"slow": "slower", "bare": plain.description}
 
 
 def test_variants_are_inherited_changed_and_can_be_extended(tmp_path):
     write(tmp_path, CHILD)
     change = {"variants": {"slow": {"planning": {"min_margin": 10.0}}, "bare": None}}
     heir = write(tmp_path, {"extends": "child.yaml", "name": "heir"} | change, "heir.yaml")
-    assert list(list_variants(heir)) == ["slow"]
+    assert list(list_variants(heir)) == [*list_variants("platform"), "slow"]
     planning = load_scenario(heir, "slow").planning
     assert (planning.max_duration_s, planning.min_margin) == (9.0, 10.0)
     of_variant = load_scenario(write(tmp_path, {"extends": "child.yaml@slow"}, "of.yaml"))
@@ -135,7 +136,7 @@ def test_a_mesh_of_an_extended_file_is_found_from_elsewhere(tmp_path):
         ),
         ({"extends": 3}, r"child\.yaml:1: extends is 3; valid: a built-in scenario"),
         ({"extends": "child.yaml"}, r"child\.yaml:1: extends is 'child\.yaml', which leads back"),
-        ({"extends": "platform@none"}, r"has no variant 'none'; valid: none, the scenario has no variants"),
+        ({"extends": "platform@none"}, r"has no variant 'none'; valid: slippery"),
         ({"variants": [1]}, r"child\.yaml:\d+: variants is \[1\]; valid: a mapping"),
         ({"variants": {"v": 3}}, r"child\.yaml:\d+: variants\.v is 3; valid: a mapping"),
         ({"variants": {"a/b": {}}}, r"variants\.a/b is a name that cannot be asked for"),
@@ -168,9 +169,11 @@ def test_a_mistake_in_the_extended_file_is_placed_there(tmp_path):
 
 def test_an_unknown_variant_names_the_valid_ones(tmp_path):
     path = write(tmp_path, CHILD)
-    with pytest.raises(ScenarioError, match=r"no variant 'slo'; did you mean 'slow'\? valid: slow, bare"):
+    with pytest.raises(
+        ScenarioError, match=r"no variant 'slo'; did you mean 'slow'\? valid: slippery, slow, bare"
+    ):
         load_scenario(path, "slo")
-    with pytest.raises(ScenarioError, match=r"no variant ''; valid: slow, bare"):
+    with pytest.raises(ScenarioError, match=r"no variant ''; valid: slippery, slow, bare"):
         load_scenario(f"{path}@")
     with pytest.raises(ScenarioError, match="names a variant, and so does 'bare'"):
         load_scenario(f"{path}@slow", "bare")

@@ -1,0 +1,223 @@
+"""Many runs at once: every built-in scenario with its variants, one process per run.
+
+A run is a process of its own, so that one which crashes or hangs takes no other with it, and its
+result does not depend on what ran before or beside it.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time as clock
+from collections.abc import Callable, Generator, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO, Any
+
+from manikin.scenarios import list_scenarios, list_variants, load_scenario
+
+TIME_LIMIT = 1800.0
+"""Wall time after which a run is ended [s]."""
+
+_POLL = 0.05
+_EXPLAINED = 3
+"""Exit status of a run that ended in an explained failure."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to be done.
+
+    Attributes:
+        scenario: Name of a built-in scenario, or a scenario file.
+        variant: Name of one of its variants, or None.
+        expected: ``"success"`` or ``"failure"``, see the key ``expect`` of a scenario.
+    """
+
+    scenario: str
+    variant: str | None = None
+    expected: str = "success"
+
+    @property
+    def name(self) -> str:
+        """As the command line takes it: ``NAME`` or ``NAME@VARIANT``."""
+        return self.scenario if self.variant is None else f"{self.scenario}@{self.variant}"
+
+    @property
+    def folder(self) -> str:
+        """Name of its run directory."""
+        stem = Path(self.scenario).stem
+        return stem if self.variant is None else f"{stem}@{self.variant}"
+
+
+@dataclass(frozen=True, eq=False)
+class RunOptions:
+    """What is passed on to every run.
+
+    Attributes:
+        out: Directory of the run directories, or None to write none.
+        figures: Whether figures are drawn into them.
+        arguments: Further arguments of ``manikin run``, such as ``("--seed", "3")``.
+    """
+
+    out: Path | None = None
+    figures: bool = False
+    arguments: tuple[str, ...] = ()
+
+    def command(self, job: Job) -> list[str]:
+        """The process of a job."""
+        words = [sys.executable, "-m", "manikin", "run", job.name, "--json", *self.arguments]
+        if self.out is not None:
+            words += ["--out", str(self.out / job.folder)]
+        return words if self.figures else [*words, "--no-figures"]
+
+
+def built_in_jobs() -> tuple[Job, ...]:
+    """Every built-in scenario followed by its variants, in the order of ``manikin scenarios``.
+
+    Raises:
+        ScenarioError: If one of the files is not valid.
+    """
+    return tuple(
+        Job(name, variant, load_scenario(name, variant).file.expect)
+        for name in list_scenarios()
+        for variant in (None, *list_variants(name))
+    )
+
+
+def run_jobs(
+    jobs: Sequence[Job],
+    command: Callable[[Job], list[str]],
+    *,
+    workers: int | None = None,
+    time_limit: float = TIME_LIMIT,
+    report: Callable[[dict[str, Any], int], None] | None = None,
+) -> dict[str, Any]:
+    """Run jobs side by side and gather their summaries.
+
+    Args:
+        jobs: What to run.
+        command: Process of a job; it prints the run's summary as JSON on standard output.
+        workers: Runs at a time; one per usable core when omitted.
+        time_limit: Wall time after which a run is ended [s].
+        report: Told the entry of each run that has ended, and how many have.
+
+    Returns:
+        ``runs`` in the order of the jobs, each the summary of the run with ``variant``,
+        ``expected`` and ``as_expected``; ``succeeded`` and ``failed``, the numbers of runs that
+        did and did not end as expected; ``wall_s``.
+    """
+    began = clock.perf_counter()
+    found: dict[int, dict[str, Any]] = {}
+    with closing(_completed(jobs, command, workers or usable_cores(), time_limit)) as completed:
+        for index, entry in completed:
+            found[index] = entry
+            if report is not None:
+                report(entry, len(found))
+    runs = [found[index] for index in range(len(jobs))]
+    right = sum(entry["as_expected"] for entry in runs)
+    wall = clock.perf_counter() - began
+    return {"runs": runs, "succeeded": right, "failed": len(runs) - right, "wall_s": wall}
+
+
+def usable_cores() -> int:
+    """Number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@dataclass(eq=False)
+class _Run:
+    """A process that runs."""
+
+    job: Job
+    process: subprocess.Popen[bytes]
+    output: IO[bytes]
+    errors: IO[bytes]
+    began: float = field(default_factory=clock.perf_counter)
+
+    @property
+    def seconds(self) -> float:
+        return clock.perf_counter() - self.began
+
+
+def _completed(
+    jobs: Sequence[Job], command: Callable[[Job], list[str]], workers: int, time_limit: float
+) -> Generator[tuple[int, dict[str, Any]]]:
+    """Index and entry of each job, in the order in which they end."""
+    waiting = list(enumerate(jobs))[::-1]
+    running: dict[int, _Run] = {}
+    with ExitStack() as stack:
+        stack.callback(lambda: [_end(run.process) for run in running.values()])
+        while waiting or running:
+            while waiting and len(running) < workers:
+                index, job = waiting.pop()
+                running[index] = _start(job, command(job), stack)
+            clock.sleep(_POLL)
+            for index, run in list(running.items()):
+                late = run.seconds > time_limit
+                if late:
+                    _end(run.process)
+                if run.process.poll() is not None:
+                    yield index, _entry(running.pop(index), time_limit if late else None)
+
+
+def _start(job: Job, words: list[str], stack: ExitStack) -> _Run:
+    # Files and not pipes: nobody has to read them while the process runs.
+    output = stack.enter_context(TemporaryFile())  # noqa: SIM115
+    errors = stack.enter_context(TemporaryFile())  # noqa: SIM115
+    # A session of its own: Ctrl-C reaches this process alone, which then ends the others in order.
+    process = subprocess.Popen(
+        words, stdin=subprocess.DEVNULL, stdout=output, stderr=errors, start_new_session=True,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+    )  # fmt: skip
+    return _Run(job, process, output, errors)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Ask a process to end, and make it."""
+    process.terminate()
+    try:
+        process.wait(timeout=10.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _entry(run: _Run, time_limit: float | None) -> dict[str, Any]:
+    """Summary of a run that has ended, or one that says how it broke off."""
+    summary = None if time_limit is not None else _summary(run.output)
+    explained = summary is not None and run.process.returncode == _EXPLAINED
+    if summary is None:
+        summary = _broken_off(run, time_limit)
+    ended = "success" if summary["succeeded"] else "failure" if explained else "broken off"
+    return {
+        **summary, "variant": run.job.variant, "expected": run.job.expected,
+        "as_expected": ended == run.job.expected,
+    }  # fmt: skip
+
+
+def _summary(output: IO[bytes]) -> dict[str, Any] | None:
+    output.seek(0)
+    try:
+        summary = json.loads(output.read())
+    except ValueError:
+        return None
+    return summary if isinstance(summary, dict) and "succeeded" in summary else None
+
+
+def _broken_off(run: _Run, time_limit: float | None) -> dict[str, Any]:
+    run.errors.seek(0)
+    lines = run.errors.read().decode(errors="replace").strip().splitlines()
+    what = f"the run ended with status {run.process.returncode}"
+    if time_limit is not None:
+        what = f"the run did not end within {time_limit:g} s"
+    reason = f"{what}: {lines[-1]}" if lines else what
+    failure = {"stage": "run", "reason": reason, "time_s": 0.0, "where": ""}
+    stages = dict.fromkeys(("centroidal", "wholebody", "execution"))
+    return {
+        "scenario": run.job.folder, "succeeded": False, "failure": failure, **stages, "wall_s": run.seconds,
+    }  # fmt: skip

@@ -1,0 +1,110 @@
+"""One table of many runs, for the command line and for the documentation."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+HEADER = (
+    "scenario", "variant", "duration", "planned margin", "radius", "clearance", "executed margin",
+    "CoM rms", "fell", "wall", "result",
+)  # fmt: skip
+"""Columns of the table."""
+
+UNITS = ("", "", "s", "", "N.m", "mm", "N.m", "mm", "", "s + s + s", "")
+"""Units of the columns; the planned margin brings its own."""
+
+NOTHING = "-"
+
+_KEPT: dict[str, tuple[str, ...]] = {
+    "centroidal": ("duration_s", "min_margin", "margin_unit", "feasibility_radius", "wall_s"),
+    "wholebody": ("min_clearance_m", "wall_s"),
+    "execution": ("min_margin", "com_rms_error_m", "fell", "wall_s"),
+}
+"""Keys of a run's summary that the table shows."""
+
+
+def result_rows(report: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """One row of texts per run, under :data:`HEADER`.
+
+    Args:
+        report: As :func:`manikin.batch.run_jobs` returns it, or :func:`reduced`.
+    """
+    return [_row(run) for run in report["runs"]]
+
+
+def text_table(report: Mapping[str, Any]) -> str:
+    """The table in columns of equal width."""
+    rows = [HEADER, UNITS, *result_rows(report)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(HEADER) - 1)]
+    lines = [
+        "  ".join([*(cell.ljust(width) for cell, width in zip(row[:-1], widths, strict=True)), row[-1]])
+        for row in rows
+    ]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def markdown_table(report: Mapping[str, Any]) -> str:
+    """The table in Markdown."""
+    heads = [f"{name} [{unit}]" if unit else name for name, unit in zip(HEADER, UNITS, strict=True)]
+    lines = [_markdown_row(heads), _markdown_row(["---"] * len(heads))]
+    return "\n".join([*lines, *(_markdown_row(row) for row in result_rows(report))]) + "\n"
+
+
+def reduced(report: Mapping[str, Any]) -> dict[str, Any]:
+    """What the table shows of a report and no more, rounded to four digits."""
+    return {
+        "runs": [_reduced_run(run) for run in report["runs"]],
+        "succeeded": report["succeeded"], "failed": report["failed"], "wall_s": _rounded(report["wall_s"]),
+    }  # fmt: skip
+
+
+def _reduced_run(run: Mapping[str, Any]) -> dict[str, Any]:
+    names = ("scenario", "variant", "expected", "as_expected", "succeeded")
+    failure = run["failure"]
+    kept: dict[str, Any] = {name: run[name] for name in names}
+    kept["failure"] = None if failure is None else {key: failure[key] for key in ("stage", "reason")}
+    for stage, keys in _KEPT.items():
+        block = run[stage]
+        kept[stage] = None if block is None else {key: _rounded(block[key]) for key in keys}
+    return {**kept, "wall_s": _rounded(run["wall_s"])}
+
+
+def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
+    com, body, executed = (run[stage] or {} for stage in _KEPT)
+    walls = [block.get("wall_s") for block in (com, body, executed)]
+    return (
+        str(run["scenario"]).partition("@")[0],
+        run["variant"] or NOTHING,
+        _number(com.get("duration_s"), 2),
+        _number(com.get("min_margin"), 1, f" {com.get('margin_unit', '')}"),
+        _number(com.get("feasibility_radius"), 1),
+        _number(body.get("min_clearance_m"), 1, scale=1000.0),
+        _number(executed.get("min_margin"), 1),
+        _number(executed.get("com_rms_error_m"), 2, scale=1000.0),
+        {True: "yes", False: "no", None: NOTHING}[executed.get("fell")],
+        " + ".join(_number(wall, 1) for wall in walls if wall is not None) or NOTHING,
+        _result(run),
+    )
+
+
+def _result(run: Mapping[str, Any]) -> str:
+    if run["failure"] is None:
+        return "succeeded" if run["as_expected"] else "succeeded although a failure was expected"
+    word = "failed as expected" if run["as_expected"] else "FAILED"
+    return f"{word} ({run['failure']['stage']}): {run['failure']['reason']}"
+
+
+def _number(value: float | None, digits: int, unit: str = "", scale: float = 1.0) -> str:
+    return NOTHING if value is None else f"{scale * value:.{digits}f}{unit}"
+
+
+def _rounded(value: Any) -> Any:
+    """Four significant digits, so that what changes in a file has changed in the world."""
+    if not isinstance(value, float) or not math.isfinite(value) or value == 0.0:
+        return value
+    return round(value, 3 - math.floor(math.log10(abs(value))))
+
+
+def _markdown_row(cells: Sequence[str]) -> str:
+    escaped = (" ".join(cell.split()).replace("|", "\\|") for cell in cells)
+    return f"| {' | '.join(escaped)} |"
