@@ -34,6 +34,7 @@ from manikin.simulation import Execution, Push, execute
 from manikin.spatial import rotation_from_yaw
 from manikin.wholebody import WholeBodyResult, WholeBodySettings, plan_whole_body
 from manikin.wholebody.configuration_spline import rotation_from_quaternion
+from manikin.wholebody.manner import manner_of
 
 Progress = Callable[[str, float], None]
 """Told the stage and the share of it that is done, in [0, 1]."""
@@ -145,7 +146,7 @@ def run(
         overrides: Values to set, ``"supports.friction=0.5"`` each.
         out: Run directory; nothing is written when omitted.
         seed: Seed of every random choice; the scenario's own when omitted.
-        settings: Options of the whole-body stage.
+        settings: Options of the whole-body stage; the defaults in the scenario's manner when omitted.
         requirements: What the execution must keep.
         progress: Called with the stage and the share of it that is done.
 
@@ -185,7 +186,8 @@ class _Run:
         progress: Progress | None,
     ) -> None:
         self._began = clock.perf_counter()
-        self._scenario, self._settings, self._requirements = scenario, settings, requirements
+        self._scenario, self._requirements = scenario, requirements
+        self._settings = settings or WholeBodySettings(manner=manner_of(scenario.manner))
         self._progress = progress or _silent
         self._body: BodyModel = scenario.build_body()
         self._scene: Scene = scenario.build_scene()

@@ -204,7 +204,8 @@ class Controller:
         if support.mode is SupportMode.LANDING:
             target = landing_reference(support, self.settings.supports.press_speed)
             return swing_task(name, frame, target, gains.swing, weight)
-        return swing_task(name, frame, lifted(reference.effectors[name], support), gains.swing, weight)
+        target = lifted(reference.effectors[name], support)
+        return swing_task(name, frame, target, gains.swing, weight, support.follow)
 
     def _posture_weight(self, supports: Mapping[str, SupportState]) -> FloatArray:
         weight = np.full(self.body.nv - 6, self.settings.weights.posture)

@@ -72,6 +72,8 @@ class SupportSettings:
 
     Attributes:
         unload_time: The normal force's limit falls to zero over this time before lift-off [s].
+        follow_time: The gains with which a foot follows its flight rise from zero over this time
+            after lift-off [s].
         load_time: It rises from zero over this time after touch-down [s].
         early_window: A touch this long before the planned landing counts as the landing [s].
         release_time: A support that has not touched for this long is landed anew [s].
@@ -84,6 +86,7 @@ class SupportSettings:
     """
 
     unload_time: float = 0.05
+    follow_time: float = 0.04
     load_time: float = 0.04
     early_window: float = 0.1
     release_time: float = 0.03
@@ -94,7 +97,7 @@ class SupportSettings:
     sole_inset: float = 0.01
 
     def __post_init__(self) -> None:
-        for name in ("unload_time", "load_time", "press_speed", "default_cap"):
+        for name in ("unload_time", "follow_time", "load_time", "press_speed", "default_cap"):
             finite_number(getattr(self, name), f"support setting {name!r}", above=0.0)
         for name in ("early_window", "release_time", "hover", "press_depth", "sole_inset"):
             finite_number(getattr(self, name), f"support setting {name!r}", at_least=0.0)

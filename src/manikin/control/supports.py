@@ -48,6 +48,7 @@ class SupportState:
         press: How far below the planned contact a landing effector is sent [m]; negative above.
         lift: (3,) offset of a flying effector from its planned path [m].
         lift_rate: (3,) rate of that offset [m/s].
+        follow: Share of the feedback gains with which a flying effector follows its path.
     """
 
     effector: str
@@ -58,6 +59,7 @@ class SupportState:
     press: float = 0.0
     lift: FloatArray = field(default_factory=lambda: _NO_LIFT)
     lift_rate: FloatArray = field(default_factory=lambda: _NO_LIFT)
+    follow: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +152,7 @@ class SupportSwitch:
             if interval is not None and math.isinf(interval.start):
                 memory.landed, memory.touched = interval.start, time
         if interval is None:
-            return SupportState(name, SupportMode.SWING, None)
+            return SupportState(name, SupportMode.SWING, None, follow=self._follow(name, time))
         planned = time >= interval.start - 1e-9
         self._remember_touch(memory, time, planned if touching is None else touching)
         if memory.landed is not None:
@@ -182,6 +184,12 @@ class SupportSwitch:
             lift=share**2 * (3.0 - 2.0 * share) * up,
             lift_rate=6.0 * share * (1.0 - share) / duration * up,
         )
+
+    def _follow(self, name: str, time: float) -> float:
+        """Feedback gains rise smoothly after a lift-off, where plan and reality differ in speed."""
+        ends = [interval.end for interval in self._intervals[name] if interval.end <= time + 1e-9]
+        since = time - max(ends, default=-math.inf)
+        return float(np.clip(since / self._settings.follow_time, 0.0, 1.0))
 
     def _interval(self, name: str, time: float) -> tuple[int, SupportInterval | None]:
         for number, interval in enumerate(self._intervals[name]):

@@ -78,9 +78,14 @@ def orientation_task(
 
 
 def swing_task(
-    name: str, frame: FrameState, reference: EffectorReference, gains: Impedance, weight: float
+    name: str,
+    frame: FrameState,
+    reference: EffectorReference,
+    gains: Impedance,
+    weight: float,
+    follow: float = 1.0,
 ) -> AccelerationTask:
-    """Follow placement, twist and acceleration of a flying effector."""
+    """Follow placement, twist and acceleration of a flying effector; the gains times ``follow``."""
     error = np.concatenate(
         (
             reference.position - frame.position,
@@ -88,7 +93,9 @@ def swing_task(
         )
     )
     wanted = (
-        reference.acceleration + gains.stiffness * error + gains.damping * (reference.twist - frame.twist)
+        reference.acceleration
+        + follow * gains.stiffness * error
+        + follow * gains.damping * (reference.twist - frame.twist)
     )
     return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
 

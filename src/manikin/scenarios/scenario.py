@@ -85,6 +85,11 @@ class Scenario:
         return self.file.planning
 
     @property
+    def manner(self) -> str:
+        """How the body carries itself where the task leaves freedom."""
+        return self.file.manner
+
+    @property
     def push(self) -> PushSection | None:
         """Disturbance during the execution, or None."""
         return self.file.push

@@ -407,6 +407,11 @@ class ScenarioFile(Section):
         default_factory=list, description="constraints on the centre of mass"
     )
     planning: PlanningSection = Field(default=PlanningSection(), description="options of the planner")
+    manner: Literal["ready", "walking"] = Field(
+        default="ready",
+        description="how the body carries itself where the task leaves freedom: arms raised and bent, clear "
+        "of the thighs, or an upright trunk and arms that swing against the legs",
+    )
     push: PushSection | None = Field(default=None, description="disturbance during the execution")
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
         default=0, description="seed of every random choice"

@@ -26,7 +26,8 @@ from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
 from manikin.wholebody.forces import plan_forces
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
-from manikin.wholebody.reference import reference_motion, reference_scale
+from manikin.wholebody.manner import READY, Manner
+from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.swing import SwingLimits
 from manikin.wholebody.targets import FitTargets, effector_targets, ignored_pairs
 
@@ -55,6 +56,7 @@ class WholeBodySettings:
         swing: What a swing must keep.
         fit: Scales and limits of the fit.
         requirements: What the finished motion must keep.
+        manner: How the body carries itself where the task leaves freedom.
     """
 
     knot_spacing: float = 0.05
@@ -64,6 +66,7 @@ class WholeBodySettings:
     swing: SwingLimits = field(default_factory=SwingLimits)
     fit: FitScales = field(default_factory=FitScales)
     requirements: WholeBodyRequirements = field(default_factory=WholeBodyRequirements)
+    manner: Manner = READY
 
 
 @dataclass(frozen=True)
@@ -157,7 +160,7 @@ class _Planner:
         self.proximity = Proximity(body, scene)
         self.flights = FlightPlanner(
             body, scene, trajectory, settings.swing, rng,
-            lambda time: reference_motion(body, trajectory, np.array([time]))[0],
+            lambda time: reference_motion(body, trajectory, np.array([time]), settings.manner)[0],
         )  # fmt: skip
         self._progress = progress
 
@@ -212,7 +215,8 @@ class _Planner:
         return plan_guide(
             self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time),
             self.trajectory.position(time), ignored_pairs(self.body, self.scene, schedule, time),
-            reference_motion(self.body, self.trajectory, time), self.settings.fit.safe_distance,
+            reference_motion(self.body, self.trajectory, time, self.settings.manner),
+            self.settings.fit.safe_distance, self.settings.manner.preferences,
         )  # fmt: skip
 
     def _targets(self, swings: tuple[PlannedSwing, ...], guide: Guide) -> tuple[FitTargets, FloatArray]:
@@ -227,13 +231,15 @@ class _Planner:
             com_acceleration=self.trajectory.acceleration(time),
             margin=self._margin(time, self._point_mass_wrench(time)),
             reference=guide.at(time),
-            reference_scale=reference_scale(self.body),
+            reference_scale=self.settings.manner.scale(self.body),
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
         )
         return targets, knots
 
     def _fit(self, swings: tuple[PlannedSwing, ...], guide: Guide, scales: FitScales) -> FitResult:
         targets, knots = self._targets(swings, guide)
+        share = self.settings.manner.moment_factor * scales.moment_share
+        scales = replace(scales, moment_share=share)
         fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, scales)
         return fit.solve(fit.initial_spline(targets.reference))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactSchedule
-from manikin.posture import Placement, PostureProblem, PostureResult, SolverSettings, generate_posture
+from manikin.posture import Placement, PostureProblem, Preferences, PostureResult, SolverSettings, generate_posture
 from manikin.scene import Proximity
 from manikin.spatial import FloatArray
 from manikin.wholebody.configuration_spline import align_quaternions
@@ -75,6 +75,7 @@ def plan_guide(
     ignored: tuple[Ignored, ...],
     reference: FloatArray,
     clearance: float,
+    preferences: Preferences | None = None,
 ) -> Guide:
     """Find a posture at each time, each one starting from the one before.
 
@@ -88,6 +89,7 @@ def plan_guide(
         ignored: Pairs that may touch, per time.
         reference: (k, nq) preferred postures, the first of which starts the search.
         clearance: Wanted distance to everything [m].
+        preferences: What the postures should look like; the generator's own when omitted.
     """
     q = reference[0]
     found: list[FloatArray] = []
@@ -101,7 +103,7 @@ def plan_guide(
         )
         problem = PostureProblem(
             body, contacts, placements, com=com[k], proximity=proximity, clearance=clearance,
-            self_clearance=clearance, ignore=ignored[k], reference=wanted,
+            self_clearance=clearance, ignore=ignored[k], reference=wanted, preferences=preferences or Preferences(),
         )  # fmt: skip
         result = generate_posture(problem, q, settings=settings)
         if not result.succeeded:

@@ -1,7 +1,5 @@
 """The posture a person would keep where the task leaves freedom."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import pinocchio as pin
 
@@ -10,6 +8,7 @@ from manikin.centroidal import CentroidalTrajectory
 from manikin.contact import ContactSchedule
 from manikin.spatial import FloatArray
 from manikin.wholebody.configuration_spline import align_quaternions
+from manikin.wholebody.manner import READY, Manner
 
 
 def heading_of(schedule: ContactSchedule, time: FloatArray) -> FloatArray:
@@ -24,27 +23,45 @@ def heading_of(schedule: ContactSchedule, time: FloatArray) -> FloatArray:
     return np.interp(time, middles, np.unwrap(headings))
 
 
-READY_ANGLES: Mapping[str, float] = {
-    "shoulder_flexion": np.deg2rad(20.0),
-    "shoulder_abduction": np.deg2rad(25.0),
-    "elbow_flexion": np.deg2rad(60.0),
-}
-"""Arms of a person who steps over something: slightly raised and bent, clear of the thighs [rad]."""
+def foot_lead(schedule: ContactSchedule, time: FloatArray) -> FloatArray:
+    """(n,) how far the left foot is ahead of the right one along the heading [m]; 0 without both."""
+    heading = heading_of(schedule, time)
+    forward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    places = [_foot_path(schedule, f"{side}_foot", time) for side in ("left", "right")]
+    if places[0] is None or places[1] is None:
+        return np.zeros(len(time))
+    return np.sum(forward * (places[0] - places[1]), axis=1)
 
 
-def ready_posture(body: BodyModel) -> FloatArray:
-    """(nq,) standing posture with the arms ready."""
-    q = np.array(body.standing_posture())
-    for index, name in enumerate(body.joint_names):
-        for key, angle in READY_ANGLES.items():
-            if key in name:
-                q[7 + index] = angle
-    return q
+def _foot_path(schedule: ContactSchedule, effector: str, time: FloatArray) -> FloatArray | None:
+    """(n, 2) where an effector is, seen from above; smoothly from one contact to the next."""
+    known: list[float] = []
+    places: list[FloatArray] = []
+    for index, phase in enumerate(schedule.sequence):
+        if effector in phase.stance:
+            known.extend(schedule.instants[index : index + 2])
+            places.extend([phase.stance[effector].position[:2]] * 2)
+    if not known:
+        return None
+    after = np.clip(np.searchsorted(known, time, side="right"), 1, len(known) - 1)
+    start, end = np.array(known)[after - 1], np.array(known)[after]
+    share = np.clip((time - start) / np.maximum(end - start, 1e-9), 0.0, 1.0)[:, None]
+    blend = share**2 * (3.0 - 2.0 * share)
+    return (1.0 - blend) * np.array(places)[after - 1] + blend * np.array(places)[after]
 
 
-def reference_motion(body: BodyModel, trajectory: CentroidalTrajectory, time: FloatArray) -> FloatArray:
-    """(n, nq) standing posture carried along the centre of mass, facing as the feet do."""
-    standing = ready_posture(body)
+def reference_motion(
+    body: BodyModel, trajectory: CentroidalTrajectory, time: FloatArray, manner: Manner = READY
+) -> FloatArray:
+    """(n, nq) preferred posture carried along the centre of mass, facing as the feet do.
+
+    Args:
+        body: The body.
+        trajectory: Centre of mass and contacts in time.
+        time: (n,) [s].
+        manner: Preferred posture and swing of the arms.
+    """
+    standing = manner.posture(body)
     model = body.pinocchio
     offset = pin.centerOfMass(model, model.createData(), standing) - standing[:3]
     com = trajectory.position(time)
@@ -53,20 +70,13 @@ def reference_motion(body: BodyModel, trajectory: CentroidalTrajectory, time: Fl
         turn = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.0, float(yaw)))
         row[:3] = centre - turn.matrix() @ offset
         row[3:7] = (turn * pin.Quaternion(*standing[[6, 3, 4, 5]])).coeffs()
+    _swing_arms(body, out, manner.arm_swing * foot_lead(trajectory.schedule, time))
     return align_quaternions(out)
 
 
-REFERENCE_SCALES: Mapping[str, float] = {
-    "toe": 0.01, "hip": 1.0, "knee": 1.5, "ankle": 1.0, "lumbar": 0.35, "thorax": 0.35, "neck": 0.25,
-    "shoulder": 0.35, "elbow": 0.35, "wrist": 0.1,
-}  # fmt: skip
-"""Deviation of a joint from the reference posture that costs one unit [rad], by name."""
-
-
-def reference_scale(body: BodyModel) -> FloatArray:
-    """(nv,) scales of the deviation from the reference posture."""
-    scale = np.full(body.nv, np.inf)
-    scale[3:6] = 0.3
-    for index, name in enumerate(body.joint_names):
-        scale[6 + index] = next((s for key, s in REFERENCE_SCALES.items() if key in name), 0.5)
-    return scale
+def _swing_arms(body: BodyModel, configurations: FloatArray, angle: FloatArray) -> None:
+    """Add the shoulders' flexion (n,) [rad], the right forward and the left back when positive."""
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        name = f"{side}_shoulder_flexion"
+        if name in body.joint_names:
+            configurations[:, 7 + body.joint_index(name)] += sign * angle
