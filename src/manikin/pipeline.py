@@ -307,6 +307,7 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
         "margin_unit": result.problem.margin_unit,
         "limiting_phase": result.limiting_phase,
         "limiting_contact": limiting_contact(result),
+        "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
         "feasibility_radius": result.feasibility_radius,
         "wall_s": result.wall_time,
     }
@@ -334,6 +335,7 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
         "max_velocity_share": certificate.max_velocity_share,
         "max_torque_share": certificate.max_torque_share,
         "min_margin": float(result.motion.margin.min()),
+        "min_zmp_distance_m": certificate.min_zmp_distance_m,
         "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],
         "wall_s": result.wall_time,
     }

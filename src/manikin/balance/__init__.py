@@ -16,6 +16,7 @@ from manikin.balance.limiting import LimitingConstraint, LimitShare
 from manikin.balance.limits import ContactLimits, LimitKind, contact_limits
 from manikin.balance.margin import StabilityMargins, force_space, moment_space, stability_margins
 from manikin.balance.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
+from manikin.balance.support_plane import SupportPlane, least_zmp_distance, support_plane
 from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytope
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "LimitShare",
     "LimitingConstraint",
     "StabilityMargins",
+    "SupportPlane",
     "WrenchPolytope",
     "admissible_com_polygon",
     "admissible_zmp_polygon",
@@ -37,12 +39,14 @@ __all__ = [
     "evaluate_balance",
     "foot_rotation_indicator",
     "force_space",
+    "least_zmp_distance",
     "moment_space",
     "polygon_of_halfplanes",
     "pseudo_wrench",
     "signed_distance",
     "stability_margins",
     "support_height",
+    "support_plane",
     "support_polygon",
     "wrench_polytope",
     "zero_moment_point",

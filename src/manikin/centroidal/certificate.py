@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manikin.balance import WrenchPolytope
+from manikin.balance import WrenchPolytope, least_zmp_distance
 from manikin.centroidal.feasibility import row_slopes
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.centroidal.trajectory import CentroidalTrajectory
@@ -63,12 +63,15 @@ class Residuals:
         min_margin: Smallest margin [N.m] or [N].
         limiting_phase: Phase in which it occurs.
         limiting_time: Instant at which it occurs [s].
+        min_zmp_distance: Least distance of the ZMP to the edge of the support polygon, negative
+            outside [m]; of the phases whose contacts lie in one plane, None without any.
     """
 
     items: tuple[Residual, ...]
     min_margin: float
     limiting_phase: int
     limiting_time: float
+    min_zmp_distance: float | None = None
 
     def __getitem__(self, requirement: str) -> Residual:
         for item in self.items:
@@ -154,7 +157,11 @@ def measure(
         *_position_residuals(problem, trajectory, times),
         *_duration_residuals(problem, trajectory),
     )
-    return Residuals(items, lowest[phase], phase, time)
+    zmp = least_zmp_distance(
+        (part.stance, trajectory.pseudo_wrench(instants))
+        for part, instants in zip(problem.sequence, times, strict=True)
+    )
+    return Residuals(items, lowest[phase], phase, time, zmp)
 
 
 def _end_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:

@@ -202,9 +202,9 @@ class _Planner:
         self._report(0.4)
         fit = self._fit(swings, guide, scales or self.settings.fit)
         self._report(0.8)
-        motion = self._sample(fit.spline)
+        motion, wrench = self._sample(fit.spline)
         ignored = ignored_pairs(self.body, self.scene, self.trajectory.schedule, motion.time)
-        certificate = certify(self.body, self.proximity, self.trajectory, motion, ignored)
+        certificate = certify(self.body, self.proximity, self.trajectory, motion, ignored, wrench)
         failure = self._failure(swings, guide, certificate)
         wall = clock.perf_counter() - began
         return WholeBodyResult(motion, fit.spline, certificate, swings, guide, failure, fit.iterations, wall)
@@ -243,7 +243,8 @@ class _Planner:
         fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, scales)
         return fit.solve(fit.initial_spline(targets.reference))
 
-    def _sample(self, spline: ConfigurationSpline) -> Motion:
+    def _sample(self, spline: ConfigurationSpline) -> tuple[Motion, FloatArray]:
+        """The motion at 1 kHz with its whole-body pseudo-wrench (n, 6)."""
         schedule = self.trajectory.schedule
         count = max(2, round(float(schedule.instants[-1]) / self.settings.sampling) + 1)
         time = np.linspace(0.0, float(schedule.instants[-1]), count)
@@ -251,11 +252,12 @@ class _Planner:
         forces = plan_forces(self.body, schedule, time, q, v, a)
         com, momentum, wrench = self._centroidal(q, v, a)
         names = schedule.sequence.effectors
-        return Motion(
+        motion = Motion(
             time=time, q=q, v=v, a=a, tau=forces.tau, com=com, angular_momentum=momentum,
             margin=self._margin(time, wrench), support=schedule.support(time, names),
             contact_force=forces.contact_force, contact_names=names, joint_names=self.body.joint_names,
         )  # fmt: skip
+        return motion, wrench
 
     def _centroidal(self, q: FloatArray, v: FloatArray, a: FloatArray) -> tuple[FloatArray, ...]:
         """Centre of mass (n, 3), angular momentum (n, 3) and whole-body pseudo-wrench (n, 6)."""

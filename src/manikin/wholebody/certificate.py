@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from manikin.balance import least_zmp_distance
 from manikin.body import BodyModel
 from manikin.centroidal import CentroidalTrajectory
+from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.scene import Proximity
 from manikin.spatial import FloatArray
@@ -56,6 +58,8 @@ class WholeBodyResiduals:
         max_velocity_share: Largest share of a joint's velocity limit.
         max_missing_wrench: Part of the dynamics that no admissible contact force supplies [N, N.m].
         max_torque_share: Largest share of a joint's torque limit.
+        min_zmp_distance_m: Least distance of the ZMP to the edge of the support polygon, negative
+            outside; of the phases whose contacts lie in one plane, None without any [m].
         worst_times_s: When each of the errors is largest [s], by field name.
     """
 
@@ -68,6 +72,7 @@ class WholeBodyResiduals:
     max_velocity_share: float
     max_missing_wrench: float
     max_torque_share: float
+    min_zmp_distance_m: float | None
     worst_times_s: dict[str, float]
 
     def violation(self, requirements: WholeBodyRequirements) -> tuple[str, float] | None:
@@ -97,6 +102,7 @@ def certify(
     trajectory: CentroidalTrajectory,
     motion: Motion,
     ignored: tuple[Ignored, ...],
+    wrench: FloatArray,
 ) -> WholeBodyResiduals:
     """Measure a motion against its contacts, centre of mass, limits and obstacles.
 
@@ -106,6 +112,7 @@ def certify(
         trajectory: Planned centre of mass and contacts.
         motion: The planned motion, densely sampled.
         ignored: Pairs that may touch, per sample.
+        wrench: (n, 6) pseudo-wrench of the whole body about the world origin, per sample.
     """
     support, turn = _support_errors(body, trajectory, motion)
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
@@ -127,7 +134,15 @@ def certify(
         **{name: float(values.max()) for name, values in series.items()},
         min_clearance_m=float(clearance.distance),
         closest_pair=clearance.pair or ("", ""),
+        min_zmp_distance_m=_least_zmp_distance(trajectory.schedule, motion.time, wrench),
         worst_times_s=times,
+    )
+
+
+def _least_zmp_distance(schedule: ContactSchedule, time: FloatArray, wrench: FloatArray) -> float | None:
+    phases = schedule.phase_at(time)
+    return least_zmp_distance(
+        (phase.stance, wrench[phases == index]) for index, phase in enumerate(schedule.sequence)
     )
 
 

@@ -121,9 +121,9 @@ class FlightPlanner:
     def _pitch(self, swing: Swing, lift_off: float) -> float:
         """Turn the toes down where the foot is left far behind: a level foot has no posture there [rad]."""
         assert swing.start is not None
-        forward = swing.start.rotation_contact_to_world[:, 0]
-        com = self._trajectory.position(lift_off)
-        behind = float(forward @ (com - swing.start.position))
+        yaw = swing.start.yaw
+        away = self._trajectory.position(lift_off) - swing.start.position
+        behind = float(np.cos(yaw) * away[0] + np.sin(yaw) * away[1])
         return float(np.clip(PITCH_PER_METRE * (behind - LEVEL_BEHIND), 0.0, MOST_PITCH))
 
     def _clearance(self, swing: Swing) -> EffectorClearance:
