@@ -148,3 +148,42 @@ def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_pat
 def test_an_execution_that_misses_its_requirement_is_a_failure(platform):
     requirements = ExecutionRequirements(margin=1e6)
     assert "executed margin" in requirements.violation(platform.execution)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["walk", "ramp", "ramp-down"])
+@pytest.mark.parametrize(("stature", "mass"), [(1.75, 70.0), (1.65, 62.0), (1.85, 78.0)])
+def test_walks_succeed_for_every_stature(name, stature, mass):
+    """[Qiu2012]_ 5.4.4: the ZMP stays inside the support polygon, of the point mass and the body."""
+    scenario = load_scenario(name).with_body(stature_m=stature, mass_kg=mass)
+    result = manikin.run(scenario)
+    assert result.succeeded, result.summary["failure"]
+    com, body = result.summary["centroidal"], result.summary["wholebody"]
+    assert com["min_margin"] >= scenario.required_margin - 1e-6
+    assert com["min_zmp_distance_m"] > 0.0
+    assert body["min_zmp_distance_m"] > 0.0
+
+
+def test_the_walk_asks_for_the_published_margin_and_duration():
+    """[Qiu2012]_ 5.4.4: 25.86 N.m in 3.54 s, four steps in nine phases from (0, 0) to (0, 1.5)."""
+    scenario = load_scenario("walk")
+    assert scenario.required_margin == pytest.approx(25.86)
+    assert scenario.planning.max_duration_s == pytest.approx(3.54)
+    assert scenario.goal_com - scenario.start_com == pytest.approx([0.0, 1.5, 0.0])
+    assert len(scenario.build_sequence().swings()) == 4
+
+
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("walk@slippery", "friction of 0.05 is too low"),
+        ("walk@long-step", "step is too long"),
+        ("ramp@slippery", "slope of 15.0 degrees needs a friction of at least 0.27"),
+        ("ramp-down@slippery", "slope of 15.0 degrees needs a friction of at least 0.27"),
+    ],
+)
+def test_impossible_walks_name_the_cause(name, cause):
+    """The explanation names what would have to change, not where a solver stopped."""
+    result = manikin.run(name)
+    assert not result.succeeded
+    assert cause in result.summary["failure"]["reason"]

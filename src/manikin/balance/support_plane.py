@@ -11,7 +11,7 @@ from manikin.balance.polygon import convex_polygon, signed_distance
 from manikin.contact import ContactKind, Stance
 from manikin.spatial import FloatArray, rotation_from_normal, skew
 
-FLATNESS = 1e-6
+FLATNESS = 1e-3
 """Contact points this far from a plane, and normals this far from its own, lie in it [m], [1]."""
 
 

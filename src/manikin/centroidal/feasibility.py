@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytope
+from manikin.centroidal.causes import low_friction, out_of_reach, slipping_slope
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.polytope import Polytope
 from manikin.spatial import FloatArray, skew
@@ -25,8 +26,8 @@ class Failure:
 
     Attributes:
         requirement: Short name of what cannot be met: ``"durations"``, ``"intersection"``,
-            ``"start balance"``, ``"goal balance"``, ``"support distance"``, ``"balance margin"``
-            or the name of a geometric constraint.
+            ``"start balance"``, ``"goal balance"``, ``"friction"``, ``"support distance"``,
+            ``"balance margin"`` or the name of a geometric constraint.
         reason: One sentence with the numbers.
         phase: Index of the phase, or None when it concerns the whole motion.
         time: Instant in the last attempt [s], or None when nothing was attempted.
@@ -84,18 +85,25 @@ def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
 def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Feasibility:
     """Test everything that needs no optimisation.
 
-    Durations and end points against their bounds, then emptiness of the intersections
-    (Proposition 1) and their radius against the required margin (Proposition 2), then whether
+    Durations against their bounds, whether the legs reach the contacts of each phase, end points
+    against their bounds, whether the friction holds the body at both ends, then emptiness of the
+    intersections (Proposition 1) and their radius against the required margin (Proposition 2), then whether
     any acceleration balances the CoM at the start and at the goal.
     """
     radii = intersection_radii(polytopes)
     failure = (
         _duration_failure(problem)
+        or _reach_failure(problem)
         or _end_failure(problem)
+        or _slope_failure(problem, polytopes)
         or _intersection_failure(problem, radii)
         or _end_balance_failure(problem, polytopes)
     )
     return Feasibility(radii, failure)
+
+
+def _common_radius(polytopes: Sequence[Polytope]) -> float:
+    return float(intersection_radii(polytopes).min())
 
 
 def _signed_radius(polytope: Polytope) -> float:
@@ -139,20 +147,42 @@ def _end_failure(problem: CentroidalProblem) -> Failure | None:
     return None
 
 
+def _reach_failure(problem: CentroidalProblem) -> Failure | None:
+    for index, phase in enumerate(problem.sequence):
+        reason = out_of_reach(problem, index)
+        if reason is not None:
+            return Failure("support distance", reason, index, where=", ".join(phase.stance.effectors))
+    return None
+
+
+def _slope_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Failure | None:
+    for index in (0, len(problem.sequence) - 1):
+        stance, polytope = problem.sequence[index].stance, polytopes[index]
+        reason = (
+            slipping_slope(stance, polytope, problem.mass) if isinstance(polytope, WrenchPolytope) else None
+        )
+        if reason is not None:
+            return Failure("friction", reason, index, where=", ".join(stance.effectors))
+    return None
+
+
 def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Failure | None:
     for index, radius in enumerate(radii):
         where = f"phases {index} and {index + 1}"
+        stances = [problem.sequence[number].stance for number in (index, index + 1)]
         if radius < -VANISHING_MARGIN:
             return Failure(
                 "intersection",
-                f"no wrench is admissible in both of {where}: their polytopes do not meet (Proposition 1)",
+                f"no wrench is admissible in both of {where}: their polytopes do not meet (Proposition 1)"
+                f"{low_friction(stances, problem, _common_radius)}",
                 index, where=where,
             )  # fmt: skip
         if problem.margin_space == "wrench" and radius <= max(problem.required_margin, VANISHING_MARGIN):
             return Failure(
                 "intersection",
                 f"the margin between {where} is at most {radius:.2f} N.m, the radius of the largest ball "
-                f"in both polytopes (Proposition 2); required {problem.required_margin:.2f} N.m",
+                f"in both polytopes (Proposition 2); required {problem.required_margin:.2f} N.m"
+                f"{low_friction(stances, problem, _common_radius)}",
                 index, where=where,
             )  # fmt: skip
     return None

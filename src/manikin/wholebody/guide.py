@@ -13,7 +13,14 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactSchedule
-from manikin.posture import Placement, PostureProblem, Preferences, PostureResult, SolverSettings, generate_posture
+from manikin.posture import (
+    Placement,
+    PostureProblem,
+    PostureResult,
+    Preferences,
+    SolverSettings,
+    generate_posture,
+)
 from manikin.scene import Proximity
 from manikin.spatial import FloatArray
 from manikin.wholebody.configuration_spline import align_quaternions
@@ -103,7 +110,8 @@ def plan_guide(
         )
         problem = PostureProblem(
             body, contacts, placements, com=com[k], proximity=proximity, clearance=clearance,
-            self_clearance=clearance, ignore=ignored[k], reference=wanted, preferences=preferences or Preferences(),
+            self_clearance=clearance, ignore=ignored[k], reference=wanted,
+            preferences=preferences or Preferences(),
         )  # fmt: skip
         result = generate_posture(problem, q, settings=settings)
         if not result.succeeded:

@@ -79,7 +79,7 @@ WALKING = Manner(
     arm_swing=0.7,
     moment_factor=1.0,
     preferences=Preferences(
-        hinges=MappingProxyType({"shoulder": 0.5, "elbow": 0.5, "side_bend": 2.0, "lumbar": 2.0, "thorax": 2.0, **Preferences().hinges}),
+        hinges=MappingProxyType({"shoulder": 0.5, **Preferences().hinges}),
         pelvis=2.0, trunk=2.0, head=1.0, arms=0.0,
     ),
 )  # fmt: skip
