@@ -35,8 +35,8 @@ def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str
         return None
     angle, contact = min(steepness, key=lambda item: item[0])
     return (
-        f"nobody can stand on {', '.join(stance.effectors)}: a slope of {np.degrees(angle):.1f} degrees needs "
-        f"a friction of at least {np.tan(angle):.2f}, {contact.effector} has {contact.friction:g}"
+        f"nobody can stand on {', '.join(stance.effectors)}: a slope of {np.degrees(angle):.1f} degrees "
+        f"needs a friction of at least {np.tan(angle):.2f}, {contact.effector} has {contact.friction:g}"
     )
 
 
@@ -89,8 +89,9 @@ def out_of_reach(problem: CentroidalProblem, phase: int) -> str | None:
     if missing <= REACH_TOLERANCE:
         return None
     return (
-        f"the step is too long: {second} and {first} are {apart:.2f} m apart in phase {phase}, and no centre "
-        f"of mass within {limit:.3f} m of both keeps the constraints on it (it misses them by {missing:.2f} m)"
+        f"the step is too long: {second} and {first} are {apart:.2f} m apart in phase {phase}, and no "
+        f"centre of mass within {limit:.3f} m of both keeps the constraints on it "
+        f"(it misses them by {missing:.2f} m)"
     )
 
 
