@@ -82,7 +82,9 @@ def test_products_of_a_point_mass_run_are_its_figures(tmp_path):
 
 
 def test_a_run_that_failed_at_once_has_no_products(tmp_path):
-    assert write_products(write_run(tmp_path / "failed", com=False)) == []
+    path = write_run(tmp_path / "failed", com=False)
+    assert write_products(path) == []
+    assert not (path / "figures").exists()
 
 
 def test_the_plan_may_end_before_the_last_phases(tmp_path):

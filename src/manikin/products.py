@@ -29,6 +29,8 @@ def write_products(directory: str | Path, progress: Callable[[str, float], None]
     """
     folder = Path(directory)
     record = read_run(folder)
+    if not record.tracks and record.schedule is None:
+        return []
     (folder / FIGURES).mkdir(exist_ok=True)
     report = progress or _silent
     written = write_figures(record, folder / FIGURES, lambda share: report("figures", 0.9 * share))

@@ -50,11 +50,12 @@ class ComTrack:
 
     @classmethod
     def of_motion(cls, motion: Motion) -> "ComTrack":
-        """Track of a whole-body motion, its derivatives by central differences."""
+        """Track of a motion, its derivatives by central differences."""
         velocity = com_velocity(motion)
         still = len(motion.time) < 2
         acceleration = np.zeros_like(velocity) if still else np.gradient(velocity, motion.time, axis=0)
-        return cls(motion.time, motion.com, velocity, acceleration, motion.margin)
+        unit = getattr(motion, "margin_unit", "N.m")
+        return cls(motion.time, motion.com, velocity, acceleration, motion.margin, unit)
 
     def at(self, times: FloatArray) -> FloatArray:
         """(n, 3) position at other times [m]; held before the first and after the last."""
@@ -101,23 +102,24 @@ class RunRecord:
 
     @property
     def motions(self) -> dict[str, Motion]:
-        """Whole-body motions by name, ``"planned"`` before ``"executed"``."""
-        return self.content.motions
+        """Whole-body motions by name, ``"planned"`` before ``"executed"``; a point mass has none."""
+        jointed = {name: motion for name, motion in self.content.motions.items() if motion.joint_names}
+        return jointed if self.body is None or self.body.joint_names else {}
 
     @cached_property
     def tracks(self) -> dict[str, ComTrack]:
-        """The CoM of each motion; without any, the planned point mass under ``"planned"``."""
-        if self.motions:
-            return {name: ComTrack.of_motion(motion) for name, motion in self.motions.items()}
-        return {} if self.plan is None else {"planned": self.plan}
+        """The CoM of each motion; without a whole body, that of the planned point mass."""
+        if self.plan is not None and not self.motions:
+            return {"planned": self.plan}
+        moved = self.motions or self.content.motions
+        return {name: ComTrack.of_motion(motion) for name, motion in moved.items()}
 
     @cached_property
     def phases(self) -> PhaseTable | None:
         """Phases of the schedule, or else of the first motion."""
-        if self.motions:
-            return phases_of(next(iter(self.motions.values())), self.schedule)
         if self.schedule is None:
-            return None
+            moved = next(iter(self.content.motions.values()), None)
+            return None if moved is None else phases_of(moved)
         supports = tuple(tuple(phase.stance.effectors) for phase in self.schedule.sequence)
         return PhaseTable(self.schedule.instants, supports)
 
@@ -131,7 +133,7 @@ class RunRecord:
     @cached_property
     def effector_paths(self) -> dict[str, dict[str, FloatArray]]:
         """(n, 3) origin of each effector in contact, by motion and effector [m]; none without a body."""
-        if self.body is None:
+        if self.body is None or not self.motions:
             return {}
         names = tuple(name for name in self.effectors if name in self.body.effectors)
         return {kind: effector_positions(self.body, motion, names) for kind, motion in self.motions.items()}

@@ -6,6 +6,7 @@ from dataclasses import replace
 import matplotlib
 import numpy as np
 import pytest
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from manikin.errors import FigureError, MotionFileError
 from manikin.figures import (
@@ -157,6 +158,25 @@ def test_zmp_figure_plots_the_distances_where_they_decide(run):
     ]
     assert any(np.array_equal(line.get_ydata(), millimetres, equal_nan=True) for line in lines)
     assert any(f"least {np.nanmin(millimetres):.1f} mm" in text for text in labels(figure))
+
+
+def test_point_mass_in_space_has_a_leg_to_every_contact(walls):
+    """Four legs in the three phases on four feet, two in the two others."""
+    axes = scene_figure(walls).axes[0]
+    legs = [c for c in axes.collections if isinstance(c, Line3DCollection)]
+    assert [len(c._segments3d) for c in legs] == [4, 2, 4, 2, 4]
+
+
+def test_motion_of_a_body_without_joints_is_that_of_a_point_mass(finished_run, walls):
+    """Its file holds a pelvis that carries the CoM and nothing else; there is no posture to draw."""
+    given = finished_run.planned
+    n = len(given.time)
+    zero = np.zeros((n, 6))
+    lone = replace(given, q=given.q[:, :7], v=zero, a=zero, tau=zero, joint_names=())
+    record = RunRecord("lone", MotionFile(lone, schedule=finished_run.schedule))
+    assert record.motions == {}
+    np.testing.assert_array_equal(record.tracks["planned"].position, lone.com)
+    assert applicable(record) == applicable(walls) | {"footprints"}
 
 
 def test_planes_show_the_path_on_each_plane(run):

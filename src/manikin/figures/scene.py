@@ -14,7 +14,7 @@ from manikin.figures.style import COLOURS, colours_of, need, new_figure, white_e
 from manikin.figures.views import distinct_contacts
 from manikin.motion import Motion
 from manikin.motion.derived import phases_of, segment_positions
-from manikin.record import RunRecord
+from manikin.record import ComTrack, RunRecord
 from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
 from manikin.spatial import FloatArray
 
@@ -41,6 +41,8 @@ def scene_figure(record: RunRecord, elevation_deg: float = 14.0, azimuth_deg: fl
         seen.append(draw_soles(axes, record.schedule))
     if record.body is not None and motion is not None:
         seen.append(_draw_figures(axes, record.body, motion, record.schedule))
+    elif record.schedule is not None:
+        _draw_legs(axes, track, record.schedule)
     axes.plot(*track.position.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
     if record.phases is not None:
         places = track.at(record.phases.instants)
@@ -75,6 +77,24 @@ def _draw_figures(
             )
         )
     return np.vstack([list(places.values()) for places in postures])
+
+
+def _draw_legs(axes: Axes3D, track: ComTrack, schedule: ContactSchedule) -> None:
+    """Join the point mass to the contacts held in the middle of each phase; thick where they are fewer."""
+    most = max(len(phase.stance) for phase in schedule.sequence)
+    colours = colours_of(schedule.sequence.effectors)
+    middles = (schedule.instants[:-1] + schedule.instants[1:]) / 2.0
+    for place, phase in zip(track.at(middles), schedule.sequence, strict=True):
+        if not len(phase.stance):
+            continue
+        legs = Line3DCollection(
+            [[place, contact.position] for contact in phase.stance],
+            colors=[colours[contact.effector] for contact in phase.stance],
+            linewidths=2.0 if len(phase.stance) < most else 0.8,
+            alpha=0.7,
+            zorder=6,
+        )
+        axes.add_collection3d(legs)
 
 
 def _label_heads(axes: Axes3D, body: BodyModel, motion: Motion, schedule: ContactSchedule | None) -> None:
