@@ -20,7 +20,7 @@ from manikin.record import ComTrack, RunRecord
 
 COLUMNS = 6
 PANEL = 2.3
-"""Width of a panel [inch]."""
+"""Width of a panel [inch]; of a tall one less."""
 MOST = 24
 """More phases than this are not drawn one by one."""
 
@@ -48,8 +48,9 @@ def contacts_figure(record: RunRecord) -> Figure:
     seen = np.vstack(points + ([] if track is None else [track.position]))
     low, high = seen.min(axis=0) - 0.1, seen.max(axis=0) + 0.1
     width, height = view(high - low)
-    pitch = np.array([1.06 * width, height + 0.45 * width / PANEL])
-    scale = PANEL / width
+    panel = PANEL * float(np.clip(1.3 * width / height, 0.55, 1.0))
+    pitch = np.array([1.06 * width, height + 0.45 * width / panel])
+    scale = panel / width
     figure, grid = new_grid(
         columns * pitch[0] * scale + 0.8, rows * pitch[1] * scale + 1.15,
         f"Contacts of each phase, {view.words}", 1, 1, top=0.75,
@@ -74,7 +75,7 @@ def contacts_figure(record: RunRecord) -> Figure:
         axes.spines[side].set_visible(False)
     axes.set_xticks(*panel_ticks(left, right, rights))
     axes.set_yticks(*panel_ticks(bottom, top, ups))
-    axes.set(xlim=(left, right + rights[-1]), ylim=(bottom + ups[-1], top + 0.25 * width / PANEL))
+    axes.set(xlim=(left, right + rights[-1]), ylim=(bottom + ups[-1], top + 0.25 * width / panel))
     axes.set_aspect("equal", adjustable="box", anchor="W")
     _legend(figure, schedule)
     return figure

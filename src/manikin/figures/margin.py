@@ -20,8 +20,11 @@ from manikin.motion.derived import PhaseTable
 from manikin.record import ComTrack, RunRecord
 
 POINT_MASS = "planned point mass"
-ZOOM_FROM = 4.0
+ZOOM_FROM = 5.0
 """A second panel shows the lower part when some phase peaks this many times higher than another."""
+
+ZOOM = 2.5
+"""Height of that panel over the smallest peak of a phase."""
 
 
 def margin_figure(record: RunRecord) -> Figure:
@@ -85,7 +88,7 @@ def _zoom_ceiling(curves: dict[str, ComTrack], phases: PhaseTable) -> float | No
         for phase in range(len(phases))
     ]
     lowest = min((peak for peak in peaks if peak > 0.0), default=0.0)
-    return 1.6 * lowest if lowest > 0.0 and max(peaks) > ZOOM_FROM * lowest else None
+    return ZOOM * lowest if lowest > 0.0 and max(peaks) > ZOOM_FROM * lowest else None
 
 
 def _draw_curves(
@@ -100,6 +103,7 @@ def _draw_curves(
             _mark_minima(axes, curve, phases, name, below=name == "executed", top=top)
     low = min(0.0, *(float(curve.margin.min()) for curve in curves.values()))
     high = max(float(curve.margin.max()) for curve in curves.values()) if top is None else top
+    low = low if top is None else max(low, -top)
     axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
 
 

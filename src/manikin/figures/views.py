@@ -156,7 +156,8 @@ def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: 
     patches.set_clip_path(window)
     if view.name != "xy" and scene.floor_height is not None:
         level = scene.floor_height + view.offset[1]
-        axes.hlines(level, left, right, color=COLOURS["soft"], linewidth=0.9, zorder=0.6)
+        if bottom <= level <= top:
+            axes.hlines(level, left, right, color=COLOURS["soft"], linewidth=0.9, zorder=0.6)
 
 
 def draw_body(axes: Axes, body: BodyModel, q: FloatArray, view: View) -> None:

@@ -92,7 +92,9 @@ def _draw_plan(axes: Axes, schedule: ContactSchedule, name: str, path: ZmpPath) 
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_aspect("equal", adjustable="box", anchor="NW")
     dress(axes, "y [m]", "x [m]", f"{name.capitalize()}, from above")
-    axes.legend(handles=handles, fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
+    narrow = high[0] - low[0] < 0.75 * (high[1] - low[1])
+    beside = {"bbox_to_anchor": (1.02, 1.0)} if narrow else {}
+    axes.legend(handles=handles, fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none", **beside)
 
 
 def _draw_distance(axes: Axes, name: str, path: ZmpPath) -> None:
