@@ -1,9 +1,18 @@
-"""Timing-free CoM planning of the platform scenario ([Qiu2012]_ 5.4.4; the thesis took < 3 minutes)."""
+"""CoM planning of the platform scenario ([Qiu2012]_ 5.4.4; the thesis took < 3 minutes), by both methods."""
 
 import numpy as np
 import pytest
 
-from manikin.centroidal import BentSurface, CentroidalProblem, assess_feasibility, height_band, plan_com
+from manikin.centroidal import (
+    BentSurface,
+    CentroidalProblem,
+    KeyframeProblem,
+    Recording,
+    assess_feasibility,
+    height_band,
+    plan_com,
+    plan_com_through_key_frames,
+)
 from manikin.centroidal.feasibility import polytopes_of
 from manikin.centroidal.transcription import transcribe
 from manikin.contact import Phase, Stance, StanceSequence, sole
@@ -54,3 +63,12 @@ def test_certificate(benchmark, problem):
     """Every requirement measured at every millisecond."""
     result = plan_com(problem)
     assert benchmark(result.residuals).within()
+
+
+def test_through_key_frames(benchmark, problem):
+    """Polytopes, quadratic programme and certificate, on the timing-free trajectory as a recording."""
+    trajectory = plan_com(problem).trajectory
+    time = np.linspace(0.0, trajectory.duration, 501)
+    recording = Recording(time, trajectory.position(time), problem.sequence, trajectory.schedule.instants)
+    asked = KeyframeProblem(79.0, recording)
+    assert benchmark(plan_com_through_key_frames, asked).succeeded
