@@ -5,6 +5,7 @@ from manikin.centroidal.constraints import BentSurface, GeometricConstraint, hei
 from manikin.centroidal.feasibility import Failure, Feasibility, assess_feasibility, intersection_radii
 from manikin.centroidal.keyframe_problem import KeyframeProblem
 from manikin.centroidal.keyframes import KeyframeResult, plan_com_through_key_frames
+from manikin.centroidal.overhead import CeilingHeight, Zone, height_below
 from manikin.centroidal.problem import CentroidalProblem, MarginSpace, Weights
 from manikin.centroidal.recording import Recording
 from manikin.centroidal.timing_free import CentroidalResult, plan_com
@@ -12,6 +13,7 @@ from manikin.centroidal.trajectory import CentroidalTrajectory
 
 __all__ = [
     "BentSurface",
+    "CeilingHeight",
     "CentroidalProblem",
     "CentroidalResult",
     "CentroidalTrajectory",
@@ -25,8 +27,10 @@ __all__ = [
     "Residual",
     "Residuals",
     "Weights",
+    "Zone",
     "assess_feasibility",
     "height_band",
+    "height_below",
     "intersection_radii",
     "plan_com",
     "plan_com_through_key_frames",

@@ -20,10 +20,13 @@ class GeometricConstraint:
         name: How messages call it, such as ``"height above the lower surface"``.
         function: Takes the three coordinates [m] as numpy arrays or as CasADi symbols and
             returns the violation [m], element-wise; numpy's elementary functions work on both.
+        impassable: Why no position on the far side can be reached through the constraint; empty
+            when it can be met everywhere. It is what a failure then names.
     """
 
     name: str
     function: CoordinateFunction
+    impassable: str = ""
 
     def violation(self, position: FloatArray) -> FloatArray:
         """(n,) value of the function at (n, 3) positions; positive means violated [m]."""

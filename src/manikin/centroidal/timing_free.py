@@ -177,6 +177,10 @@ def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], be
     else has the largest margin that was found.
     """
     found, worst = best.certificate, best.certificate.largest
+    barrier = next((item for item in problem.geometric if item.impassable), None)
+    if barrier is not None:
+        at = found[barrier.name]
+        return Failure(barrier.name, f"{barrier.impassable}; no way around it was found", at.phase, at.time)
     if worst.requirement != "balance margin":
         return Failure(
             worst.requirement, f"no trajectory found: {worst} in the best attempt", worst.phase, worst.time

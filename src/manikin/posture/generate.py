@@ -139,11 +139,14 @@ def generate_posture(
     found: list[_Iterate] = []
     for q, warm in _starts(problem, start, settings):
         # A cold start goes to its contacts through the obstacles first: from outside, thin
-        # obstacles would trap it on their wrong side.
+        # obstacles would trap it on their wrong side. A low one may trap it there.
         if not warm and problem.proximity is not None:
             freely = freely or PostureSolver(replace(problem, proximity=None), settings)
-            q = freely.solve(q).q
-        found.append(solver.solve(q))
+            found.append(solver.solve(freely.solve(q).q))
+            if not solver.meets(found[-1]):
+                found.append(solver.solve(q))
+        else:
+            found.append(solver.solve(q))
         met = sum(solver.meets(item) for item in found)
         if met == COMPARED or (met and warm):
             break

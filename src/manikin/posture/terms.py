@@ -122,7 +122,10 @@ class ComTerm:
 
 @dataclass(frozen=True, eq=False)
 class UprightTerm:
-    """A segment's vertical axis upright: ``r = z x up``, the sine of the tilt.
+    """A segment's vertical axis upright: ``r = z - up``, the chord of the tilt.
+
+    For small tilts it is as long as the tilt; unlike the sine it grows up to the opposite
+    direction, so that a raised arm is drawn down.
 
     Attributes:
         segment: Name of the segment.
@@ -137,14 +140,14 @@ class UprightTerm:
     def evaluate(self, configuration: Configuration) -> Linearised:
         """See :class:`Term`."""
         rotation, _ = configuration.segment_placement(self.segment)
-        axis, up = rotation @ self.axis, self.direction
-        # d(z x u) = (w x z) x u = z (w.u) - w (z.u)
-        turning = np.outer(axis, up) - (axis @ up) * np.eye(3)
-        return Linearised(skew(axis) @ up, turning @ configuration.segment_jacobian(self.segment)[3:])
+        axis = rotation @ self.axis
+        return Linearised(
+            axis - self.direction, -skew(axis) @ configuration.segment_jacobian(self.segment)[3:]
+        )
 
     def describe(self, residual: FloatArray) -> str:
         """See :class:`Term`."""
-        angle = np.rad2deg(np.arcsin(min(1.0, float(np.linalg.norm(residual)))))
+        angle = np.rad2deg(2.0 * np.arcsin(min(1.0, 0.5 * float(np.linalg.norm(residual)))))
         return f"segment '{self.segment}' is tilted by {angle:.1f} deg"
 
 

@@ -33,7 +33,7 @@ from manikin.spatial import GRAVITY, FloatArray, frozen_array, rotation_from_rpy
 
 if TYPE_CHECKING:
     from manikin.body import BodyModel
-    from manikin.centroidal import CentroidalProblem, KeyframeProblem
+    from manikin.centroidal import CentroidalProblem, GeometricConstraint, KeyframeProblem
     from manikin.scene import Scene
 
 BODY_WEIGHTS_CAP = 3.0
@@ -247,9 +247,9 @@ class Scenario:
         Raises:
             ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
         """
-        from manikin.centroidal import CentroidalProblem, Weights, height_band
+        from manikin.centroidal import CentroidalProblem, Weights
 
-        options, band = self.planning, self.height_band
+        options = self.planning
         rest = (0.0, 0.0, 0.0) if options.zero_end_accelerations else None
         given = {"degree": options.degree, "samples": options.samples}
         try:
@@ -263,7 +263,7 @@ class Scenario:
                 margin_space=options.margin_space,
                 required_margin=self.required_margin,
                 support_distance=self.max_support_distance,
-                geometric=() if band is None else height_band(band.lower, band.upper),
+                geometric=self._height_constraints(),
                 max_duration=options.max_duration_s,
                 weights=Weights(**options.weights.model_dump(exclude_none=True)),
                 friction_model=options.friction_model,
@@ -301,6 +301,18 @@ class Scenario:
         """Path of a file that the scenario names: in its folder, or else from the current one."""
         inside = self.folder / name
         return inside if inside.exists() else Path(name)
+
+    def _height_constraints(self) -> tuple[GeometricConstraint, ...]:
+        from manikin.centroidal import height_band
+        from manikin.scenarios.overhead import overhead_constraints
+
+        band, entry = self.height_band, self._constraint("overhead")
+        found = () if band is None else height_band(band.lower, band.upper)
+        if entry is None or entry.overhead is None:
+            return found
+        names = None if entry.overhead == "automatic" else tuple(entry.overhead)
+        sequence = self.build_sequence()
+        return (*found, *overhead_constraints(self.build_body(), self.build_scene(), sequence, names))
 
     def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
         """Check that every contact of the supports lies on a surface of the scene.

@@ -301,6 +301,11 @@ class ComConstraintSection(Section):
     max_support_distance_m: Positive | None = Field(
         default=None, description="largest distance from the CoM to every foot in contact [m]"
     )
+    overhead: Annotated[list[Text], Field(min_length=1)] | Literal["automatic"] | None = Field(
+        default=None,
+        description="keep the CoM low enough for the body to fold below overhead obstacles: 'automatic' for "
+        "all that hover 0.3 m or more above the supports, or the names of those to pass below",
+    )
 
     @model_validator(mode="after")
     def _one(self) -> Self:
@@ -431,6 +436,15 @@ class ScenarioFile(Section):
         for index, name in enumerate(names):
             if name in names[:index]:
                 raise refuse(f"scene[{index}].name", f"is {name!r} again; valid: a unique name")
+        for index, constraint in enumerate(self.com_constraints):
+            wanted = constraint.overhead if isinstance(constraint.overhead, list) else []
+            for number, name in enumerate(wanted):
+                if name not in names:
+                    raise refuse(
+                        f"com_constraints[{index}].overhead[{number}]",
+                        f"is {name!r}; valid: automatic, or the name of an obstacle of the scene "
+                        f"({', '.join(names) or 'it has none'})",
+                    )
         for key in type(self.com_constraints[0])._keys() if self.com_constraints else ():
             if sum(getattr(c, key) is not None for c in self.com_constraints) > 1:
                 raise refuse("com_constraints", f"holds {key} twice; valid: at most once")

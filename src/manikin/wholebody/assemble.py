@@ -183,7 +183,7 @@ class _Planner:
         if result.failure is None:
             return None
         for index, item in enumerate(swings):
-            start, end = self.trajectory.schedule.swing_interval(item.swing)
+            start, end = item.interval
             near = start - NEAR_FLIGHT <= result.failure.time <= end + NEAR_FLIGHT
             if item.method == "smooth" and item.failure is None and near:
                 other = self.flights.search(item.swing, item, iterations=SECOND_SEARCH)
@@ -290,7 +290,7 @@ class _Planner:
             return None
         reason, time = violation
         for item in swings:
-            start, end = self.trajectory.schedule.swing_interval(item.swing)
+            start, end = item.interval
             if item.failure is not None and start <= time <= end:
                 reason = f"{reason}; swing of {item.swing.effector}: {item.failure}"
         near = [failure for failure in guide.failures if abs(failure.time - time) < 0.2]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manikin.body import BodyModel
+from manikin.body import BodyModel, Configuration
 from manikin.body.limb import end_segments
 from manikin.centroidal import CentroidalTrajectory
 from manikin.contact import Contact, ContactSchedule, Swing
@@ -28,6 +28,9 @@ PITCH_PER_METRE = 3.0
 MOST_PITCH = 0.9
 """Largest such turn [rad]."""
 
+REACHING_TIME = 0.7
+"""A free hand begins to reach for its grasp this long before [s], and is put away as slowly."""
+
 
 @dataclass(frozen=True, eq=False)
 class PlannedSwing:
@@ -36,7 +39,7 @@ class PlannedSwing:
     Attributes:
         swing: The flight.
         curve: Its curve, or the best attempt.
-        method: ``"smooth"`` or ``"bi-rrt"``.
+        method: ``"smooth"``, ``"bi-rrt"``, or ``"reach"`` for an effector that is free at one end.
         failure: None, or what the best attempt does not keep.
     """
 
@@ -44,6 +47,11 @@ class PlannedSwing:
     curve: SwingCurve
     method: str
     failure: str | None = None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """First and last instant of the curve [s]: the whole flight unless one end is free."""
+        return self.curve.start_time, self.curve.end_time
 
 
 class FlightPlanner:
@@ -78,14 +86,13 @@ class FlightPlanner:
         return self._trajectory.schedule
 
     def flights(self) -> tuple[Swing, ...]:
-        """Every flight from one contact to another."""
-        swings = self.schedule.sequence.swings()
-        return tuple(swing for swing in swings if swing.start is not None and swing.end is not None)
+        """Every flight from a contact or to one."""
+        return self.schedule.sequence.swings()
 
     def plan(self, swing: Swing) -> PlannedSwing:
         """Find a smooth curve, or else search one."""
-        assert swing.start is not None
-        assert swing.end is not None
+        if swing.start is None or swing.end is None:
+            return self._reach(swing)
         start, end = self.schedule.swing_interval(swing)
         plan = plan_swing(
             _pose(swing.start), _pose(swing.end), start, end, self._clearance(swing), limits=self._limits,
@@ -93,6 +100,33 @@ class FlightPlanner:
         )  # fmt: skip
         smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure)
         return smooth if plan.succeeded else self.search(swing, smooth)
+
+    def _reach(self, swing: Swing) -> PlannedSwing:
+        """Curve between a contact and where the effector is in the preferred posture.
+
+        Only the end at the contact has to be kept; the rest is a hint, see
+        :func:`~manikin.wholebody.targets.effector_targets`.
+        """
+        start, end = self.schedule.swing_interval(swing)
+        if swing.start is None:
+            start = max(start, end - REACHING_TIME)
+        else:
+            end = min(end, start + REACHING_TIME)
+        contact = swing.end or swing.start
+        assert contact is not None
+        first, last = (
+            self._free_pose(swing.effector, time) if held is None else _pose(held)
+            for held, time in ((swing.start, start), (swing.end, end))
+        )
+        plan = plan_swing(
+            first, last, start, end, self._clearance(swing), limits=self._limits,
+            start_normal=contact.normal, end_normal=contact.normal, refine=0,
+        )  # fmt: skip
+        return PlannedSwing(swing, plan.curve, "reach")
+
+    def _free_pose(self, effector: str, time: float) -> Pose:
+        rotation, position = Configuration(self._body, self._reference(time)).effector_placement(effector)
+        return Pose(np.array(position), np.array(rotation))
 
     def search(self, swing: Swing, fallback: PlannedSwing, iterations: int = 2000) -> PlannedSwing:
         """Search a curve with the Bi-RRT and posture checks; ``fallback`` when there is none."""

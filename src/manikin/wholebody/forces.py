@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear, nnls
 
 from manikin.body import BodyModel
 from manikin.body.limb import carrying_segment, hinge_line
@@ -205,7 +205,11 @@ def _share_wrench(generators: _Generators, wrench: FloatArray, shares: FloatArra
     target = np.concatenate([force, (moment - turned) / _ARM])
     cost = np.diag(generators.cost / shares[generators.contact])
     stacked = np.vstack([_WRENCH_WEIGHT * matrix, cost])
-    return nnls(stacked, np.concatenate([_WRENCH_WEIGHT * target, np.zeros(len(cost))]))[0]
+    wanted = np.concatenate([_WRENCH_WEIGHT * target, np.zeros(len(cost))])
+    try:
+        return nnls(stacked, wanted)[0]
+    except RuntimeError:  # its active set cycles where generators are nearly dependent
+        return lsq_linear(stacked, wanted, bounds=(0.0, np.inf), tol=1e-12).x
 
 
 def _apply(model: pin.Model, data: pin.Data, generators: _Generators, magnitude: FloatArray) -> FloatArray:

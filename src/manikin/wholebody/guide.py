@@ -27,6 +27,10 @@ from manikin.wholebody.configuration_spline import align_quaternions
 from manikin.wholebody.targets import EffectorTarget, Ignored
 
 
+LEAST_WEIGHT = 0.05
+"""Targets of less importance than this are left to the fit."""
+
+
 @dataclass(frozen=True, eq=False)
 class GuideFailure:
     """The first guide posture that could not be found.
@@ -127,7 +131,7 @@ def _requirements(
     stance = schedule.stance_at(time)
     placements = {}
     for name, target in effectors.items():
-        if name not in stance and target.weight[k] > 0.0:
+        if name not in stance and target.weight[k] >= LEAST_WEIGHT:
             turn = (
                 target.rotation[k]
                 if target.rotation is not None and target.rotation_weight[k] > 0.5

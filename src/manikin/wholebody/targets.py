@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.contact import ContactSchedule
+from manikin.contact import ContactKind, ContactSchedule
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.flights import PlannedSwing, touch_pairs
@@ -72,15 +72,21 @@ def effector_targets(
                 contact, rows = phase.stance[name], phases == index
                 position[rows], rotation[rows] = contact.position, contact.rotation_contact_to_world
                 weight[rows] = 1.0
+                if contact.kind is ContactKind.GRASP:
+                    rotation_weight[rows] = GRASP_ROTATION_WEIGHT
         for item in swings:
             if item.swing.effector == name:
-                start, end = schedule.swing_interval(item.swing)
+                start, end = item.interval
                 rows = (time >= start) & (time < end)
                 state = item.curve.evaluate(time[rows])
                 position[rows], rotation[rows] = state.position, state.rotation
                 share = (time[rows] - start) / (end - start)
                 weight[rows] = _flight_weight(share, FLIGHT_POSITION_WEIGHT)
                 rotation_weight[rows] = _flight_weight(share, FLIGHT_ROTATION_WEIGHT)
+                if item.method == "reach":
+                    held = share if item.swing.start is None else 1.0 - share
+                    weight[rows] = _reach_weight(held)
+                    rotation_weight[rows] = GRASP_ROTATION_WEIGHT * held
         targets[name] = EffectorTarget(position, rotation, weight, rotation_weight)
     return targets
 
@@ -90,6 +96,17 @@ FLIGHT_POSITION_WEIGHT = 0.1
 
 FLIGHT_ROTATION_WEIGHT = 0.05
 """Importance of its orientation there: a hint, so that the ankle may follow the shank."""
+
+
+GRASP_ROTATION_WEIGHT = 0.05
+"""Importance of a grasping hand's orientation: a hint, for a grasp holds a point."""
+
+
+def _reach_weight(share: FloatArray) -> FloatArray:
+    """Importance from a free end (0) to the contact (1): none, then that of a flight, then full."""
+    blend = np.clip(share / 0.75, 0.0, 1.0)
+    rising = blend**2 * (3.0 - 2.0 * blend)
+    return rising * _flight_weight(np.maximum(share, 0.5), FLIGHT_POSITION_WEIGHT)
 
 
 def _flight_weight(share: FloatArray, middle: float) -> FloatArray:

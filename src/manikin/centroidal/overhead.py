@@ -1,0 +1,148 @@
+"""An upper bound of the CoM's height below an overhead obstacle, smooth in x and y.
+
+Where the body, with the CoM at (x, y), would reach below the obstacle, the CoM must not be
+higher than the body can fold to; away from it the bound rises smoothly to a height that no
+posture reaches.  [Qiu2012]_ 5.29 drew such a surface by hand and left its construction open
+(8.2.2); this is our own.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull
+
+from manikin.centroidal.constraints import GeometricConstraint
+from manikin.errors import InputError
+from manikin.spatial import FloatArray, finite_number, frozen_array
+
+_PARALLEL = 1e-9
+"""Sine of the angle up to which two edges count as parallel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """A convex polygon of the ground with soft edges.
+
+    Attributes:
+        normals: (k, 2) unit outward normals of the edges.
+        offsets: (k,) the polygon is ``normals @ p <= offsets`` [m].
+        onset: Distance from an edge at which the zone is no longer felt [m].
+    """
+
+    normals: FloatArray
+    offsets: FloatArray
+    onset: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "normals", frozen_array(self.normals, "zone normals", (None, 2)))
+        object.__setattr__(self, "offsets", frozen_array(self.offsets, "zone offsets", (len(self.normals),)))
+        finite_number(self.onset, "zone onset [m]", above=0.0)
+
+    @classmethod
+    def below(cls, outline: ArrayLike, footprints: list[FloatArray], onset: float) -> "Zone":
+        """CoM positions at which a body reaches below an obstacle.
+
+        The outline is widened by the mirrored footprint (their Minkowski sum): a footprint
+        placed at the CoM meets the outline exactly when the CoM is in the sum.
+
+        Args:
+            outline: (n, 2) points whose convex hull is the obstacle seen from above [m].
+            footprints: (m, 2) corners of the convex region that the body covers, relative to
+                the CoM in world axes; one for each heading, of which the widest counts [m].
+            onset: See :class:`Zone`.
+        """
+        points = frozen_array(outline, "overhead outline [m]", (None, 2))
+        normals = _distinct(np.vstack([_edge_normals(points), *(_edge_normals(-f) for f in footprints)]))
+        reach = np.max([(-footprint @ normals.T).max(axis=0) for footprint in footprints], axis=0)
+        return cls(normals, (points @ normals.T).max(axis=0) + reach, onset)
+
+    def share(self, x: Any, y: Any) -> Any:
+        """1 inside, 0 beyond the onset of any edge, twice continuously differentiable between.
+
+        The product of the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` over the edges.
+
+        Args:
+            x: Floats, arrays or CasADi symbols [m].
+            y: The same.
+        """
+        share = 1.0
+        for normal, offset in zip(self.normals, self.offsets, strict=True):
+            beyond = (normal[0] * x + normal[1] * y - offset) / self.onset
+            u = 1.0 - np.fmin(np.fmax(beyond, 0.0), 1.0)
+            share = share * (u**3 * (u * (6.0 * u - 15.0) + 10.0))
+        return share
+
+    def crosses(self, start: ArrayLike, goal: ArrayLike) -> bool:
+        """Whether the straight line between two points (2,) meets the polygon itself."""
+        a, b = np.asarray(start, dtype=np.float64), np.asarray(goal, dtype=np.float64)
+        first, last = self.normals @ a - self.offsets, self.normals @ b - self.offsets
+        enter, leave = 0.0, 1.0
+        for before, after in zip(first, last, strict=True):
+            if before > 0.0 and after > 0.0:
+                return False
+            if before > 0.0:
+                enter = max(enter, before / (before - after))
+            elif after > 0.0:
+                leave = min(leave, before / (before - after))
+        return enter <= leave
+
+
+@dataclass(frozen=True, eq=False)
+class CeilingHeight:
+    """Greatest height of the CoM near one overhead obstacle.
+
+    Attributes:
+        zone: Where the body is below it.
+        free: Height far from it, out of reach of the body [m].
+        low: Height in the zone [m].
+    """
+
+    zone: Zone
+    free: float
+    low: float
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.free:
+            raise InputError(
+                f"height below an obstacle is {self.low} m and {self.free} m away from it; "
+                "valid: not higher below it"
+            )
+
+    def __call__(self, x: Any, y: Any, z: Any = 0.0) -> Any:  # noqa: ARG002
+        """Height at (x, y) [m], for numbers, arrays and CasADi symbols."""
+        return self.free - (self.free - self.low) * self.zone.share(x, y)
+
+
+@dataclass(frozen=True)
+class _Below:
+    surface: CeilingHeight
+
+    def __call__(self, x: Any, y: Any, z: Any) -> Any:
+        return z - self.surface(x, y)
+
+
+def height_below(name: str, surface: CeilingHeight, impassable: str = "") -> GeometricConstraint:
+    """The CoM below the surface of one overhead obstacle.
+
+    Args:
+        name: Of the obstacle.
+        surface: Greatest height of the CoM.
+        impassable: Why nothing passes below it, when the body cannot fold that low.
+    """
+    return GeometricConstraint(f"height below '{name}'", _Below(surface), impassable)
+
+
+def _edge_normals(points: FloatArray) -> FloatArray:
+    """(k, 2) outward normals of the edges of the convex hull of (n, 2) points."""
+    hull = ConvexHull(points)
+    return np.asarray(hull.equations[:, :2], dtype=np.float64)
+
+
+def _distinct(normals: FloatArray) -> FloatArray:
+    kept: list[FloatArray] = []
+    for normal in normals:
+        if all(normal @ other < 1.0 - _PARALLEL for other in kept):
+            kept.append(normal)
+    return np.array(kept)
