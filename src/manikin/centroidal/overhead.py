@@ -6,6 +6,7 @@ posture reaches.  [Qiu2012]_ 5.29 drew such a surface by hand and left its const
 (8.2.2); this is our own.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,7 +42,7 @@ class Zone:
         finite_number(self.onset, "zone onset [m]", above=0.0)
 
     @classmethod
-    def below(cls, outline: ArrayLike, footprints: list[FloatArray], onset: float) -> "Zone":
+    def below(cls, outline: ArrayLike, footprints: Sequence[FloatArray], onset: float) -> "Zone":
         """CoM positions at which a body reaches below an obstacle.
 
         The outline is widened by the mirrored footprint (their Minkowski sum): a footprint
@@ -51,11 +52,12 @@ class Zone:
             outline: (n, 2) points whose convex hull is the obstacle seen from above [m].
             footprints: (m, 2) corners of the convex region that the body covers, relative to
                 the CoM in world axes; one for each heading, of which the widest counts [m].
+                Without any the zone is the outline itself.
             onset: See :class:`Zone`.
         """
         points = frozen_array(outline, "overhead outline [m]", (None, 2))
         normals = _distinct(np.vstack([_edge_normals(points), *(_edge_normals(-f) for f in footprints)]))
-        reach = np.max([(-footprint @ normals.T).max(axis=0) for footprint in footprints], axis=0)
+        reach = np.max([(-f @ normals.T).max(axis=0) for f in footprints] or [np.zeros(len(normals))], axis=0)
         return cls(normals, (points @ normals.T).max(axis=0) + reach, onset)
 
     def share(self, x: Any, y: Any) -> Any:

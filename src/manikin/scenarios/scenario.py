@@ -311,8 +311,10 @@ class Scenario:
         if entry is None or entry.overhead is None:
             return found
         names = None if entry.overhead == "automatic" else tuple(entry.overhead)
-        sequence = self.build_sequence()
-        return (*found, *overhead_constraints(self.build_body(), self.build_scene(), sequence, names))
+        overhead = overhead_constraints(
+            self.build_body(), self.build_scene(), self.build_sequence(), (self.start_com, self.goal_com), names
+        )
+        return (*found, *overhead)
 
     def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
         """Check that every contact of the supports lies on a surface of the scene.

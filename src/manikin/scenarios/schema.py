@@ -304,7 +304,7 @@ class ComConstraintSection(Section):
     overhead: Annotated[list[Text], Field(min_length=1)] | Literal["automatic"] | None = Field(
         default=None,
         description="keep the CoM low enough for the body to fold below overhead obstacles: 'automatic' for "
-        "all that hover 0.3 m or more above the supports, or the names of those to pass below",
+        "all that hover over the way at least 0.3 m above the supports, or the names of those to pass below",
     )
 
     @model_validator(mode="after")

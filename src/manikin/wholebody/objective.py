@@ -120,7 +120,7 @@ class MotionObjective:
         with np.errstate(divide="ignore"):
             self._reference_weight = 1.0 / targets.reference_scale
         self.task_rows = 6 * len(self._frames) + 3
-        held = [np.repeat(target.weight[:, None] >= 1.0, 6, axis=1) for target in targets.effectors.values()]
+        held = [_held_rows(target) for target in targets.effectors.values()]
         self.exact_rows = np.hstack([*held, np.ones((len(targets.time), 3), dtype=bool)])
         """(n, task_rows) whether a task has to be met exactly: contacts and centre of mass."""
 
@@ -268,6 +268,13 @@ class MotionObjective:
         first, second, third = (jacobian / scale[:, :, None] for jacobian in momentum.jacobians)
         out.momentum = MomentumRate(residual / scale, (first, second, third))
         out.sample_cost += 0.5 * np.sum(out.momentum.value**2, axis=1)
+
+
+def _held_rows(target: EffectorTarget) -> NDArray[np.bool_]:
+    """(n, 6) whether position and orientation have to be met exactly; a grasp holds its position only."""
+    position = target.weight >= 1.0
+    rows = (position, position & (target.rotation_weight >= 1.0))
+    return np.repeat(np.stack(rows, axis=1), 3, axis=1)
 
 
 def _to_raw(jacobian: FloatArray, tangent: FloatArray) -> FloatArray:

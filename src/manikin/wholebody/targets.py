@@ -98,7 +98,7 @@ FLIGHT_ROTATION_WEIGHT = 0.05
 """Importance of its orientation there: a hint, so that the ankle may follow the shank."""
 
 
-GRASP_ROTATION_WEIGHT = 0.05
+GRASP_ROTATION_WEIGHT = 0.03
 """Importance of a grasping hand's orientation: a hint, for a grasp holds a point."""
 
 
