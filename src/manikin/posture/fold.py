@@ -15,6 +15,7 @@ from manikin.body import BodyModel, Configuration
 from manikin.body.limb import end_segments
 from manikin.body.segments import Shape, ShapeKind
 from manikin.contact import Contact, sole
+from manikin.errors import BodyError
 from manikin.posture.generate import PostureResult, SolverSettings, generate_posture
 from manikin.posture.problem import PostureProblem, com_target
 from manikin.scene import Box, Obstacle, Proximity, Scene
@@ -73,6 +74,9 @@ def fold_under(body: BodyModel, height: float) -> Fold | None:
 
     Returns:
         The fold, or None when no posture on both feet was found.
+
+    Raises:
+        BodyError: If the body has no stature or no soles.
     """
     q = body.standing_posture()
     for ceiling in _heights(body, height):
@@ -167,8 +171,8 @@ def _half_extents(shape: Shape, rotation: FloatArray) -> FloatArray:
 
 
 def _feet(body: BodyModel) -> Iterator[Contact]:
-    half = 0.5 * FEET_APART * (body.stature or 1.75)
+    if body.stature is None or body.sole_length is None or body.sole_width is None:
+        raise BodyError(f"body {body.name!r} has no stature or soles; valid: a human body")
+    half = 0.5 * FEET_APART * body.stature
     for effector, y in (("left_foot", half), ("right_foot", -half)):
-        yield sole(
-            effector, (0.0, y, 0.0), 0.0, length=body.sole_length, width=body.sole_width, friction=0.7
-        )
+        yield sole(effector, (0.0, y, 0.0), 0.0, length=body.sole_length, width=body.sole_width, friction=0.7)

@@ -68,9 +68,7 @@ def _hovers(obstacle: Obstacle, soles: Sequence[Contact]) -> bool:
     return float(obstacle.bounds[0][2]) - _level(soles, _outline(obstacle)) >= HOVERING
 
 
-def _constraint(
-    body: BodyModel, obstacle: Obstacle, soles: Sequence[Contact]
-) -> GeometricConstraint | None:
+def _constraint(body: BodyModel, obstacle: Obstacle, soles: Sequence[Contact]) -> GeometricConstraint | None:
     standing = Configuration(body, body.standing_posture())
     stature = float(standing.effector_placement("head")[1][2])
     scale = stature / _REFERENCE_STATURE

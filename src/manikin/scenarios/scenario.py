@@ -312,7 +312,11 @@ class Scenario:
             return found
         names = None if entry.overhead == "automatic" else tuple(entry.overhead)
         overhead = overhead_constraints(
-            self.build_body(), self.build_scene(), self.build_sequence(), (self.start_com, self.goal_com), names
+            self.build_body(),
+            self.build_scene(),
+            self.build_sequence(),
+            (self.start_com, self.goal_com),
+            names,
         )
         return (*found, *overhead)
 

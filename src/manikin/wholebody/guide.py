@@ -26,7 +26,6 @@ from manikin.spatial import FloatArray
 from manikin.wholebody.configuration_spline import align_quaternions
 from manikin.wholebody.targets import EffectorTarget, Ignored
 
-
 LEAST_WEIGHT = 0.05
 """Targets of less importance than this are left to the fit."""
 
