@@ -10,7 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from manikin.centroidal import KeyframeProblem, Recording, Weights, plan_com_through_key_frames
+from manikin.centroidal import (
+    GeometricConstraint,
+    KeyframeProblem,
+    Recording,
+    Weights,
+    plan_com_through_key_frames,
+)
 from manikin.centroidal.keyframe_spline import keyframe_knots
 from manikin.errors import InputError
 from manikin.motion.description import schedule_from
@@ -250,6 +256,16 @@ def test_a_position_that_nothing_balances_is_explained(platform_stances):
     assert failure.requirement == "key frame balance"
     assert "key frame 3" in failure.reason
     assert failure.time == pytest.approx(good.key_times[3])
+
+
+def test_a_recorded_position_that_breaks_a_constraint_is_explained(platform_stances):
+    low = GeometricConstraint("height under the ceiling", lambda _x, _y, z: z - 0.9)
+    failure = plan_com_through_key_frames(problem(platform_stances, geometric=[low])).failure
+    assert failure.requirement == "height under the ceiling"
+    limit = {"support_distance": 0.93}
+    failure = plan_com_through_key_frames(problem(platform_stances, **limit)).failure
+    assert failure.requirement == "support distance"
+    assert "key frame" in failure.reason
 
 
 def test_too_little_freedom_is_explained_with_the_largest_margin(platform_stances):

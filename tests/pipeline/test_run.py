@@ -129,6 +129,22 @@ def test_an_executed_run_is_a_recording_for_the_keyframe_method(platform, tmp_pa
     assert result.summary["execution"]["min_margin"] > 0.0
 
 
+@pytest.mark.slow
+def test_the_passage_under_a_beam_runs_again_through_its_key_frames(tmp_path):
+    """The example of [Qiu2012]_ 5.3.3, 9 key frames with a left-hand grasp, on our own recording."""
+    recorded = run("beam-H1C1@S2", out=tmp_path / "recorded", seed=0)
+    assert recorded.succeeded, recorded.summary["failure"]
+    file = tmp_path / "again.yaml"
+    file.write_text(
+        "extends: beam-H1C1@S2\nname: again\nplanning: {method: keyframes, recording: recorded}\n"
+    )
+    result = run(file)
+    assert result.succeeded, result.summary["failure"]
+    assert len(result.centroidal.key_instants) == 9
+    assert result.summary["centroidal"]["min_margin"] > 15.0
+    assert result.summary["execution"]["min_margin"] > 0.0
+
+
 def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_path):
     text = load_scenario("platform").to_yaml().replace("min_margin: 20.0", "min_margin: 60.0")
     file = tmp_path / "greedy.yaml"

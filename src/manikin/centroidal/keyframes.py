@@ -241,9 +241,32 @@ class _Search:
 
 
 def _assess(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Feasibility:
-    """Propositions 1 and 2 and the ends, then whether each recorded position can be balanced at all."""
+    """Propositions 1 and 2 and the ends, then each recorded position by itself."""
     found = assess_feasibility(problem.requirements, polytopes)
-    return found if found.failure else replace(found, failure=_key_frame_failure(problem, polytopes))
+    failure = found.failure or _position_failure(problem) or _key_frame_failure(problem, polytopes)
+    return replace(found, failure=failure)
+
+
+def _position_failure(problem: KeyframeProblem) -> Failure | None:
+    """Find a key frame whose recorded position breaks a constraint; passing it, the motion would as well."""
+    requirements, recording = problem.requirements, problem.recording
+    for number, frame in enumerate(recording.key_frames):
+        time, com = float(recording.time[frame]), recording.com[frame]
+        phase = int(recording.schedule.phase_at(time))
+        what = f"recorded CoM {np.round(com, 3).tolist()} of key frame {number} at {time:.3f} s"
+        for constraint in requirements.geometric:
+            violation = float(constraint.violation(com))
+            if violation > TOLERANCE:
+                reason = f"{what} violates '{constraint.name}' by {violation:.4f} m"
+                return Failure(constraint.name, reason, phase, time)
+        limit = requirements.support_distance
+        for index in phases_touching(recording.schedule, time) if limit is not None else ():
+            for contact in recording.sequence[index].stance:
+                distance = float(np.linalg.norm(com - contact.position))
+                if limit is not None and distance > limit + TOLERANCE:
+                    reason = f"{what} is {distance:.3f} m from {contact.effector}; the limit is {limit:.3f} m"
+                    return Failure("support distance", reason, index, time, contact.effector)
+    return None
 
 
 def _key_frame_failure(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Failure | None:
