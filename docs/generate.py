@@ -163,6 +163,52 @@ def results_table() -> str:
     return f"{markdown_table(report)}\n{total}\n"
 
 
+# --- walls ---------------------------------------------------------------------------------------
+
+
+PUBLISHED_TRIALS = {
+    "trial-1": ("1", "1e3", 3.58, 0.30),
+    "trial-2": ("1e3", "1", 3.90, 196.26),
+    "trial-3": ("1e3", "1e-3", 3.92, 134.01),
+    "trial-4": ("1e4", "1e-3", 5.29, 280.55),
+    "trial-5": ("1e4", "10", 5.28, 280.60),
+}
+"""[Qiu2012] Table 5.1: weights of margin and smoothness, duration [s], margin [N]."""
+
+
+def walls_trials() -> str:
+    """Table 5.1 beside the trials measured by ``docs/walls.py``."""
+    found = json.loads((DOCS / "walls.json").read_text(encoding="utf-8"))
+    rows = [
+        "| trial | $w_1$ | $w_2$ | thesis: duration [s] | margin [N] | ours: duration [s] | margin [N] | "
+        "solved in [s] |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name, (margin_weight, smoothness, duration, margin) in PUBLISHED_TRIALS.items():
+        ours = found["trials"][name]
+        rows.append(
+            f"| {name} | {margin_weight} | {smoothness} | {duration:.2f} | {margin:.2f} | "
+            f"{ours['duration_s']:.2f} | {ours['margin_N']:.2f} | {ours['wall_s']:.1f} |"
+        )
+    ours = found["one_polynomial"]
+    rows.append(
+        f"| one-polynomial | 1e4 | 1e-3 | 5.29 | 280.55 | {ours['duration_s']:.2f} | "
+        f"{ours['margin_N']:.2f} | {ours['wall_s']:.1f} |"
+    )
+    return "\n".join(rows) + "\n"
+
+
+def walls_spacing() -> str:
+    """Margins of trial 4 within its published duration, over the spacing of the pairs."""
+    found = json.loads((DOCS / "walls.json").read_text(encoding="utf-8"))["spacings"]
+    rows = ["| pairs apart along y [m] | duration [s] | margin [N] |", "|---|---|---|"]
+    for spacing, ours in found.items():
+        value = "none found" if ours["margin_N"] is None else f"{ours['margin_N']:.1f}"
+        duration = "" if ours["duration_s"] is None else f"{ours['duration_s']:.2f}"
+        rows.append(f"| {spacing} | {duration} | {value} |")
+    return "\n".join(rows) + "\n"
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "scenario": lambda: schema_tables(json_schema()),
     "stance": lambda: schema_tables(StanceFile.model_json_schema()),
@@ -170,6 +216,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "hinges": hinge_table,
     "datasets": dataset_table,
     "results": results_table,
+    "walls-trials": walls_trials,
+    "walls-spacing": walls_spacing,
 }
 
 

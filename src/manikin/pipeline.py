@@ -35,6 +35,7 @@ from manikin.spatial import rotation_from_yaw
 from manikin.wholebody import WholeBodyResult, WholeBodySettings, plan_whole_body
 from manikin.wholebody.configuration_spline import rotation_from_quaternion
 from manikin.wholebody.manner import manner_of
+from manikin.wholebody.point_mass import point_mass_motion
 
 Progress = Callable[[str, float], None]
 """Told the stage and the share of it that is done, in [0, 1]."""
@@ -100,7 +101,7 @@ class RunResult:
 
     Attributes:
         summary: As printed by ``manikin run --json``.
-        planned: Planned whole-body motion, or None when that stage did not run.
+        planned: Planned whole-body motion, or that of a point mass; None when there is none.
         executed: Executed motion, or None.
         centroidal: Result of the centre-of-mass stage.
         wholebody: Result of the whole-body stage, or None.
@@ -204,17 +205,28 @@ class _Run:
 
     def run(self) -> RunResult:
         centroidal, trajectory = self._plan_com()
+        if self._scenario.is_point_mass:
+            return self._result(centroidal, self._move_point_mass(centroidal), None, None)
         wholebody = None if trajectory is None else self._plan_whole_body(trajectory)
         execution = None
         if trajectory is not None and wholebody is not None and wholebody.succeeded:
             execution = self._execute(trajectory, wholebody)
+        return self._result(centroidal, None if wholebody is None else wholebody.motion, wholebody, execution)
+
+    def _result(
+        self,
+        centroidal: CentroidalResult,
+        planned: Motion | None,
+        wholebody: WholeBodyResult | None,
+        execution: Execution | None,
+    ) -> RunResult:
         self._summary["succeeded"] = self._summary["failure"] is None
         self._summary["wall_s"] = clock.perf_counter() - self._began
         if self._directory is not None:
             self._directory.write_summary(self._summary)
         return RunResult(
             summary=self._summary,
-            planned=None if wholebody is None else wholebody.motion,
+            planned=planned,
             executed=None if execution is None else execution.motion,
             centroidal=centroidal,
             wholebody=wholebody,
@@ -239,6 +251,14 @@ class _Run:
             return result, None
         real = ContactSchedule(self._scenario.build_sequence(), result.trajectory.schedule.instants)
         return result, replace(result.trajectory, schedule=real)
+
+    def _move_point_mass(self, centroidal: CentroidalResult) -> Motion | None:
+        """Motion of a body that has no joints to plan for and nothing to execute."""
+        if centroidal.trajectory is None:
+            return None
+        motion = point_mass_motion(centroidal.problem, centroidal.trajectory, centroidal.polytopes)
+        self._keep_motions(centroidal.trajectory, motion, None)
+        return motion
 
     def _plan_whole_body(self, trajectory: CentroidalTrajectory) -> WholeBodyResult:
         result = plan_whole_body(

@@ -15,7 +15,7 @@ COMPARISON = "comparison.json"
 
 
 def write_products(directory: str | Path, progress: Callable[[str, float], None] | None = None) -> list[Path]:
-    """Draw the figures and write the BVH file of a run directory.
+    """Draw the figures and write the BVH file of a run directory; a point mass has no skeleton for BVH.
 
     Args:
         directory: The directory of a finished run, successful or not.
@@ -34,7 +34,7 @@ def write_products(directory: str | Path, progress: Callable[[str, float], None]
     (folder / FIGURES).mkdir(exist_ok=True)
     report = progress or _silent
     written = write_figures(record, folder / FIGURES, lambda share: report("figures", 0.9 * share))
-    if record.motions and record.body is not None:
+    if record.motions and record.body is not None and not record.body.is_point_mass:
         written.append(export_motion(record.content, folder, "bvh"))
     report("figures", 1.0)
     return written

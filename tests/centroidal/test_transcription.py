@@ -38,7 +38,7 @@ def test_gram_matrix_integrates_products():
 @pytest.mark.parametrize("style", GUESS_STYLES)
 def test_guesses_meet_the_ends_and_the_durations(platform, style):
     for problem in (platform(), platform(max_duration=2.7)):
-        bezier, durations = guess(problem, style)
+        bezier, durations = guess(problem, style, polytopes_of(problem))
         assert np.allclose(bezier[0, 0], problem.start_com)
         assert np.allclose(bezier[-1, -1], problem.goal_com)
         assert np.allclose(bezier[0, 1], problem.start_com)
@@ -63,7 +63,7 @@ def programme_values(problem, bezier, durations, margin):
 def test_balance_rows_are_the_facet_distances_at_the_samples(platform):
     """Row j of a phase is h - H w at j / n_s of the phase, j = 0 ... n_s (DOUBTS Q-8)."""
     problem = platform()
-    bezier, durations = guess(problem, GUESS_STYLES[0])
+    bezier, durations = guess(problem, GUESS_STYLES[0], polytopes_of(problem))
     programme, polytopes, _, rows = programme_values(problem, bezier, durations, 7.0)
     trajectory = trajectory_of(problem, bezier, durations)
     phase, start = 0, 0
@@ -81,7 +81,7 @@ def test_balance_rows_are_the_facet_distances_at_the_samples(platform):
 
 def test_continuity_and_end_rows_vanish_on_a_spline(platform):
     problem = platform()
-    bezier, durations = guess(problem, GUESS_STYLES[0])
+    bezier, durations = guess(problem, GUESS_STYLES[0], polytopes_of(problem))
     programme, _, _, rows = programme_values(problem, bezier, durations, 0.0)
     start = 0
     ends = 0
@@ -99,7 +99,7 @@ def test_continuity_and_end_rows_vanish_on_a_spline(platform):
 def test_objective_is_the_time_average_of_the_squares(platform):
     """[Qiu2012]_ 5.28 against a fine sum over samples of the trajectory."""
     problem = platform()
-    bezier, durations = guess(problem, GUESS_STYLES[0])
+    bezier, durations = guess(problem, GUESS_STYLES[0], polytopes_of(problem))
     _, _, objective, _ = programme_values(problem, bezier, durations, 7.0)
     trajectory = trajectory_of(problem, bezier, durations)
     t = (np.arange(200_000) + 0.5) / 200_000 * trajectory.duration
@@ -126,7 +126,7 @@ def test_leaving_facets_out_does_not_change_the_solution(platform):
     """Few facets with a certificate over all give the optimum of all facets."""
     problem = platform()
     polytopes = polytopes_of(problem)
-    bezier, durations = guess(problem, GUESS_STYLES[0])
+    bezier, durations = guess(problem, GUESS_STYLES[0], polytopes_of(problem))
     distances = facet_distances(problem, trajectory_of(problem, bezier, durations), polytopes)
     few, every = nearest_facets(distances), nearest_facets(distances, 1000)
     attempts = [

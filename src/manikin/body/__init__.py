@@ -10,6 +10,7 @@ from manikin.body.configuration import (
 )
 from manikin.body.human import body_from_signature, human
 from manikin.body.model import BodyModel
+from manikin.body.point_mass import point_mass
 from manikin.body.segments import Effector, Hinge, Segment, Shape, ShapeKind
 
 __all__ = [
@@ -27,5 +28,6 @@ __all__ = [
     "human",
     "integrate",
     "interpolate",
+    "point_mass",
     "random_configuration",
 ]

@@ -87,6 +87,11 @@ class BodyModel:
         return tuple(hinge.name for hinge in self.hinges)
 
     @property
+    def is_point_mass(self) -> bool:
+        """Whether it is one ball without joints, on massless feet."""
+        return len(self.segments) == 1 and not self.effectors
+
+    @property
     def nv(self) -> int:
         """Size of the velocity vector."""
         return 6 + len(self.hinges)

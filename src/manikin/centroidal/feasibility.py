@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
@@ -10,8 +11,9 @@ from scipy.optimize import linprog
 from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytope
 from manikin.centroidal.causes import low_friction, out_of_reach, slipping_slope
 from manikin.centroidal.problem import CentroidalProblem
+from manikin.contact import Stance
 from manikin.polytope import Polytope
-from manikin.spatial import FloatArray, skew
+from manikin.spatial import GRAVITY, FloatArray, skew
 
 ROUNDING = 1e-9
 """Slack given to comparisons of given lengths and times [m], [s]."""
@@ -25,7 +27,7 @@ class Failure:
     """Why there is no trajectory.
 
     Attributes:
-        requirement: Short name of what cannot be met: ``"durations"``, ``"intersection"``,
+        requirement: Short name of what cannot be met: ``"durations"``, ``"weight"``, ``"intersection"``,
             ``"start balance"``, ``"goal balance"``, ``"friction"``, ``"support distance"``,
             ``"balance margin"`` or the name of a geometric constraint.
         reason: One sentence with the numbers.
@@ -61,10 +63,39 @@ class Feasibility:
 
 
 def polytopes_of(problem: CentroidalProblem) -> tuple[WrenchPolytope, ...]:
-    """W_i of every phase about the world origin ([Qiu2012]_ 5.4.1; n_t polytopes for n_t phases)."""
-    return tuple(
-        wrench_polytope(phase.stance, friction_model=problem.friction_model) for phase in problem.sequence
-    )
+    """W_i of every phase about the world origin ([Qiu2012]_ 5.4.1; n_t polytopes for n_t phases).
+
+    A stance that is an earlier one moved elsewhere has that one's polytope, with moments about the
+    point moved along.
+    """
+    known: dict[tuple[Any, ...], tuple[FloatArray, WrenchPolytope]] = {}
+    found = []
+    for phase in problem.sequence:
+        centre = np.mean([contact.position for contact in phase.stance] or [np.zeros(3)], axis=0)
+        shape = _shape_of(phase.stance, centre)
+        if shape not in known:
+            polytope = wrench_polytope(phase.stance, friction_model=problem.friction_model)
+            known[shape] = centre, polytope
+        else:
+            before, like = known[shape]
+            moved = WrenchPolytope(
+                like.H, like.h, phase.stance, like.reference + centre - before, like.friction_model,
+                like.stance_cap_multipliers,
+            )  # fmt: skip
+            polytope = moved.at_reference(like.reference)
+        found.append(polytope)
+    return tuple(found)
+
+
+def _shape_of(stance: Stance, centre: FloatArray) -> tuple[Any, ...]:
+    """What a wrench polytope depends on but for the place of the stance, lengths to a nanometre."""
+    contacts = []
+    for contact in stance:
+        place = np.concatenate([contact.points_in_world - centre, contact.normal[None]])
+        limits = (contact.friction, contact.normal_force_cap, contact.torsion_limit, contact.max_force)
+        numbers = tuple((np.round(place, 9) + 0.0).ravel().tolist())
+        contacts.append((str(contact.kind), numbers, *map(str, limits), contact.max_moment))
+    return (stance.normal_force_cap, *sorted(contacts))
 
 
 def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
@@ -86,7 +117,8 @@ def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]
     """Test everything that needs no optimisation.
 
     Durations against their bounds, whether the legs reach the contacts of each phase, end points
-    against their bounds, whether the friction holds the body at both ends, then emptiness of the
+    against their bounds, whether any phase lifts the weight,
+    whether the friction holds the body at both ends, then emptiness of the
     intersections (Proposition 1) and their radius against the required margin (Proposition 2), then whether
     any acceleration balances the CoM at the start and at the goal.
     """
@@ -95,6 +127,7 @@ def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]
         _duration_failure(problem)
         or _reach_failure(problem)
         or _end_failure(problem)
+        or _weight_failure(problem, polytopes)
         or _slope_failure(problem, polytopes)
         or _intersection_failure(problem, radii)
         or _end_balance_failure(problem, polytopes)
@@ -164,6 +197,44 @@ def _slope_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) ->
         if reason is not None:
             return Failure("friction", reason, index, where=", ".join(stance.effectors))
     return None
+
+
+def _weight_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Failure | None:
+    """From rest to rest the mean vertical force is the weight, so some phase must be able to exceed it."""
+    start, goal = problem.start_velocity, problem.goal_velocity
+    if start is None or goal is None or goal[2] < start[2]:
+        return None
+    weight = problem.mass * GRAVITY
+    lifts = [_largest_lift(polytope) for polytope in polytopes]
+    best = int(np.argmax(lifts))
+    if lifts[best] >= weight:
+        return None
+    stance = problem.sequence[best].stance
+    rubbing = [contact for contact in stance if contact.friction > 0.0 and abs(contact.normal[2]) < 0.1]
+    cause = "the caps on the normal forces are too small"
+    if rubbing and len(rubbing) == len(stance):
+        squeeze = sum(contact.normal_force_cap or 0.0 for contact in rubbing)
+        pressed = f" pressed with {squeeze:.0f} N in all" if squeeze else ""
+        friction = min(contact.friction for contact in rubbing)
+        cause = (
+            f"on walls only friction carries, and a friction of {friction:g}{pressed} is too small: "
+            "more friction or a stronger squeeze is needed"
+        )
+    return Failure(
+        "weight",
+        f"the contacts push up with {lifts[best]:.0f} N at most, in phase {best}, and the body weighs "
+        f"{weight:.0f} N; {cause}",
+        best,
+        where=", ".join(stance.effectors),
+    )
+
+
+def _largest_lift(polytope: Polytope) -> float:
+    """Largest upward force of any admissible wrench [N]."""
+    cost = np.zeros(polytope.dimension)
+    cost[2] = -1.0
+    found = linprog(cost, polytope.H, polytope.h, bounds=(None, None), method="highs")
+    return -float(found.fun) if found.success else np.inf
 
 
 def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Failure | None:

@@ -1,14 +1,17 @@
 """First trajectory for the optimisation: through the centres of the shared supports."""
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
+from scipy.optimize import linprog
 
+from manikin.balance import WrenchPolytope
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.contact import Stance
-from manikin.spatial import FloatArray
+from manikin.spatial import GRAVITY_VECTOR, FloatArray, skew
 from manikin.spline import BSpline, clamped_knots, end_control_points, start_control_points
 
 
@@ -25,12 +28,23 @@ class GuessStyle:
     stretch: float
 
 
+INFEASIBLE = 2
+"""Status of a linear programme without a solution."""
+
 GUESS_STYLES = (GuessStyle(0.5, 1.5), GuessStyle(0.3, 1.2), GuessStyle(0.7, 2.5))
 
 
-def guess(problem: CentroidalProblem, style: GuessStyle) -> tuple[FloatArray, FloatArray]:
-    """Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s] to start from."""
-    durations = _guess_durations(problem, style.stretch)
+def guess(
+    problem: CentroidalProblem, style: GuessStyle, polytopes: Sequence[WrenchPolytope]
+) -> tuple[FloatArray, FloatArray]:
+    """Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s] to start from.
+
+    Args:
+        problem: What to find.
+        style: How to guess.
+        polytopes: W_i of the phases about the world origin.
+    """
+    durations = _guess_durations(problem, style.stretch, polytopes)
     instants = np.concatenate([[0.0], np.cumsum(durations)])
     path = PchipInterpolator(instants, _guess_key_positions(problem, instants, style.pull))
     k = problem.degree
@@ -45,13 +59,34 @@ def guess(problem: CentroidalProblem, style: GuessStyle) -> tuple[FloatArray, Fl
     return spline.bezier_points(), durations
 
 
-def _guess_durations(problem: CentroidalProblem, stretch: float) -> FloatArray:
+def _guess_durations(
+    problem: CentroidalProblem, stretch: float, polytopes: Sequence[WrenchPolytope]
+) -> FloatArray:
     lower, upper = problem.min_durations, problem.max_durations
     durations = np.minimum(stretch * lower + 0.1, upper)
+    # Where the weight cannot be carried the body falls: such a phase is over as soon as it may be.
+    falling = np.array([not can_rest(polytope, problem.mass) for polytope in polytopes])
+    durations = np.where(falling, lower, durations)
     if problem.max_duration is not None and durations.sum() > problem.max_duration:
         room = problem.max_duration - lower.sum()
         durations = lower + 0.95 * room * (durations - lower) / max((durations - lower).sum(), 1e-9)
     return durations
+
+
+def can_rest(polytope: WrenchPolytope, mass: float) -> bool:
+    """Whether the contacts can hold a body of this mass still at some position of its CoM.
+
+    The wrench ``[m (-g); p ^ m (-g)]`` is linear in the position ``p``: a linear programme.
+    """
+    weight = -mass * GRAVITY_VECTOR
+    found = linprog(
+        np.zeros(3),
+        polytope.H[:, 3:] @ -skew(weight),
+        polytope.h - polytope.H[:, :3] @ weight,
+        bounds=(None, None),
+        method="highs",
+    )
+    return found.status != INFEASIBLE
 
 
 def _guess_key_positions(problem: CentroidalProblem, instants: FloatArray, pull: float) -> FloatArray:

@@ -140,7 +140,7 @@ def _rounds(
     problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], style: GuessStyle
 ) -> Iterator[Attempt]:
     """Optimise until the certificate holds with all facets, or until another round cannot help."""
-    bezier, durations = guess(problem, style)
+    bezier, durations = guess(problem, style, polytopes)
     trajectory = trajectory_of(problem, bezier, durations)
     facets = nearest_facets(facet_distances(problem, trajectory, polytopes))
     targets = Targets.of(problem)

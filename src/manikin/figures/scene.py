@@ -39,8 +39,9 @@ def scene_figure(record: RunRecord, elevation_deg: float = 14.0, azimuth_deg: fl
     corners = draw_scene(axes, record.scene) if record.scene is not None else np.zeros((0, 3))
     if record.schedule is not None:
         seen.append(draw_soles(axes, record.schedule))
-    if record.body is not None and motion is not None:
-        seen.append(_draw_figures(axes, record.body, motion, record.schedule))
+    figure_of = None if record.body is None or record.body.is_point_mass else record.body
+    if figure_of is not None and motion is not None:
+        seen.append(_draw_figures(axes, figure_of, motion, record.schedule))
     elif record.schedule is not None:
         _draw_legs(axes, track, record.schedule)
     axes.plot(*track.position.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
@@ -51,8 +52,8 @@ def scene_figure(record: RunRecord, elevation_deg: float = 14.0, azimuth_deg: fl
         )
     frame(axes, np.vstack(seen), corners)
     axes.view_init(elevation_deg, azimuth_deg)
-    if record.body is not None and motion is not None:
-        _label_heads(axes, record.body, motion, record.schedule)
+    if figure_of is not None and motion is not None:
+        _label_heads(axes, figure_of, motion, record.schedule)
     axes.legend(loc="upper right", fontsize=8, frameon=False)
     return figure
 

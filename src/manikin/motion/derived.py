@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
+from manikin.motion.massless import foot_positions
 from manikin.motion.motion import Motion
 from manikin.spatial import FloatArray, frozen_array
 
@@ -57,8 +58,14 @@ def com_velocity(motion: Motion) -> FloatArray:
     return np.gradient(motion.com, motion.time, axis=0)
 
 
-def effector_positions(body: BodyModel, motion: Motion, names: tuple[str, ...]) -> dict[str, FloatArray]:
-    """(n, 3) position of each named effector [m]."""
+def effector_positions(
+    body: BodyModel, motion: Motion, names: tuple[str, ...], schedule: ContactSchedule | None = None
+) -> dict[str, FloatArray]:
+    """(n, 3) position of each named effector [m]; the feet of a point mass follow the schedule."""
+    if body.is_point_mass:
+        if schedule is None:
+            return dict.fromkeys(names, motion.com)
+        return {name: foot_positions(schedule, motion.time)[name] for name in names}
     data = body.pinocchio.createData()
     frames = {name: body.effector_frame(name) for name in names}
     found = {name: np.empty((len(motion.time), 3)) for name in names}

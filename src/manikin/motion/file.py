@@ -49,7 +49,11 @@ DATASETS: Mapping[str, tuple[str, str]] = {
     "tau": ("N, N.m", "generalised forces; the first six, of the pelvis, are zero"),
     "com": ("m", "centre of mass in the world"),
     "angular_momentum": ("kg.m^2/s", "about the centre of mass, world axes"),
-    "margin": ("N.m", "distance of the pseudo-wrench to the faces of the wrench polytope, negative outside"),
+    "margin": (
+        "N.m",
+        "distance of the pseudo-wrench to the faces of the wrench polytope, negative outside; with the unit "
+        "N, the smallest force at the centre of mass that ends balance",
+    ),
     "support": ("-", "1 where the contact is active, in the order of contact_names"),
     "contact_force": ("N, N.m", "force and moment of the scene on the body, world axes, about the contact"),
 }
@@ -147,6 +151,7 @@ def _write_motion(group: h5py.Group, motion: Motion) -> None:
     group.attrs.create("contact_names", np.array(motion.contact_names, dtype=object), dtype=text)
     for name, array in motion.arrays().items():
         unit, meaning = DATASETS[name]
+        unit = motion.margin_unit if name == "margin" else unit
         data = array.astype(np.uint8) if array.dtype == np.bool_ else array
         dataset = group.create_dataset(name, data=data, track_times=False)
         dataset.attrs.update(unit=unit, description=meaning)
@@ -196,7 +201,8 @@ def _read_motion(file: h5py.File, name: str, source: str) -> Motion | None:
         joints, contacts = (
             tuple(str(text) for text in values.attrs[key]) for key in ("joint_names", "contact_names")
         )
-        return Motion(**arrays, joint_names=joints, contact_names=contacts)
+        unit = str(values["margin"].attrs.get("unit", "N.m"))
+        return Motion(**arrays, joint_names=joints, contact_names=contacts, margin_unit=unit)
     except (ValueError, TypeError, MotionFileError) as error:
         raise MotionFileError(f"{source}: {name}: {error}") from None
 

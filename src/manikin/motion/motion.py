@@ -25,12 +25,14 @@ class Motion:
         tau: (n, nv) generalised forces; the first six (pelvis) are zero [N, N.m].
         com: (n, 3) centre of mass [m].
         angular_momentum: (n, 3) about the centre of mass [kg.m^2/s].
-        margin: (n,) wrench margin about the world origin, alpha = 1 m [N.m].
+        margin: (n,) wrench margin about the world origin, alpha = 1 m [N.m]; of a point mass
+            planned in the force space, the force margin at the CoM [N].
         support: (n, c) True where the contact is active.
         contact_force: (n, c, 6) force [N] and moment [N.m] of the scene on the body,
             moment about the contact frame's origin.
         contact_names: c effector names.
         joint_names: nv - 6 hinge names, in the order of ``q[7:]``.
+        margin_unit: ``"N.m"`` or ``"N"``.
     """
 
     time: FloatArray
@@ -45,6 +47,7 @@ class Motion:
     contact_force: FloatArray
     contact_names: tuple[str, ...]
     joint_names: tuple[str, ...]
+    margin_unit: str = "N.m"
 
     def __post_init__(self) -> None:
         n, c, nv = len(self.time), len(self.contact_names), len(self.joint_names) + 6

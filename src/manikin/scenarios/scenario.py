@@ -80,6 +80,11 @@ class Scenario:
         return self.file.body.mass_kg
 
     @property
+    def is_point_mass(self) -> bool:
+        """Whether the body is a point mass, which is planned but has nothing to execute."""
+        return self.file.body.model == "point_mass"
+
+    @property
     def planning(self) -> PlanningSection:
         """Options of the centre-of-mass planner."""
         return self.file.planning
@@ -185,8 +190,10 @@ class Scenario:
         Raises:
             ScenarioError: If the body's data are out of range.
         """
-        from manikin.body import human
+        from manikin.body import human, point_mass
 
+        if self.is_point_mass:
+            return point_mass(self.mass)
         data, supports = self.file.body, self.file.supports
         soles = (
             {"sole_length": supports.sole.length_m, "sole_width": supports.sole.width_m} if supports else {}
@@ -231,7 +238,14 @@ class Scenario:
             for section, contacts in zip(supports.phases, supports.resolved_phases(), strict=True):
                 stance = Stance(
                     [
-                        build_contact(effector, entry, supports.friction, default_sole, planning=planning)
+                        build_contact(
+                            effector,
+                            entry,
+                            supports.friction,
+                            default_sole,
+                            planning=planning,
+                            force_cap=supports.contact_normal_force_cap_N,
+                        )
                         for effector, entry in contacts.items()
                     ],
                     cap,
@@ -456,6 +470,7 @@ def build_contact(
     default_sole: SoleSection,
     *,
     planning: bool = False,
+    force_cap: float | None = None,
 ) -> Contact:
     """Build one contact from its section and the defaults around it.
 
@@ -465,6 +480,7 @@ def build_contact(
         friction: Coulomb coefficient where the contact gives none.
         default_sole: Sole size where the contact gives none.
         planning: Let ``default_sole`` shrink a sole the contact gives itself.
+        force_cap: Cap on the normal force where the contact gives none [N].
 
     Raises:
         ContactError: If a value is out of its range.
@@ -481,10 +497,11 @@ def build_contact(
             rotation=rotation_from_rpy(*rpy) if rpy is not None else rotation,
         )
     friction = entry.friction or friction
+    force_cap = entry.normal_force_cap_N or force_cap
     if kind == "point":
         return point(
             effector, entry.position, friction=friction, normal=entry.normal,
-            normal_force_cap=entry.normal_force_cap_N,
+            normal_force_cap=force_cap,
         )  # fmt: skip
     own = entry.sole or default_sole
     shrink = planning and entry.sole is not None
@@ -496,7 +513,7 @@ def build_contact(
         width=min(own.width_m, default_sole.width_m) if shrink else own.width_m,
         friction=friction,
         normal=entry.normal,
-        normal_force_cap=entry.normal_force_cap_N,
+        normal_force_cap=force_cap,
         torsion_limit=entry.torsion_limit_Nm,
     )
 

@@ -6,7 +6,15 @@ Lengths are metres and angles degrees, as the keys say; the builders of
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from manikin.errors import ScenarioError
 from manikin.scenarios.expressions import Expression
@@ -27,7 +35,10 @@ from manikin.scenarios.validation import (
 )
 
 EFFECTORS = ("left_foot", "right_foot", "left_hand", "right_hand")
-"""Effectors that a phase may put in contact, in the order of the contact tables."""
+"""Effectors of a human that a phase may put in contact, in the order of the contact tables."""
+
+MASSLESS_FEET = ("left_front_foot", "right_front_foot", "left_hind_foot", "right_hind_foot")
+"""Feet that only a point mass has, besides those of a human."""
 
 OBSTACLE_SHAPES = ("box", "cylinder", "capsule", "sphere", "plane", "half_space", "mesh")
 
@@ -38,14 +49,33 @@ _KIND_KEYS: dict[str, tuple[str, ...]] = {
 }
 """Keys of a contact that only some kinds have."""
 
+_HUMAN_KEYS = ("stature_m", "sex")
+
 
 class BodySection(Section):
     """Whose motion it is."""
 
-    model: Literal["human"] = Field(default="human", description="built-in body")
-    stature_m: Positive = Field(default=1.75, description="standing height [m]")
+    model: Literal["human", "point_mass"] = Field(
+        default="human",
+        description="built-in body: a person, or a point mass on massless feet, planned but not executed",
+    )
+    stature_m: Positive = Field(default=1.75, description="standing height [m], of a human only")
     mass_kg: Positive = Field(default=79.0, description="body mass [kg]")
-    sex: Literal["male", "female"] = Field(default="male", description="which anthropometric table")
+    sex: Literal["male", "female"] = Field(
+        default="male", description="which anthropometric table, of a human only"
+    )
+
+    @model_validator(mode="after")
+    def _only_of_a_human(self) -> Self:
+        for key in _HUMAN_KEYS if self.model != "human" else ():
+            if key in self.model_fields_set:
+                raise refuse(key, "does not apply to a point mass; valid: model, mass_kg")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_what_does_not_apply(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        data = write(self)
+        return data if self.model == "human" else {k: v for k, v in data.items() if k not in _HUMAN_KEYS}
 
 
 class RoundSection(Section):
@@ -187,6 +217,18 @@ class PhaseSection(Section):
     right_foot: ContactEntry | None = Field(default=None, description="contact of the right foot, or 'same'")
     left_hand: ContactEntry | None = Field(default=None, description="contact of the left hand, or 'same'")
     right_hand: ContactEntry | None = Field(default=None, description="contact of the right hand, or 'same'")
+    left_front_foot: ContactEntry | None = Field(
+        default=None, description="contact of that foot of a point mass, or 'same'"
+    )
+    right_front_foot: ContactEntry | None = Field(
+        default=None, description="contact of that foot of a point mass, or 'same'"
+    )
+    left_hind_foot: ContactEntry | None = Field(
+        default=None, description="contact of that foot of a point mass, or 'same'"
+    )
+    right_hind_foot: ContactEntry | None = Field(
+        default=None, description="contact of that foot of a point mass, or 'same'"
+    )
     min_duration_s: Duration = Field(default=0.1, description="shortest duration [s]")
     max_duration_s: Duration | None = Field(default=None, description="longest duration [s]")
 
@@ -206,7 +248,7 @@ class PhaseSection(Section):
 
     def entries(self) -> dict[str, "ContactSection | Literal['same']"]:
         """Contacts by effector, those in the air left out."""
-        found = {name: getattr(self, name) for name in EFFECTORS}
+        found = {name: getattr(self, name) for name in (*EFFECTORS, *MASSLESS_FEET)}
         return {name: entry for name, entry in found.items() if entry is not None}
 
 
@@ -223,6 +265,9 @@ class SupportsSection(Section):
     )
     normal_force_cap_N: Positive | None = Field(
         default=None, description="largest sum of the normal forces of a stance [N] (default: 3 body weights)"
+    )
+    contact_normal_force_cap_N: Positive | None = Field(
+        default=None, description="largest normal force of each sole or point that gives none itself [N]"
     )
     phases: Annotated[list[PhaseSection], Field(min_length=1)] = Field(description="phases in order")
 
@@ -445,6 +490,7 @@ class ScenarioFile(Section):
                         f"is {name!r}; valid: automatic, or the name of an obstacle of the scene "
                         f"({', '.join(names) or 'it has none'})",
                     )
+        self._check_body()
         for key in type(self.com_constraints[0])._keys() if self.com_constraints else ():
             if sum(getattr(c, key) is not None for c in self.com_constraints) > 1:
                 raise refuse("com_constraints", f"holds {key} twice; valid: at most once")
@@ -461,6 +507,20 @@ class ScenarioFile(Section):
                         "has no meaning beside explicit supports; valid: only com, [x, y, z]",
                     )
         return self
+
+    def _check_body(self) -> None:
+        if self.body.model == "human":
+            for number, phase in enumerate(self.supports.phases if self.supports is not None else ()):
+                for name in phase.entries():
+                    if name in MASSLESS_FEET:
+                        raise refuse(
+                            f"supports.phases[{number}].{name}",
+                            f"is no part of a human; valid: {', '.join(EFFECTORS)}, or a point_mass",
+                        )
+            return
+        for key in ("reference_stature_m", "push"):
+            if getattr(self, key) is not None:
+                raise refuse(key, "does not apply to a point mass; valid: leave it out")
 
 
 def json_schema() -> dict[str, Any]:

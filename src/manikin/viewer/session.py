@@ -14,6 +14,7 @@ from viser import uplot
 
 from manikin.errors import InputError
 from manikin.motion import Motion
+from manikin.motion.derived import effector_positions
 from manikin.motion.file import MotionFile
 from manikin.scene import HalfSpace, Plane
 from manikin.spatial import FloatArray
@@ -70,6 +71,11 @@ class ViewerSession:
         self.speed = 1.0
         self._body = content.body
         self._data = content.body.pinocchio.createData()
+        self._feet: dict[str, FloatArray] = {}
+        if content.body.is_point_mass:
+            self._feet = effector_positions(
+                content.body, self.motion, self.motion.contact_names, content.schedule
+            )
         self._lock = threading.RLock()
         self._closed = threading.Event()
         with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
@@ -98,6 +104,7 @@ class ViewerSession:
             index = int(np.clip(np.searchsorted(motion.time, self.time), 0, len(motion.time) - 1))
             with self.server.atomic():
                 self._place_body(motion.q[index])
+                self._place_legs(motion, index)
                 self._place_forces(motion, index)
                 self._com.position = motion.com[index]
             self._show_numbers(motion, index)
@@ -258,9 +265,26 @@ class ViewerSession:
             force = motion.contact_force[index, number, :3]
             drawn = bool(np.linalg.norm(force) >= SMALLEST_FORCE) and self._forces_wanted()
             if drawn:
-                start = self._data.oMf[self._body.effector_frame(name)].translation
+                start = self._effector_place(name, index)
                 self._arrows[name].points = np.array([[start, start + METRES_PER_NEWTON * force]])
             self._arrows[name].visible = drawn
+
+    def _effector_place(self, name: str, index: int) -> FloatArray:
+        if name in self._feet:
+            return self._feet[name][index]
+        return self._data.oMf[self._body.effector_frame(name)].translation
+
+    def _place_legs(self, motion: Motion, index: int) -> None:
+        """Draw the massless legs of a point mass as lines, those in contact thicker."""
+        for name, places in self._feet.items():
+            on = bool(motion.support[index, motion.contact_names.index(name)])
+            self.server.scene.add_line_segments(
+                f"/legs/{name}",
+                np.array([[motion.com[index], places[index]]]),
+                np.array(_side_colour(name)),
+                thickness=6.0 if on else 2.0,
+                thickness_units="screen",
+            )
 
     def _forces_wanted(self) -> bool:
         return not hasattr(self, "_forces") or self._forces.value
@@ -314,7 +338,7 @@ class ViewerSession:
                 "x": uplot.Scale(time=False, auto=True),
                 "y": uplot.Scale(auto=False, range=self._plot_range),
             },
-            axes=(uplot.Axis(label="time [s]"), uplot.Axis(label="margin [N.m]")),
+            axes=(uplot.Axis(label="time [s]"), uplot.Axis(label=f"margin [{self.motion.margin_unit}]")),
             aspect=1.35,
         )
 
@@ -338,7 +362,7 @@ class ViewerSession:
             [
                 f"**{self.time:.3f} s**, {self.chosen}",
                 "",
-                f"- margin: **{motion.margin[index]:.1f} N.m**",
+                f"- margin: **{motion.margin[index]:.1f} {motion.margin_unit}**",
                 f"- supports: {', '.join(supports) or 'none'}",
                 f"- vertical contact force: {load:.0f} N",
                 f"- CoM: {', '.join(f'{value:.3f}' for value in motion.com[index])} m",
