@@ -54,8 +54,7 @@ class ComTrack:
         velocity = com_velocity(motion)
         still = len(motion.time) < 2
         acceleration = np.zeros_like(velocity) if still else np.gradient(velocity, motion.time, axis=0)
-        unit = getattr(motion, "margin_unit", "N.m")
-        return cls(motion.time, motion.com, velocity, acceleration, motion.margin, unit)
+        return cls(motion.time, motion.com, velocity, acceleration, motion.margin, motion.margin_unit)
 
     def at(self, times: FloatArray) -> FloatArray:
         """(n, 3) position at other times [m]; held before the first and after the last."""
