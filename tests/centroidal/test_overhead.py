@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from manikin.centroidal import CeilingHeight, Zone, height_below
+from manikin.centroidal import CeilingHeight, Zone, height_below, keep_out
 from manikin.errors import InputError
 
 OUTLINE = np.array([[0.3, -1.0], [0.4, -1.0], [0.4, 1.0], [0.3, 1.0]])
@@ -70,6 +70,14 @@ def test_arrays_and_violations():
     points = np.array([[0.35, 0.0, 0.7], [0.35, 0.0, 0.6], [-2.0, 0.0, 1.0]])
     assert constraint.violation(points) == pytest.approx([0.06, -0.04, -0.08])
     assert constraint.name == "height below 'beam'"
+
+
+def test_nothing_passes_through_a_zone_that_is_kept_out_of():
+    """At any height; outside the onset there is room to spare."""
+    constraint = keep_out("beam", ZONE, "nobody folds that low")
+    points = np.array([[0.35, 0.0, -5.0], [0.35, 0.0, 5.0], [-0.1, 0.0, 0.9]])
+    assert constraint.violation(points) == pytest.approx([0.075, 0.075, -0.075])
+    assert constraint.impassable == "nobody folds that low"
 
 
 def test_crossing():

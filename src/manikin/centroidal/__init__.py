@@ -5,7 +5,7 @@ from manikin.centroidal.constraints import BentSurface, GeometricConstraint, hei
 from manikin.centroidal.feasibility import Failure, Feasibility, assess_feasibility, intersection_radii
 from manikin.centroidal.keyframe_problem import KeyframeProblem
 from manikin.centroidal.keyframes import KeyframeResult, plan_com_through_key_frames
-from manikin.centroidal.overhead import CeilingHeight, Zone, height_below
+from manikin.centroidal.overhead import CeilingHeight, Zone, height_below, keep_out
 from manikin.centroidal.problem import CentroidalProblem, MarginSpace, Weights
 from manikin.centroidal.recording import Recording
 from manikin.centroidal.timing_free import CentroidalResult, plan_com
@@ -32,6 +32,7 @@ __all__ = [
     "height_band",
     "height_below",
     "intersection_radii",
+    "keep_out",
     "plan_com",
     "plan_com_through_key_frames",
 ]

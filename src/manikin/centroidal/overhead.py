@@ -125,15 +125,33 @@ class _Below:
         return z - self.surface(x, y)
 
 
-def height_below(name: str, surface: CeilingHeight, impassable: str = "") -> GeometricConstraint:
+@dataclass(frozen=True)
+class _Outside:
+    zone: Zone
+
+    def __call__(self, x: Any, y: Any, z: Any) -> Any:  # noqa: ARG002
+        return self.zone.onset * (self.zone.share(x, y) - 0.5)
+
+
+def height_below(name: str, surface: CeilingHeight) -> GeometricConstraint:
     """The CoM below the surface of one overhead obstacle.
 
     Args:
         name: Of the obstacle.
         surface: Greatest height of the CoM.
-        impassable: Why nothing passes below it, when the body cannot fold that low.
     """
-    return GeometricConstraint(f"height below '{name}'", _Below(surface), impassable)
+    return GeometricConstraint(f"height below '{name}'", _Below(surface))
+
+
+def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
+    """The CoM outside a zone through which nothing passes, at any height.
+
+    Args:
+        name: Of the obstacle.
+        zone: Where the body would be below it; half the onset counts as inside.
+        reason: Why nothing passes, for the explanation of a failure.
+    """
+    return GeometricConstraint(f"way around '{name}'", _Outside(zone), reason)
 
 
 def _edge_normals(points: FloatArray) -> FloatArray:

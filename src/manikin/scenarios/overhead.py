@@ -7,7 +7,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.centroidal import GeometricConstraint
-from manikin.centroidal.overhead import CeilingHeight, Zone, height_below
+from manikin.centroidal.overhead import CeilingHeight, Zone, height_below, keep_out
 from manikin.contact import Contact, ContactKind, StanceSequence
 from manikin.posture.fold import HEAD_CLEARANCE, fold_under, lowest_ceiling
 from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
@@ -16,7 +16,7 @@ from manikin.spatial import FloatArray
 HOVERING = 0.3
 """What leaves at least this above the supports is overhead, what leaves less is stepped over [m]."""
 
-ONSET = 0.15
+ONSET = 0.10
 """Distance within which the body comes down before an obstacle, for a stature of 1.75 m [m]."""
 
 NEAR = 0.45
@@ -87,7 +87,7 @@ def _constraint(body: BodyModel, obstacle: Obstacle, soles: Sequence[Contact]) -
             f"'{obstacle.name}' leaves {free:.2f} m above the supports; this body folds to no less than "
             f"{lowest_ceiling(body):.2f} m on its feet"
         )
-        return height_below(obstacle.name, CeilingHeight(zone, top, level), reason)
+        return keep_out(obstacle.name, zone, reason)
     return height_below(obstacle.name, CeilingHeight(zone, top, level + fold.com_height))
 
 

@@ -41,7 +41,7 @@ __all__ = [
 Clearance = Callable[[float, Pose], float]
 """Signed distance [m] of an effector at a pose and a time [s] to everything it must not touch."""
 
-HEIGHTS = (0.06, 0.10, 0.15, 0.22, 0.30)
+HEIGHTS = (0.06, 0.10, 0.15, 0.22, 0.30, 0.42, 0.56, 0.70)
 """Apex heights above the higher end that are tried [m]."""
 
 LATERALS = (0.0, 0.10, -0.10, 0.20, -0.20)

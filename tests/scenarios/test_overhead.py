@@ -1,0 +1,49 @@
+"""Constraints on the CoM's height that a scenario's scene and body give."""
+
+import numpy as np
+import pytest
+
+from manikin.centroidal import plan_com
+from manikin.errors import ScenarioError
+from manikin.scenarios import load_scenario
+
+
+def constraints(*settings, name="beam-H1C1", variant=None):
+    return load_scenario(name, variant=variant, overrides=settings).build_centroidal_problem().geometric
+
+
+def test_the_beam_bounds_the_height_under_it():
+    """Below 1.45 m at the height of people, 0.85 m; free at the start; the post is no ceiling."""
+    (bound,) = constraints(variant="S2")
+    assert bound.name == "height below 'beam'"
+    assert bound.violation(np.array([0.38, 0.4, 0.85])) == pytest.approx(0.0, abs=0.03)
+    assert bound.violation(np.array([0.0, 0.0, 0.99])) < 0.0
+
+
+def test_a_beam_above_the_head_bounds_nothing():
+    """Its underside at 1.85 m is out of reach of 1.75 m."""
+    assert constraints("scene.beam.position.2=1.875") == ()
+
+
+def test_named_obstacles_are_taken_and_unknown_ones_refused():
+    """A beam a hand above the floor is stepped over, unless the file says it is to be passed below."""
+    low = "scene.beam.position.2=0.225"
+    assert constraints(low) == ()
+    (bound,) = constraints(low, "com_constraints.0.overhead=[beam]")
+    assert bound.impassable.startswith("'beam' leaves 0.20 m above the supports; this body folds to")
+    with pytest.raises(ScenarioError, match=r"overhead\[0\] is 'roof'; valid: automatic, or the name"):
+        constraints("com_constraints.0.overhead=[roof]")
+
+
+def test_the_roof_of_the_platform_is_found():
+    """Over the platform at 0.2 m the roof leaves 1.275 m; the threshold is stepped over."""
+    (bound,) = constraints("com_constraints=[{overhead: automatic}]", name="platform")
+    assert bound.name == "height below 'roof'"
+    assert 0.85 < 1.2 - float(bound.violation(np.array([0.9, 0.75, 1.2]))) < 1.0
+
+
+def test_a_knee_high_beam_ends_in_its_true_cause():
+    """0.4 m is less than the body folds to; the failure says so."""
+    result = plan_com(load_scenario("beam-H1C1", variant="knee-high").build_centroidal_problem())
+    assert result.trajectory is None
+    assert "'beam' leaves 0.40 m above the supports; this body folds to no less than" in result.failure.reason
