@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
+from manikin.contact import ContactSchedule, Phase, SolePart, Stance, StanceSequence, roll_feet
 from manikin.control import SupportMode, SupportSettings
 from manikin.control.supports import SupportSwitch, support_intervals
 
@@ -99,3 +99,32 @@ def test_intervals_cover_the_schedule(stepping):
     assert (second.start, second.end) == (LAND, np.inf)
     assert second.early == pytest.approx(LAND - (LAND - LIFT) / 3)
     assert len(support_intervals(stepping, "left_foot", 0.1)) == 1
+
+
+@pytest.fixture
+def rolling(contacts):
+    """The right foot leaves over its toes and lands on its heel."""
+    both = Phase(Stance(contacts))
+    sequence = roll_feet(StanceSequence([both, Phase(Stance(contacts[:1])), both]), 0.06)
+    return ContactSchedule(sequence, [0.0, 0.8, LIFT, LAND, 1.7, END])
+
+
+def test_a_rolling_support_is_one_support_of_changing_parts(rolling):
+    """Heel, sole and toes are one support: no landing in between, other points in each."""
+    first, second = support_intervals(rolling, "right_foot", 0.1)
+    assert (first.start, first.end, second.start, second.end) == (-np.inf, LIFT, LAND, np.inf)
+    switch = SupportSwitch(rolling, SupportSettings())
+    parts = [right(switch, t).contact.part for t in (0.5, 0.9, LAND, 1.65, 2.0)]
+    assert parts == [SolePart.FULL, SolePart.TOES, SolePart.HEEL, SolePart.HEEL, SolePart.FULL]
+
+
+def test_load_moves_gradually_to_the_part_that_stays(rolling):
+    """Points that cease to touch are unloaded before, points that begin to are loaded after a change."""
+    settings = SupportSettings()
+    switch = SupportSwitch(rolling, settings)
+    before = right(switch, 0.8 - 0.5 * settings.unload_time)
+    assert before.fades == ((SolePart.TOES, pytest.approx(0.5)),)
+    assert right(switch, 0.9).fades == ()
+    after = right(switch, 1.7 + 0.5 * settings.rolling_load_time)
+    assert after.fades == ((SolePart.HEEL, pytest.approx(0.25)),)
+    assert right(switch, 2.5).fades == ()

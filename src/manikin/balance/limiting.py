@@ -122,6 +122,7 @@ def _contact_shares(contact: Contact, W: WrenchPolytope, normal: FloatArray, cap
     if contact.kind is ContactKind.GRASP:
         return _grasp_shares(contact, limits, _twist_at(contact.position - W.reference, normal))
     rotation = contact.rotation_contact_to_world
+    contact = _centred(contact)
     in_world = _twist_at(contact.position - W.reference, normal)
     twist = np.concatenate([rotation.T @ in_world[:3], rotation.T @ in_world[3:]])
     twist[2] -= cap
@@ -138,6 +139,14 @@ def _contact_shares(contact: Contact, W: WrenchPolytope, normal: FloatArray, cap
         LimitShare(contact.effector, limits.kinds[i], limits.phrases[i], float(weights[i]))
         for i in np.flatnonzero(weights > NEGLIGIBLE)
     ]
+
+
+def _centred(contact: Contact) -> Contact:
+    """The same contact with its frame in the middle of its points, where its limits are symmetric."""
+    if not contact.centre.any():
+        return contact
+    middle = contact.position + contact.rotation_contact_to_world @ contact.centre
+    return replace(contact, position=middle, points=contact.points - contact.centre)
 
 
 def _twist_at(arm: FloatArray, normal: FloatArray) -> FloatArray:

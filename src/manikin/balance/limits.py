@@ -57,6 +57,8 @@ def contact_limits(contact: Contact, friction_model: FrictionModel = "pyramid") 
     mu |t tau| <= limit`` ([Qiu2012]_ 4.21 corrected), beside friction on the whole
     force (4.20) and CoP (4.14).
 
+    A part of a sole is taken about the middle of its points; an edge resists no moment about itself.
+
     Raises:
         ContactError: If the friction model is unknown.
     """
@@ -96,6 +98,13 @@ def _pressure_rows(contact: Contact) -> list[Row]:
     half_length, half_width = contact.length / 2, contact.width / 2
     left, right = _side_names(contact.effector)
     tip = LimitKind.TIPPING
+    if half_length == 0.0:
+        return [
+            ([0, 0, 0, 0, -1, 0], 0.0, tip, "rolling forward over its edge"),
+            ([0, 0, 0, 0, 1, 0], 0.0, tip, "rolling backward over its edge"),
+            ([0, 0, -half_width, 1, 0, 0], 0.0, tip, f"tipping over its {left} end"),
+            ([0, 0, -half_width, -1, 0, 0], 0.0, tip, f"tipping over its {right} end"),
+        ]
     return [
         ([0, 0, -half_length, 0, -1, 0], 0.0, tip, "tipping over its front edge"),
         ([0, 0, -half_length, 0, 1, 0], 0.0, tip, "tipping over its rear edge"),

@@ -1,6 +1,16 @@
 """Contacts, stances and their sequences: plain data, no geometry engine."""
 
-from manikin.contact.contact import Contact, ContactKind, grasp, point, sole, soles_overlap
+from manikin.contact.contact import (
+    Contact,
+    ContactKind,
+    SolePart,
+    grasp,
+    point,
+    sole,
+    sole_part,
+    soles_overlap,
+)
+from manikin.contact.rolling import Rolling, roll_feet
 from manikin.contact.schedule import ContactSchedule
 from manikin.contact.sequence import Phase, StanceSequence, Swing
 from manikin.contact.stance import Stance
@@ -10,11 +20,15 @@ __all__ = [
     "ContactKind",
     "ContactSchedule",
     "Phase",
+    "Rolling",
+    "SolePart",
     "Stance",
     "StanceSequence",
     "Swing",
     "grasp",
     "point",
+    "roll_feet",
     "sole",
+    "sole_part",
     "soles_overlap",
 ]

@@ -1,6 +1,6 @@
 """One contact between an effector and the scene: a sole, a point or a grasp."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -28,6 +28,17 @@ class ContactKind(StrEnum):
     """Bilateral, bounded in force (and moment) along each world axis."""
 
 
+class SolePart(StrEnum):
+    """Which part of a sole touches; what does not touch may tilt about the part that does."""
+
+    FULL = "full"
+    """All of it."""
+    HEEL = "heel"
+    """Its rear edge, about which the foot tilts after it has landed."""
+    TOES = "toes"
+    """What lies before the hinge of the toes, about which the foot tilts before it leaves."""
+
+
 @dataclass(frozen=True, eq=False)
 class Contact:
     """Where and how an effector touches the scene ([Qiu2012]_ 4.2.1).
@@ -47,6 +58,8 @@ class Contact:
             friction of the corner points limits it ([Qiu2012]_ 4.21, safe form).
         max_force: Grasp force limit per world axis [N].
         max_moment: Grasp moment limit per world axis [N.m].
+        part: Part of the sole that touches; position and rotation are always those of the full sole
+            lying flat, :attr:`points` only those that touch.
     """
 
     effector: str
@@ -59,6 +72,12 @@ class Contact:
     torsion_limit: float | None = None
     max_force: float = 0.0
     max_moment: float = 0.0
+    part: SolePart = SolePart.FULL
+
+    @property
+    def centre(self) -> FloatArray:
+        """(3,) middle of the points in the contact frame [m]; the origin for a full sole."""
+        return 0.5 * (self.points.min(axis=0) + self.points.max(axis=0))
 
     @property
     def normal(self) -> FloatArray:
@@ -202,6 +221,42 @@ def grasp(
         points=frozen_array(np.zeros((1, 3)), "points"),
         max_force=finite_number(max_force, f"{where} max_force [N]", above=0.0, error=ContactError),
         max_moment=finite_number(max_moment, f"{where} max_moment [N.m]", at_least=0.0, error=ContactError),
+    )
+
+
+def sole_part(contact: Contact, part: SolePart, hinge: float) -> Contact:
+    """Keep of a full sole only the points of one of its parts, at the same place.
+
+    Forces at these points alone make the part's wrenches: two for the heel, so that it gives no
+    moment about its edge. A torsion limit is dropped, as the friction of fewer points is less.
+
+    Args:
+        contact: A full sole.
+        part: What touches.
+        hinge: Where the hinge of the toes crosses the sole's x axis [m].
+
+    Raises:
+        ContactError: If the contact is no full sole or the hinge lies beyond it.
+    """
+    where = f"{part} of '{contact.effector}'"
+    if contact.kind is not ContactKind.SOLE or contact.part is not SolePart.FULL:
+        raise ContactError(f"{where} is taken from a {contact.part} {contact.kind}; valid: a full sole")
+    if part is SolePart.FULL:
+        return contact
+    half_length, half_width = contact.length / 2, contact.width / 2
+    line = finite_number(
+        hinge, f"{where} hinge [m]", above=-half_length, at_most=half_length, error=ContactError
+    )
+    tip, rear = (
+        [[x, y, 0.0] for x, y in ((half_length, half_width), (half_length, -half_width))],
+        -half_length,
+    )
+    if part is SolePart.TOES:
+        points = [*tip, [line, -half_width, 0.0], [line, half_width, 0.0]]
+    else:
+        points = [[rear, -half_width, 0.0], [rear, half_width, 0.0]]
+    return replace(
+        contact, points=frozen_array(points, f"{where} points", (None, 3)), part=part, torsion_limit=None
     )
 
 

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
-from manikin.contact import Contact, ContactKind
+from manikin.contact import Contact, ContactKind, SolePart
 from manikin.control.dynamics import DynamicsState
 from manikin.spatial import FloatArray, skew
 
@@ -63,6 +64,8 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
         BodyError: If the body has no such effector.
     """
     effector = body.effector(contact.effector)
+    if contact.part is not SolePart.FULL:
+        return _part_geometry(body, contact, inset)
     if contact.kind is not ContactKind.SOLE:
         local = effector.translation + contact.points @ effector.rotation.T
         return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
@@ -81,6 +84,39 @@ def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> Contact
         contact.effector,
         (ContactPatch(effector.segment, heel), ContactPatch(toes.name, tips - toes.origin)),
     )
+
+
+def _part_geometry(body: BodyModel, contact: Contact, inset: float) -> ContactGeometry:
+    """Points of a heel's edge on the foot; of toes, the hinge's ends on the foot and the tips on the toes."""
+    effector, toes = (
+        body.effector(contact.effector),
+        hanging_segment(body, body.effector(contact.effector).segment),
+    )
+    points = contact.points.copy()
+    points[:, 1] -= inset * np.sign(points[:, 1])
+    if contact.part is SolePart.TOES:
+        points[points[:, 0] >= points[:, 0].max(), 0] -= inset
+    local = effector.translation + points @ effector.rotation.T
+    if contact.part is SolePart.HEEL or toes is None:
+        return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
+    return ContactGeometry(contact.effector, (ContactPatch(toes.name, local - toes.origin),))
+
+
+def points_along(body: BodyModel, geometry: ContactGeometry) -> FloatArray:
+    """(k,) place of each force-carrying point along the effector's x axis, toes straight [m]."""
+    effector = body.effector(geometry.effector)
+    places = []
+    for patch in geometry.patches:
+        offset = np.zeros(3) if patch.segment == effector.segment else body.segment(patch.segment).origin
+        places.append(((patch.points + offset - effector.translation) @ effector.rotation)[:, 0])
+    return np.concatenate(places)
+
+
+def touches(part: SolePart, along: FloatArray) -> NDArray[np.bool_]:
+    """(k,) whether points at these places along a sole belong to a part (heel: behind its middle)."""
+    if part is SolePart.FULL:
+        return np.ones(len(along), dtype=np.bool_)
+    return along < 0 if part is SolePart.HEEL else along > 0
 
 
 def segment_key(segment: str) -> str:

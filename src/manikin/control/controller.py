@@ -1,14 +1,14 @@
 """Weighted multi-task control of a planned motion ([Qiu2012]_ 6.3)."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
-from manikin.contact import Contact, ContactSchedule
+from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.control.build_qp import (
     ControlProblem,
     JointBounds,
@@ -20,7 +20,9 @@ from manikin.control.contact_forces import (
     ContactGeometry,
     contact_force_basis,
     contact_geometry,
+    points_along,
     segment_key,
+    touches,
 )
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.reference import Reference, ReferenceSample
@@ -35,6 +37,7 @@ from manikin.control.tasks import (
     lifted,
     orientation_task,
     posture_task,
+    rolling_task,
     stance_task,
     swing_task,
 )
@@ -110,6 +113,7 @@ class Controller:
         self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
         self._switch = SupportSwitch(schedule, self.settings.supports)
         self._geometry = _geometries(body, schedule, self.settings.supports.sole_inset)
+        self._along = {key: points_along(body, geometry) for key, geometry in self._geometry.items()}
         self._hanging = {name: _hanging_joints(body, name) for name in self._switch.effectors}
         frames = {name: body.effector_frame(name) for name in (*self._switch.effectors, _PELVIS)}
         segments = {
@@ -198,13 +202,17 @@ class Controller:
         self, support: SupportState, state: DynamicsState, reference: ReferenceSample
     ) -> AccelerationTask:
         name, weight, gains = support.effector, self.settings.weights.effectors, self.settings.impedances
-        frame = state.frames[name]
+        frame, planned = state.frames[name], reference.effectors[name]
+        part = support.contact is not None and support.contact.part is not SolePart.FULL
+        if support.mode is SupportMode.STANCE and part:
+            return rolling_task(name, frame, planned, support, gains.stance, weight)
         if support.mode is SupportMode.STANCE:
             return stance_task(name, frame, support, gains.stance, weight)
         if support.mode is SupportMode.LANDING:
-            target = landing_reference(support, self.settings.supports.press_speed)
+            speed = self.settings.supports.press_speed_of(support.contact)
+            target = landing_reference(support, speed, planned if part else None)
             return swing_task(name, frame, target, gains.swing, weight)
-        target = lifted(reference.effectors[name], support)
+        target = lifted(planned, support)
         return swing_task(name, frame, target, gains.swing, weight, support.follow)
 
     def _posture_weight(self, supports: Mapping[str, SupportState]) -> FloatArray:
@@ -215,12 +223,23 @@ class Controller:
         return weight
 
     def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
-        basis = contact_force_basis(contact, self._geometry[support.effector], state)
+        basis = contact_force_basis(contact, self._geometry[support.effector, contact.part], state)
         cap = contact.normal_force_cap or self.settings.supports.default_cap * state.mass * GRAVITY
         cap *= support.load_share
         if support.unload_share < 1.0:
             cap = min(cap, support.unload_share * self._carried.get(support.effector, cap))
+        if support.fades:
+            limits = state.mass * GRAVITY * self._point_shares(support, contact)
+            basis = replace(basis, upper=np.minimum(basis.upper, limits))
         return LoadedContact(basis, cap, min(support.load_share, support.unload_share))
+
+    def _point_shares(self, support: SupportState, contact: Contact) -> FloatArray:
+        """(4 k,) body weights that each point's variables may carry while the touching part changes."""
+        along = self._along[contact.effector, contact.part]
+        shares = np.full(len(along), np.inf)
+        for part, share in support.fades:
+            shares[~touches(part, along)] = np.minimum(shares[~touches(part, along)], share)
+        return np.repeat(shares, 4)
 
     def _remember_loads(self, supports: Mapping[str, SupportState], loads: Mapping[str, float]) -> None:
         """Keep what each support carries until its unloading begins."""
@@ -251,12 +270,14 @@ class Controller:
         return None, f"previous torques: {solution.status}, then {relaxed.status}"
 
 
-def _geometries(body: BodyModel, schedule: ContactSchedule, inset: float) -> dict[str, ContactGeometry]:
-    found: dict[str, ContactGeometry] = {}
+def _geometries(
+    body: BodyModel, schedule: ContactSchedule, inset: float
+) -> dict[tuple[str, SolePart], ContactGeometry]:
+    found: dict[tuple[str, SolePart], ContactGeometry] = {}
     for phase in schedule.sequence:
         for contact in phase.stance:
-            if contact.effector not in found:
-                found[contact.effector] = contact_geometry(body, contact, inset)
+            if (contact.effector, contact.part) not in found:
+                found[contact.effector, contact.part] = contact_geometry(body, contact, inset)
     return found
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from manikin.contact import Contact, SolePart
 from manikin.errors import InputError
 from manikin.spatial import finite_number
 
@@ -75,12 +76,16 @@ class SupportSettings:
         follow_time: The gains with which a foot follows its flight rise from zero over this time
             after lift-off [s].
         load_time: It rises from zero over this time after touch-down [s].
+        rolling_load_time: Over this time it rises at the points of a sole that begin to touch when
+            the foot has rolled onto them, slowly at first: they may not quite touch yet [s].
         early_window: A touch this long before the planned landing counts as the landing [s].
         release_time: A support that has not touched for this long is landed anew [s].
         hover: Before its landing a foot is held this far above its support, so that it does
             not touch, and load the leg, ahead of time [m].
-        press_speed: From its landing time on it goes down at this speed [m/s] ...
-        press_depth: ... until it is this far below the planned support [m].
+        press_speed: From its landing time on it goes down at this speed [m/s], until it is
+            ``press_depth`` below the planned support.
+        rolling_press_speed: The same of a foot that lands on its heel, which this speed sets turning [m/s].
+        press_depth: How far below the planned support it is sent at most [m].
         default_cap: Normal force limit of a contact that states none [body weights].
         sole_inset: The controller keeps its forces this far inside the edge of the sole [m].
     """
@@ -88,19 +93,34 @@ class SupportSettings:
     unload_time: float = 0.05
     follow_time: float = 0.04
     load_time: float = 0.04
+    rolling_load_time: float = 0.08
     early_window: float = 0.1
     release_time: float = 0.03
     hover: float = 0.0015
     press_speed: float = 0.1
+    rolling_press_speed: float = 0.04
     press_depth: float = 0.03
     default_cap: float = 3.0
     sole_inset: float = 0.01
 
     def __post_init__(self) -> None:
-        for name in ("unload_time", "follow_time", "load_time", "press_speed", "default_cap"):
+        for name in (
+            "unload_time",
+            "follow_time",
+            "load_time",
+            "rolling_load_time",
+            "press_speed",
+            "rolling_press_speed",
+            "default_cap",
+        ):
             finite_number(getattr(self, name), f"support setting {name!r}", above=0.0)
         for name in ("early_window", "release_time", "hover", "press_depth", "sole_inset"):
             finite_number(getattr(self, name), f"support setting {name!r}", at_least=0.0)
+
+    def press_speed_of(self, contact: Contact | None) -> float:
+        """Speed at which a landing foot goes down to its contact [m/s]."""
+        rolls = contact is not None and contact.part is not SolePart.FULL
+        return self.rolling_press_speed if rolls else self.press_speed
 
 
 @dataclass(frozen=True)

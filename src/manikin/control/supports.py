@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from manikin.contact import Contact, ContactSchedule
+from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.control.settings import SupportSettings
 from manikin.spatial import FloatArray
 
@@ -49,6 +49,9 @@ class SupportState:
         lift: (3,) offset of a flying effector from its planned path [m].
         lift_rate: (3,) rate of that offset [m/s].
         follow: Share of the feedback gains with which a flying effector follows its path.
+        planned: Whether the time is one of planned support, not of an early touch.
+        fades: Parts of the sole beyond which the load limits rise after a change of the touching
+            part, or fall before one, and how far, in [0, 1].
     """
 
     effector: str
@@ -60,6 +63,8 @@ class SupportState:
     lift: FloatArray = field(default_factory=lambda: _NO_LIFT)
     lift_rate: FloatArray = field(default_factory=lambda: _NO_LIFT)
     follow: float = 1.0
+    planned: bool = True
+    fades: tuple[tuple[SolePart, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +76,38 @@ class SupportInterval:
         start: Planned touch-down [s]; -inf when held from the beginning.
         end: Planned lift-off [s]; inf when held to the end.
         early: First time at which a touch counts as this touch-down [s].
+        parts: Contact from each time on, in order; the same place throughout, but other parts of
+            a sole that rolls.
     """
 
     contact: Contact
     start: float
     end: float
     early: float
+    parts: tuple[tuple[float, Contact], ...] = ()
+
+    def contact_at(self, time: float) -> Contact:
+        """Part of the contact that is planned at a time [s]; before the first, the first."""
+        found = self.contact
+        for start, contact in self.parts:
+            if start <= time + 1e-9:
+                found = contact
+        return found
+
+    def part_before(self, time: float) -> tuple[SolePart, float] | None:
+        """Part that touched before the one of a time [s], and when it changed; None without."""
+        now = self.contact_at(time).part
+        earlier = [(start, contact.part) for start, contact in self.parts if start <= time + 1e-9]
+        for (_, part), (changed, _) in zip(earlier[-2::-1], earlier[::-1], strict=False):
+            if part is not now:
+                return part, changed
+        return None
+
+    def part_after(self, time: float) -> tuple[SolePart, float] | None:
+        """Part that touches after the one of a time [s], and when it changes; None without."""
+        now = self.contact_at(time).part
+        later = ((contact.part, start) for start, contact in self.parts if start > time + 1e-9)
+        return next(((part, start) for part, start in later if part is not now), None)
 
 
 def support_intervals(
@@ -103,7 +134,11 @@ def support_intervals(
         start = -math.inf if first == 0 else float(schedule.instants[first])
         end = math.inf if index == len(phases) else float(schedule.instants[index])
         early = max(start - early_window, start - (start - previous_end) / 3) if first else start
-        found.append(SupportInterval(phases[first].stance[effector], start, end, early))
+        parts = tuple(
+            (float(schedule.instants[number]), phases[number].stance[effector])
+            for number in range(first, index)
+        )
+        found.append(SupportInterval(parts[0][1], start, end, early, parts))
         previous_end = end
     return tuple(found)
 
@@ -161,16 +196,19 @@ class SupportSwitch:
             return SupportState(
                 name,
                 SupportMode.STANCE,
-                interval.contact,
+                interval.contact_at(time),
                 load_share=float(np.clip(rising, _FIRST_SHARE, 1.0)),
                 unload_share=float(np.clip(falling, 0.0, 1.0)),
+                planned=planned,
+                fades=self._fades(interval, time),
             )
         if not planned:
             return self._hovering(name, interval, time)
         late = time - max(interval.start, memory.touched)
         height = self._settings.hover if memory.touched < interval.start else 0.0
-        press = min(self._settings.press_depth, self._settings.press_speed * late - height)
-        return SupportState(name, SupportMode.LANDING, interval.contact, press=press)
+        contact = interval.contact_at(time)
+        press = min(self._settings.press_depth, self._settings.press_speed_of(contact) * late - height)
+        return SupportState(name, SupportMode.LANDING, contact, press=press)
 
     def _hovering(self, name: str, interval: SupportInterval, time: float) -> SupportState:
         """Lift the end of a flight smoothly, in the first part of the time in which it might touch."""
@@ -184,6 +222,18 @@ class SupportSwitch:
             lift=share**2 * (3.0 - 2.0 * share) * up,
             lift_rate=6.0 * share * (1.0 - share) / duration * up,
         )
+
+    def _fades(self, interval: SupportInterval, time: float) -> tuple[tuple[SolePart, float], ...]:
+        """Load moves gradually to points that begin to touch, and off those that cease to."""
+        found = []
+        before, after = interval.part_before(time), interval.part_after(time)
+        if before is not None:
+            share = (time - before[1]) / self._settings.rolling_load_time
+            found.append((before[0], float(np.clip(share, 0.0, 1.0)) ** 2))
+        if after is not None:
+            share = (after[1] - time) / self._settings.unload_time
+            found.append((after[0], float(np.clip(share, 0.0, 1.0))))
+        return tuple(item for item in found if item[1] < 1.0)
 
     def _follow(self, name: str, time: float) -> float:
         """Feedback gains rise smoothly after a lift-off, where plan and reality differ in speed."""

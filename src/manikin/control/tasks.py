@@ -107,19 +107,53 @@ def lifted(reference: EffectorReference, support: SupportState) -> EffectorRefer
     return replace(reference, position=reference.position + support.lift, twist=twist)
 
 
-def landing_reference(support: SupportState, press_speed: float) -> EffectorReference:
-    """Reference of an effector that is due to touch and does not: go on along the normal."""
+def landing_reference(
+    support: SupportState, press_speed: float, planned: EffectorReference | None = None
+) -> EffectorReference:
+    """Reference of an effector that is due to touch and does not: go on along the normal.
+
+    Args:
+        support: A landing effector.
+        press_speed: Along the normal [m/s].
+        planned: Where a foot that lands on a part of its sole should be; the contact when omitted.
+    """
     contact = support.contact
     if contact is None or support.mode is not SupportMode.LANDING:
         raise ValueError(f"{support.effector} is in {support.mode}; valid: a landing effector")
-    twist = np.zeros(6)
-    twist[:3] = -press_speed * contact.normal
+    twist = np.zeros(6) if planned is None else planned.twist.copy()
+    twist[:3] -= press_speed * contact.normal
+    if planned is not None:
+        position = planned.position - support.press * contact.normal
+        return replace(planned, position=position, twist=twist)
     return EffectorReference(
         contact.rotation_contact_to_world,
         contact.position - support.press * contact.normal,
         twist,
         np.zeros(6),
     )
+
+
+def rolling_task(
+    name: str,
+    frame: FrameState,
+    reference: EffectorReference,
+    support: SupportState,
+    gains: Impedance,
+    weight: float,
+) -> AccelerationTask:
+    """Let a foot tilt as planned about the part of its sole that touches.
+
+    The planned twist turns about that part, which itself has no velocity in it. As in
+    :func:`stance_task`, of the placement only the orientation is fed back. Before its planned
+    landing the foot keeps its tilt.
+    """
+    if not support.planned:
+        return AccelerationTask(
+            name, frame.jacobian, -gains.damping * frame.twist - frame.drift, np.full(6, weight)
+        )
+    wanted = reference.acceleration + gains.damping * (reference.twist - frame.twist)
+    wanted[3:] += gains.stiffness * orientation_error(reference.rotation, frame.rotation)
+    return AccelerationTask(name, frame.jacobian, wanted - frame.drift, np.full(6, weight))
 
 
 def stance_task(

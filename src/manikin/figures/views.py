@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 
 from manikin.balance import convex_polygon
 from manikin.body import BodyModel, Shape, ShapeKind
-from manikin.contact import Contact, ContactSchedule
+from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.figures.style import COLOURS
 from manikin.scene import Box, HalfSpace, Mesh, Plane, Scene
 from manikin.spatial import FloatArray
@@ -94,12 +94,15 @@ def best_view(schedule: ContactSchedule) -> View:
 
 
 def distinct_contacts(schedule: ContactSchedule) -> list[Contact]:
-    """Every contact once, in the order in which it is made."""
+    """Every contact once, in the order in which it is made; of a rolling foot the full sole."""
     found: list[Contact] = []
     for phase in schedule.sequence:
         for contact in phase.stance:
-            if not any(contact.same_place(other) for other in found):
+            known = next((n for n, other in enumerate(found) if contact.same_place(other)), None)
+            if known is None:
                 found.append(contact)
+            elif found[known].part is not SolePart.FULL and contact.part is SolePart.FULL:
+                found[known] = contact
     return found
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from manikin.body import BodyModel, Effector, Hinge, Segment, Shape
-from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, Stance, StanceSequence
+from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance, StanceSequence
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
 from manikin.spatial import frozen_array
 
@@ -199,6 +199,7 @@ def _describe_contact(contact: Contact) -> Json:
         "torsion_limit": contact.torsion_limit,
         "max_force": contact.max_force,
         "max_moment": contact.max_moment,
+        "part": str(contact.part),
     }
 
 
@@ -214,4 +215,5 @@ def _contact_from(data: Mapping[str, Any]) -> Contact:
         torsion_limit=data["torsion_limit"],
         max_force=data["max_force"],
         max_moment=data["max_moment"],
+        part=SolePart(data.get("part", SolePart.FULL)),
     )

@@ -12,7 +12,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from manikin.contact import Contact, Phase, Stance, StanceSequence, grasp, point, sole, soles_overlap
+from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
+from manikin.contact import (
+    Contact,
+    Phase,
+    Stance,
+    StanceSequence,
+    grasp,
+    point,
+    roll_feet,
+    sole,
+    soles_overlap,
+)
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios.expressions import Expression
 from manikin.scenarios.heights import HeightBand, SupportLevel
@@ -230,6 +241,16 @@ class Scenario:
         Raises:
             ScenarioError: If there are no supports, or a contact slides between phases.
         """
+        sequence, supports = self._flat_sequence(planning), self._supports()
+        if supports.foot == "flat":
+            return sequence
+        try:
+            return roll_feet(sequence, (TOE_HINGE_FROM_HEEL - 0.5) * supports.sole.length_m)
+        except InputError as error:
+            raise self._refused(("supports", "foot"), error) from None
+
+    def _flat_sequence(self, planning: bool = False) -> StanceSequence:
+        """The stances as the file lists them, with full soles."""
         supports = self._supports()
         default_sole = supports.planning_sole if planning and supports.planning_sole else supports.sole
         cap = supports.normal_force_cap_N or BODY_WEIGHTS_CAP * self.mass * GRAVITY
@@ -344,7 +365,7 @@ class Scenario:
         Raises:
             ScenarioError: For the first contact that is off every surface or overlaps another.
         """
-        for number, stance in enumerate(phase.stance for phase in self.build_sequence()):
+        for number, stance in enumerate(phase.stance for phase in self._flat_sequence()):
             for first, second in combinations(stance, 2):
                 if soles_overlap(first, second):
                     raise self._error(

@@ -263,6 +263,11 @@ class SupportsSection(Section):
         default=None,
         description="smaller soles that planning balances on, for robustness (default: the real ones)",
     )
+    foot: Literal["flat", "rolling"] = Field(
+        default="flat",
+        description="whether a foot lands and leaves with its whole sole, or lands on its heel and leaves "
+        "from its toes while another foot stands",
+    )
     normal_force_cap_N: Positive | None = Field(
         default=None, description="largest sum of the normal forces of a stance [N] (default: 3 body weights)"
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.balance import wrench_polytope
-from manikin.contact import Contact, ContactKind, ContactSchedule, Stance
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.control import ControlOutput, SupportMode
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.motion import Motion
@@ -86,7 +86,8 @@ class Recorder:
 
     def _measure_slip(self, name: str, output: ControlOutput) -> None:
         support, position = output.supports[name], output.state.frames[name].position
-        if support.mode is not SupportMode.STANCE or support.contact is None or support.load_share < 1:
+        held = support.mode is SupportMode.STANCE and support.load_share >= 1
+        if not held or support.contact is None or support.contact.part is not SolePart.FULL:
             self._landings[name] = None
             return
         landing = self._landings[name]

@@ -7,7 +7,7 @@ and centre of mass as one spline, and the result is certified at 1 kHz.
 
 import itertools
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,7 +29,7 @@ from manikin.wholebody.guide import Guide, guide_times, plan_guide
 from manikin.wholebody.manner import READY, Manner
 from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.swing import SwingLimits
-from manikin.wholebody.targets import FitTargets, effector_targets, ignored_pairs
+from manikin.wholebody.targets import FitTargets, effector_targets, ignored_pairs, toe_angles
 
 DEGREE = 5
 """Degree of the whole-body spline: four continuous derivatives."""
@@ -39,6 +39,9 @@ NEAR_FLIGHT = 0.05
 
 SECOND_SEARCH = 600
 """Random points of the Bi-RRT where a smooth curve exists but the body cannot follow it."""
+
+ROLLING_TOES = 2.0e-3
+"""Deviation of toes from lying flat, or straight, that costs one unit where feet roll [rad]."""
 
 Progress = Callable[[float], None]
 """Told the share of the work that is done, in [0, 1]."""
@@ -185,7 +188,7 @@ class _Planner:
         for index, item in enumerate(swings):
             start, end = item.interval
             near = start - NEAR_FLIGHT <= result.failure.time <= end + NEAR_FLIGHT
-            if item.method == "smooth" and item.failure is None and near:
+            if item.method == "smooth" and item.failure is None and item.roll is None and near:
                 other = self.flights.search(item.swing, item, iterations=SECOND_SEARCH)
                 if other.method != item.method:
                     return (*swings[:index], other, *swings[index + 1 :])
@@ -212,11 +215,13 @@ class _Planner:
     def _guide(self, swings: tuple[PlannedSwing, ...]) -> Guide:
         schedule = self.trajectory.schedule
         time = guide_times(schedule.instants, self.settings.guide_spacing)
+        toes = toe_angles(self.body, swings, time)
+        reference = reference_motion(self.body, self.trajectory, time, self.settings.manner)
         return plan_guide(
             self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time),
             self.trajectory.position(time), ignored_pairs(self.body, self.scene, schedule, time),
-            reference_motion(self.body, self.trajectory, time, self.settings.manner),
-            self.settings.fit.safe_distance, self.settings.manner.preferences,
+            _with_joints(reference, toes), self.settings.fit.safe_distance,
+            self.settings.manner.preferences, tuple(toes),
         )  # fmt: skip
 
     def _targets(self, swings: tuple[PlannedSwing, ...], guide: Guide) -> tuple[FitTargets, FloatArray]:
@@ -224,14 +229,17 @@ class _Planner:
         schedule, settings = self.trajectory.schedule, self.settings
         knots = phase_knots(schedule.instants, settings.knot_spacing, DEGREE)
         time = sample_times(knots, settings.samples_per_span)
+        toes = toe_angles(self.body, swings, time)
+        scale = self.settings.manner.scale(self.body)
+        scale[[6 + joint for joint in toes]] = ROLLING_TOES
         targets = FitTargets(
             time=time,
             effectors=effector_targets(schedule, swings, time),
             com=self.trajectory.position(time),
             com_acceleration=self.trajectory.acceleration(time),
             margin=self._margin(time, self._point_mass_wrench(time)),
-            reference=guide.at(time),
-            reference_scale=self.settings.manner.scale(self.body),
+            reference=_with_joints(guide.at(time), toes),
+            reference_scale=scale,
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
         )
         return targets, knots
@@ -306,6 +314,14 @@ class _Planner:
     def _report(self, share: float) -> None:
         if self._progress is not None:
             self._progress(share)
+
+
+def _with_joints(configurations: FloatArray, angles: Mapping[int, FloatArray]) -> FloatArray:
+    """Configurations (n, nq) with other angles (n,) of some joints."""
+    changed = np.array(configurations)
+    for joint, values in angles.items():
+        changed[:, 7 + joint] = values
+    return changed
 
 
 def _better(first: WholeBodyResult, second: WholeBodyResult) -> WholeBodyResult:

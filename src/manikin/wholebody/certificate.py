@@ -11,8 +11,9 @@ import pinocchio as pin
 
 from manikin.balance import least_zmp_distance
 from manikin.body import BodyModel
+from manikin.body.limb import hanging_segment
 from manikin.centroidal import CentroidalTrajectory
-from manikin.contact import ContactSchedule
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.motion import Motion
 from manikin.scene import Proximity
 from manikin.spatial import FloatArray
@@ -154,13 +155,35 @@ def _support_errors(
     schedule = trajectory.schedule
     position, turn = np.zeros(len(motion.time)), np.zeros(len(motion.time))
     phases = schedule.phase_at(motion.time)
-    frames = {name: body.effector_frame(name) for name in schedule.sequence.effectors}
     for k, q in enumerate(motion.q):
         pin.forwardKinematics(model, data, q)
+        pin.updateFramePlacements(model, data)
         for contact in schedule.sequence[int(phases[k])].stance:
-            placement = pin.updateFramePlacement(model, data, frames[contact.effector])
-            position[k] = max(position[k], float(np.linalg.norm(placement.translation - contact.position)))
-            if contact.kind == "sole":
-                relative = contact.rotation_contact_to_world.T @ placement.rotation
-                turn[k] = max(turn[k], float(np.linalg.norm(pin.log3(relative))))
+            measure = _placement_error if contact.part is SolePart.FULL else _part_error
+            moved, turned = measure(body, data, contact)
+            position[k], turn[k] = max(position[k], moved), max(turn[k], turned)
     return position, turn
+
+
+def _placement_error(body: BodyModel, data: pin.Data, contact: Contact) -> tuple[float, float]:
+    """Distance [m] and, of a sole, angle [rad] of an effector from its contact."""
+    placement = data.oMf[body.effector_frame(contact.effector)]
+    moved = float(np.linalg.norm(placement.translation - contact.position))
+    if contact.kind is not ContactKind.SOLE:
+        return moved, 0.0
+    return moved, float(np.linalg.norm(pin.log3(contact.rotation_contact_to_world.T @ placement.rotation)))
+
+
+def _part_error(body: BodyModel, data: pin.Data, contact: Contact) -> tuple[float, float]:
+    """Largest distance of a point of a part from where it touches [m]; tilts show in it too."""
+    effector = body.effector(contact.effector)
+    hanging = hanging_segment(body, effector.segment)
+    moved = 0.0
+    for local, wanted in zip(contact.points, contact.points_in_world, strict=True):
+        inside = effector.translation + effector.rotation @ local
+        segment = effector.segment
+        if contact.part is SolePart.TOES and hanging is not None:
+            segment, inside = hanging.name, inside - hanging.origin
+        actual = data.oMf[body.segment_frame(segment)].act(inside)
+        moved = max(moved, float(np.linalg.norm(actual - wanted)))
+    return moved, 0.0

@@ -6,10 +6,12 @@ centre of mass.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import coal
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
@@ -42,12 +44,20 @@ class EffectorClearance:
         effector: Name of the flying effector.
         standing: Contacts of the other effectors during the flight.
         com: Planned centre of mass, which the standing limbs point to.
+        bend: Angle of the hanging segment (toes) at a time [rad]; straight when omitted.
     """
 
     def __init__(
-        self, body: BodyModel, scene: Scene, effector: str, standing: Sequence[Contact], com: CentreOfMass
+        self,
+        body: BodyModel,
+        scene: Scene,
+        effector: str,
+        standing: Sequence[Contact],
+        com: CentreOfMass,
+        bend: Callable[[float], float] | None = None,
     ) -> None:
         self._own = end_shapes(body, effector)
+        self._bend, self._hinge = bend, _hinge_of(body, effector)
         self._fixed = [
             (part.geometry, coal.Transform3s(part.rotation, part.translation))
             for obstacle in scene.obstacles
@@ -69,6 +79,9 @@ class EffectorClearance:
             [offset + turn @ ball[0] for (_, turn, offset), ball in zip(self._own, balls, strict=True)]
         )
         self._radii = np.array([ball[1] for ball in balls])
+        # A bent shape stays this close to its straight place.
+        hanging = [offset for _, _, offset in self._own[self._hinge.first :]]
+        self._reach = max((2.0 * float(np.linalg.norm(o - self._hinge.place)) for o in hanging), default=0.0)
         self._com = com
         self._placed: dict[float, list[Placed]] = {}
         self._request = coal.DistanceRequest()
@@ -76,22 +89,37 @@ class EffectorClearance:
 
     def __call__(self, time: float, pose: Pose) -> float:
         """Return the signed distance at a pose [m]; negative means penetration."""
+        local = self._bent(time)
         own = [
             (geometry, coal.Transform3s(pose.rotation @ turn, pose.position + pose.rotation @ offset))
-            for geometry, turn, offset in self._own
+            for geometry, turn, offset in local
         ]
         smallest = min((self._distance(mine, limb) for limb in self._placed_limbs(time) for mine in own),
                        default=np.inf)  # fmt: skip
         # Far obstacles are told by the box around them and the ball around the own shape.
         centres = pose.position + self._centres @ pose.rotation.T
+        slack = 0.0 if local is self._own else self._reach
         beyond = np.maximum(np.maximum(self._low - centres[:, None], centres[:, None] - self._high), 0.0)
-        lower = np.sqrt(np.einsum("ijk,ijk->ij", beyond, beyond)) - self._radii[:, None]
+        lower = np.sqrt(np.einsum("ijk,ijk->ij", beyond, beyond)) - self._radii[:, None] - slack
         for index in np.argsort(lower, axis=None, kind="stable"):
             mine, other = divmod(int(index), lower.shape[1])
             if lower[mine, other] > smallest:
                 break
             smallest = min(smallest, self._distance(own[mine], self._fixed[other]))
         return float(smallest)
+
+    def _bent(self, time: float) -> list[tuple[Any, FloatArray, FloatArray]]:
+        """The own shapes in the effector frame, those of the hanging segment turned about its hinge."""
+        angle = 0.0 if self._bend is None else self._bend(time)
+        if angle == 0.0:
+            return self._own
+        turn = Rotation.from_rotvec(angle * self._hinge.axis).as_matrix()
+        place = self._hinge.place
+        bent = [
+            (geometry, turn @ rotation, place + turn @ (offset - place))
+            for geometry, rotation, offset in self._own[self._hinge.first :]
+        ]
+        return [*self._own[: self._hinge.first], *bent]
 
     def _placed_limbs(self, time: float) -> list[Placed]:
         if time not in self._placed:
@@ -102,6 +130,31 @@ class EffectorClearance:
     def _distance(self, mine: Placed, other: Placed) -> float:
         self._result.clear()
         return coal.distance(*mine, *other, self._request, self._result)
+
+
+@dataclass(frozen=True, eq=False)
+class _Hinge:
+    """Hinge of the segment that hangs on an effector's own.
+
+    Attributes:
+        first: Number of shapes before those of the hanging segment.
+        place: (3,) in the effector frame [m].
+        axis: (3,) unit axis in the effector frame.
+    """
+
+    first: int
+    place: FloatArray
+    axis: FloatArray
+
+
+def _hinge_of(body: BodyModel, effector: str) -> _Hinge:
+    frame = body.effector(effector)
+    hanging = hanging_segment(body, frame.segment)
+    first = len(body.segment(frame.segment).shapes)
+    if hanging is None:
+        return _Hinge(first, np.zeros(3), np.array([0.0, 1.0, 0.0]))
+    place = frame.rotation.T @ (hanging.origin - frame.translation)
+    return _Hinge(first, place, frame.rotation.T @ hanging.hinges[0].axis)
 
 
 def end_shapes(body: BodyModel, effector: str) -> list[tuple[Any, FloatArray, FloatArray]]:

@@ -1,7 +1,7 @@
 """A curve for every flight of a motion: smooth curves first, the Bi-RRT where they fail."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,8 +15,9 @@ from manikin.spatial import FloatArray
 from manikin.wholebody.birrt import FlightLimits
 from manikin.wholebody.effector_clearance import EffectorClearance
 from manikin.wholebody.flight_search import ClearFlight, PostureCheck, search_swing
+from manikin.wholebody.foot_roll import FootRoll, foot_roll
 from manikin.wholebody.path import Pose
-from manikin.wholebody.swing import SwingLimits, plan_swing
+from manikin.wholebody.swing import HEIGHTS, SwingLimits, plan_swing
 from manikin.wholebody.swing_curve import SwingCurve
 
 LEVEL_BEHIND = 0.08
@@ -32,6 +33,16 @@ REACHING_TIME = 0.7
 """A free hand begins to reach for its grasp this long before [s], and is put away as slowly."""
 
 
+ROLLING_CLEARANCE = 0.6
+"""Clearance of a rolling foot relative to that of a level one: people lift their toes by 1.5 cm."""
+
+ROLLING_DEPARTURE = 0.4
+"""Clearance it gains per metre, relative to that of a level one: it turns before it rises."""
+
+ROLLING_HEIGHTS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, *HEIGHTS[1:])
+"""Apex heights of the point about which a rolling foot tilts: the ankle is lifted by the tilt already [m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class PlannedSwing:
     """A flight and the curve found for it.
@@ -41,12 +52,14 @@ class PlannedSwing:
         curve: Its curve, or the best attempt.
         method: ``"smooth"``, ``"bi-rrt"``, or ``"reach"`` for an effector that is free at one end.
         failure: None, or what the best attempt does not keep.
+        roll: How the foot pitches; the curve is then that of the point it tilts about.
     """
 
     swing: Swing
     curve: SwingCurve
     method: str
     failure: str | None = None
+    roll: FootRoll | None = None
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -94,6 +107,9 @@ class FlightPlanner:
         if swing.start is None or swing.end is None:
             return self._reach(swing)
         start, end = self.schedule.swing_interval(swing)
+        roll = foot_roll(self._body, self.schedule, swing)
+        if roll is not None:
+            return self._plan_rolling(swing, roll)
         plan = plan_swing(
             _pose(swing.start), _pose(swing.end), start, end, self._clearance(swing), limits=self._limits,
             start_normal=swing.start.normal, end_normal=swing.end.normal, pitch=self._pitch(swing, start),
@@ -128,6 +144,28 @@ class FlightPlanner:
         rotation, position = Configuration(self._body, self._reference(time)).effector_placement(effector)
         return Pose(np.array(position), np.array(rotation))
 
+    def _plan_rolling(self, swing: Swing, roll: FootRoll) -> PlannedSwing:
+        """Find a smooth curve of the point about which the foot tilts."""
+        assert swing.start is not None
+        assert swing.end is not None
+        distance = self._clearance(swing, lambda time: float(roll.toe_extension(np.array([time]))[0]))
+
+        def clearance(time: float, pivot: Pose) -> float:
+            position, rotation = roll.pose(pivot.position[None], pivot.rotation[None], np.array([time]))
+            return distance(time, Pose(position[0], rotation[0]))
+
+        start, end = self.schedule.swing_interval(swing)
+        limits = replace(
+            self._limits,
+            clearance=ROLLING_CLEARANCE * self._limits.clearance,
+            departure=ROLLING_DEPARTURE * self._limits.departure,
+        )
+        plan = plan_swing(
+            *roll.pivots, start, end, clearance, limits=limits,
+            start_normal=swing.start.normal, end_normal=swing.end.normal, heights=ROLLING_HEIGHTS,
+        )  # fmt: skip
+        return PlannedSwing(swing, plan.curve, "smooth", plan.failure, roll)
+
     def search(self, swing: Swing, fallback: PlannedSwing, iterations: int = 2000) -> PlannedSwing:
         """Search a curve with the Bi-RRT and posture checks; ``fallback`` when there is none."""
         assert swing.start is not None
@@ -160,10 +198,10 @@ class FlightPlanner:
         behind = float(np.cos(yaw) * away[0] + np.sin(yaw) * away[1])
         return float(np.clip(PITCH_PER_METRE * (behind - LEVEL_BEHIND), 0.0, MOST_PITCH))
 
-    def _clearance(self, swing: Swing) -> EffectorClearance:
+    def _clearance(self, swing: Swing, bend: Callable[[float], float] | None = None) -> EffectorClearance:
         return EffectorClearance(
             self._body, self._scene, swing.effector, standing_during(self.schedule, swing),
-            self._trajectory.position,
+            self._trajectory.position, bend,
         )  # fmt: skip
 
     def _touch_pairs(self, contact: Contact) -> frozenset[tuple[str, str]]:

@@ -15,7 +15,7 @@ from scipy.optimize import lsq_linear, nnls
 
 from manikin.body import BodyModel
 from manikin.body.limb import carrying_segment, hinge_line
-from manikin.contact import Contact, ContactKind, ContactSchedule, Stance
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.spatial import FloatArray, skew
 from manikin.wholebody.configuration_spline import rotation_from_quaternion
 
@@ -170,7 +170,12 @@ def _force_points(body: BodyModel, contact: Contact) -> FloatArray:
     """(k, 3) points of the contact frame that carry force: corners, and the ends of the toes' hinge."""
     line = hinge_line(body, contact.effector)
     inside = line is not None and abs(line) < 0.5 * contact.length
-    if contact.kind is not ContactKind.SOLE or line is None or not inside:
+    if (
+        contact.kind is not ContactKind.SOLE
+        or contact.part is not SolePart.FULL
+        or line is None
+        or not inside
+    ):
         return contact.points
     half = 0.5 * contact.width
     return np.vstack([contact.points, [[line, half, 0.0], [line, -half, 0.0]]])

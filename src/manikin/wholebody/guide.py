@@ -7,12 +7,13 @@ and they are what the fitted motion stays near.
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.contact import Contact, ContactSchedule
+from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.posture import (
     Placement,
     PostureProblem,
@@ -86,6 +87,7 @@ def plan_guide(
     reference: FloatArray,
     clearance: float,
     preferences: Preferences | None = None,
+    exact: Sequence[int] = (),
 ) -> Guide:
     """Find a posture at each time, each one starting from the one before.
 
@@ -100,6 +102,7 @@ def plan_guide(
         reference: (k, nq) preferred postures, the first of which starts the search.
         clearance: Wanted distance to everything [m].
         preferences: What the postures should look like; the generator's own when omitted.
+        exact: Joints that keep to the reference whatever the posture before.
     """
     q = reference[0]
     found: list[FloatArray] = []
@@ -108,9 +111,10 @@ def plan_guide(
     for k, instant in enumerate(time):
         contacts, placements = _requirements(schedule, float(instant), effectors, k)
         # Half way to the posture before: neighbouring postures must not jump.
-        wanted = (
-            reference[k] if k == 0 else np.concatenate([reference[k][:7], 0.5 * (reference[k][7:] + q[7:])])
-        )
+        wanted = np.array(reference[k])
+        if k > 0:
+            wanted[7:] = 0.5 * (reference[k][7:] + q[7:])
+            wanted[[7 + joint for joint in exact]] = reference[k][[7 + joint for joint in exact]]
         problem = PostureProblem(
             body, contacts, placements, com=com[k], proximity=proximity, clearance=clearance,
             self_clearance=clearance, ignore=ignored[k], reference=wanted,
@@ -127,17 +131,17 @@ def plan_guide(
 def _requirements(
     schedule: ContactSchedule, time: float, effectors: dict[str, EffectorTarget], k: int
 ) -> tuple[tuple[Contact, ...], dict[str, Placement]]:
-    stance = schedule.stance_at(time)
+    held = {c.effector: c for c in schedule.stance_at(time) if c.part is SolePart.FULL}
     placements = {}
     for name, target in effectors.items():
-        if name not in stance and target.weight[k] >= LEAST_WEIGHT:
+        if name not in held and target.weight[k] >= LEAST_WEIGHT:
             turn = (
                 target.rotation[k]
                 if target.rotation is not None and target.rotation_weight[k] > 0.5
                 else None
             )
             placements[name] = Placement(target.position[k], turn)
-    return tuple(stance), placements
+    return tuple(held.values()), placements
 
 
 def _failure(schedule: ContactSchedule, time: float, result: PostureResult) -> GuideFailure:

@@ -77,7 +77,7 @@ WALKING = Manner(
     }),
     trunk_scale=0.15,
     arm_swing=0.7,
-    moment_factor=1.0,
+    moment_factor=1.6,
     preferences=Preferences(
         hinges=MappingProxyType({"shoulder": 0.5, **Preferences().hinges}),
         pelvis=2.0, trunk=2.0, head=1.0, arms=0.0,

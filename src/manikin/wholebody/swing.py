@@ -7,7 +7,7 @@ clearance, the control points of the best one are moved by sequential quadratic 
 """
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import daqp
@@ -149,6 +149,7 @@ def plan_swing(
     pitch: float = 0.0,
     refine: int = 20,
     controls: int = 20,
+    heights: Sequence[float] = HEIGHTS,
 ) -> SwingPlan:
     """Find a smooth flight from ``start`` to ``goal`` that keeps clear.
 
@@ -164,6 +165,7 @@ def plan_swing(
         pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
         refine: Largest number of iterations of the optimisation; 0 tries the family only.
         controls: Number of control poses of the curves.
+        heights: Apex heights above the higher end that are tried [m].
 
     Returns:
         A plan that says whether it succeeded and, if not, what its best attempt breaks.
@@ -183,7 +185,7 @@ def plan_swing(
             start, goal, start_time, end_time, height=height, lateral=lateral, apex=apex,
             start_normal=normals[0], end_normal=normals[1], pitch=pitch, controls=controls,
         )
-        for height, lateral, apex in _choices()
+        for height, lateral, apex in _choices(heights)
     )  # fmt: skip
     best, best_check, tried = _first_clear(family, clearance, limits)
     best, best_check, iterations = _refine(best, best_check, clearance, limits, normals, refine)
@@ -244,10 +246,10 @@ def _first_clear(
     return curve, check_swing(curve, clearance, limits), len(found)
 
 
-def _choices() -> list[tuple[float, float, float]]:
+def _choices(heights: Sequence[float]) -> list[tuple[float, float, float]]:
     """Heights, lateral offsets and apexes of the family, from the least to the most effort."""
     return sorted(
-        itertools.product(HEIGHTS, LATERALS, APEXES),
+        itertools.product(heights, LATERALS, APEXES),
         key=lambda choice: choice[0] + 0.5 * abs(choice[1]) + 0.2 * abs(choice[2] - 0.5),
     )
 

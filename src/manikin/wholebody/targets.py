@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.body import BodyModel
+from manikin.body.limb import hanging_segment
 from manikin.contact import ContactKind, ContactSchedule
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
@@ -77,9 +78,8 @@ def effector_targets(
         for item in swings:
             if item.swing.effector == name:
                 start, end = item.interval
+                _place(item, time, position, rotation, (start, end))
                 rows = (time >= start) & (time < end)
-                state = item.curve.evaluate(time[rows])
-                position[rows], rotation[rows] = state.position, state.rotation
                 share = (time[rows] - start) / (end - start)
                 weight[rows] = _flight_weight(share, FLIGHT_POSITION_WEIGHT)
                 rotation_weight[rows] = _flight_weight(share, FLIGHT_ROTATION_WEIGHT)
@@ -89,6 +89,35 @@ def effector_targets(
                     rotation_weight[rows] = GRASP_ROTATION_WEIGHT * held
         targets[name] = EffectorTarget(position, rotation, weight, rotation_weight)
     return targets
+
+
+def _place(
+    item: PlannedSwing,
+    time: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    interval: tuple[float, float],
+) -> None:
+    """Write the effector's placement during a flight, and while it rolls before and after it."""
+    start, end = interval if item.roll is None else (item.roll.instants[0], item.roll.instants[3])
+    rows = (time >= start) & (time < end)
+    state = item.curve.evaluate(time[rows])
+    position[rows], rotation[rows] = state.position, state.rotation
+    if item.roll is not None:
+        position[rows], rotation[rows] = item.roll.pose(state.position, state.rotation, time[rows])
+
+
+def toe_angles(body: BodyModel, swings: Sequence[PlannedSwing], time: FloatArray) -> dict[int, FloatArray]:
+    """Angle (n,) of each joint of toes that stay flat while their foot rolls [rad], by joint index."""
+    found: dict[int, FloatArray] = {}
+    for item in swings:
+        toes = hanging_segment(body, body.effector(item.swing.effector).segment)
+        if item.roll is None or toes is None:
+            continue
+        joint = body.joint_index(toes.hinges[0].name)
+        rows = (time >= item.roll.instants[0]) & (time < item.roll.instants[2])
+        found.setdefault(joint, np.zeros(len(time)))[rows] = item.roll.toe_extension(time[rows])
+    return found
 
 
 FLIGHT_POSITION_WEIGHT = 0.1

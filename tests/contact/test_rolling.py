@@ -1,0 +1,146 @@
+"""Parts of a sole and the expansion of a stance sequence into heel, sole and toes."""
+
+import numpy as np
+import pytest
+
+from manikin.balance import (
+    least_zmp_distance,
+    pseudo_wrench,
+    signed_distance,
+    support_plane,
+    wrench_polytope,
+)
+from manikin.contact import (
+    Phase,
+    Rolling,
+    SolePart,
+    Stance,
+    StanceSequence,
+    grasp,
+    point,
+    roll_feet,
+    sole_part,
+)
+from manikin.contact import sole as make_sole
+from manikin.errors import ContactError
+
+SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
+HINGE = 0.0644
+
+
+def foot(name="left_foot", place=(0.0, 0.1, 0.0), yaw=0.3, **limits):
+    return make_sole(name, place, yaw, **SIZE, **limits)
+
+
+def step():
+    left, right = foot(), foot("right_foot", (0.0, -0.1, 0.0))
+    ahead = foot("right_foot", (0.4, -0.1, 0.0))
+    stances = ([left, right], [left], [left, ahead])
+    return StanceSequence([Phase(Stance(contacts, 1500.0), 0.3) for contacts in stances])
+
+
+def random_wrenches(count=500):
+    """Wrenches about the sizes that a person's contacts give, inside and outside of them."""
+    rng = np.random.default_rng(3)
+    return rng.normal(size=(count, 6)) * [60, 60, 300, 40, 40, 10] + [0, 0, 600, 0, 0, 0]
+
+
+@pytest.mark.parametrize("part", [SolePart.HEEL, SolePart.TOES])
+def test_a_part_applies_what_its_points_apply(part):
+    """The polytope of a part beside a full sole is that of frictional points at its corners."""
+    other = foot("right_foot", (0.2, -0.1, 0.0))
+    touching = sole_part(foot(), part, HINGE)
+    points = [
+        point(f"p{i}", place, friction=0.7, rotation=touching.rotation_contact_to_world)
+        for i, place in enumerate(touching.points_in_world)
+    ]
+    first = wrench_polytope(Stance([touching, other], 1500.0))
+    second = wrench_polytope(Stance([*points, other], 1500.0))
+    wrench = random_wrenches()
+    assert first.margin(wrench) == pytest.approx(second.margin(wrench), abs=1e-6)
+
+
+@pytest.mark.parametrize("part", [SolePart.HEEL, SolePart.TOES])
+def test_a_part_adds_to_the_other_sole_and_stays_within_the_full_one(part):
+    """A wrench inside has no less margin in the larger set: sole, sole and part, both soles."""
+    other = foot("right_foot", (0.2, -0.1, 0.0))
+    single, rolling, full = (
+        wrench_polytope(Stance(contacts, 1500.0))
+        for contacts in ([other], [sole_part(foot(), part, HINGE), other], [foot(), other])
+    )
+    wrench = random_wrenches()
+    assert np.any(single.margin(wrench) >= 0)
+    for smaller, larger in ((single, rolling), (rolling, full)):
+        inside = smaller.margin(wrench) >= 0
+        assert np.all(larger.margin(wrench[inside]) >= smaller.margin(wrench[inside]) - 1e-6)
+
+
+def test_the_zmp_of_an_edge_lies_on_its_line():
+    """Two points that push have their centre of pressure between them."""
+    heel = sole_part(foot(), SolePart.HEEL, HINGE)
+    W = wrench_polytope(Stance([heel], 1500.0))
+    first, second = heel.points_in_world
+    for share in (0.1, 0.5, 0.9):
+        place = (1.0 - share) * first + share * second
+        wrench = pseudo_wrench(60.0, place + np.array([0.0, 0.0, 0.9]), np.zeros(3))
+        assert W.margin(wrench) == pytest.approx(0.0, abs=1e-6)
+        plane = support_plane(Stance([heel], 1500.0))
+        assert signed_distance(plane.zero_moment_point(wrench), plane.polygon) == pytest.approx(0.0, abs=1e-9)
+    beside = pseudo_wrench(60.0, first + 0.02 * heel.rotation_contact_to_world[:, 0], np.zeros(3))
+    assert W.margin(beside) < -1.0
+
+
+def test_an_edge_gives_way_by_rolling():
+    """The limit of an edge beside nothing else is named after what the foot does."""
+    heel = sole_part(foot(), SolePart.HEEL, HINGE)
+    W = wrench_polytope(Stance([heel], 1500.0))
+    middle = heel.points_in_world.mean(axis=0)
+    ahead = middle + 0.1 * heel.rotation_contact_to_world[:, 0]
+    assert "rolling forward" in W.limiting(pseudo_wrench(60.0, ahead, np.zeros(3))).description
+
+
+def test_a_step_is_split_into_heel_sole_and_toes():
+    """The foot that leaves goes over its toes, the one that lands over its heel; places stay."""
+    rolled = roll_feet(step(), HINGE, Rolling(heel=0.08, toes=0.14, flat=0.05))
+    parts = [{c.effector: str(c.part) for c in phase.stance} for phase in rolled]
+    assert parts == [
+        {"left_foot": "full", "right_foot": "full"},
+        {"left_foot": "full", "right_foot": "toes"},
+        {"left_foot": "full"},
+        {"left_foot": "full", "right_foot": "heel"},
+        {"left_foot": "full", "right_foot": "full"},
+    ]
+    assert [phase.min_duration for phase in rolled] == pytest.approx([0.16, 0.14, 0.3, 0.08, 0.22])
+    assert len(rolled.swings()) == len(step().swings())
+    assert rolled[1].stance["right_foot"].same_place(rolled[0].stance["right_foot"])
+
+
+def test_rolling_never_has_less_than_single_support():
+    """Every phase contains the wrenches of one full sole or more."""
+    for phase in roll_feet(step(), HINGE):
+        assert any(contact.part is SolePart.FULL for contact in phase.stance)
+
+
+def test_a_foot_alone_does_not_roll():
+    """A hop, and a foot beside a hand only, land and leave flat: an edge alone cannot hold a body."""
+    hold = grasp("left_hand", (0.3, 0.2, 1.0), max_force=100.0)
+    hop = StanceSequence([Phase(Stance(c, 1500.0)) for c in ([foot()], [], [foot(place=(0.4, 0.1, 0.0))])])
+    held = StanceSequence([Phase(Stance(c, 1500.0)) for c in ([foot(), hold], [hold])])
+    for sequence in (hop, held):
+        assert len(roll_feet(sequence, HINGE)) == len(sequence)
+
+
+def test_parts_are_taken_from_full_soles():
+    with pytest.raises(ContactError, match="valid: a full sole"):
+        sole_part(sole_part(foot(), SolePart.HEEL, HINGE), SolePart.TOES, HINGE)
+    with pytest.raises(ContactError, match="hinge"):
+        sole_part(foot(), SolePart.TOES, 0.2)
+
+
+def test_parts_count_as_support_of_the_zmp():
+    """The support polygon of a sole and a heel reaches back to the heel's edge."""
+    heel = sole_part(foot(yaw=0.0, place=(0.5, 0.1, 0.0)), SolePart.HEEL, HINGE)
+    stance = Stance([foot("right_foot", (0.0, -0.1, 0.0), yaw=0.0), heel], 1500.0)
+    between = 0.5 * (heel.points_in_world.mean(axis=0) + np.array([0.0, -0.1, 0.0]))
+    wrench = pseudo_wrench(60.0, between + np.array([0.0, 0.0, 0.9]), np.zeros(3))
+    assert least_zmp_distance([(stance, wrench[None])]) > 0.0
