@@ -22,7 +22,7 @@ def force_per_point(problem, solution, controller):
         basis = loaded.basis
         edges = solution[start : start + basis.normal.size].reshape(-1, 4)
         start += basis.normal.size
-        geometry = controller._geometry[basis.contact.effector]
+        geometry = controller._geometry[basis.contact.effector, basis.contact.part]
         number = 0
         for patch in geometry.patches:
             frame = problem.state.frames[f"segment/{patch.segment}"]

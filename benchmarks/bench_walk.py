@@ -1,0 +1,45 @@
+"""The walk with rolling feet, stage by stage ([Qiu2012]_ 5.4.4; the thesis took < 3 minutes for the CoM)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from manikin.centroidal import plan_com
+from manikin.centroidal.transcription import transcribe
+from manikin.contact import ContactSchedule
+from manikin.pipeline import run
+from manikin.scenarios import load_scenario
+from manikin.wholebody import WholeBodySettings, plan_whole_body
+from manikin.wholebody.manner import manner_of
+
+
+@pytest.fixture(scope="module", params=["walk", "walk@flat"])
+def scenario(request):
+    return load_scenario(request.param)
+
+
+def test_com(benchmark, scenario):
+    """The CoM, cold."""
+    problem = scenario.build_centroidal_problem()
+    result = benchmark.pedantic(plan_com, (problem,), setup=transcribe.cache_clear, rounds=3)
+    assert result.succeeded
+
+
+def test_whole_body(benchmark, scenario):
+    """The whole body along a planned CoM."""
+    com = plan_com(scenario.build_centroidal_problem()).trajectory
+    trajectory = replace(com, schedule=ContactSchedule(scenario.build_sequence(), com.schedule.instants))
+    body, scene = scenario.build_body(), scenario.build_scene()
+    settings = WholeBodySettings(manner=manner_of(scenario.manner))
+    result = benchmark.pedantic(
+        lambda: plan_whole_body(body, scene, trajectory, rng=np.random.default_rng(0), settings=settings),
+        rounds=2, iterations=1,
+    )  # fmt: skip
+    assert result.succeeded
+
+
+def test_everything(benchmark, scenario):
+    """All stages with the execution, without files and figures."""
+    result = benchmark.pedantic(lambda: run(scenario), rounds=2, iterations=1)
+    assert result.succeeded
