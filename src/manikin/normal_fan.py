@@ -26,11 +26,13 @@ RANK_TOLERANCE = 1e-9
 INCIDENCE_TOLERANCE = 1e-9
 """A ray lies on a facet when the cosine between them is below this."""
 
-SPLINTER_TOLERANCE = 1e-6
-"""Unit normals closer than this may belong to splinters of one facet."""
+QHULL_OPTIONS = ("Qx", "Qx C-1e-10", "Qx C-1e-8", "Qx Q12 C-1e-10", "Qx Q12 C-1e-8", "Qx Q12 C-1e-7")
+"""Tried in turn: merge coplanar facets; merge ever less coplanar ones; allow wide merges.
 
-QHULL_OPTIONS = ("Qx", "Qx Q12", "Qx Q12 C-1e-10", "Qx Q12 C-1e-8", "Qx Q12 C-1e-7")
-"""Tried in turn: merge coplanar facets; allow wide merges; merge ever less coplanar ones."""
+Wide merges alone ("Qx Q12") lose facets, or cut off points, without a word."""
+
+HULL_TOLERANCE = 1e-6
+"""A hull that leaves a point out by more than this, in units of the points' spread, is wrong."""
 
 _CHUNK = 4_000_000
 """Entries of one adjacency table (pairs x rays)."""
@@ -257,7 +259,7 @@ def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above:
     normals = normals / np.linalg.norm(normals, axis=1)[:, None]
     cosine = normals @ (rays / np.linalg.norm(rays, axis=1)[:, None]).T
     on_generator = cosine > -INCIDENCE_TOLERANCE
-    once = _without_splinters(normals, on_generator)
+    once = _without_splinters(on_generator)
     return NormalFan(
         basis=basis,
         inverse=inverse,
@@ -326,9 +328,14 @@ def _hull_equations(points: FloatArray) -> FloatArray:
     for options in QHULL_OPTIONS:
         try:
             hull = HalfspaceIntersection(halfspaces, np.zeros(points.shape[1]), qhull_options=options)
-            return hull.dual_equations
         except QhullError as error:
             reason = str(error).strip().splitlines()[0]
+            continue
+        equations = hull.dual_equations
+        outside = float((points @ equations[:, :-1].T + equations[:, -1]).max())
+        if outside < HULL_TOLERANCE:
+            return equations
+        reason = f"its hull leaves a point out by {outside:.1e}"
     raise PolytopeError(f"Qhull failed on points of shape {points.shape}: {reason}")
 
 
@@ -355,13 +362,16 @@ def _rank(rows: FloatArray) -> int:
     return int(np.linalg.matrix_rank(rows, tol=1e-8 * max(1.0, float(np.abs(rows).max(initial=0.0)))))
 
 
-def _without_splinters(normals: FloatArray, on_generator: BoolArray) -> NDArray[np.intp]:
-    """Indices of the rays left when facets that Qhull did not merge are merged.
+def _without_splinters(on_generator: BoolArray) -> NDArray[np.intp]:
+    """Indices of the facets left when splinters are dropped.
 
-    A splinter has (nearly) the normal of another facet and no generator beside that one's.
+    Rounding makes Qhull split a facet, or put a sliver of any direction along a ridge, where
+    generators are coplanar but for their last digits. A splinter has no generator beside
+    those of another facet; left in, it would pass for the neighbour across that ridge and
+    hide the facets that a segment adds there.
     """
     order = np.argsort(-on_generator.sum(axis=1), kind="stable")
-    n, tight = normals[order], on_generator[order].astype(np.float32)
+    tight = on_generator[order].astype(np.float32)
     count = tight.sum(axis=1)
     keep = np.ones(len(order), dtype=np.bool_)
     step = max(1, _CHUNK // max(1, len(order)))
@@ -369,9 +379,7 @@ def _without_splinters(normals: FloatArray, on_generator: BoolArray) -> NDArray[
         rows = slice(start, start + step)
         i, j = np.nonzero(tight[rows] @ tight.T == count[rows, None])
         i += start
-        before = j < i
-        i, j = i[before], j[before]
-        keep[i[np.abs(n[i] - n[j]).max(axis=1, initial=0.0) < SPLINTER_TOLERANCE]] = False
+        keep[i[j < i]] = False
     return np.sort(order[keep])
 
 

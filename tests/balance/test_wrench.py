@@ -158,18 +158,6 @@ def test_rows_are_of_unit_length_and_distinct(two_soles):
     assert apart.min() > 1e-6
 
 
-def test_every_row_is_needed(contact_program, two_soles):
-    """H is minimal: without its row, each facet's own point beyond it would be admitted."""
-    W = wrench_polytope(two_soles)
-    program = contact_program(two_soles)
-    for i in range(0, len(W), 4):
-        extreme = [program.support(W.H[i] + 1e-3 * d)[1] for d in np.vstack([np.eye(6), -np.eye(6)])]
-        on_facet = [w for w in extreme if W.h[i] - W.H[i] @ w < 1e-4]
-        beyond = np.mean(on_facet, axis=0) + 1e-2 * W.H[i]
-        others = np.delete(W.distances(beyond), i)
-        assert W.distances(beyond)[i] < 0 < others.min() + 1e-4
-
-
 def test_a_single_sole_has_sixteen_cone_rows_and_the_cap():
     stance = Stance([sole("left_foot", (0.2, 0.4, 0.1), 0.3, length=0.28, width=0.12, friction=0.7)], 800.0)
     W = wrench_polytope(stance)
