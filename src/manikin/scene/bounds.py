@@ -74,6 +74,19 @@ class PairBounds:
             table[:, :, self._count :] = self._to_parts(centres)
         return table[:, self.first, self.second]
 
+    def moved(self, rotations: FloatArray, translations: FloatArray) -> FloatArray:
+        """(n, pairs) by how much a pair's distance may have changed since the sample before [m].
+
+        Args:
+            rotations: (n, shapes, 3, 3) shape-to-world rotations.
+            translations: (n, shapes, 3) [m].
+        """
+        corners = self._corners @ np.swapaxes(rotations, -1, -2) + translations[:, :, None]
+        path = np.zeros((len(corners), self._count + len(self._part_low)))
+        steps = np.diff(corners, axis=0)
+        path[1:, : self._count] = np.sqrt(np.einsum("nsci,nsci->nsc", steps, steps).max(axis=2))
+        return path[:, self.first] + path[:, self.second]
+
     def displacement(
         self, pair: int, sample: int, rotations: FloatArray, translations: FloatArray
     ) -> FloatArray:

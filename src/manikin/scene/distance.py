@@ -23,6 +23,9 @@ Pair = tuple[str, str]
 Ignored = frozenset[Pair]
 NOTHING: Ignored = frozenset()
 
+SLACK = 1e-5
+"""More than a measured distance may be wrong by [m]: ten times Coal's tolerance."""
+
 WINDOW = 200
 """Neighbouring samples whose lower bounds one measured distance raises."""
 
@@ -190,6 +193,9 @@ class Proximity:
     ) -> ProximitySamples:
         """Measure every close pair of many configurations; like :meth:`evaluate`, with one broad phase.
 
+        A pair that was found far is measured again only when its shapes have moved so much
+        that it may be near; the result is the same as if it were measured at every sample.
+
         Args:
             q_samples: (n, nq).
             activation: [m]; farther pairs are left out.
@@ -209,15 +215,19 @@ class Proximity:
             )
             pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
             placements[sample] = self._placements()
-        lower = self._bounds.lower(placements[..., :3, :3], placements[..., :3, 3])
-        near = (lower < activation) & considered
-        found = [
-            # The measurements' vectors are buffers that the next sample overwrites.
-            (sample, pair, item[0], np.array(item[1]), np.array(item[2]))
-            for sample in range(n)
-            for pair, item in self._measured(np.flatnonzero(near[sample]), placements[sample])
-            if item[0] < activation
-        ]
+        rotations, translations = placements[..., :3, :3], placements[..., :3, 3]
+        near = (self._bounds.lower(rotations, translations) < activation) & considered
+        moved = self._bounds.moved(rotations, translations)
+        known = np.full(len(self.pairs), -np.inf)
+        found = []
+        for sample in range(n):
+            known -= moved[sample]
+            pairs = np.flatnonzero(near[sample] & (known < activation))
+            for pair, item in self._measured(pairs, placements[sample]):
+                known[pair] = item[0] - SLACK
+                if item[0] < activation:
+                    # The measurement's vectors are buffers that the next sample overwrites.
+                    found.append((sample, pair, item[0], np.array(item[1]), np.array(item[2])))
         samples, pairs = (np.array([row[part] for row in found], dtype=np.int64) for part in (0, 1))
         normal, on_body = (np.array([row[part] for row in found]).reshape(-1, 3) for part in (3, 4))
         wrench = np.hstack([normal, np.cross(on_body, normal)])

@@ -8,6 +8,7 @@ one sparse product and solved by a banded Cholesky factorisation in linear time.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
@@ -60,6 +61,7 @@ class BlockBandedSystem:
         self._basis = basis
         self._dimension = dimension
         self._bandwidth = basis.values.shape[2]
+        self._lower = np.tril_indices(self._bandwidth)
         self._products = [self._pair_products(order) for order in range(3)]
         self._rows = [self._row_weights(order) for order in range(3)]
         self.reset()
@@ -82,6 +84,17 @@ class BlockBandedSystem:
             self._blocks += self._products[order] @ hessian.reshape(len(hessian), -1)
         self._right -= self._rows[order] @ gradient
 
+    def add_diagonal(self, weight: FloatArray, gradient: FloatArray, order: int = 0) -> None:
+        """Add per-sample terms whose Gauss-Newton matrices are diagonal.
+
+        Args:
+            weight: (n, d) diagonals of the matrices.
+            gradient: (n, d) gradients of half the squared residuals.
+            order: 0 for values, 1 for rates, 2 for accelerations.
+        """
+        self._blocks[:, :: self._dimension + 1] += self._products[order] @ weight
+        self._right -= self._rows[order] @ gradient
+
     def add_coupled(self, jacobians: tuple[FloatArray, FloatArray, FloatArray], residual: FloatArray) -> None:
         """Add residuals that depend on values, rates and accelerations at once.
 
@@ -95,14 +108,14 @@ class BlockBandedSystem:
         for order, jacobian in enumerate(jacobians):
             local += self._basis.values[order][:, None, :, None] * jacobian[:, :, None, :]
         local = local.reshape(n, m, width * d)
+        row, column = self._lower
+        places = (row - column) * size + column
         spans, start = np.unique(self._basis.first, return_index=True)
         stop = np.append(start[1:], n)
         for first, a, b in zip(spans, start, stop, strict=True):
             rows = local[a:b].reshape(-1, width * d)
             hessian = (rows.T @ rows).reshape(width, d, width, d)
-            for column in range(width):
-                for row in range(column, width):
-                    self._blocks[(row - column) * size + first + column] += hessian[row, :, column].ravel()
+            self._blocks[places + first] += hessian[row, :, column].reshape(len(row), d * d)
             self._right[first : first + width] -= (rows.T @ residual[a:b].ravel()).reshape(width, d)
 
     def solve(self, damping: float | FloatArray) -> FloatArray:
@@ -112,17 +125,27 @@ class BlockBandedSystem:
             damping: One number, or one per control point.
         """
         size, d = self._basis.size, self._dimension
-        band = np.zeros((self._bandwidth * d, size * d))
-        row, column = np.indices((d, d))
-        for offset in range(self._bandwidth):
-            blocks = self._blocks[offset * size : (offset + 1) * size].reshape(size, d, d)[: size - offset]
-            keep = (row >= column) if offset == 0 else np.ones((d, d), dtype=bool)
-            diagonal = offset * d + (row - column)[keep]
-            columns = np.arange(size - offset)[:, None] * d + column[keep]
-            inside = diagonal >= 0
-            band[diagonal[inside], columns[:, inside]] = blocks[:, keep][:, inside]
+        band = self._band()
         band[0] += np.repeat(np.broadcast_to(damping, size), d)
-        return solveh_banded(band, self._right.ravel(), lower=True, check_finite=False).reshape(size, d)
+        return solveh_banded(
+            band, self._right.ravel(), overwrite_ab=True, lower=True, check_finite=False
+        ).reshape(size, d)
+
+    def _band(self) -> FloatArray:
+        """The matrix in LAPACK's lower banded storage: (bandwidth d, size d), column by column."""
+        size, d, width = self._basis.size, self._dimension, self._bandwidth
+        depth = width * d
+        memory = np.zeros(size * d * depth)
+        # Below a diagonal element follow the rows of its own block column, so that the same
+        # row of the next column lies one place earlier.
+        by_column = as_strided(
+            memory, (size, d, width, d), [memory.itemsize * step for step in (d * depth, depth - 1, d, 1)]
+        )
+        blocks = self._blocks.reshape(width, size, d, d)
+        # The zeros above the diagonal fall on places of the previous column that come next.
+        by_column[:, :, 0] = np.tril(blocks[0]).transpose(0, 2, 1)
+        by_column[:, :, 1:] = blocks[1:].transpose(1, 3, 0, 2)
+        return memory.reshape(size * d, depth).T
 
     def _pair_products(self, order: int) -> csr_matrix:
         values, first, size = self._basis.values[order], self._basis.first, self._basis.size

@@ -37,6 +37,7 @@ class Linearised:
         sample_cost: (n,) half the squared residuals at each sample.
         hessian: (n, nq, nq) Gauss-Newton matrices by order of the spline's derivative.
         gradient: (n, nq) gradients by order.
+        diagonal: (n, nq) diagonals of the matrices and gradients, for orders without other terms.
         task_residual: (n, m) scaled residuals of effectors and centre of mass.
         task_jacobian: (n, m, nq) their derivatives by the raw coordinates.
         momentum: Scaled residual (n, 6) of the momentum's rate with its derivatives.
@@ -49,6 +50,7 @@ class Linearised:
     sample_cost: FloatArray
     hessian: dict[int, FloatArray] = field(default_factory=dict)
     gradient: dict[int, FloatArray] = field(default_factory=dict)
+    diagonal: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
     task_residual: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     task_jacobian: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 0)))
     momentum: MomentumRate | None = None
@@ -70,12 +72,13 @@ class Linearised:
 
     def add_diagonal(self, order: int, weight: FloatArray, residual: FloatArray) -> None:
         """Add residuals (n, nq), one per coordinate, with derivative ``weight`` (n, nq)."""
-        n, nq = weight.shape
-        if order not in self.hessian:
-            self._add_terms(order, np.zeros((n, nq, nq)), np.zeros((n, nq)))
-        index = np.arange(nq)
-        self.hessian[order][:, index, index] += weight**2
-        self.gradient[order] += weight * residual
+        if order in self.hessian:
+            index = np.arange(weight.shape[1])
+            self.hessian[order][:, index, index] += weight**2
+            self.gradient[order] += weight * residual
+        else:
+            before, gradient = self.diagonal.get(order, (0.0, 0.0))
+            self.diagonal[order] = (before + weight**2, gradient + weight * residual)
         self.sample_cost += 0.5 * np.sum(residual**2, axis=1)
 
     def shift_tasks(self, before: FloatArray, after: FloatArray) -> None:
@@ -89,6 +92,8 @@ class Linearised:
         system.reset()
         for order, gradient in self.gradient.items():
             system.add(self.hessian[order], gradient, order)
+        for order, (weight, gradient) in self.diagonal.items():
+            system.add_diagonal(weight, gradient, order)
         if self.momentum is not None:
             system.add_coupled(self.momentum.jacobians, self.momentum.value)
 
