@@ -448,3 +448,19 @@ def test_many_configurations_at_once_are_measured_as_one_by_one():
         assert tuple(np.array(together.pairs, dtype=object)[mine].tolist()) or not len(alone)
         np.testing.assert_array_equal(together.distance[mine], alone.distance)
         np.testing.assert_allclose(together.gradient[mine], alone.gradient, atol=1e-12)
+
+
+def test_no_near_pair_is_skipped_along_a_smooth_motion():
+    """Between samples that move little, far pairs are not measured; what is reported stays the same."""
+    body = human()
+    rng = np.random.default_rng(21)
+    start, end = (random_configuration(body, rng) for _ in range(2))
+    scene = Scene([Obstacle("table", Box((0.5, 0.5, 0.4)), translation=(0.2, 0.1, 0.3))])
+    proximity = Proximity(body, scene)
+    samples = np.array([pin.interpolate(body.pinocchio, start, end, s) for s in np.linspace(0.0, 1.0, 60)])
+    together = proximity.evaluate_over(samples, 0.05)
+    assert len(together.distance)
+    for k, q in enumerate(samples):
+        alone, mine = proximity.evaluate(q, 0.05), together.sample == k
+        np.testing.assert_array_equal(together.distance[mine], alone.distance)
+        np.testing.assert_allclose(together.gradient[mine], alone.gradient, atol=1e-12)

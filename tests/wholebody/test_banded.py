@@ -60,3 +60,14 @@ def test_coupled_terms_equal_the_dense_normal_equations():
     dense = full.T @ full + 1e-3 * np.eye(full.shape[1])
     expected = np.linalg.solve(dense, -full.T @ residual.ravel()).reshape(basis.size, d)
     np.testing.assert_allclose(system.solve(1e-3), expected, rtol=1e-6, atol=1e-9)
+
+
+def test_diagonal_terms_equal_full_ones():
+    _, _, time, basis = _setup()
+    rng = np.random.default_rng(3)
+    weight, gradient = rng.uniform(size=(len(time), 4)), rng.normal(size=(len(time), 4))
+    full, diagonal = BlockBandedSystem(basis, 4), BlockBandedSystem(basis, 4)
+    for order in range(3):
+        full.add(np.einsum("nd,de->nde", weight, np.eye(4)), gradient, order)
+        diagonal.add_diagonal(weight, gradient, order)
+    np.testing.assert_array_equal(diagonal.solve(1e-3), full.solve(1e-3))

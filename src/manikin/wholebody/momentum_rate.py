@@ -33,7 +33,7 @@ class MomentumRateSamples:
         self._by_q, self._by_v, self._by_a = np.zeros((3, count, 6, model.nv))
 
     def record(self, sample: int, data: pin.Data, states: StateSamples) -> None:
-        """Evaluate one sample; ``data`` then holds its kinematics."""
+        """Evaluate one sample; ``data`` then holds its kinematics and joint Jacobians."""
         _, by_q, by_v, by_a = pin.computeCentroidalDynamicsDerivatives(
             self._model, data, states.q[sample], states.v[sample], states.a[sample]
         )

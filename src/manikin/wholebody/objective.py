@@ -159,7 +159,6 @@ class MotionObjective:
         momentum = MomentumRateSamples(self._model, n)
         for s in range(n):
             momentum.record(s, self._data, states)
-            pin.computeJointJacobians(self._model, self._data, states.q[s])
             pin.updateFramePlacements(self._model, self._data)
             self._task_rows(s, states.q[s], jacobian[s], residual[s], scales, out)
         out.task_residual, out.task_jacobian = residual, _to_raw(jacobian, tangent)
