@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
+from manikin.balance.friction import cross
 from manikin.errors import InputError
 from manikin.spatial import FloatArray, finite_number, frozen_array
 from manikin.wholebody.path import EffectorPath, Pose
@@ -268,16 +269,16 @@ class SwingCurve:
         rotation = np.broadcast_to(self.control_rotation[0], (count, 3, 3)).copy()
         velocity, acceleration = np.zeros((count, 3)), np.zeros((count, 3))  # in the turning frame
         relative = np.swapaxes(self.control_rotation[:-1], 1, 2) @ self.control_rotation[1:]
-        for index, turn in enumerate(Rotation.from_matrix(relative).as_rotvec()):
-            if not np.any(np.abs(turn) > 1e-14):
-                continue
-            # Cumulative basis: the sum of the basis functions from this control pose on.
-            b, b1, b2 = (w[:, index + 1 :].sum(axis=1)[:, None] for w in weights)
-            step = Rotation.from_rotvec(b * turn).as_matrix()
+        turns = Rotation.from_matrix(relative).as_rotvec()
+        turning = np.flatnonzero(np.any(np.abs(turns) > 1e-14, axis=1))
+        # Cumulative basis: the sum of the basis functions from this control pose on.
+        shares = [[w[:, index + 1 :].sum(axis=1)[:, None] for w in weights] for index in turning]
+        angles = np.array([b * turns[index] for index, (b, _, _) in zip(turning, shares, strict=True)])
+        steps = Rotation.from_rotvec(angles.reshape(-1, 3)).as_matrix().reshape(-1, count, 3, 3)
+        for index, step, (_, b1, b2) in zip(turning, steps, shares, strict=True):
+            turn = turns[index]
             carried = np.einsum("kji,kj->ki", step, velocity)
-            acceleration = (
-                np.einsum("kji,kj->ki", step, acceleration) + np.cross(carried, b1 * turn) + b2 * turn
-            )
+            acceleration = np.einsum("kji,kj->ki", step, acceleration) + cross(carried, b1 * turn) + b2 * turn
             velocity = carried + b1 * turn
             rotation = rotation @ step
         return (
