@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.benchmark(timer=time.process_time)
 
 NAMES = [*list_scenarios(), "walls@trial-5"]
 
-scenario_of = lru_cache(maxsize=None)(load_scenario)
+scenario_of = cache(load_scenario)
 
 
 def _plan_com(name):
@@ -38,13 +38,13 @@ def _plan_whole_body(name, trajectory):
     )  # fmt: skip
 
 
-@lru_cache(maxsize=None)
+@cache
 def _trajectory(name):
     com = _plan_com(name).trajectory
     return replace(com, schedule=ContactSchedule(scenario_of(name).build_sequence(), com.schedule.instants))
 
 
-@lru_cache(maxsize=None)
+@cache
 def _motion(name):
     return _plan_whole_body(name, _trajectory(name)).motion
 
