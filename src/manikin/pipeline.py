@@ -23,7 +23,8 @@ from manikin.centroidal import (
     plan_com,
     plan_com_through_key_frames,
 )
-from manikin.contact import ContactSchedule
+from manikin.contact import ContactSchedule, StanceSequence
+from manikin.control import ControlSettings, SupportSettings
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
@@ -32,7 +33,7 @@ from manikin.scenarios import Scenario, load_scenario
 from manikin.scene import Scene
 from manikin.simulation import Execution, Push, execute
 from manikin.spatial import rotation_from_yaw
-from manikin.wholebody import WholeBodyResult, WholeBodySettings, plan_whole_body
+from manikin.wholebody import WholeBodyResult, WholeBodySettings, continue_seated, plan_whole_body
 from manikin.wholebody.configuration_spline import rotation_from_quaternion
 from manikin.wholebody.manner import manner_of
 from manikin.wholebody.point_mass import point_mass_motion
@@ -249,8 +250,21 @@ class _Run:
         self._progress("centroidal", 1.0)
         if result.trajectory is None:
             return result, None
-        real = ContactSchedule(self._scenario.build_sequence(), result.trajectory.schedule.instants)
-        return result, replace(result.trajectory, schedule=real)
+        return result, self._on_real_supports(result.trajectory)
+
+    def _on_real_supports(self, planned: CentroidalTrajectory) -> CentroidalTrajectory | None:
+        """The plan on the real soles, friction and caps, with the seated part where there is one."""
+        real, seat = self._scenario.build_sequence(), self._scenario.seated_from
+        standing = real if seat is None else StanceSequence(real.phases[:seat])
+        trajectory = replace(planned, schedule=ContactSchedule(standing, planned.schedule.instants))
+        if seat is None:
+            return trajectory
+        continuation = continue_seated(
+            self._body, self._scene, trajectory, StanceSequence(real.phases[seat:])
+        )
+        if continuation.failure is not None:
+            self._fail("wholebody", continuation.failure, trajectory.duration, f"phase {seat}")
+        return continuation.trajectory
 
     def _move_point_mass(self, centroidal: CentroidalResult) -> Motion | None:
         """Motion of a body that has no joints to plan for and nothing to execute."""
@@ -274,6 +288,7 @@ class _Run:
     def _execute(self, trajectory: CentroidalTrajectory, planned: WholeBodyResult) -> Execution:
         result = execute(
             self._body, self._scene, planned.motion, trajectory.schedule, pushes=self._pushes(planned.motion),
+            padded=self._scenario.padded, settings=self._control_settings(),
             progress=lambda share: self._progress("execution", share),
         )  # fmt: skip
         self._finish("execution", result.summary())
@@ -286,6 +301,10 @@ class _Run:
             self._fail("execution", reason, time, _place(phase, held))
         self._keep_motions(trajectory, planned.motion, result.motion)
         return result
+
+    def _control_settings(self) -> ControlSettings:
+        """The defaults; with the share of the friction that planning keeps to where it has its own."""
+        return ControlSettings(supports=SupportSettings(friction_share=self._scenario.friction_share))
 
     def _pushes(self, motion: Motion) -> tuple[Push, ...]:
         push = self._scenario.push

@@ -37,6 +37,15 @@ _SOFT_PAIRS = (
 
 _ARM_SPREAD = np.deg2rad(14.0)
 
+SEAT_DEPTH = 0.07
+"""Depth of the pressed buttocks below the hip joints, as a share of the stature; our choice."""
+
+SEAT_LENGTH = 0.08
+"""Length, back to front, of the patch that presses on a seat, as a share of the stature."""
+
+SEAT_WIDTH = 0.14
+"""Distance between the two lines that press on a seat, as a share of the stature."""
+
 _STANDING_DEG = MappingProxyType(
     {"hip_flexion": 2.0, "knee_flexion": 10.0, "ankle_dorsiflexion": 8.0, "elbow_flexion": 15.0}
 )
@@ -66,7 +75,8 @@ def human(
     Effectors: ``left_foot``, ``right_foot`` (sole centre, x to the toes, z up),
     ``left_hand``, ``right_hand`` (palm centre, x along the fingers, z out of the back of the
     hand: parallel to the world when the palm lies on a table, fingers forward),
-    ``head`` (vertex) and ``pelvis`` (its segment frame).
+    ``head`` (vertex), ``pelvis`` (its segment frame) and ``buttocks`` (middle of what presses on
+    a seat, axes as the pelvis).
 
     Collision shapes are the flesh made slim: the breadth over the hips is Winter's 0.191 H, all
     other breadths and girths are our choice. They scale with stature and (within 12 %) with the
@@ -175,6 +185,7 @@ class _HumanBuilder:
         found = [
             Effector("pelvis", "pelvis", np.zeros(3)),
             Effector("head", "head", np.array([0.0, 0.0, head_length])),
+            Effector("buttocks", "pelvis", np.array([self._seat_x, 0.0, -SEAT_DEPTH * self.stature])),
         ]
         for side, sign in (("left", 1.0), ("right", -1.0)):
             sole = np.array([(0.5 - ANKLE_FROM_HEEL) * size.sole_length, 0.0, -size.ankle_height])
@@ -188,7 +199,25 @@ class _HumanBuilder:
     def _pelvis(self) -> Segment:
         length = self.size.length("lower_trunk")
         across = _across("hips", 0.060 * self.stature, 0.191 * self.stature * self.girth, 0.35 * length)
-        return self._trunk_segment("pelvis", None, "lower_trunk", 0.0, (across,))
+        return self._trunk_segment("pelvis", None, "lower_trunk", 0.0, (across, *self._buttocks()))
+
+    @property
+    def _seat_x(self) -> float:
+        """Place of the buttocks' middle behind the hip joints [m]."""
+        return -0.017 * self.stature
+
+    def _buttocks(self) -> tuple[Shape, Shape]:
+        """Two short capsules from back to front; their lowest lines are what a seat carries."""
+        radius, half = 0.027 * self.stature, 0.5 * SEAT_LENGTH * self.stature
+        height, aside = radius - SEAT_DEPTH * self.stature, 0.5 * SEAT_WIDTH * self.stature
+        left, right = (
+            Shape(
+                f"{side}_buttock", ShapeKind.CAPSULE, (radius, 2 * half),
+                (self._seat_x, sign * aside, height), _ALONG_X,
+            )
+            for side, sign in (("left", 1.0), ("right", -1.0))
+        )  # fmt: skip
+        return left, right
 
     def _lumbar(self) -> Segment:
         length, border = self.size.length("middle_trunk"), self.size.length("lower_trunk")

@@ -1,11 +1,12 @@
 """The CoM trajectory: a clamped B-spline over normalised time with its contact schedule."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from manikin.balance import pseudo_wrench
 from manikin.contact import ContactSchedule, StanceSequence
@@ -25,11 +26,14 @@ class CentroidalTrajectory:
         mass: [kg].
         spline: B-spline on [0, 1] in three dimensions [m].
         schedule: Stances with their key instants [s]; the motion starts at 0.
+        binding_until: A whole body must keep its CoM on the trajectory until then [s]; after
+            that, safe on a seat, the trajectory only shows the way. None for the whole motion.
     """
 
     mass: float
     spline: BSpline
     schedule: ContactSchedule
+    binding_until: float | None = None
 
     def __post_init__(self) -> None:
         finite_number(self.mass, "centroidal trajectory mass [kg]", above=0.0)
@@ -44,6 +48,51 @@ class CentroidalTrajectory:
     def duration(self) -> float:
         """Length of the motion [s]."""
         return float(self.schedule.instants[-1])
+
+    def binds(self, time: ArrayLike) -> NDArray[np.bool_]:
+        """(...) whether the whole body must keep its CoM on the trajectory at each time."""
+        last = np.inf if self.binding_until is None else self.binding_until
+        return np.asarray(time, dtype=np.float64) <= last + 1e-9
+
+    def followed_by(self, other: "CentroidalTrajectory") -> "CentroidalTrajectory":
+        """Join a trajectory that starts where this one ends, at the same velocity and acceleration.
+
+        Raises:
+            SplineError: If end and start, or the degrees, differ.
+        """
+        k, here, there = self.spline.degree, self.spline, other.spline
+        gaps = [
+            float(np.abs(self._derivative(self.duration, d) - other._derivative(0.0, d)).max())
+            for d in range(3)
+        ]
+        if there.degree != k or max(gaps) > 1e-4:
+            raise SplineError(
+                f"trajectories of degrees {k} and {there.degree} meet with gaps of {gaps[0]:.2g} m, "
+                f"{gaps[1]:.2g} m/s and {gaps[2]:.2g} m/s^2; valid: one degree, and the second starts as the "
+                "first ends"
+            )
+        total = self.duration + other.duration
+        first, second = (
+            here.knots * (self.duration / total),
+            1.0 - (1.0 - there.knots) * (other.duration / total),
+        )
+        # Two continuous derivatives: the joint is k - 2 knots.
+        joint = np.full(k - 2, self.duration / total)
+        knots = np.concatenate([first[: -k - 1], joint, second[k + 1 :]])
+        inner = np.unique(knots)
+        times = np.unique(np.concatenate([np.linspace(a, b, 4 * k) for a, b in itertools.pairwise(inner)]))
+        before = times <= joint[0]
+        wanted = np.concatenate([
+            here(np.clip(times[before] * total / self.duration, 0.0, 1.0)),
+            there(np.clip(1.0 - (1.0 - times[~before]) * total / other.duration, 0.0, 1.0)),
+        ])  # fmt: skip
+        spline = BSpline.fit(
+            k, knots, times, wanted, first=here.control_points[:1], last=there.control_points[-1:]
+        )
+        phases = (*self.schedule.sequence, *other.schedule.sequence)
+        instants = np.concatenate([self.schedule.instants, self.duration + other.schedule.instants[1:]])
+        schedule = ContactSchedule(StanceSequence(phases), instants)
+        return CentroidalTrajectory(self.mass, spline, schedule)
 
     def position(self, time: ArrayLike) -> FloatArray:
         """(..., 3) CoM at each time [m] ([Qiu2012]_ 5.5)."""

@@ -60,6 +60,9 @@ class Contact:
         max_moment: Grasp moment limit per world axis [N.m].
         part: Part of the sole that touches; position and rotation are always those of the full sole
             lying flat, :attr:`points` only those that touch.
+        oriented: Whether a grasping hand should have the rotation (a sole always does).
+        settle: Time after the touch-down in which the effector may still slide along the
+            surface to its place, as a body that sits down does [s].
     """
 
     effector: str
@@ -73,6 +76,8 @@ class Contact:
     max_force: float = 0.0
     max_moment: float = 0.0
     part: SolePart = SolePart.FULL
+    oriented: bool = False
+    settle: float = 0.0
 
     @property
     def centre(self) -> FloatArray:
@@ -128,6 +133,7 @@ def sole(
     rotation: ArrayLike | None = None,
     normal_force_cap: float | None = None,
     torsion_limit: float | None = None,
+    settle: float = 0.0,
 ) -> Contact:
     """Make a rectangular sole: four corner points with friction pyramids.
 
@@ -142,6 +148,7 @@ def sole(
         rotation: (3, 3) contact-to-world rotation; replaces ``yaw`` and ``normal``.
         normal_force_cap: Largest normal force on this sole [N].
         torsion_limit: Largest moment about the normal [N.m].
+        settle: Time after the touch-down in which it may still slide to its place [s].
 
     Raises:
         ContactError: If a value is not finite or out of its range.
@@ -155,10 +162,12 @@ def sole(
         [-half_length, -half_width, 0.0],
         [-half_length, half_width, 0.0],
     ]
-    return _frictional(
+    made = _frictional(
         where, effector, ContactKind.SOLE, position, corners, yaw, friction, normal, rotation,
         normal_force_cap, torsion_limit,
     )  # fmt: skip
+    settle = finite_number(settle, f"{where} settle [s]", at_least=0.0, error=ContactError)
+    return replace(made, settle=settle) if settle else made
 
 
 def point(
@@ -205,7 +214,7 @@ def grasp(
         position: (3,) in the world [m].
         max_force: Largest force along each world axis [N], > 0.
         max_moment: Largest moment along each world axis [N.m]; 0 makes a pure point grasp.
-        rotation: (3, 3) contact-to-world rotation, for the hand's placement only.
+        rotation: (3, 3) contact-to-world rotation that the hand should have; free when omitted.
 
     Raises:
         ContactError: If a value is not finite or out of its range.
@@ -221,6 +230,7 @@ def grasp(
         points=frozen_array(np.zeros((1, 3)), "points"),
         max_force=finite_number(max_force, f"{where} max_force [N]", above=0.0, error=ContactError),
         max_moment=finite_number(max_moment, f"{where} max_moment [N.m]", at_least=0.0, error=ContactError),
+        oriented=rotation is not None,
     )
 
 

@@ -53,6 +53,17 @@ class ContactSchedule:
         table = np.array([[name in phase.stance for name in effectors] for phase in self.sequence])
         return table[self.phase_at(np.atleast_1d(time))]
 
+    def settling(self, time: ArrayLike, effector: str) -> NDArray[np.bool_]:
+        """(n,) whether the contact of an effector may still slide to its place at each time."""
+        times = np.atleast_1d(np.asarray(time, dtype=np.float64))
+        settling = np.zeros(len(times), dtype=bool)
+        held = False
+        for phase, start in zip(self.sequence, self.instants, strict=False):
+            if effector in phase.stance and not held:
+                settling |= (times >= start) & (times < start + phase.stance[effector].settle)
+            held = effector in phase.stance
+        return settling
+
     def swing_interval(self, swing: Swing) -> tuple[float, float]:
         """Lift-off and landing time of a swing [s]."""
         return float(self.instants[swing.first_phase]), float(self.instants[swing.last_phase + 1])

@@ -154,7 +154,8 @@ class ContactForceBasis:
 
 
 def contact_force_basis(
-    contact: Contact, geometry: ContactGeometry, state: DynamicsState
+    contact: Contact, geometry: ContactGeometry, state: DynamicsState, *, sliding: bool = False,
+    friction_share: float = 1.0,
 ) -> ContactForceBasis:
     """Build the force map of a contact at the current state.
 
@@ -162,10 +163,14 @@ def contact_force_basis(
         contact: The contact; its planned rotation gives the normal and the friction its slope.
         geometry: Points of the body, from :func:`contact_geometry`.
         state: Current dynamics with a frame for each segment of the geometry and the effector.
+        sliding: Whether the contact may slide; where it does, friction acts against the motion.
+        friction_share: Share of the friction that is made use of.
     """
     if contact.kind is ContactKind.GRASP:
         return _grasp_basis(contact, state)
-    edges = pyramid_edges(contact)
+    edges = pyramid_edges(contact, friction_share)
+    if sliding:
+        edges = sliding_edges(contact, state.frames[contact.effector].twist[:3], edges)
     origin = state.frames[contact.effector].position
     count = 4 * geometry.point_count
     generalised = np.empty((len(state.v), count))
@@ -201,17 +206,36 @@ def _edge_wrenches(edges: FloatArray, arms: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=256)
-def pyramid_edges(contact: Contact) -> FloatArray:
+def pyramid_edges(contact: Contact, share: float = 1.0) -> FloatArray:
     """(4, 3) edges of the inner friction pyramid in the world, each with unit normal force.
 
-    The edges lie on the friction cone: their tangential part is ``mu`` long.
+    The edges lie on the friction cone, or inside it: their tangential part is ``share mu`` long.
     """
-    slope = contact.friction / np.sqrt(2.0)
+    slope = share * contact.friction / np.sqrt(2.0)
     signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     local = np.column_stack((slope * signs, np.ones(4)))
     edges = local @ contact.rotation_contact_to_world.T
     edges.setflags(write=False)
     return edges
+
+
+SLIDING_SPEED = 0.03
+"""Slower than this a contact is not said to slide [m/s]."""
+
+
+def sliding_edges(contact: Contact, velocity: FloatArray, edges: FloatArray) -> FloatArray:
+    """(4, 3) edges of a contact that slides: all of them the kinetic friction with unit normal force.
+
+    Args:
+        contact: The contact.
+        velocity: (3,) of the effector [m/s].
+        edges: (4, 3) what holds when it does not slide.
+    """
+    along = velocity - (velocity @ contact.normal) * contact.normal
+    speed = float(np.linalg.norm(along))
+    if speed < SLIDING_SPEED:
+        return edges
+    return np.tile(contact.normal - contact.friction / speed * along, (4, 1))
 
 
 def _grasp_basis(contact: Contact, state: DynamicsState) -> ContactForceBasis:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
-from manikin.contact import Contact, ContactSchedule, SolePart
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.control.build_qp import (
     ControlProblem,
     JointBounds,
@@ -206,6 +206,10 @@ class Controller:
         part = support.contact is not None and support.contact.part is not SolePart.FULL
         if support.mode is SupportMode.STANCE and part:
             return rolling_task(name, frame, planned, support, gains.stance, weight)
+        grasps = support.contact is not None and support.contact.kind is ContactKind.GRASP
+        if support.mode is not SupportMode.SWING and (grasps or support.settling):
+            # A hand turns in its grasp; what settles is on its way.
+            return swing_task(name, frame, planned, gains.swing, weight)
         if support.mode is SupportMode.STANCE:
             return stance_task(name, frame, support, gains.stance, weight)
         if support.mode is SupportMode.LANDING:
@@ -223,7 +227,11 @@ class Controller:
         return weight
 
     def _loaded(self, support: SupportState, contact: Contact, state: DynamicsState) -> LoadedContact:
-        basis = contact_force_basis(contact, self._geometry[support.effector, contact.part], state)
+        geometry = self._geometry[support.effector, contact.part]
+        basis = contact_force_basis(
+            contact, geometry, state, sliding=support.settling,
+            friction_share=self.settings.supports.friction_share,
+        )  # fmt: skip
         cap = contact.normal_force_cap or self.settings.supports.default_cap * state.mass * GRAVITY
         cap *= support.load_share
         if support.unload_share < 1.0:

@@ -88,6 +88,8 @@ class SupportSettings:
         press_depth: How far below the planned support it is sent at most [m].
         default_cap: Normal force limit of a contact that states none [body weights].
         sole_inset: The controller keeps its forces this far inside the edge of the sole [m].
+        friction_share: Share of the friction of soles and points that it makes use of: a foot whose
+            load dips must not slip.
     """
 
     unload_time: float = 0.05
@@ -102,6 +104,7 @@ class SupportSettings:
     press_depth: float = 0.03
     default_cap: float = 3.0
     sole_inset: float = 0.01
+    friction_share: float = 1.0
 
     def __post_init__(self) -> None:
         for name in (
@@ -112,6 +115,7 @@ class SupportSettings:
             "press_speed",
             "rolling_press_speed",
             "default_cap",
+            "friction_share",
         ):
             finite_number(getattr(self, name), f"support setting {name!r}", above=0.0)
         for name in ("early_window", "release_time", "hover", "press_depth", "sole_inset"):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -14,6 +14,12 @@ from manikin.spatial import FloatArray
 _FIRST_SHARE = 0.05
 """Load share at touch-down, and of a foot that lands early until its planned landing."""
 
+
+EARLY_SHARE = 0.15
+"""Share of a long flight before its end in which a touch counts as the landing."""
+
+LONG_FLIGHT = 1.0
+"""Flights longer than this come down, and rise, slowly [s]."""
 
 _NO_LIFT: FloatArray = np.zeros(3)
 _NO_LIFT.setflags(write=False)
@@ -46,6 +52,7 @@ class SupportState:
         unload_share: Share of the load it carried when its unloading began that it may
             still carry, falling to 0 at lift-off; 1 before that.
         press: How far below the planned contact a landing effector is sent [m]; negative above.
+        settling: Whether it may still slide to its place.
         lift: (3,) offset of a flying effector from its planned path [m].
         lift_rate: (3,) rate of that offset [m/s].
         follow: Share of the feedback gains with which a flying effector follows its path.
@@ -60,6 +67,7 @@ class SupportState:
     load_share: float = 0.0
     unload_share: float = 1.0
     press: float = 0.0
+    settling: bool = False
     lift: FloatArray = field(default_factory=lambda: _NO_LIFT)
     lift_rate: FloatArray = field(default_factory=lambda: _NO_LIFT)
     follow: float = 1.0
@@ -78,12 +86,14 @@ class SupportInterval:
         early: First time at which a touch counts as this touch-down [s].
         parts: Contact from each time on, in order; the same place throughout, but other parts of
             a sole that rolls.
+        late: Last time at which a touch counts as not having left it yet [s].
     """
 
     contact: Contact
     start: float
     end: float
     early: float
+    late: float = math.inf
     parts: tuple[tuple[float, Contact], ...] = ()
 
     def contact_at(self, time: float) -> Contact:
@@ -118,7 +128,8 @@ def support_intervals(
     Args:
         schedule: Stances and their instants.
         effector: Name of the effector.
-        early_window: Largest advance of a touch-down [s]; at most the last third of the flight.
+        early_window: Largest advance of a touch-down [s]; more before the end of a long flight,
+            which comes down slowly, but at most its last third.
     """
     found: list[SupportInterval] = []
     phases = list(schedule.sequence)
@@ -133,12 +144,19 @@ def support_intervals(
             index += 1
         start = -math.inf if first == 0 else float(schedule.instants[first])
         end = math.inf if index == len(phases) else float(schedule.instants[index])
-        early = max(start - early_window, start - (start - previous_end) / 3) if first else start
+        flight = start - previous_end
+        long = LONG_FLIGHT < flight < math.inf
+        window = max(early_window, EARLY_SHARE * flight) if long else early_window
+        early = max(start - window, start - flight / 3) if first else start
         parts = tuple(
             (float(schedule.instants[number]), phases[number].stance[effector])
             for number in range(first, index)
         )
-        found.append(SupportInterval(parts[0][1], start, end, early, parts))
+        found.append(SupportInterval(parts[0][1], start, end, early, end + early_window, parts))
+        if len(found) > 1:
+            # A long flight rises as slowly as it comes down.
+            before = found[-2]
+            found[-2] = replace(before, late=before.end + window)
         previous_end = end
     return tuple(found)
 
@@ -189,9 +207,12 @@ class SupportSwitch:
         if interval is None:
             return SupportState(name, SupportMode.SWING, None, follow=self._follow(name, time))
         planned = time >= interval.start - 1e-9
+        settling = interval.contact.settle > 0.0 and time < interval.start + interval.contact.settle
         self._remember_touch(memory, time, planned if touching is None else touching)
         if memory.landed is not None:
-            rising = (time - max(memory.landed, interval.start)) / self._settings.load_time
+            since = time - max(memory.landed, interval.start)
+            # A seat takes the weight as soon as it is touched.
+            rising = 1.0 if interval.contact.settle > 0.0 else since / self._settings.load_time
             falling = (interval.end - time) / self._settings.unload_time
             return SupportState(
                 name,
@@ -201,6 +222,7 @@ class SupportSwitch:
                 unload_share=float(np.clip(falling, 0.0, 1.0)),
                 planned=planned,
                 fades=self._fades(interval, time),
+                settling=settling,
             )
         if not planned:
             return self._hovering(name, interval, time)
@@ -208,7 +230,7 @@ class SupportSwitch:
         height = self._settings.hover if memory.touched < interval.start else 0.0
         contact = interval.contact_at(time)
         press = min(self._settings.press_depth, self._settings.press_speed_of(contact) * late - height)
-        return SupportState(name, SupportMode.LANDING, contact, press=press)
+        return SupportState(name, SupportMode.LANDING, contact, press=press, settling=settling)
 
     def _hovering(self, name: str, interval: SupportInterval, time: float) -> SupportState:
         """Lift the end of a flight smoothly, in the first part of the time in which it might touch."""

@@ -200,6 +200,8 @@ def _describe_contact(contact: Contact) -> Json:
         "max_force": contact.max_force,
         "max_moment": contact.max_moment,
         "part": str(contact.part),
+        "oriented": contact.oriented,
+        "settle": contact.settle,
     }
 
 
@@ -216,4 +218,6 @@ def _contact_from(data: Mapping[str, Any]) -> Contact:
         max_force=data["max_force"],
         max_moment=data["max_moment"],
         part=SolePart(data.get("part", SolePart.FULL)),
+        oriented=data.get("oriented", False),
+        settle=data.get("settle", 0.0),
     )

@@ -32,6 +32,8 @@ class Placement:
     Attributes:
         position: (3,) [m], or None to leave it free.
         rotation: (3, 3) effector-to-world, or None to leave it free.
+        position_weight: None when the position is required; otherwise it is only wished, with this
+            weight [1/m^2].
         rotation_weight: None when the rotation is required; otherwise it is only wished, with
             this weight [1/rad^2] beside those of :class:`Preferences`.
     """
@@ -39,6 +41,7 @@ class Placement:
     position: FloatArray | None = None
     rotation: FloatArray | None = None
     rotation_weight: float | None = None
+    position_weight: float | None = None
 
     def __post_init__(self) -> None:
         if self.position is not None:
@@ -60,6 +63,7 @@ class Preferences:
         trunk: Of the thorax' tilt.
         head: Of the head's tilt.
         arms: Of the upper arms' deviation from hanging.
+        grasp: Of a grasping hand's deviation from the orientation its contact gives [1/rad^2].
         damping: Of every change in one iteration; keeps the problem regular.
     """
 
@@ -77,6 +81,7 @@ class Preferences:
     trunk: float = 0.2
     head: float = 0.6
     arms: float = 0.1
+    grasp: float = 0.3
     damping: float = 1e-3
 
 
@@ -139,7 +144,7 @@ class PostureProblem:
             if contact.kind is ContactKind.SOLE:
                 terms.append(RotationTerm(contact.effector, contact.rotation_contact_to_world, "contact"))
         for name, placement in self.placements.items():
-            if placement.position is not None:
+            if placement.position is not None and placement.position_weight is None:
                 terms.append(PositionTerm(name, placement.position))
             if placement.rotation is not None and placement.rotation_weight is None:
                 terms.append(RotationTerm(name, placement.rotation))
@@ -154,7 +159,14 @@ class PostureProblem:
         wishes: list[tuple[FloatArray, Term]] = [
             (hinge_weights(self.body, weights), ReferenceTerm(self.reference[7:]))
         ]
+        for contact in self.contacts:
+            if contact.kind is ContactKind.GRASP and contact.oriented:
+                weight = np.full(3, weights.grasp)
+                wishes.append((weight, RotationTerm(contact.effector, contact.rotation_contact_to_world)))
         for name, placement in self.placements.items():
+            if placement.position is not None and placement.position_weight is not None:
+                weight = np.full(3, placement.position_weight)
+                wishes.append((weight, PositionTerm(name, placement.position)))
             if placement.rotation is not None and placement.rotation_weight is not None:
                 weight = np.full(3, placement.rotation_weight)
                 wishes.append((weight, RotationTerm(name, placement.rotation)))

@@ -252,8 +252,13 @@ class Scenario:
     def _flat_sequence(self, planning: bool = False) -> StanceSequence:
         """The stances as the file lists them, with full soles."""
         supports = self._supports()
-        default_sole = supports.planning_sole if planning and supports.planning_sole else supports.sole
-        cap = supports.normal_force_cap_N or BODY_WEIGHTS_CAP * self.mass * GRAVITY
+        default_sole, friction, cap = supports.sole, supports.friction, supports.normal_force_cap_N
+        if planning:
+            default_sole = supports.planning_sole or default_sole
+            friction = supports.planning_friction or friction
+            cap = supports.planning_normal_force_cap_N or cap
+        cap = cap or BODY_WEIGHTS_CAP * self.mass * GRAVITY
+        seat = self._seat_patch()
         phases = []
         try:
             for section, contacts in zip(supports.phases, supports.resolved_phases(), strict=True):
@@ -262,8 +267,8 @@ class Scenario:
                         build_contact(
                             effector,
                             entry,
-                            supports.friction,
-                            default_sole,
+                            friction,
+                            seat if effector == "buttocks" else default_sole,
                             planning=planning,
                             force_cap=supports.contact_normal_force_cap_N,
                         )
@@ -276,25 +281,53 @@ class Scenario:
         except InputError as error:
             raise self._refused(("supports", "phases"), error) from None
 
+    @property
+    def friction_share(self) -> float:
+        """Friction that planning keeps to over the real one."""
+        supports = self.file.supports
+        if supports is None or supports.planning_friction is None:
+            return 1.0
+        return supports.planning_friction / supports.friction
+
+    @property
+    def padded(self) -> tuple[str, ...]:
+        """Names of the obstacles that any part of the body may lean on."""
+        return tuple(obstacle.name for obstacle in self.file.scene if obstacle.padded)
+
+    @property
+    def seated_from(self) -> int | None:
+        """First phase of those, up to the last, in which the body sits; None when it ends on its feet."""
+        if self.file.supports is None:
+            return None
+        sits = ["buttocks" in contacts for contacts in self.file.supports.resolved_phases()]
+        if not sits[-1]:
+            return None
+        return len(sits) - next((k for k, held in enumerate(reversed(sits)) if not held), len(sits))
+
     def build_centroidal_problem(self) -> CentroidalProblem:
         """Build the problem of the centre-of-mass planner, with every height scaled to the body.
+
+        The phases at the end in which the body sits are left out: there the centre of mass is
+        not what keeps the balance ([Qiu2012]_ 7.2.2).
 
         Raises:
             ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
         """
         from manikin.centroidal import CentroidalProblem, Weights
 
-        options = self.planning
+        options, seat = self.planning, self.seated_from
+        sequence = self.build_sequence(planning=True)
         rest = (0.0, 0.0, 0.0) if options.zero_end_accelerations else None
         given = {"degree": options.degree, "samples": options.samples}
         try:
             return CentroidalProblem(
                 self.mass,
-                self.build_sequence(planning=True),
+                sequence if seat is None else StanceSequence(sequence.phases[:seat]),
                 self.start_com,
                 self.goal_com,
+                goal_velocity=self.file.task.goal.velocity_m_s if seat is not None else (0.0, 0.0, 0.0),
                 start_acceleration=rest,
-                goal_acceleration=rest,
+                goal_acceleration=rest if seat is None else None,
                 margin_space=options.margin_space,
                 required_margin=self.required_margin,
                 support_distance=self.max_support_distance,
@@ -374,7 +407,7 @@ class Scenario:
                     )
             for contact in stance:
                 try:
-                    scene.supporting_surface(contact, tolerance)
+                    scene.touched_obstacle(contact, tolerance)
                 except InputError as error:
                     path: KeyPath = ("supports", "phases", number, contact.effector)
                     raise self._refused(path, error) from None
@@ -414,6 +447,13 @@ class Scenario:
         if "recording" in data["planning"]:
             data["planning"]["recording"] = str(self.find_file(data["planning"]["recording"]).resolve())
         return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100, default_flow_style=None)
+
+    def _seat_patch(self) -> SoleSection:
+        """Rectangle of the body's buttocks that presses on a seat."""
+        from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
+
+        stature = self.file.body.stature_m
+        return SoleSection(length_m=SEAT_LENGTH * stature, width_m=SEAT_WIDTH * stature)
 
     def _changed(self, **changes: Any) -> Scenario:
         data = self._data()
@@ -509,13 +549,12 @@ def build_contact(
     kind = entry.kind_for(effector)
     if kind == "grasp":
         rpy = None if entry.rpy_deg is None else np.radians(entry.rpy_deg)
-        rotation = rotation_from_rpy(0.0, 0.0, math.radians(entry.yaw_deg)) if rpy is None else None
         return grasp(
             effector,
             entry.position,
-            max_force=entry.max_force_N or 0.0,
+            max_force=(planning and entry.planning_max_force_N) or entry.max_force_N or 0.0,
             max_moment=entry.max_moment_Nm or 0.0,
-            rotation=rotation_from_rpy(*rpy) if rpy is not None else rotation,
+            rotation=None if rpy is None else rotation_from_rpy(*rpy),
         )
     friction = entry.friction or friction
     force_cap = entry.normal_force_cap_N or force_cap
@@ -536,6 +575,7 @@ def build_contact(
         normal=entry.normal,
         normal_force_cap=force_cap,
         torsion_limit=entry.torsion_limit_Nm,
+        settle=entry.settle_s or 0.0,
     )
 
 

@@ -34,7 +34,7 @@ from manikin.scenarios.validation import (
     rule_error,
 )
 
-EFFECTORS = ("left_foot", "right_foot", "left_hand", "right_hand")
+EFFECTORS = ("left_foot", "right_foot", "left_hand", "right_hand", "buttocks")
 """Effectors of a human that a phase may put in contact, in the order of the contact tables."""
 
 MASSLESS_FEET = ("left_front_foot", "right_front_foot", "left_hind_foot", "right_hind_foot")
@@ -43,9 +43,9 @@ MASSLESS_FEET = ("left_front_foot", "right_front_foot", "left_hind_foot", "right
 OBSTACLE_SHAPES = ("box", "cylinder", "capsule", "sphere", "plane", "half_space", "mesh")
 
 _KIND_KEYS: dict[str, tuple[str, ...]] = {
-    "sole": ("normal", "sole", "friction", "normal_force_cap_N", "torsion_limit_Nm"),
+    "sole": ("normal", "sole", "friction", "normal_force_cap_N", "torsion_limit_Nm", "settle_s"),
     "point": ("normal", "friction", "normal_force_cap_N"),
-    "grasp": ("max_force_N", "max_moment_Nm", "rpy_deg"),
+    "grasp": ("max_force_N", "planning_max_force_N", "max_moment_Nm", "rpy_deg"),
 }
 """Keys of a contact that only some kinds have."""
 
@@ -115,6 +115,9 @@ class ObstacleSection(Section):
     convex: Literal["no", "hull", "parts"] | None = Field(
         default=None, description="replace the mesh, or each connected part, by its convex hull"
     )
+    padded: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="whether any part of the body may lean on it, as on a seat"
+    )
     position: Vector3 = Field(default=(0.0, 0.0, 0.0), description="origin in the world [m]")
     rpy_deg: Vector3 = Field(default=(0.0, 0.0, 0.0), description="fixed-axis roll, pitch, yaw [deg]")
 
@@ -166,8 +169,14 @@ class ContactSection(Section):
     torsion_limit_Nm: Positive | None = Field(
         default=None, description="largest moment about the normal [N.m]"
     )
+    settle_s: NonNegative | None = Field(
+        default=None, description="time after the touch-down in which it may still slide to its place [s]"
+    )
     max_force_N: Positive | None = Field(
         default=None, description="grasp: largest force along each world axis [N]"
+    )
+    planning_max_force_N: Positive | None = Field(
+        default=None, description="grasp: smaller limit that planning balances with (default: max_force_N)"
     )
     max_moment_Nm: NonNegative | None = Field(
         default=None, description="grasp: largest moment per axis [N.m]"
@@ -229,6 +238,7 @@ class PhaseSection(Section):
     right_hind_foot: ContactEntry | None = Field(
         default=None, description="contact of that foot of a point mass, or 'same'"
     )
+    buttocks: ContactEntry | None = Field(default=None, description="contact with a seat, or 'same'")
     min_duration_s: Duration = Field(default=0.1, description="shortest duration [s]")
     max_duration_s: Duration | None = Field(default=None, description="longest duration [s]")
 
@@ -268,11 +278,17 @@ class SupportsSection(Section):
         description="whether a foot lands and leaves with its whole sole, or lands on its heel and leaves "
         "from its toes while another foot stands",
     )
+    planning_friction: Positive | None = Field(
+        default=None, description="smaller friction that planning balances with (default: the real one)"
+    )
     normal_force_cap_N: Positive | None = Field(
         default=None, description="largest sum of the normal forces of a stance [N] (default: 3 body weights)"
     )
     contact_normal_force_cap_N: Positive | None = Field(
         default=None, description="largest normal force of each sole or point that gives none itself [N]"
+    )
+    planning_normal_force_cap_N: Positive | None = Field(
+        default=None, description="smaller cap that planning balances with (default: the real one)"
     )
     phases: Annotated[list[PhaseSection], Field(min_length=1)] = Field(description="phases in order")
 
@@ -283,6 +299,13 @@ class SupportsSection(Section):
                 ours, real = getattr(self.planning_sole, key), getattr(self.sole, key)
                 if ours > real:
                     raise refuse(f"planning_sole.{key}", f"is {ours:g}; valid: at most sole.{key} = {real:g}")
+        for key, real in (
+            ("planning_friction", "friction"),
+            ("planning_normal_force_cap_N", "normal_force_cap_N"),
+        ):
+            ours, limit = getattr(self, key), getattr(self, real)
+            if ours is not None and limit is not None and ours > limit:
+                raise refuse(key, f"is {ours:g}; valid: at most {real} = {limit:g}")
         for number, phase in enumerate(self.phases):
             before = self.phases[number - 1].entries() if number else {}
             for effector, entry in phase.entries().items():
@@ -308,6 +331,9 @@ class StateSection(Section):
     """Where the body starts or ends."""
 
     com: Vector3 | None = Field(default=None, description="centre of mass [m]")
+    velocity_m_s: Vector3 | None = Field(
+        default=None, description="of the centre of mass when the body sits down at the goal (default: free)"
+    )
     at: Vector2 | None = Field(default=None, description="where to stand, x and y [m]")
     heading_deg: Number | None = Field(default=None, description="where to face [deg]")
     posture: Text | None = Field(
@@ -462,7 +488,7 @@ class ScenarioFile(Section):
         default_factory=list, description="constraints on the centre of mass"
     )
     planning: PlanningSection = Field(default=PlanningSection(), description="options of the planner")
-    manner: Literal["ready", "walking"] = Field(
+    manner: Literal["ready", "walking", "close"] = Field(
         default="ready",
         description="how the body carries itself where the task leaves freedom: arms raised and bent, clear "
         "of the thighs, or an upright trunk and arms that swing against the legs",

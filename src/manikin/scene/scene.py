@@ -22,6 +22,8 @@ from manikin.spatial import FloatArray, finite_number, frozen_array
 
 FLOOR = "floor"
 """Name of the floor obstacle."""
+GRASP_REACH = 0.06
+"""Largest distance from the middle of a grasping palm to the surface that it holds on to [m]."""
 _ALIGNED = float(np.cos(np.deg2rad(2.0)))
 
 
@@ -141,6 +143,31 @@ class Scene:
         distance, name = min(distances, key=lambda item: item[0])
         return name, distance
 
+    def touched_obstacle(self, contact: Contact, tolerance: float = 0.005) -> str:
+        """Name of the obstacle that a contact touches.
+
+        Args:
+            contact: A sole or point, which lies on a surface, or a grasp, which has the fingers
+                around something within :data:`GRASP_REACH` of its position.
+            tolerance: As for :meth:`supporting_surface`.
+
+        Raises:
+            ContactError: If there is none.
+        """
+        if contact.kind is not ContactKind.GRASP:
+            return self.supporting_surface(contact, tolerance).obstacle
+        name, distance = self.nearest(contact.position) if self.obstacles else ("", np.inf)
+        if distance > GRASP_REACH:
+            place = np.round(contact.position, 4).tolist()
+            nearest = (
+                f"the nearest, {name!r}, is {distance * 1000:.1f} mm away" if name else "the scene is empty"
+            )
+            raise ContactError(
+                f"grasp '{contact.effector}' at {place} m holds on to nothing: {nearest}; "
+                f"valid: within {GRASP_REACH * 1000:g} mm of an obstacle"
+            )
+        return name
+
     def resting_pairs(
         self,
         stance: Stance,
@@ -161,14 +188,11 @@ class Scene:
             nearest obstacle.
 
         Raises:
-            ContactError: If a sole or point lies on no surface.
+            ContactError: If a contact touches nothing.
         """
         found = set()
         for contact in stance:
-            if contact.kind is ContactKind.GRASP:
-                obstacle = self.nearest(contact.position)[0]
-            else:
-                obstacle = self.supporting_surface(contact, tolerance).obstacle
+            obstacle = self.touched_obstacle(contact, tolerance)
             names = (segments or {}).get(contact.effector, (contact.effector,))
             found.update((segment, obstacle) for segment in names)
         return frozenset(found)

@@ -219,12 +219,23 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
             item.add_freejoint(name="root", align=mujoco.mjtAlignFree.mjALIGNFREE_FALSE)
         for hinge in segment.hinges:
             _add_hinge(spec, item, hinge, options)
+        own = dict(options.segment_friction).get(segment.name)
+        special = {} if own is None else _soft_contact(own, options)
         for shape in segment.shapes:
-            _add_shape(item, segment, shape, contact)
+            _add_shape(item, segment, shape, {**contact, **special})
     for effector in body.effectors.values():
         made[effector.segment].add_site(
             name=f"effector/{effector.name}", pos=effector.translation, quat=quaternion(effector.rotation)
         )
+
+
+def _soft_contact(friction: float, options: PhysicsOptions) -> dict[str, Any]:
+    """Contact settings of soft flesh, which count before those of what it touches."""
+    return {
+        "friction": [friction, 0.005, 0.0001],
+        "solref": [options.soft_time_constant, options.contact_damping_ratio],
+        "priority": 1,
+    }
 
 
 def _set_inertia(item: Any, segment: Segment) -> None:

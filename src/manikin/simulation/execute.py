@@ -31,6 +31,9 @@ CONTACT_TIME = 3e-3
 """Time constant of the contacts in the default physics [s]: a stiff floor, three time steps.
 Halves sinking and creeping of loaded feet against the engine's usual 5 ms or more."""
 
+GRASPING = 0.4
+"""Time before and after a grasp in which the hand may touch what it holds on to [s]."""
+
 FALL_DISTANCE = 0.3
 """A body whose CoM is this far from its plan has fallen [m]."""
 
@@ -52,16 +55,22 @@ class _Hold:
     obstacle: str
 
 
-def default_physics(schedule: ContactSchedule) -> PhysicsOptions:
-    """Physics of an execution: the schedule's least friction, stiff contacts, passive damping."""
-    frictions = [
-        contact.friction
+def default_physics(body: BodyModel, schedule: ContactSchedule) -> PhysicsOptions:
+    """Physics of an execution: the schedule's least friction, stiff contacts, passive damping.
+
+    What slides to its place on a seat has the friction of that contact alone.
+    """
+    contacts = [
+        contact
         for phase in schedule.sequence
         for contact in phase.stance
         if contact.kind is not ContactKind.GRASP
     ]
     options = PhysicsOptions(joint_damping=JOINT_DAMPING, contact_time_constant=CONTACT_TIME)
-    return replace(options, friction=min(frictions)) if frictions else options
+    sliding = {body.effector(c.effector).segment: c.friction for c in contacts if c.settle > 0.0}
+    firm = [contact.friction for contact in contacts if contact.settle == 0.0]
+    options = replace(options, segment_friction=tuple(sorted(sliding.items())))
+    return replace(options, friction=min(firm)) if firm else options
 
 
 def execute(
@@ -74,6 +83,7 @@ def execute(
     physics: PhysicsOptions | None = None,
     hold: float = 1.0,
     pushes: Sequence[Push] = (),
+    padded: Sequence[str] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Execution:
     """Execute a planned motion and stand for a while after its end.
@@ -87,6 +97,7 @@ def execute(
         physics: Settings of the engine; :func:`default_physics` when omitted.
         hold: Time to stand at the end [s].
         pushes: Forces that disturb the execution, in the motion's time.
+        padded: Obstacles that any part of the body may lean on, such as a backrest.
         progress: Called with the share done, in [0, 1], after every control step.
 
     Returns:
@@ -98,7 +109,8 @@ def execute(
         ContactError: If a support does not lie on a surface of the scene.
     """
     finite_number(hold, "hold [s]", at_least=0.0)
-    return _Run(body, scene, motion, schedule, settings, physics, pushes).execute(hold, progress)
+    run = _Run(body, scene, motion, schedule, settings, physics, pushes, padded)
+    return run.execute(hold, progress)
 
 
 class _Run:
@@ -113,10 +125,11 @@ class _Run:
         settings: ControlSettings | None,
         physics: PhysicsOptions | None,
         pushes: Sequence[Push],
+        padded: Sequence[str] = (),
     ) -> None:
         self.body, self.plan = body, motion
         settings = settings or ControlSettings()
-        physics = physics or default_physics(schedule)
+        physics = physics or default_physics(body, schedule)
         self.period = settings.period
         self.substeps = _substeps(settings.period, physics.timestep)
         damping = np.full(body.nv - 6, physics.joint_damping)
@@ -128,7 +141,9 @@ class _Run:
         segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self.recorder = Recorder(schedule, segments)
         self.failure, self.failure_time = "", None
-        self._planned_now: tuple[int, ...] = ()
+        everything = tuple(segment.name for segment in body.segments)
+        self._leaning = [(everything, name) for name in padded]
+        self._planned_now: tuple[int, ...] | None = None
 
     def execute(self, hold: float, progress: Callable[[float], None] | None) -> Execution:
         began = clock.perf_counter()
@@ -163,15 +178,17 @@ class _Run:
 
     def _switch(self, time: float) -> None:
         """Tell the world which touches are planned now, and hold on to grasps."""
-        now = tuple(number for number, hold in enumerate(self.holds) if near(hold.interval, time))
+        now = tuple(number for number, hold in enumerate(self.holds) if _expected(hold.interval, time))
         if now != self._planned_now:
-            self.world.plan_touches([(self.holds[i].segments, self.holds[i].obstacle) for i in now])
+            planned = [(self.holds[i].segments, self.holds[i].obstacle) for i in now]
+            self.world.plan_touches([*planned, *self._leaning])
             self._planned_now = now
-        for item in self.holds:
-            contact = item.interval.contact
-            if contact.kind is ContactKind.GRASP:
-                held = item.interval.start <= time < item.interval.end
-                self._grip(contact) if held else self.world.release(contact.effector)
+        grasps = [item.interval for item in self.holds if item.interval.contact.kind is ContactKind.GRASP]
+        held = {item.contact.effector: item.contact for item in grasps if item.start <= time < item.end}
+        for effector in {item.contact.effector for item in grasps} - held.keys():
+            self.world.release(effector)
+        for contact in held.values():
+            self._grip(contact)
 
     def _grip(self, contact: Contact) -> None:
         self.world.grip(Grip(contact.effector, contact.position, contact.max_force))
@@ -179,7 +196,7 @@ class _Run:
     def _touching(self, time: float) -> dict[str, bool]:
         """Whether each effector touches the support it holds or is about to make."""
         felt: dict[str, bool] = {}
-        for number in self._planned_now:
+        for number in self._planned_now or ():
             item = self.holds[number]
             grasp = item.interval.contact.kind is ContactKind.GRASP
             if not grasp and time < item.interval.end - 1e-9:
@@ -205,6 +222,7 @@ class _Run:
             self._fail(f"unplanned touch: {world.touches[0]}", world.touches[0].time)
         executed = recorder.motion(self.body.joint_names, self.body.mass)
         com = recorder.com_errors()
+        bound = com[: max(recorder.bound_samples(), 1)]
         peak = np.abs(executed.tau[:, 6:]).max(axis=0)
         simulated = len(recorder.samples) * self.period
         return Execution(
@@ -212,8 +230,8 @@ class _Run:
             fell=fell,
             failure=self.failure,
             failure_time_s=self.failure_time,
-            com_rms_error_m=float(np.sqrt(np.mean(com**2))),
-            com_max_error_m=float(com.max()),
+            com_rms_error_m=float(np.sqrt(np.mean(bound**2))),
+            com_max_error_m=float(bound.max()),
             max_foot_error_m=float(recorder.effector_errors().max(initial=0.0)),
             final_com_error_m=float(com[-1]),
             min_margin=float(executed.margin.min()),
@@ -227,6 +245,13 @@ class _Run:
             fallbacks=tuple(recorder.fallbacks),
             max_slip_m=recorder.max_slip,
         )
+
+
+def _expected(interval: SupportInterval, time: float) -> bool:
+    """Whether a touch is planned; a hand may brush along what it is about to grasp or has let go."""
+    if interval.contact.kind is not ContactKind.GRASP:
+        return near(interval, time)
+    return interval.start - GRASPING <= time <= interval.end + GRASPING
 
 
 def _substeps(period: float, timestep: float) -> int:
@@ -244,7 +269,7 @@ def _holds(body: BodyModel, scene: Scene, schedule: ContactSchedule) -> tuple[_H
             effector,
             end_segments(body, effector),
             interval,
-            scene.supporting_surface(interval.contact).obstacle,
+            scene.touched_obstacle(interval.contact),
         )
         for effector in schedule.sequence.effectors
         for interval in support_intervals(schedule, effector, SWITCHING)

@@ -1,9 +1,10 @@
 """Collects what happens during an execution and turns it into a motion and its measures."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.balance import wrench_polytope
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
@@ -69,7 +70,7 @@ class Recorder:
         if output.fallback:
             self.fallbacks.append((sensed.time, output.fallback))
         for name in self.effectors:
-            self._measure_slip(name, output)
+            self._measure_slip(name, output, sensed.time)
 
     def _wrench(self, name: str, sensed: Sensed) -> FloatArray:
         contact = self._nearest_contact(name, sensed.time)
@@ -80,14 +81,15 @@ class Recorder:
     def _nearest_contact(self, name: str, time: float) -> Contact:
         """Contact of an effector at ``time``; in flight, the one to come or else the last."""
         for interval in self._intervals[name]:
-            if time < interval.end + (SWITCHING if near(interval, time) else 0.0):
+            if time < interval.end or near(interval, time):
                 return interval.contact
         return self._intervals[name][-1].contact
 
-    def _measure_slip(self, name: str, output: ControlOutput) -> None:
+    def _measure_slip(self, name: str, output: ControlOutput, time: float) -> None:
         support, position = output.supports[name], output.state.frames[name].position
         held = support.mode is SupportMode.STANCE and support.load_share >= 1
-        if not held or support.contact is None or support.contact.part is not SolePart.FULL:
+        rolls = support.contact is not None and support.contact.part is not SolePart.FULL
+        if not held or support.contact is None or rolls or self._schedule.settling(time, name)[0]:
             self._landings[name] = None
             return
         landing = self._landings[name]
@@ -104,21 +106,30 @@ class Recorder:
         """(n,) distance of the CoM from its plan [m]."""
         return _lengths([s.output.state.com - s.output.reference.com for s in self.samples])
 
+    def bound_samples(self) -> int:
+        """Number of samples before the body sits down, after which its CoM need not follow a plan."""
+        times = np.array([s.sensed.time for s in self.samples])
+        seated = [
+            item.start for found in self._intervals.values() for item in found if item.contact.settle > 0.0
+        ]
+        return int(np.sum(times < min(seated, default=np.inf)))
+
     def effector_errors(self) -> FloatArray:
-        """(n * effectors,) distance of each effector's origin from its plan [m]."""
+        """(n * effectors,) distance of each effector's origin from its plan, where it does not slide [m]."""
         return _lengths(
             [
                 s.output.state.frames[name].position - s.output.reference.effectors[name].position
                 for s in self.samples
                 for name in self.effectors
+                if all(item.contact.settle == 0.0 for item in self._intervals[name])
             ]
         )
 
     def margins(self, mass: float) -> FloatArray:
         """(n,) wrench margin of the mean measured wrenches [N.m].
 
-        The stance is the one planned for the beginning of the step, at its planned placements:
-        a foot that presses before its time or after it is no support.
+        The stance is the one planned for the beginning of the step, at its planned placements,
+        but for what slides to its place on a seat, which is taken where it is: a foot that presses before its time or after it is no support.
 
         Args:
             mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
@@ -126,11 +137,33 @@ class Recorder:
         totals = np.array([sample.total for sample in self.samples])
         phases = self._schedule.phase_at([sample.sensed.time for sample in self.samples])
         margins = np.empty(len(self.samples))
+        settling = self._settling_rows()
         for index, phase in enumerate(self._schedule.sequence):
-            rows = phases == index
+            rows = (phases == index) & ~settling
             if np.any(rows):
                 margins[rows] = wrench_polytope(_bounded(phase.stance, mass)).margin(totals[rows])
+        for row in np.flatnonzero(settling):
+            stance = self._as_measured(self._schedule.sequence[int(phases[row])].stance, self.samples[row])
+            margins[row] = wrench_polytope(_bounded(stance, mass)).margin(totals[row])
         return margins
+
+    def _settling_rows(self) -> NDArray[np.bool_]:
+        """(n,) whether a contact is still on its way to its place."""
+        times = np.array([sample.sensed.time for sample in self.samples])
+        rows = np.zeros(len(times), dtype=bool)
+        for name in self.effectors:
+            rows |= self._schedule.settling(times, name)
+        return rows
+
+    def _as_measured(self, stance: Stance, sample: Sample) -> Stance:
+        """The stance with what is settling where it is now."""
+        contacts = []
+        for contact in stance:
+            if self._schedule.settling(sample.sensed.time, contact.effector)[0]:
+                here = sample.output.state.frames[contact.effector].position
+                contact = replace(contact, position=here)
+            contacts.append(contact)
+        return Stance(contacts, stance.normal_force_cap)
 
     def motion(self, joint_names: Sequence[str], mass: float) -> Motion:
         """Turn the samples into a motion."""
@@ -159,7 +192,7 @@ def _lengths(vectors: list[FloatArray]) -> FloatArray:
 
 def near(interval: SupportInterval, time: float) -> bool:
     """Whether a support is planned at ``time`` [s] or has just been, or is about to be."""
-    return interval.early - 1e-9 <= time <= interval.end + SWITCHING
+    return interval.early - 1e-9 <= time <= interval.late + 1e-9
 
 
 def _bounded(stance: Stance, mass: float) -> Stance:

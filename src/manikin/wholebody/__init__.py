@@ -10,15 +10,18 @@ from manikin.wholebody.certificate import WholeBodyRequirements, WholeBodyResidu
 from manikin.wholebody.configuration_spline import ConfigurationSpline
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import PlannedSwing
+from manikin.wholebody.seated import SeatedContinuation, continue_seated
 
 __all__ = [
     "ConfigurationSpline",
     "FitScales",
     "PlannedSwing",
+    "SeatedContinuation",
     "WholeBodyFailure",
     "WholeBodyRequirements",
     "WholeBodyResiduals",
     "WholeBodyResult",
     "WholeBodySettings",
+    "continue_seated",
     "plan_whole_body",
 ]

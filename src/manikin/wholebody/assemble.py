@@ -7,8 +7,9 @@ and centre of mass as one spline, and the result is certified at 1 kHz.
 
 import itertools
 import time as clock
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +17,7 @@ import pinocchio as pin
 from manikin.balance import pseudo_wrench, wrench_polytope
 from manikin.body import BodyModel
 from manikin.centroidal import CentroidalTrajectory
+from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
@@ -36,6 +38,18 @@ DEGREE = 5
 
 NEAR_FLIGHT = 0.05
 """A requirement that breaks this close to a flight is put down to it [s]."""
+
+SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09, 0.13])
+"""Further knots around a touch-down at speed, from it [s]."""
+
+CLOSEST_KNOTS = 4.0e-3
+"""Knots closer than this are one [s]."""
+
+SITTING_FIT: Mapping[str, Any] = {"joint_limit": 2.0e-3, "multiplier_rounds": 24}
+"""Changed scales of a motion that ends on a seat: its touch is sudden, and harder to fit."""
+
+LOOSE_COM = 0.01
+"""Importance of a centre of mass that only shows the way."""
 
 SECOND_SEARCH = 600
 """Random points of the Bi-RRT where a smooth curve exists but the body cannot follow it."""
@@ -159,6 +173,8 @@ class _Planner:
         settings: WholeBodySettings,
         progress: Progress | None,
     ) -> None:
+        if trajectory.binding_until is not None:
+            settings = replace(settings, fit=replace(settings.fit, **SITTING_FIT))
         self.body, self.scene, self.trajectory, self.settings = body, scene, trajectory, settings
         self.proximity = Proximity(body, scene)
         self.flights = FlightPlanner(
@@ -219,15 +235,21 @@ class _Planner:
         reference = reference_motion(self.body, self.trajectory, time, self.settings.manner)
         return plan_guide(
             self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time),
-            self.trajectory.position(time), ignored_pairs(self.body, self.scene, schedule, time),
+            self._guide_com(time), ignored_pairs(self.body, self.scene, schedule, time),
             _with_joints(reference, toes), self.settings.fit.safe_distance,
             self.settings.manner.preferences, tuple(toes),
         )  # fmt: skip
 
+    def _guide_com(self, time: FloatArray) -> FloatArray:
+        """(k, 3) centre of mass of the guide postures; NaN where the body is safe without one."""
+        com = self.trajectory.position(time)
+        com[~self.trajectory.binds(time)] = np.nan
+        return com
+
     def _targets(self, swings: tuple[PlannedSwing, ...], guide: Guide) -> tuple[FitTargets, FloatArray]:
         """What the fit has to do, and the knots of its spline."""
         schedule, settings = self.trajectory.schedule, self.settings
-        knots = phase_knots(schedule.instants, settings.knot_spacing, DEGREE)
+        knots = phase_knots(schedule.instants, settings.knot_spacing, DEGREE, touch_downs_at_speed(schedule))
         time = sample_times(knots, settings.samples_per_span)
         toes = toe_angles(self.body, swings, time)
         scale = self.settings.manner.scale(self.body)
@@ -236,6 +258,7 @@ class _Planner:
             time=time,
             effectors=effector_targets(schedule, swings, time),
             com=self.trajectory.position(time),
+            com_weight=np.where(self.trajectory.binds(time), 1.0, LOOSE_COM),
             com_acceleration=self.trajectory.acceleration(time),
             margin=self._margin(time, self._point_mass_wrench(time)),
             reference=_with_joints(guide.at(time), toes),
@@ -329,10 +352,35 @@ def _better(first: WholeBodyResult, second: WholeBodyResult) -> WholeBodyResult:
     return second if second.succeeded and not first.succeeded else first
 
 
-def phase_knots(instants: FloatArray, spacing: float, degree: int) -> FloatArray:
-    """Clamped knots with every key instant among them and at most ``spacing`` [s] apart."""
+def touch_downs_at_speed(schedule: ContactSchedule) -> FloatArray:
+    """(k,) times at which a contact is made that still has to settle [s]."""
+    found = [
+        float(start)
+        for number, (phase, start) in enumerate(zip(schedule.sequence, schedule.instants, strict=False))
+        if any(
+            item.settle > 0.0 and (number == 0 or item.effector not in schedule.sequence[number - 1].stance)
+            for item in phase.stance
+        )
+    ]
+    return np.array(found)
+
+
+def phase_knots(
+    instants: FloatArray, spacing: float, degree: int, sudden: FloatArray | Sequence[float] = ()
+) -> FloatArray:
+    """Clamped knots with every key instant among them and at most ``spacing`` [s] apart.
+
+    Args:
+        instants: (phases + 1,) key instants [s].
+        spacing: Largest distance of two knots [s].
+        degree: Of the spline.
+        sudden: Times around which the knots lie closer, because the motion changes suddenly [s].
+    """
+    fine = np.concatenate([np.zeros(0), *(time + SUDDEN_KNOTS for time in sudden)])
+    breaks = np.unique(np.concatenate([instants, fine[(fine > instants[0]) & (fine < instants[-1])]]))
+    breaks = breaks[np.append(True, np.diff(breaks) > CLOSEST_KNOTS)]
     inner: list[float] = []
-    for start, end in itertools.pairwise(instants):
+    for start, end in itertools.pairwise(breaks):
         count = max(1, int(np.ceil((end - start) / spacing)))
         inner.extend(np.linspace(start, end, count, endpoint=False))
     ends = np.full(degree, instants[0]), np.full(degree + 1, instants[-1])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from manikin.balance import least_zmp_distance
 from manikin.body import BodyModel
@@ -117,10 +118,12 @@ def certify(
     """
     support, turn = _support_errors(body, trajectory, motion)
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
+    com = np.where(trajectory.binds(motion.time), com, 0.0)
     angles = motion.q[:, 7:]
     limit = np.maximum(body.lower - angles, angles - body.upper).max(axis=1)
     speed = (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1)
     torque = (np.abs(motion.tau[:, 6:]) / body.torque_limit).max(axis=1)
+    torque = np.where(_impact(trajectory.schedule, motion.time), 0.0, torque)
     missing = np.linalg.norm(motion.tau[:, :6], axis=1)
     clearance = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
     series = {
@@ -147,20 +150,41 @@ def _least_zmp_distance(schedule: ContactSchedule, time: FloatArray, wrench: Flo
     )
 
 
+IMPACT = 0.03
+"""Time after a touch-down at speed in which torques are not counted [s]: the smooth plan has no
+impact, and what the joints really give there is bounded, and measured, in the execution."""
+
+
+def _impact(schedule: ContactSchedule, time: FloatArray) -> NDArray[np.bool_]:
+    """(n,) whether a contact was made at speed just before each time."""
+    found = np.zeros(len(time), dtype=bool)
+    for name in schedule.sequence.effectors:
+        settling = schedule.settling(time, name)
+        found |= settling & ~schedule.settling(time - IMPACT, name)
+    return found
+
+
 def _support_errors(
     body: BodyModel, trajectory: CentroidalTrajectory, motion: Motion
 ) -> tuple[FloatArray, FloatArray]:
-    """(n,) largest position [m] and orientation [rad] error of the effectors in contact."""
+    """(n,) largest position [m] and orientation [rad] error of the effectors in contact.
+
+    Of a contact that is still settling, what it is below its surface counts.
+    """
     model, data = body.pinocchio, body.pinocchio.createData()
     schedule = trajectory.schedule
     position, turn = np.zeros(len(motion.time)), np.zeros(len(motion.time))
     phases = schedule.phase_at(motion.time)
+    settling = {name: schedule.settling(motion.time, name) for name in schedule.sequence.effectors}
     for k, q in enumerate(motion.q):
         pin.forwardKinematics(model, data, q)
         pin.updateFramePlacements(model, data)
         for contact in schedule.sequence[int(phases[k])].stance:
             measure = _placement_error if contact.part is SolePart.FULL else _part_error
             moved, turned = measure(body, data, contact)
+            if settling[contact.effector][k]:
+                place = data.oMf[body.effector_frame(contact.effector)].translation
+                moved, turned = -float(contact.normal @ (place - contact.position)), 0.0
             position[k], turn[k] = max(position[k], moved), max(turn[k], turned)
     return position, turn
 

@@ -99,8 +99,9 @@ class FlightPlanner:
         return self._trajectory.schedule
 
     def flights(self) -> tuple[Swing, ...]:
-        """Every flight from a contact or to one."""
-        return self.schedule.sequence.swings()
+        """Every flight from a contact or to one; the trunk is not flown."""
+        swings = self.schedule.sequence.swings()
+        return tuple(swing for swing in swings if hangs(self._body, swing.effector))
 
     def plan(self, swing: Swing) -> PlannedSwing:
         """Find a smooth curve, or else search one."""
@@ -220,6 +221,12 @@ class FlightPlanner:
         )  # fmt: skip
 
 
+def hangs(body: BodyModel, effector: str) -> bool:
+    """Whether an effector is at the end of a limb, so that it can reach by itself."""
+    root = next(segment.name for segment in body.segments if segment.parent is None)
+    return body.effector(effector).segment != root
+
+
 def standing_during(schedule: ContactSchedule, swing: Swing) -> tuple[Contact, ...]:
     """Every contact held at some time of a flight."""
     found: dict[tuple[str, bytes], Contact] = {}
@@ -231,7 +238,7 @@ def standing_during(schedule: ContactSchedule, swing: Swing) -> tuple[Contact, .
 
 def touch_pairs(body: BodyModel, scene: Scene, contact: Contact) -> frozenset[tuple[str, str]]:
     """Pairs of end segment and obstacle that a contact brings together."""
-    obstacle = scene.supporting_surface(contact, tolerance=0.02).obstacle
+    obstacle = scene.touched_obstacle(contact, tolerance=0.02)
     return frozenset((segment, obstacle) for segment in end_segments(body, contact.effector))
 
 

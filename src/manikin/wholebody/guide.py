@@ -8,11 +8,12 @@ and they are what the fitted motion stays near.
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from manikin.body import BodyModel
+from manikin.body.configuration import Configuration
 from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.posture import (
     Placement,
@@ -25,7 +26,7 @@ from manikin.posture import (
 from manikin.scene import Proximity
 from manikin.spatial import FloatArray
 from manikin.wholebody.configuration_spline import align_quaternions
-from manikin.wholebody.targets import EffectorTarget, Ignored
+from manikin.wholebody.targets import EffectorTarget, Ignored, settled_share
 
 LEAST_WEIGHT = 0.05
 """Targets of less importance than this are left to the fit."""
@@ -97,7 +98,7 @@ def plan_guide(
         schedule: Contacts in time.
         time: (k,) [s].
         effectors: Targets at these times.
-        com: (k, 3) centre of mass [m].
+        com: (k, 3) centre of mass [m]; NaN leaves it free.
         ignored: Pairs that may touch, per time.
         reference: (k, nq) preferred postures, the first of which starts the search.
         clearance: Wanted distance to everything [m].
@@ -107,9 +108,11 @@ def plan_guide(
     q = reference[0]
     found: list[FloatArray] = []
     failures: list[GuideFailure] = []
+    touched: dict[str, FloatArray] = {}
     settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False)
     for k, instant in enumerate(time):
         contacts, placements = _requirements(schedule, float(instant), effectors, k)
+        placements.update(_settling(body, schedule, float(instant), q, touched))
         # Half way to the posture before: neighbouring postures must not jump.
         wanted = np.array(reference[k])
         if k > 0:
@@ -121,6 +124,12 @@ def plan_guide(
             preferences=preferences or Preferences(),
         )  # fmt: skip
         result = generate_posture(problem, q, settings=settings)
+        flying = [name for name in placements if effectors[name].weight[k] < 1.0]
+        if not result.succeeded and flying:
+            # In flight an effector need not pass exactly where its curve does.
+            loose = {n: _loosened(item) if n in flying else item for n, item in placements.items()}
+            retry = generate_posture(replace(problem, placements=loose), q, settings=settings)
+            result = retry if retry.succeeded else result
         if not result.succeeded:
             failures.append(_failure(schedule, float(instant), result))
         q = result.q
@@ -131,10 +140,15 @@ def plan_guide(
 def _requirements(
     schedule: ContactSchedule, time: float, effectors: dict[str, EffectorTarget], k: int
 ) -> tuple[tuple[Contact, ...], dict[str, Placement]]:
-    held = {c.effector: c for c in schedule.stance_at(time) if c.part is SolePart.FULL}
+    held = {
+        c.effector: c
+        for c in schedule.stance_at(time)
+        if c.part is SolePart.FULL and not schedule.settling(time, c.effector)[0]
+    }
+    settling = {name for name in effectors if schedule.settling(time, name)[0]}
     placements = {}
     for name, target in effectors.items():
-        if name not in held and target.weight[k] >= LEAST_WEIGHT:
+        if name not in held and name not in settling and target.weight[k] >= LEAST_WEIGHT:
             turn = (
                 target.rotation[k]
                 if target.rotation is not None and target.rotation_weight[k] > 0.5
@@ -142,6 +156,49 @@ def _requirements(
             )
             placements[name] = Placement(target.position[k], turn)
     return tuple(held.values()), placements
+
+
+def _settling(
+    body: BodyModel, schedule: ContactSchedule, time: float, q: FloatArray, touched: dict[str, FloatArray]
+) -> dict[str, Placement]:
+    """Places of the contacts that are still settling, on their way from where they touched.
+
+    Args:
+        body: The body.
+        schedule: Contacts in time.
+        time: [s].
+        q: (nq,) posture before.
+        touched: Where each of them touched, kept from posture to posture [m].
+    """
+    placements = {}
+    phase = int(schedule.phase_at(time))
+    for contact in schedule.sequence[phase].stance:
+        if schedule.settling(time, contact.effector)[0]:
+            if contact.effector not in touched:
+                _, here = Configuration(body, q).effector_placement(contact.effector)
+                touched[contact.effector] = here - contact.normal * (
+                    contact.normal @ (here - contact.position)
+                )
+            start = touched[contact.effector]
+            share = float(settled_share(schedule, phase, contact, np.array([time]))[0])
+            placements[contact.effector] = Placement(
+                start + share * (contact.position - start),
+                contact.rotation_contact_to_world,
+                rotation_weight=SETTLING_TURN,
+            )
+    return placements
+
+
+LOOSE_FLIGHT = 100.0
+"""Weight of the place of a flying effector where it cannot be exact [1/m^2]."""
+
+
+def _loosened(placement: Placement) -> Placement:
+    return replace(placement, position_weight=LOOSE_FLIGHT)
+
+
+SETTLING_TURN = 10.0
+"""Weight of its orientation [1/rad^2]."""
 
 
 def _failure(schedule: ContactSchedule, time: float, result: PostureResult) -> GuideFailure:

@@ -85,7 +85,23 @@ WALKING = Manner(
 )  # fmt: skip
 """An upright trunk and hanging arms that swing against the legs."""
 
-MANNERS: Mapping[str, Manner] = MappingProxyType({manner.name: manner for manner in (READY, WALKING)})
+CLOSE = Manner(
+    "close",
+    MappingProxyType(
+        {
+            "shoulder_flexion": np.deg2rad(25.0),
+            "shoulder_abduction": np.deg2rad(15.0),
+            "elbow_flexion": np.deg2rad(80.0),
+        }
+    ),
+    MappingProxyType({**READY.scales, "shoulder": 0.15, "elbow": 0.2}),
+    preferences=Preferences(
+        hinges=MappingProxyType({"shoulder": 0.5, "elbow": 0.3, **Preferences().hinges}), arms=0.3
+    ),
+)
+"""Arms kept close to the body, as in a narrow place."""
+
+MANNERS: Mapping[str, Manner] = MappingProxyType({manner.name: manner for manner in (READY, WALKING, CLOSE)})
 """Every manner by its name."""
 
 

@@ -25,6 +25,9 @@ from manikin.wholebody.targets import EffectorTarget, FitTargets
 LEAST_MARGIN = 10.0
 """Planned margins below this do not make the scale of the moments any finer [N.m]."""
 
+LEAST_FORCE_WEIGHT = 0.25
+"""Importance of the linear momentum's rate where the centre of mass only shows the way."""
+
 _RADIAL_SCALE = 0.05
 """Deviation of a raw quaternion's length from one that costs one unit."""
 
@@ -126,7 +129,7 @@ class MotionObjective:
             self._reference_weight = 1.0 / targets.reference_scale
         self.task_rows = 6 * len(self._frames) + 3
         held = [_held_rows(target) for target in targets.effectors.values()]
-        self.exact_rows = np.hstack([*held, np.ones((len(targets.time), 3), dtype=bool)])
+        self.exact_rows = np.hstack([*held, np.repeat(targets.com_weight[:, None] >= 1.0, 3, axis=1)])
         """(n, task_rows) whether a task has to be met exactly: contacts and centre of mass."""
 
     def linearise(self, points: FloatArray, scales: FitScales, shift: FloatArray) -> Linearised:
@@ -175,10 +178,12 @@ class MotionObjective:
             target, rows = self._targets.effectors[name], slice(6 * number, 6 * number + 6)
             if target.weight[s] > 0.0:
                 self._effector_rows(s, frame, target, jacobian[rows], residual[rows], scales, out)
-        jacobian[-3:] = pin.jacobianCenterOfMass(self._model, self._data, q) / scales.com
+        weight = self._targets.com_weight[s]
+        jacobian[-3:] = pin.jacobianCenterOfMass(self._model, self._data, q) * (weight / scales.com)
         error = self._data.com[0] - self._targets.com[s]
-        residual[-3:] = error / scales.com
-        out.com_error = max(out.com_error, float(np.linalg.norm(error)))
+        residual[-3:] = error * (weight / scales.com)
+        if weight >= 1.0:
+            out.com_error = max(out.com_error, float(np.linalg.norm(error)))
 
     def _effector_rows(
         self, s: int, frame: int, target: EffectorTarget, jacobian: FloatArray, residual: FloatArray,
@@ -188,7 +193,11 @@ class MotionObjective:
         full = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
         error = placement.translation - target.position[s]
         weight = target.weight[s] / scales.position
-        jacobian[:3], residual[:3] = weight * full[:3], weight * error
+        if target.along is None:
+            jacobian[:3], residual[:3] = weight * full[:3], weight * error
+        else:
+            jacobian[:3] = weight * target.along[s] @ full[:3]
+            residual[:3] = weight * target.along[s] @ error
         if target.weight[s] >= 1.0:
             out.support_error = max(out.support_error, float(np.linalg.norm(error)))
         if target.rotation is not None:
@@ -266,6 +275,7 @@ class MotionObjective:
         """Rate of the centroidal momentum against what the planned trajectory needs."""
         targets = self._targets
         scale = np.full((len(targets.time), 6), scales.force)
+        scale[:, :3] /= np.maximum(targets.com_weight, LEAST_FORCE_WEIGHT)[:, None]
         scale[:, 3:] = scales.moment_share * np.maximum(targets.margin, LEAST_MARGIN)[:, None]
         residual = momentum.value.copy()
         residual[:, :3] -= self._body.mass * targets.com_acceleration

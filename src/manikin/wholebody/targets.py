@@ -7,10 +7,10 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
-from manikin.contact import ContactKind, ContactSchedule
+from manikin.contact import Contact, ContactKind, ContactSchedule
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
-from manikin.wholebody.flights import PlannedSwing, touch_pairs
+from manikin.wholebody.flights import PlannedSwing, hangs, touch_pairs
 
 Ignored = frozenset[tuple[str, str]]
 """Pairs of segment and obstacle (or segment) whose distance does not count."""
@@ -25,12 +25,15 @@ class EffectorTarget:
         rotation: (n, 3, 3) effector-to-world, or None when only the position counts.
         weight: (n,) importance of the position: 1 in contact, less in flight, 0 where free.
         rotation_weight: (n,) importance of the orientation, likewise.
+        along: (n, 3, 3) applied to the position error before it is weighted: the identity, or
+            less than it along the surface of a contact that is still settling; None for the identity.
     """
 
     position: FloatArray
     rotation: FloatArray | None
     weight: FloatArray
     rotation_weight: FloatArray
+    along: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +44,8 @@ class FitTargets:
         time: (n,) [s].
         effectors: Target of each controlled effector.
         com: (n, 3) centre of mass [m].
+        com_weight: (n,) importance of the centre of mass: 1 where it is required, less where the
+            trajectory only shows the way.
         com_acceleration: (n, 3) its acceleration [m/s^2].
         margin: (n,) balance margin of the planned centre of mass [N.m].
         reference: (n, nq) preferred configuration.
@@ -52,6 +57,7 @@ class FitTargets:
     time: FloatArray
     effectors: Mapping[str, EffectorTarget]
     com: FloatArray
+    com_weight: FloatArray
     com_acceleration: FloatArray
     margin: FloatArray
     reference: FloatArray
@@ -68,26 +74,41 @@ def effector_targets(
     for name in schedule.sequence.effectors:
         position, rotation = np.zeros((len(time), 3)), np.tile(np.eye(3), (len(time), 1, 1))
         weight, rotation_weight = np.zeros(len(time)), np.ones(len(time))
+        settling = schedule.settling(time, name)
+        along = np.tile(np.eye(3), (len(time), 1, 1)) if np.any(settling) else None
         for index, phase in enumerate(schedule.sequence):
             if name in phase.stance:
                 contact, rows = phase.stance[name], phases == index
                 position[rows], rotation[rows] = contact.position, contact.rotation_contact_to_world
-                weight[rows] = 1.0
+                weight[rows] = np.where(settling[rows], ALMOST, 1.0)
                 if contact.kind is ContactKind.GRASP:
-                    rotation_weight[rows] = GRASP_ROTATION_WEIGHT
+                    rotation_weight[rows] = GRASP_ROTATION_WEIGHT if contact.oriented else 0.0
+                if along is not None:
+                    share = settled_share(schedule, index, contact, time[rows])
+                    along[rows] = settling_map(contact, share)
+                    rotation_weight[rows] = share
         for item in swings:
             if item.swing.effector == name:
                 start, end = item.interval
                 _place(item, time, position, rotation, (start, end))
                 rows = (time >= start) & (time < end)
                 share = (time[rows] - start) / (end - start)
-                weight[rows] = _flight_weight(share, FLIGHT_POSITION_WEIGHT)
-                rotation_weight[rows] = _flight_weight(share, FLIGHT_ROTATION_WEIGHT)
+                place, turn, leave = (
+                    min(0.25, longest / (end - start))
+                    for longest in (POSITION_RAMP, ROTATION_RAMP, LEAVING_RAMP)
+                )
+                if end - start < LONG_FLIGHT:
+                    place = turn = leave = 0.25
+                weight[rows] = _flight_weight(share, FLIGHT_POSITION_WEIGHT, place, place)
+                rotation_weight[rows] = _flight_weight(share, FLIGHT_ROTATION_WEIGHT, leave, turn)
                 if item.method == "reach":
                     held = share if item.swing.start is None else 1.0 - share
-                    weight[rows] = _reach_weight(held)
+                    weight[rows] = _reach_weight(held, place)
                     rotation_weight[rows] = GRASP_ROTATION_WEIGHT * held
-        targets[name] = EffectorTarget(position, rotation, weight, rotation_weight)
+                hold = item.swing.end or item.swing.start
+                if hold is not None and hold.kind is ContactKind.GRASP and not hold.oriented:
+                    rotation_weight[rows] = 0.0
+        targets[name] = EffectorTarget(position, rotation, weight, rotation_weight, along)
     return targets
 
 
@@ -120,6 +141,34 @@ def toe_angles(body: BodyModel, swings: Sequence[PlannedSwing], time: FloatArray
     return found
 
 
+def settled_share(schedule: ContactSchedule, phase: int, contact: Contact, time: FloatArray) -> FloatArray:
+    """(n,) how far a contact of a phase has settled at each time: 0 at its touch-down, 1 at its place."""
+    first = phase
+    while first > 0 and contact.effector in schedule.sequence[first - 1].stance:
+        first -= 1
+    if contact.settle == 0.0:
+        return np.ones(len(time))
+    share = np.clip((time - schedule.instants[first]) / contact.settle, 0.0, 1.0)
+    return share**2 * (3.0 - 2.0 * share)
+
+
+def settling_map(contact: Contact, share: FloatArray) -> FloatArray:
+    """(n, 3, 3) map of a settling contact's position error: soon whole along the normal, later across it."""
+    normal = np.outer(contact.normal, contact.normal)
+    down = np.clip(LANDED_PER_SHARE * share, LEAST_SETTLED, 1.0)[:, None, None]
+    return down * normal + np.maximum(share, LEAST_SETTLED)[:, None, None] * (np.eye(3) - normal)
+
+
+LANDED_PER_SHARE = 10.0
+"""How much sooner a settling contact is down on its surface than at its place."""
+
+LEAST_SETTLED = 0.01
+"""Importance of the place along the surface at the touch-down of a contact that settles."""
+
+ALMOST = 1.0 - 1e-9
+"""Weight of what matters fully but is not required exactly."""
+
+
 FLIGHT_POSITION_WEIGHT = 0.1
 """Importance of an effector's position in the middle of a flight."""
 
@@ -130,18 +179,30 @@ FLIGHT_ROTATION_WEIGHT = 0.05
 GRASP_ROTATION_WEIGHT = 0.03
 """Importance of a grasping hand's orientation: a hint, for a grasp holds a point."""
 
+LONG_FLIGHT = 1.0
+"""The ends of a shorter flight are a quarter of it each [s]."""
 
-def _reach_weight(share: FloatArray) -> FloatArray:
+POSITION_RAMP = 0.2
+"""Longest time near the ends of a flight in which the position matters more [s]."""
+
+ROTATION_RAMP = 0.12
+"""The same for the orientation before the landing [s]."""
+
+LEAVING_RAMP = 0.04
+"""The same for the orientation after the lift-off to a long flight: the foot may roll off at once [s]."""
+
+
+def _reach_weight(share: FloatArray, ramp: float) -> FloatArray:
     """Importance from a free end (0) to the contact (1): none, then that of a flight, then full."""
     blend = np.clip(share / 0.75, 0.0, 1.0)
     rising = blend**2 * (3.0 - 2.0 * blend)
-    return rising * _flight_weight(np.maximum(share, 0.5), FLIGHT_POSITION_WEIGHT)
+    return rising * _flight_weight(np.maximum(share, 0.5), FLIGHT_POSITION_WEIGHT, ramp, ramp)
 
 
-def _flight_weight(share: FloatArray, middle: float) -> FloatArray:
+def _flight_weight(share: FloatArray, middle: float, leaving: float, landing: float) -> FloatArray:
     """Importance during a flight: full at its ends, so that contacts are left and met well."""
-    blend = np.clip(np.minimum(share, 1.0 - share) / 0.25, 0.0, 1.0)
-    inside = 1.0 - 1e-9 - (1.0 - middle) * blend**2 * (3.0 - 2.0 * blend)
+    blend = np.clip(np.minimum(share / leaving, (1.0 - share) / landing), 0.0, 1.0)
+    inside = ALMOST - (1.0 - middle) * blend**2 * (3.0 - 2.0 * blend)
     return np.where(blend > 0.0, inside, 1.0)
 
 
@@ -160,9 +221,27 @@ def ignored_pairs(
         for found in touching[index].values():
             pairs |= found
         per_phase.append(pairs)
+    landing: list[tuple[float, float, set[tuple[str, str]]]] = []
     for swing in sequence.swings():
+        if swing.end is not None and not hangs(body, swing.effector):
+            end = schedule.swing_interval(swing)[1]
+            landing.append((end - SITTING_DOWN, end, set(touch_pairs(body, scene, swing.end))))
+            continue
         for index in range(swing.first_phase, swing.last_phase + 1):
             for contact in (swing.start, swing.end):
                 if contact is not None:
                     per_phase[index] |= touch_pairs(body, scene, contact)
-    return tuple(frozenset(per_phase[index]) for index in schedule.phase_at(time))
+    known: dict[tuple[int, tuple[bool, ...]], Ignored] = {}
+    found = []
+    for instant, index in zip(time, schedule.phase_at(time), strict=True):
+        near = tuple(start <= instant < end for start, end, _ in landing)
+        key = int(index), near
+        if key not in known:
+            extra = (pairs for (_, _, pairs), close in zip(landing, near, strict=True) if close)
+            known[key] = frozenset(per_phase[index].union(*extra))
+        found.append(known[key])
+    return tuple(found)
+
+
+SITTING_DOWN = 0.15
+"""Time before a seat is touched in which the trunk may come close to it [s]."""
