@@ -154,7 +154,11 @@ class ContactForceBasis:
 
 
 def contact_force_basis(
-    contact: Contact, geometry: ContactGeometry, state: DynamicsState, *, sliding: bool = False,
+    contact: Contact,
+    geometry: ContactGeometry,
+    state: DynamicsState,
+    *,
+    sliding: bool = False,
     friction_share: float = 1.0,
 ) -> ContactForceBasis:
     """Build the force map of a contact at the current state.

@@ -128,8 +128,9 @@ class Recorder:
     def margins(self, mass: float) -> FloatArray:
         """(n,) wrench margin of the mean measured wrenches [N.m].
 
-        The stance is the one planned for the beginning of the step, at its planned placements,
-        but for what slides to its place on a seat, which is taken where it is: a foot that presses before its time or after it is no support.
+        The stance is the one planned for the beginning of the step, at its planned placements; what
+        slides to its place on a seat is taken where it is. A foot that presses before its time or
+        after it is no support.
 
         Args:
             mass: Mass of the body [kg]; closes the polytope of a stance without force limits.

@@ -8,8 +8,6 @@ posture, but a whole body need only follow it loosely.
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
 from manikin.centroidal import CentroidalProblem, CentroidalResult, CentroidalTrajectory, Weights, plan_com
@@ -32,6 +30,10 @@ WEIGHTS = Weights(
 
 CLEARANCE = 0.02
 """Distance that the final posture keeps to the scene and within the body [m]."""
+
+
+LONGEST_SHARE = 2.0
+"""Longest duration of the seated part, in sums of its shortest phases."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,25 +69,23 @@ def continue_seated(
         return SeatedContinuation(None, posture, None, f"no final sitting posture: {posture.failure}")
     end = trajectory.duration
     problem = CentroidalProblem(
-        trajectory.mass, phases, trajectory.position(end), Configuration(body, posture.q).com,
-        start_velocity=trajectory.velocity(end), start_acceleration=trajectory.acceleration(end), degree=trajectory.spline.degree, weights=WEIGHTS,
-        goal_acceleration=(0.0, 0.0, 0.0), max_duration=LONGEST_SHARE * float(problem_minimum(phases)),
-    )  # fmt: skip
+        trajectory.mass,
+        phases,
+        trajectory.position(end),
+        Configuration(body, posture.q).com,
+        start_velocity=trajectory.velocity(end),
+        start_acceleration=trajectory.acceleration(end),
+        goal_acceleration=(0.0, 0.0, 0.0),
+        degree=trajectory.spline.degree,
+        weights=WEIGHTS,
+        max_duration=LONGEST_SHARE * sum(phase.min_duration for phase in phases),
+    )
     result = plan_com(problem)
     if result.trajectory is None:
         reason = "not found" if result.failure is None else result.failure.reason
         return SeatedContinuation(None, posture, result, f"no centre of mass on the seat: {reason}")
     joined = replace(trajectory.followed_by(result.trajectory), binding_until=end)
     return SeatedContinuation(joined, posture, result, None)
-
-
-LONGEST_SHARE = 2.0
-"""Longest duration of the seated part, in sums of its shortest phases."""
-
-
-def problem_minimum(phases: StanceSequence) -> float:
-    """Sum of the shortest durations [s]."""
-    return float(np.sum([phase.min_duration for phase in phases]))
 
 
 def final_posture(
@@ -96,12 +96,16 @@ def final_posture(
     pairs: set[tuple[str, str]] = set()
     for contact in contacts:
         pairs |= touch_pairs(body, scene, contact)
-    return generate_posture(
-        PostureProblem(
-            body, contacts, proximity=Proximity(body, scene), clearance=CLEARANCE, self_clearance=0.5 * CLEARANCE,
-            ignore=frozenset(pairs), reference=_sitting(body, trajectory.position(trajectory.duration)),
-        )
-    )  # fmt: skip
+    problem = PostureProblem(
+        body,
+        contacts,
+        proximity=Proximity(body, scene),
+        clearance=CLEARANCE,
+        self_clearance=0.5 * CLEARANCE,
+        ignore=frozenset(pairs),
+        reference=_sitting(body, trajectory.position(trajectory.duration)),
+    )
+    return generate_posture(problem)
 
 
 def _sitting(body: BodyModel, com: FloatArray) -> FloatArray:
