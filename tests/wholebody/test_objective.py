@@ -37,6 +37,7 @@ def setup(person):
             for name in ("left_foot", "right_hand")
         },
         com=rng.normal(size=(n, 3)),
+        com_weight=np.where(rng.random(n) < 0.5, 1.0, 0.1),
         com_acceleration=rng.normal(size=(n, 3)),
         margin=np.full(n, 30.0),
         reference=np.tile(person.standing_posture(), (n, 1)),

@@ -283,11 +283,11 @@ class Scenario:
 
     @property
     def friction_share(self) -> float:
-        """Friction that planning keeps to over the real one."""
+        """Share of the real friction for the controller: half way from planning's to all of it."""
         supports = self.file.supports
         if supports is None or supports.planning_friction is None:
             return 1.0
-        return supports.planning_friction / supports.friction
+        return 0.5 * (1.0 + supports.planning_friction / supports.friction)
 
     @property
     def padded(self) -> tuple[str, ...]:
