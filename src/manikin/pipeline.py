@@ -277,7 +277,8 @@ class _Run:
     def _plan_whole_body(self, trajectory: CentroidalTrajectory) -> WholeBodyResult:
         result = plan_whole_body(
             self._body, self._scene, trajectory, rng=np.random.default_rng(self._scenario.seed),
-            settings=self._settings, progress=lambda share: self._progress("wholebody", share),
+            settings=self._settings, padded=self._scenario.padded,
+            progress=lambda share: self._progress("wholebody", share),
         )  # fmt: skip
         self._finish("wholebody", wholebody_summary(result))
         if result.failure is not None:

@@ -31,7 +31,7 @@ from manikin.wholebody.guide import Guide, guide_times, plan_guide
 from manikin.wholebody.manner import READY, Manner
 from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.swing import SwingLimits
-from manikin.wholebody.targets import FitTargets, effector_targets, ignored_pairs, toe_angles
+from manikin.wholebody.targets import FitTargets, Ignored, effector_targets, ignored_pairs, toe_angles
 
 DEGREE = 5
 """Degree of the whole-body spline: four continuous derivatives."""
@@ -138,6 +138,7 @@ def plan_whole_body(
     *,
     rng: np.random.Generator,
     settings: WholeBodySettings | None = None,
+    padded: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> WholeBodyResult:
     """Find a whole-body motion that keeps contacts, centre of mass and distances.
@@ -149,6 +150,8 @@ def plan_whole_body(
             that the forces act on.
         rng: Source of all randomness (the Bi-RRT).
         settings: Options.
+        padded: Obstacles that any part of the body may lean on: it is kept off them where that is
+            possible, but the certificate does not ask for it.
         progress: Called now and then with the share done.
 
     Returns:
@@ -158,6 +161,7 @@ def plan_whole_body(
     """
     began = clock.perf_counter()
     planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), progress)
+    planner.leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
     return planner.run(began)
 
 
@@ -181,6 +185,7 @@ class _Planner:
             body, scene, trajectory, settings.swing, rng,
             lambda time: reference_motion(body, trajectory, np.array([time]), settings.manner)[0],
         )  # fmt: skip
+        self.leaning: Ignored = frozenset()
         self._progress = progress
 
     def run(self, began: float) -> WholeBodyResult:
@@ -223,6 +228,8 @@ class _Planner:
         self._report(0.8)
         motion, wrench = self._sample(fit.spline)
         ignored = ignored_pairs(self.body, self.scene, self.trajectory.schedule, motion.time)
+        if self.leaning:
+            ignored = tuple(pairs | self.leaning for pairs in ignored)
         certificate = certify(self.body, self.proximity, self.trajectory, motion, ignored, wrench)
         failure = self._failure(swings, guide, certificate)
         wall = clock.perf_counter() - began

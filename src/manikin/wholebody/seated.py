@@ -28,8 +28,9 @@ WEIGHTS = Weights(
 )
 """Of the seated part: smooth, and not longer than it has to be."""
 
-CLEARANCE = 0.02
-"""Distance that the final posture keeps to the scene and within the body [m]."""
+CLEARANCES = (0.02, 0.0105)
+"""Distances that the final posture keeps to the scene [m], tried in order; within the body the
+last one."""
 
 
 LONGEST_SHARE = 2.0
@@ -100,12 +101,16 @@ def final_posture(
         body,
         contacts,
         proximity=Proximity(body, scene),
-        clearance=CLEARANCE,
-        self_clearance=0.5 * CLEARANCE,
+        clearance=CLEARANCES[0],
+        self_clearance=CLEARANCES[-1],
         ignore=frozenset(pairs),
         reference=_sitting(body, trajectory.position(trajectory.duration)),
     )
-    return generate_posture(problem)
+    result = generate_posture(problem)
+    for clearance in CLEARANCES[1:]:
+        if not result.succeeded:
+            result = generate_posture(replace(problem, clearance=clearance))
+    return result
 
 
 def _sitting(body: BodyModel, com: FloatArray) -> FloatArray:
