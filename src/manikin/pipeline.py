@@ -33,7 +33,15 @@ from manikin.scenarios import Scenario, load_scenario
 from manikin.scene import Scene
 from manikin.simulation import Execution, Push, execute
 from manikin.spatial import rotation_from_yaw
-from manikin.wholebody import WholeBodyResult, WholeBodySettings, continue_seated, plan_whole_body
+from manikin.wholebody import (
+    KeyPostures,
+    WholeBodyResult,
+    WholeBodySettings,
+    continue_seated,
+    find_eligible_plan,
+    find_key_postures,
+    plan_whole_body,
+)
 from manikin.wholebody.configuration_spline import rotation_from_quaternion
 from manikin.wholebody.manner import manner_of
 from manikin.wholebody.point_mass import point_mass_motion
@@ -205,9 +213,10 @@ class _Run:
         }  # fmt: skip
 
     def run(self) -> RunResult:
-        centroidal, trajectory = self._plan_com()
+        centroidal = self._plan_com()
         if self._scenario.is_point_mass:
             return self._result(centroidal, self._move_point_mass(centroidal), None, None)
+        centroidal, trajectory = self._test_key_postures(centroidal)
         wholebody = None if trajectory is None else self._plan_whole_body(trajectory)
         execution = None
         if trajectory is not None and wholebody is not None and wholebody.succeeded:
@@ -235,7 +244,7 @@ class _Run:
             directory=None if self._directory is None else self._directory.path,
         )
 
-    def _plan_com(self) -> tuple[CentroidalResult, CentroidalTrajectory | None]:
+    def _plan_com(self) -> CentroidalResult:
         self._progress("centroidal", 0.0)
         keyframes = self._keyframes
         result = plan_com(self._problem) if keyframes is None else plan_com_through_key_frames(keyframes)
@@ -245,12 +254,43 @@ class _Run:
             self._fail(
                 "centroidal", failure.reason, failure.time or 0.0, _place(failure.phase, failure.where)
             )
+        self._keep_trajectory(result)
+        self._progress("centroidal", 1.0)
+        return result
+
+    def _keep_trajectory(self, result: CentroidalResult) -> None:
         if self._directory is not None and result.trajectory is not None:
             self._directory.write_stage("com_trajectory", result.trajectory.to_dict())
-        self._progress("centroidal", 1.0)
-        if result.trajectory is None:
-            return result, None
-        return result, self._on_real_supports(result.trajectory)
+
+    def _test_key_postures(
+        self, planned: CentroidalResult
+    ) -> tuple[CentroidalResult, CentroidalTrajectory | None]:
+        """The plan, or another one where a key posture fails, with its trajectory if it can be done."""
+        if planned.trajectory is None:
+            return planned, None
+        found = find_eligible_plan(
+            planned, self._on_real_supports, self._key_postures, replan=self._keyframes is None
+        )
+        block = centroidal_summary(found.centroidal) | {
+            "replans": found.replans,
+            "key_postures": None if found.postures is None else found.postures.summary(),
+        }
+        self._finish("centroidal", block)
+        self._keep_trajectory(found.centroidal)
+        if self._directory is not None and found.postures is not None:
+            self._directory.write_stage("key_postures", found.postures.to_dict())
+        if found.failure is None:
+            return found.centroidal, found.trajectory
+        posture = found.failure.posture
+        place = _place(posture.phase, ", ".join(posture.contacts))
+        self._fail(found.failure.stage, found.failure.reason, posture.time, place)
+        return found.centroidal, None
+
+    def _key_postures(self, trajectory: CentroidalTrajectory) -> KeyPostures:
+        return find_key_postures(
+            self._body, self._scene, trajectory, manner=self._settings.manner,
+            requirements=self._settings.requirements,
+        )  # fmt: skip
 
     def _on_real_supports(self, planned: CentroidalTrajectory) -> CentroidalTrajectory | None:
         """The plan on the real soles, friction and caps, with the seated part where there is one."""
@@ -349,6 +389,8 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
         "limiting_contact": limiting_contact(result),
         "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
         "feasibility_radius": result.feasibility_radius,
+        "replans": 0,
+        "key_postures": None,
         "wall_s": result.wall_time,
     }
 

@@ -3,6 +3,7 @@
 from manikin.centroidal.certificate import Residual, Residuals
 from manikin.centroidal.constraints import BentSurface, GeometricConstraint, height_band
 from manikin.centroidal.feasibility import Failure, Feasibility, assess_feasibility, intersection_radii
+from manikin.centroidal.key_planes import KeyPlane
 from manikin.centroidal.keyframe_problem import KeyframeProblem
 from manikin.centroidal.keyframes import KeyframeResult, plan_com_through_key_frames
 from manikin.centroidal.overhead import CeilingHeight, Zone, height_below, keep_out
@@ -20,6 +21,7 @@ __all__ = [
     "Failure",
     "Feasibility",
     "GeometricConstraint",
+    "KeyPlane",
     "KeyframeProblem",
     "KeyframeResult",
     "MarginSpace",

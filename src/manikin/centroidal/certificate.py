@@ -155,6 +155,7 @@ def measure(
         shortfall,
         *_end_residuals(problem, trajectory),
         *_position_residuals(problem, trajectory, times),
+        *_key_plane_residuals(problem, trajectory),
         *_duration_residuals(problem, trajectory),
     )
     zmp = least_zmp_distance(
@@ -205,6 +206,13 @@ def _position_residuals(
 ) -> Iterator[Residual]:
     for requirement, excess in position_excess(problem, trajectory, times):
         yield _worst(requirement, excess, times)
+
+
+def _key_plane_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
+    for index, plane in enumerate(problem.key_planes):
+        time = float(trajectory.schedule.instants[plane.key])
+        beyond = float(plane.violation(trajectory.position(time)))
+        yield Residual(f"key plane {index} at T_{plane.key}", beyond, "m", plane.key - 1, time)
 
 
 def _worst(requirement: str, values: list[FloatArray], times: list[FloatArray]) -> Residual:

@@ -108,6 +108,7 @@ def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> Program
             margin_space=problem.margin_space,
             geometric=tuple(constraint.function for constraint in problem.geometric),
             limited_distance=problem.support_distance is not None,
+            key_planes=tuple(plane.key for plane in problem.key_planes),
         )
     )
 
@@ -168,6 +169,8 @@ def _parameters(
     for index, (phase, polytope, rows) in enumerate(zip(problem.sequence, polytopes, facets, strict=True)):
         values[f"H{index}"], values[f"h{index}"] = polytope.H[rows], polytope.h[rows]
         values[f"contacts{index}"] = [contact.position for contact in phase.stance]
+    for index, plane in enumerate(problem.key_planes):
+        values[f"normal{index}"], values[f"offset{index}"] = plane.normal, plane.offset
     return values
 
 
@@ -192,6 +195,7 @@ def _row_bounds(
         "balance": (0.0, np.inf),
         "distance": (-np.inf, limit**2),
         "continuity": (0.0, 0.0),
+        "key_plane": (-np.inf, 0.0),
         "total_duration": (0.0, longest),
         "required_margin": (targets.margin / MARGIN_SCALE[problem.margin_space], np.inf),
     }

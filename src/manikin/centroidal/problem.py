@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from manikin.balance import FrictionModel
 from manikin.centroidal.constraints import GeometricConstraint
+from manikin.centroidal.key_planes import KeyPlane
 from manikin.contact import StanceSequence
 from manikin.errors import InputError
 from manikin.spatial import FloatArray, finite_number, frozen_array
@@ -72,6 +73,8 @@ class CentroidalProblem:
         required_margin: d_min must not be smaller (5.21) [N.m] or [N].
         support_distance: Largest distance of the CoM from every active contact (5.26) [m].
         geometric: Further constraints on the CoM position.
+        key_planes: Planes behind which the CoM must be at single key instants, neither the first nor the
+            last, where the CoM is given.
         max_duration: Of the whole motion [s].
         weights: Of the objectives (5.28).
         samples: n_s, balance is imposed at j = 0 ... n_s in every phase.
@@ -91,6 +94,7 @@ class CentroidalProblem:
     required_margin: float
     support_distance: float | None
     geometric: tuple[GeometricConstraint, ...]
+    key_planes: tuple[KeyPlane, ...]
     max_duration: float | None
     weights: Weights
     samples: int
@@ -112,6 +116,7 @@ class CentroidalProblem:
         required_margin: float = 0.0,
         support_distance: float | None = None,
         geometric: Sequence[GeometricConstraint] = (),
+        key_planes: Sequence[KeyPlane] = (),
         max_duration: float | None = None,
         weights: Weights | None = None,
         samples: int = 10,
@@ -133,6 +138,7 @@ class CentroidalProblem:
             "required_margin": finite_number(required_margin, "centroidal required_margin", at_least=0.0),
             "support_distance": _optional_limit(support_distance, "support_distance [m]"),
             "geometric": tuple(geometric),
+            "key_planes": _inner_planes(key_planes, len(sequence)),
             "max_duration": _optional_limit(max_duration, "max_duration [s]"),
             "weights": Weights() if weights is None else weights,
             "samples": _integer(samples, "samples", 2),
@@ -159,6 +165,14 @@ class CentroidalProblem:
 
 def _optional_vector(value: ArrayLike | None, name: str) -> FloatArray | None:
     return None if value is None else frozen_array(value, f"centroidal {name}", (3,))
+
+
+def _inner_planes(planes: Sequence[KeyPlane], phases: int) -> tuple[KeyPlane, ...]:
+    for plane in planes:
+        if not 1 <= plane.key < phases:
+            valid = f"1 to {phases - 1}" if phases > 1 else "none with a single phase"
+            raise InputError(f"centroidal key_planes name key instant {plane.key}; valid: {valid}")
+    return tuple(planes)
 
 
 def _optional_limit(value: float | None, name: str) -> float | None:

@@ -39,6 +39,7 @@ class Structure:
         margin_space: ``"wrench"`` or ``"force"``.
         geometric: Functions of the geometric constraints.
         limited_distance: Whether the CoM-support distance is limited.
+        key_planes: Key instant of each plane.
     """
 
     degree: int
@@ -48,6 +49,7 @@ class Structure:
     margin_space: MarginSpace
     geometric: tuple[Callable[[Any, Any, Any], Any], ...]
     limited_distance: bool
+    key_planes: tuple[int, ...] = ()
 
     @property
     def phases(self) -> int:
@@ -136,6 +138,7 @@ def transcribe(structure: Structure) -> Programme:
         if phase + 1 < structure.phases:
             _add_continuity(builder, phase)
     _add_end_conditions(builder)
+    _add_key_planes(builder)
     builder.add("total_duration", ca.sum1(builder.durations))
     builder.add("required_margin", builder.margin + builder.shortfall)
     objective = _objective(builder)
@@ -247,6 +250,13 @@ def _add_end_conditions(builder: _Builder) -> None:
         acceleration = builder.parameter(f"{name}_acceleration", 1, 3)
         builder.add("end", _differences(points, 1)[row, :] - velocity * duration / k)
         builder.add("end", _differences(points, 2)[row, :] - acceleration * duration**2 / (k * (k - 1)))
+
+
+def _add_key_planes(builder: _Builder) -> None:
+    """How far the CoM is beyond each plane at its key instant, the end of the phase before."""
+    for index, key in enumerate(builder.structure.key_planes):
+        normal, offset = builder.parameter(f"normal{index}", 3), builder.parameter(f"offset{index}", 1)
+        builder.add("key_plane", builder.bezier[key - 1][-1, :] @ normal - offset)
 
 
 def _objective(builder: _Builder) -> ca.SX:

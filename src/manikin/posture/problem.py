@@ -94,6 +94,7 @@ class PostureProblem:
         contacts: Contacts held: a sole's whole pose, a point's or grasp's position.
         placements: Further effectors that must be somewhere, by name.
         com: (3,) centre of mass [m]; NaN leaves an axis free; None leaves it wholly free.
+        com_weight: None when it is required; otherwise it is only wished, with this weight [1/m^2].
         proximity: Measures distances of this body in a scene, exactly or between bounding
             spheres ([Qiu2012]_ 6.2.2, Appendix F); None without obstacles.
         clearance: Distance to keep to obstacles [m].
@@ -108,6 +109,7 @@ class PostureProblem:
     contacts: tuple[Contact, ...] = ()
     placements: Mapping[str, Placement] = field(default_factory=dict)
     com: FloatArray | None = None
+    com_weight: float | None = None
     proximity: Proximity | SphereProximity | None = None
     clearance: float = 0.02
     self_clearance: float = 0.005
@@ -148,7 +150,7 @@ class PostureProblem:
                 terms.append(PositionTerm(name, placement.position))
             if placement.rotation is not None and placement.rotation_weight is None:
                 terms.append(RotationTerm(name, placement.rotation))
-        if self.com is not None and np.any(np.isfinite(self.com)):
+        if self.com is not None and self.com_weight is None and np.any(np.isfinite(self.com)):
             terms.append(ComTerm(self.com))
         return tuple(terms)
 
@@ -170,6 +172,8 @@ class PostureProblem:
             if placement.rotation is not None and placement.rotation_weight is not None:
                 weight = np.full(3, placement.rotation_weight)
                 wishes.append((weight, RotationTerm(name, placement.rotation)))
+        if self.com is not None and self.com_weight is not None and np.any(np.isfinite(self.com)):
+            wishes.append((np.full(np.isfinite(self.com).sum(), self.com_weight), ComTerm(self.com)))
         if self.upright:
             names = {segment.name for segment in self.body.segments}
             sides = ("left_upper_arm", "right_upper_arm")

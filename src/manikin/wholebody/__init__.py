@@ -8,13 +8,18 @@ from manikin.wholebody.assemble import (
 )
 from manikin.wholebody.certificate import WholeBodyRequirements, WholeBodyResiduals
 from manikin.wholebody.configuration_spline import ConfigurationSpline
+from manikin.wholebody.eligibility import Eligibility, find_eligible_plan
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import PlannedSwing
+from manikin.wholebody.key_postures import KeyPosture, KeyPostures, find_key_postures
 from manikin.wholebody.seated import SeatedContinuation, continue_seated
 
 __all__ = [
     "ConfigurationSpline",
+    "Eligibility",
     "FitScales",
+    "KeyPosture",
+    "KeyPostures",
     "PlannedSwing",
     "SeatedContinuation",
     "WholeBodyFailure",
@@ -23,5 +28,7 @@ __all__ = [
     "WholeBodyResult",
     "WholeBodySettings",
     "continue_seated",
+    "find_eligible_plan",
+    "find_key_postures",
     "plan_whole_body",
 ]

@@ -1,0 +1,227 @@
+"""Whether a centre-of-mass plan can be done, asked at its key instants ([Qiu2012]_ 7.2.3).
+
+Before the whole body is planned, the posture generator looks for a collision-free posture at
+every key instant ``T_0 ... T_n``, on the contacts of both phases that meet there and with the
+planned centre of mass.  Where there is none, it looks for the nearest centre of mass with
+which there is one: that is where a new plan has to pass.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.body.configuration import Configuration
+from manikin.centroidal import CentroidalTrajectory
+from manikin.contact import Contact, ContactSchedule
+from manikin.posture import Placement, PostureProblem, PostureResult, SolverSettings, generate_posture
+from manikin.scene import Proximity, Scene
+from manikin.spatial import FloatArray
+from manikin.wholebody.certificate import WholeBodyRequirements
+from manikin.wholebody.manner import READY, Manner
+from manikin.wholebody.reference import reference_motion
+from manikin.wholebody.targets import Ignored, ignored_pairs
+
+SETTINGS = SolverSettings(tolerance=1e-3, clearance_tolerance=2e-3, settled=2e-2, explain=False)
+"""A posture counts when it is as exact as the finished motion has to be."""
+
+NEARNESS = 1e3
+"""Weight of the planned centre of mass where it is only wished [1/m^2]: far above all other wishes."""
+
+SETTLING = 10.0
+"""Weight of the place [1/m^2] and orientation [1/rad^2] of a contact that has yet to settle there."""
+
+JUST_BEFORE = 1e-6
+"""Time before a key instant at which the phase before it still lasts [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeyPosture:
+    """The posture at one key instant.
+
+    Attributes:
+        key: Index of the key instant.
+        time: [s].
+        phase: Index of the phase that ends there; of the first one at the start.
+        contacts: Effectors that must be in contact.
+        com: (3,) planned centre of mass [m].
+        q: (nq,) the posture, or the best attempt.
+        reason: What it misses and what helps, in one line; None when it is found.
+        nearest_com: (3,) nearest centre of mass found with which there is a posture [m]; None when the
+            posture is found, or there is none with any centre of mass.
+    """
+
+    key: int
+    time: float
+    phase: int
+    contacts: tuple[str, ...]
+    com: FloatArray
+    q: FloatArray
+    reason: str | None = None
+    nearest_com: FloatArray | None = None
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a posture."""
+        return self.reason is None
+
+    def __str__(self) -> str:
+        place = f"T_{self.key} = {self.time:.2f} s, end of phase {self.phase}"
+        if self.key == 0:
+            place = "T_0 = 0 s, start of phase 0"
+        return f"no posture at {place}, on {', '.join(self.contacts) or 'no contact'}: {self.reason}"
+
+
+@dataclass(frozen=True, eq=False)
+class KeyPostures:
+    """Postures at the key instants of a plan.
+
+    Attributes:
+        postures: In order of time.
+    """
+
+    postures: tuple[KeyPosture, ...]
+
+    @property
+    def failed(self) -> tuple[KeyPosture, ...]:
+        """Those that were not found."""
+        return tuple(posture for posture in self.postures if not posture.found)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the block ``key_postures`` of the summary."""
+        failed = [
+            {"key": item.key, "phase": item.phase, "time_s": item.time, "reason": item.reason}
+            for item in self.failed
+        ]
+        return {"count": len(self.postures), "failed": failed}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Time, centre of mass and configuration of every posture, with what the failed ones miss."""
+        return {
+            "time_s": [item.time for item in self.postures],
+            "com_m": [item.com.tolist() for item in self.postures],
+            "q": [item.q.tolist() for item in self.postures],
+            "reason": [item.reason for item in self.postures],
+        }
+
+
+def find_key_postures(
+    body: BodyModel,
+    scene: Scene,
+    trajectory: CentroidalTrajectory,
+    *,
+    manner: Manner = READY,
+    requirements: WholeBodyRequirements | None = None,
+) -> KeyPostures:
+    """Look for a posture at every key instant until which the trajectory binds.
+
+    Args:
+        body: The body.
+        scene: The obstacles and the floor.
+        trajectory: Planned centre of mass with its contacts in time.
+        manner: How the body carries itself where the task leaves freedom.
+        requirements: What the finished motion must keep; the clearance is asked of the postures.
+    """
+    instants = trajectory.schedule.instants
+    time = instants[trajectory.binds(instants)]
+    search = _Search(body, scene, trajectory, time, manner, requirements or WholeBodyRequirements())
+    return KeyPostures(search.run())
+
+
+class _Search:
+    """The search for one plan, each posture starting from the one before."""
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        trajectory: CentroidalTrajectory,
+        time: FloatArray,
+        manner: Manner,
+        requirements: WholeBodyRequirements,
+    ) -> None:
+        self._body, self._schedule, self._time = body, trajectory.schedule, time
+        self._proximity = Proximity(body, scene)
+        self._manner, self._clearance = manner, requirements.clearance
+        self._com = trajectory.position(time)
+        self._reference = reference_motion(body, trajectory, time, manner)
+        self._ignored = _ignored(body, scene, trajectory.schedule, time)
+
+    def run(self) -> tuple[KeyPosture, ...]:
+        q, found = self._reference[0], []
+        for key in range(len(self._time)):
+            problem = self._problem(key)
+            result = generate_posture(problem, q, settings=SETTINGS)
+            found.append(self._posture(key, problem, result))
+            q = result.q
+        return tuple(found)
+
+    def _problem(self, key: int) -> PostureProblem:
+        contacts, placements = requirements_at(self._schedule, key)
+        return PostureProblem(
+            self._body, contacts, placements, com=self._com[key], proximity=self._proximity,
+            clearance=self._clearance, self_clearance=self._clearance, ignore=self._ignored[key],
+            reference=self._reference[key], preferences=self._manner.preferences,
+        )  # fmt: skip
+
+    def _posture(self, key: int, problem: PostureProblem, result: PostureResult) -> KeyPosture:
+        contacts = (*(contact.effector for contact in problem.contacts), *problem.placements)
+        posture = KeyPosture(
+            key, float(self._time[key]), max(key - 1, 0), contacts, self._com[key], result.q
+        )
+        return posture if result.succeeded else self._explained(posture, problem, result)
+
+    def _explained(self, posture: KeyPosture, problem: PostureProblem, result: PostureResult) -> KeyPosture:
+        """Why there is no posture, and the nearest centre of mass with which there is one."""
+        wished = replace(problem, com_weight=NEARNESS)
+        near = generate_posture(wished, result.q, settings=SETTINGS)
+        if not near.succeeded:
+            result = generate_posture(problem, result.q, settings=replace(SETTINGS, explain=True))
+            return replace(posture, reason=result.failure or "posture not found")
+        com = np.array(Configuration(self._body, near.q).com)
+        away = float(np.linalg.norm(com - posture.com))
+        reason = (
+            f"{result.failure}; a posture exists without the centre-of-mass requirement, the nearest with "
+            f"it {away:.3f} m from {np.round(posture.com, 3).tolist()}, at {np.round(com, 3).tolist()} m"
+        )
+        return replace(posture, reason=reason, nearest_com=com)
+
+
+def requirements_at(
+    schedule: ContactSchedule, key: int
+) -> tuple[tuple[Contact, ...], dict[str, Placement]]:
+    """What the effectors must keep at a key instant: the contacts of both phases that meet there.
+
+    A contact that has yet to settle is only wished at its place.
+
+    Args:
+        schedule: Contacts in time.
+        key: Index of the key instant.
+
+    Returns:
+        The contacts, and placements of the other effectors.
+    """
+    time, held = float(schedule.instants[key]), {}
+    for index in (key - 1, key):
+        if 0 <= index < len(schedule.sequence):
+            held.update({contact.effector: contact for contact in schedule.sequence[index].stance})
+    contacts, placements = [], {}
+    for name, contact in held.items():
+        if schedule.settling(time, name)[0]:
+            placements[name] = Placement(
+                contact.position, contact.rotation_contact_to_world,
+                rotation_weight=SETTLING, position_weight=SETTLING,
+            )  # fmt: skip
+        else:
+            contacts.append(contact)
+    return tuple(contacts), placements
+
+
+def _ignored(
+    body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
+) -> tuple[Ignored, ...]:
+    """Pairs that may touch just before or at each key instant."""
+    before = ignored_pairs(body, scene, schedule, np.maximum(time - JUST_BEFORE, 0.0))
+    after = ignored_pairs(body, scene, schedule, time)
+    return tuple(one | other for one, other in zip(before, after, strict=True))
