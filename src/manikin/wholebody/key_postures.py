@@ -26,8 +26,9 @@ from manikin.wholebody.targets import Ignored, ignored_pairs
 SETTINGS = SolverSettings(tolerance=1e-3, clearance_tolerance=2e-3, settled=2e-2, explain=False)
 """A posture counts when it is as exact as the finished motion has to be."""
 
-NEARNESS = 1e3
-"""Weight of the planned centre of mass where it is only wished [1/m^2]: far above all other wishes."""
+NEARNESS = (200.0, 1000.0)
+"""Weights of the planned centre of mass where it is only wished, one search after the other [1/m^2]: far
+above the other wishes, and below the requirements."""
 
 SETTLING = 10.0
 """Weight of the place [1/m^2] and orientation [1/rad^2] of a contact that has yet to settle there."""
@@ -154,7 +155,7 @@ class _Search:
             problem = self._problem(key)
             result = generate_posture(problem, q, settings=SETTINGS)
             found.append(self._posture(key, problem, result))
-            q = result.q
+            q = found[-1].q
         return tuple(found)
 
     def _problem(self, key: int) -> PostureProblem:
@@ -173,12 +174,17 @@ class _Search:
         return posture if result.succeeded else self._explained(posture, problem, result)
 
     def _explained(self, posture: KeyPosture, problem: PostureProblem, result: PostureResult) -> KeyPosture:
-        """Why there is no posture, and the nearest centre of mass with which there is one."""
-        wished = replace(problem, com_weight=NEARNESS)
-        near = generate_posture(wished, result.q, settings=SETTINGS)
-        if not near.succeeded:
+        """Why there is no posture, and the nearest centre of mass with which there is one.
+
+        The nearest posture is also where a search that only ended in a poor minimum finds its way.
+        """
+        near = self._nearest(problem, result.q)
+        if near is None:
             result = generate_posture(problem, result.q, settings=replace(SETTINGS, explain=True))
             return replace(posture, reason=result.failure or "posture not found")
+        again = generate_posture(problem, near.q, settings=SETTINGS)
+        if again.succeeded:
+            return replace(posture, q=again.q)
         com = np.array(Configuration(self._body, near.q).com)
         away = float(np.linalg.norm(com - posture.com))
         reason = (
@@ -186,6 +192,18 @@ class _Search:
             f"it {away:.3f} m from {np.round(posture.com, 3).tolist()}, at {np.round(com, 3).tolist()} m"
         )
         return replace(posture, reason=reason, nearest_com=com)
+
+    def _nearest(self, problem: PostureProblem, start: FloatArray) -> PostureResult | None:
+        """The posture with the nearest centre of mass; None when there is none with any."""
+        free = generate_posture(replace(problem, com=None), start, settings=SETTINGS)
+        if not free.succeeded:
+            return None
+        nearest = free
+        for weight in NEARNESS:
+            wished = replace(problem, com_weight=weight)
+            found = generate_posture(wished, nearest.q, settings=replace(SETTINGS, restarts=False))
+            nearest = found if found.succeeded else nearest
+        return nearest
 
 
 def requirements_at(
