@@ -85,10 +85,9 @@ def find_eligible_plan(
             return Eligibility(plan, trajectory, postures, replans, failure)
         again, replans = plan_com(tightened), replans + 1
         if again.failure is not None:
-            reason = f"{worst}; no plan of the centre of mass passes there: {again.failure.reason}; {_tried(replans)}"
-            return Eligibility(
-                plan, trajectory, postures, replans, IneligiblePlan("centroidal", reason, worst)
-            )
+            cause = f"no plan of the centre of mass passes there: {again.failure.reason}"
+            failure = IneligiblePlan("centroidal", f"{worst}; {cause}; {_tried(replans)}", worst)
+            return Eligibility(plan, trajectory, postures, replans, failure)
         plan = again
 
 

@@ -6,6 +6,7 @@ planned centre of mass.  Where there is none, it looks for the nearest centre of
 which there is one: that is where a new plan has to pass.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,12 +14,14 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
+from manikin.body.limb import hanging_segment
 from manikin.centroidal import CentroidalTrajectory
-from manikin.contact import Contact, ContactSchedule
+from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.posture import Placement, PostureProblem, PostureResult, SolverSettings, generate_posture
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.certificate import WholeBodyRequirements
+from manikin.wholebody.foot_roll import FootRoll, foot_roll
 from manikin.wholebody.manner import READY, Manner
 from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.targets import Ignored, ignored_pairs
@@ -146,7 +149,10 @@ class _Search:
         self._proximity = Proximity(body, scene)
         self._manner, self._clearance = manner, requirements.clearance
         self._com = trajectory.position(time)
+        self._rolls = rolls_of(body, trajectory.schedule)
         self._reference = reference_motion(body, trajectory, time, manner)
+        _extend_toes(body, self._rolls, time, self._reference)
+        self._explained_one = False  # An examination takes seconds; the first is the one that is reported.
         self._ignored = _ignored(body, scene, trajectory.schedule, time)
 
     def run(self) -> tuple[KeyPosture, ...]:
@@ -159,7 +165,7 @@ class _Search:
         return tuple(found)
 
     def _problem(self, key: int) -> PostureProblem:
-        contacts, placements = requirements_at(self._schedule, key)
+        contacts, placements = requirements_at(self._schedule, key, self._rolls)
         return PostureProblem(
             self._body, contacts, placements, com=self._com[key], proximity=self._proximity,
             clearance=self._clearance, self_clearance=self._clearance, ignore=self._ignored[key],
@@ -168,9 +174,7 @@ class _Search:
 
     def _posture(self, key: int, problem: PostureProblem, result: PostureResult) -> KeyPosture:
         contacts = (*(contact.effector for contact in problem.contacts), *problem.placements)
-        posture = KeyPosture(
-            key, float(self._time[key]), max(key - 1, 0), contacts, self._com[key], result.q
-        )
+        posture = KeyPosture(key, float(self._time[key]), max(key - 1, 0), contacts, self._com[key], result.q)
         return posture if result.succeeded else self._explained(posture, problem, result)
 
     def _explained(self, posture: KeyPosture, problem: PostureProblem, result: PostureResult) -> KeyPosture:
@@ -180,7 +184,9 @@ class _Search:
         """
         near = self._nearest(problem, result.q)
         if near is None:
-            result = generate_posture(problem, result.q, settings=replace(SETTINGS, explain=True))
+            explain = replace(SETTINGS, explain=not self._explained_one)
+            self._explained_one = True
+            result = generate_posture(problem, result.q, settings=explain)
             return replace(posture, reason=result.failure or "posture not found")
         again = generate_posture(problem, near.q, settings=SETTINGS)
         if again.succeeded:
@@ -206,27 +212,38 @@ class _Search:
         return nearest
 
 
+Rolls = tuple[tuple[str, FootRoll], ...]
+"""Effector and roll of every flight of a foot that does not leave and land flat."""
+
+
+def rolls_of(body: BodyModel, schedule: ContactSchedule) -> Rolls:
+    """How the feet roll about their flights."""
+    found = ((swing.effector, foot_roll(body, schedule, swing)) for swing in schedule.sequence.swings())
+    return tuple((name, roll) for name, roll in found if roll is not None)
+
+
 def requirements_at(
-    schedule: ContactSchedule, key: int
+    schedule: ContactSchedule, key: int, rolls: Rolls = ()
 ) -> tuple[tuple[Contact, ...], dict[str, Placement]]:
     """What the effectors must keep at a key instant: the contacts of both phases that meet there.
 
-    A contact that has yet to settle is only wished at its place.
+    A sole that lies flat in one of them lies flat; one that only touches with an edge has the
+    pitch of its roll.  A contact that has yet to settle is only wished at its place.
 
     Args:
         schedule: Contacts in time.
         key: Index of the key instant.
+        rolls: Of :func:`rolls_of`.
 
     Returns:
         The contacts, and placements of the other effectors.
     """
-    time, held = float(schedule.instants[key]), {}
-    for index in (key - 1, key):
-        if 0 <= index < len(schedule.sequence):
-            held.update({contact.effector: contact for contact in schedule.sequence[index].stance})
+    time = float(schedule.instants[key])
     contacts, placements = [], {}
-    for name, contact in held.items():
-        if schedule.settling(time, name)[0]:
+    for name, contact in _held_at(schedule, key).items():
+        if contact.part is not SolePart.FULL:
+            placements[name] = _tilted(contact, time, [roll for other, roll in rolls if other == name])
+        elif schedule.settling(time, name)[0]:
             placements[name] = Placement(
                 contact.position, contact.rotation_contact_to_world,
                 rotation_weight=SETTLING, position_weight=SETTLING,
@@ -234,6 +251,38 @@ def requirements_at(
         else:
             contacts.append(contact)
     return tuple(contacts), placements
+
+
+def _held_at(schedule: ContactSchedule, key: int) -> dict[str, Contact]:
+    """Contacts of both phases at a key instant; of an edge and a full sole, the full one."""
+    held: dict[str, Contact] = {}
+    for index in (key - 1, key):
+        if 0 <= index < len(schedule.sequence):
+            for contact in schedule.sequence[index].stance:
+                if contact.effector not in held or contact.part is SolePart.FULL:
+                    held[contact.effector] = contact
+    return held
+
+
+def _tilted(contact: Contact, time: float, rolls: Sequence[FootRoll]) -> Placement:
+    """Where a sole is that stands on an edge."""
+    for roll in rolls:
+        up, off, land, flat = roll.instants
+        for pivot, start, end in zip(roll.pivots, (up, land), (off, flat), strict=True):
+            if start <= time <= end:
+                position, rotation = roll.pose(pivot.position[None], pivot.rotation[None], np.array([time]))
+                return Placement(position[0], rotation[0])
+    return Placement(contact.position, contact.rotation_contact_to_world)
+
+
+def _extend_toes(body: BodyModel, rolls: Rolls, time: FloatArray, configurations: FloatArray) -> None:
+    """Bend the toes of rolling feet so that they lie flat."""
+    for name, roll in rolls:
+        toes = hanging_segment(body, body.effector(name).segment)
+        if toes is not None:
+            joint = 7 + body.joint_index(toes.hinges[0].name)
+            rows = (time >= roll.instants[0]) & (time < roll.instants[2])
+            configurations[rows, joint] = roll.toe_extension(time[rows])
 
 
 def _ignored(

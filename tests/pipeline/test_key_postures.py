@@ -1,0 +1,109 @@
+"""Key postures decide about a plan of the centre of mass, and a failed one leads to another plan."""
+
+import json
+
+import numpy as np
+import pytest
+
+from manikin.pipeline import run
+
+STRIDE = """
+name: stride
+description: One long step
+body: {{model: human, stature_m: 1.75, mass_kg: 79, sex: male}}
+scene:
+  - {{name: lamp, box: [{lamp_m}, {lamp_m}, 0.1], position: [{length}, 0.0, {lamp_height}]}}
+supports:
+  friction: 0.7
+  sole: {{length_m: 0.28, width_m: 0.12}}
+  normal_force_cap_N: 1500
+  phases:
+    - left_foot: {{position: [0.0, 0.1, 0.0], yaw_deg: 0}}
+      right_foot: {{position: [0.0, -0.1, 0.0], yaw_deg: 0}}
+    - right_foot: same
+      min_duration_s: 0.5
+    - left_foot: {{position: [{length}, 0.1, 0.0], yaw_deg: 0}}
+      right_foot: same
+      min_duration_s: 0.2
+    - left_foot: same
+      min_duration_s: 0.5
+    - left_foot: same
+      right_foot: {{position: [{length}, -0.1, 0.0], yaw_deg: 0}}
+task:
+  start: {{com: [0.0, 0.0, 0.97]}}
+  goal: {{com: [{length}, 0.0, {goal_height}]}}
+com_constraints: {constraints}
+planning:
+  degree: 5
+  min_margin: 15
+  zero_end_accelerations: true
+  weights: {{margin: 0.3, smoothness: 10, duration: 2, acceleration: [1, 1, 1]}}
+"""
+"""Nothing but the legs limits the height of the CoM: a point mass steps as far as it likes, level."""
+
+
+def stride(tmp_path, **changes):
+    given = {
+        "length": 0.65, "lamp_m": 0.1, "lamp_height": 3.0, "goal_height": 0.97, "constraints": "[]",
+    }  # fmt: skip
+    file = tmp_path / "stride.yaml"
+    file.write_text(STRIDE.format(**(given | changes)))
+    return file
+
+
+@pytest.mark.slow
+def test_a_plan_too_high_for_the_legs_is_planned_again_lower_and_executed(tmp_path):
+    """Feet 0.65 m apart: legs of 0.9 m cannot carry the CoM at 0.95 m, as the first plan wants it."""
+    result = run(stride(tmp_path), out=tmp_path / "run")
+    summary = result.summary
+    assert summary["succeeded"], summary["failure"]
+    assert 1 <= summary["centroidal"]["replans"] <= 3
+    assert summary["centroidal"]["key_postures"] == {"count": 6, "failed": []}
+    assert summary["centroidal"]["min_margin"] >= 15.0
+    planes = result.centroidal.problem.key_planes
+    assert planes
+    for plane in planes:
+        # The plane binds the motion that was planned in the end, and the executed one within its error.
+        time = result.centroidal.key_instants[plane.key]
+        assert plane.violation(result.centroidal.trajectory.position(time)) <= 1e-6
+        executed = result.executed.com[np.searchsorted(result.executed.time, time)]
+        assert plane.violation(executed) <= summary["execution"]["com_max_error_m"] + 1e-3
+    kept = json.loads((tmp_path / "run/stages/key_postures.json").read_text())
+    np.testing.assert_allclose(kept["time_s"], result.centroidal.key_instants)
+    assert kept["reason"] == [None] * 6
+
+
+def test_a_goal_beyond_the_legs_is_named_without_planning_again(tmp_path):
+    """The CoM at the goal is given: no plan can lower it. A standing body's is below 1 m."""
+    result = run(stride(tmp_path, length=0.4, goal_height=1.15))
+    failure, block = result.summary["failure"], result.summary["centroidal"]
+    assert result.wholebody is None
+    assert failure["stage"] == "wholebody"
+    assert "T_5" in failure["reason"]
+    assert "centre of mass misses" in failure["reason"]
+    assert "a posture exists without the centre-of-mass requirement" in failure["reason"]
+    assert failure["where"].startswith("phase 4 on")
+    assert failure["time_s"] == pytest.approx(block["duration_s"])
+    assert block["replans"] == 0
+    assert block["key_postures"]["failed"][-1]["key"] == 5
+
+
+def test_a_place_where_nobody_fits_is_named_without_planning_again(tmp_path):
+    """A slab 0.45 m above the floor over the goal: no posture with any CoM, but one through the slab."""
+    result = run(stride(tmp_path, length=0.4, lamp_m=1.0, lamp_height=0.5))
+    failure = result.summary["failure"]
+    assert failure["stage"] == "wholebody"
+    assert "'lamp'" in failure["reason"] or "clearances" in failure["reason"]
+    assert result.summary["centroidal"]["replans"] == 0
+
+
+def test_constraints_that_forbid_the_postures_are_named(tmp_path):
+    """A stride of 1 m with the CoM above 0.94 m: legs of 0.9 m would need it far before the standing foot."""
+    band = '[{height_band: {lower: "0.94", upper: "1.0"}}]'
+    result = run(stride(tmp_path, length=1.0, constraints=band))
+    failure = result.summary["failure"]
+    assert failure["stage"] == "centroidal"
+    assert "no posture at T_" in failure["reason"]
+    assert "no plan of the centre of mass passes there" in failure["reason"]
+    assert "1 further plan of the centre of mass tried" in failure["reason"]
+    assert result.summary["centroidal"]["replans"] == 1
