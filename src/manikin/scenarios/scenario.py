@@ -332,6 +332,7 @@ class Scenario:
                 required_margin=self.required_margin,
                 support_distance=self.max_support_distance,
                 geometric=self._height_constraints(),
+                key_planes=(),
                 max_duration=options.max_duration_s,
                 weights=Weights(**options.weights.model_dump(exclude_none=True)),
                 friction_model=options.friction_model,
