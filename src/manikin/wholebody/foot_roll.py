@@ -9,6 +9,7 @@ timing are our own choice.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BPoly
@@ -72,10 +73,8 @@ class FootRoll:
 
     def toe_extension(self, time: FloatArray) -> FloatArray:
         """(n,) angle of the toes that keeps them flat before lift-off, back to 0 in flight [rad]."""
-        _, off, land, _ = self.instants
-        back = off + TOE_RETURN * (land - off)
-        curve = BPoly.from_derivatives([off, back], [self._at_lift_off, [0.0, 0.0, 0.0]])
-        return np.where(time < off, self.pitch(time), _held(curve, np.array([off, back]), time))
+        curve = self._toe_return
+        return np.where(time < curve.x[0], self.pitch(time), _held(curve, curve.x, time))
 
     def pose(
         self, position: FloatArray, rotation: FloatArray, time: FloatArray
@@ -109,7 +108,13 @@ class FootRoll:
         angle = PUSH_OFF_PITCH if off > up else 0.0
         return [angle, PUSH_OFF_RATE * angle / max(off - up, 1e-9), 0.0]
 
-    @property
+    @cached_property
+    def _toe_return(self) -> BPoly:
+        _, off, land, _ = self.instants
+        back = off + TOE_RETURN * (land - off)
+        return BPoly.from_derivatives([off, back], [self._at_lift_off, [0.0, 0.0, 0.0]])
+
+    @cached_property
     def _pitch(self) -> BPoly:
         up, off, land, flat = self.instants
         angle = HEEL_STRIKE_PITCH if flat > land else 0.0
