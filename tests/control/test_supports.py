@@ -42,17 +42,28 @@ def test_load_ramps_up_and_down(stepping):
 
 def test_late_touch_down_presses_on_and_then_loads_from_the_touch(stepping):
     """A foot in the air at its landing time goes on down and carries nothing until it touches."""
-    settings = SupportSettings(press_speed=0.1, press_depth=0.03, hover=0.002)
+    settings = SupportSettings(press_speed=0.1, press_time=0.04, press_depth=0.03, hover=0.002)
     switch = SupportSwitch(stepping, settings)
     right(switch, LAND - 0.005, False)
     late = right(switch, LAND + 0.1, False)
     assert late.mode is SupportMode.LANDING
-    # 0.1 s at 0.1 m/s, down from the hovering height.
-    assert late.press == pytest.approx(0.01 - 0.002)
+    # 0.1 s at 0.1 m/s, half of it in the first 0.04 s, down from the hovering height.
+    assert late.press == pytest.approx(0.1 * (0.1 - 0.5 * 0.04) - 0.002)
+    assert late.press_rate == pytest.approx(0.1)
     assert right(switch, LAND + 0.9, False).press == settings.press_depth
     touched = right(switch, LAND + 0.905, True)
     assert touched.mode is SupportMode.STANCE
     assert touched.load_share == pytest.approx(0.05)
+
+
+def test_a_foot_goes_down_to_its_support_without_a_jump():
+    """Its way is the integral of its speed, which starts from zero and rises to the final one."""
+    settings = SupportSettings(press_speed=0.05, press_time=0.03)
+    times = np.linspace(0.0, 0.1, 2001)
+    way, speed = np.array([settings.descent(None, float(time)) for time in times]).T
+    np.testing.assert_allclose(np.gradient(way, times)[1:-1], speed[1:-1], atol=0.05 / 2000 * 2)
+    assert speed[0] == way[0] == 0.0
+    assert speed[-1] == pytest.approx(0.05)
 
 
 def test_a_flight_ends_hovering_above_its_support(stepping, contacts):

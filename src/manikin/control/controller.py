@@ -213,8 +213,7 @@ class Controller:
         if support.mode is SupportMode.STANCE:
             return stance_task(name, frame, support, gains.stance, weight)
         if support.mode is SupportMode.LANDING:
-            speed = self.settings.supports.press_speed_of(support.contact)
-            target = landing_reference(support, speed, planned if part else None)
+            target = landing_reference(support, planned)
             return swing_task(name, frame, target, gains.swing, weight)
         target = lifted(planned, support)
         return swing_task(name, frame, target, gains.swing, weight, support.follow)

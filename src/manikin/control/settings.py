@@ -82,8 +82,9 @@ class SupportSettings:
         release_time: A support that has not touched for this long is landed anew [s].
         hover: Before its landing a foot is held this far above its support, so that it does
             not touch, and load the leg, ahead of time [m].
-        press_speed: From its landing time on it goes down at this speed [m/s], until it is
+        press_speed: From its landing time on it goes down at up to this speed [m/s], until it is
             ``press_depth`` below the planned support.
+        press_time: That speed rises from zero over this time [s].
         rolling_press_speed: The same of a foot that lands on its heel, which this speed sets turning [m/s].
         press_depth: How far below the planned support it is sent at most [m].
         default_cap: Normal force limit of a contact that states none [body weights].
@@ -99,8 +100,9 @@ class SupportSettings:
     early_window: float = 0.1
     release_time: float = 0.03
     hover: float = 0.0015
-    press_speed: float = 0.1
+    press_speed: float = 0.05
     rolling_press_speed: float = 0.04
+    press_time: float = 0.03
     press_depth: float = 0.03
     default_cap: float = 3.0
     sole_inset: float = 0.01
@@ -113,6 +115,7 @@ class SupportSettings:
             "load_time",
             "rolling_load_time",
             "press_speed",
+            "press_time",
             "rolling_press_speed",
             "default_cap",
             "friction_share",
@@ -121,10 +124,16 @@ class SupportSettings:
         for name in ("early_window", "release_time", "hover", "press_depth", "sole_inset"):
             finite_number(getattr(self, name), f"support setting {name!r}", at_least=0.0)
 
-    def press_speed_of(self, contact: Contact | None) -> float:
-        """Speed at which a landing foot goes down to its contact [m/s]."""
+    def descent(self, contact: Contact | None, late: float) -> tuple[float, float]:
+        """Way [m] and speed [m/s] of a landing foot, ``late`` after it began to go down [s].
+
+        The speed rises evenly to its final value: a sudden one would be felt by the other foot.
+        """
         rolls = contact is not None and contact.part is not SolePart.FULL
-        return self.rolling_press_speed if rolls else self.press_speed
+        speed = self.rolling_press_speed if rolls else self.press_speed
+        rising = min(late, self.press_time)
+        share = rising / self.press_time
+        return speed * (late - rising + 0.5 * share * rising), speed * share
 
 
 @dataclass(frozen=True)

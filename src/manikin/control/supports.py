@@ -52,6 +52,7 @@ class SupportState:
         unload_share: Share of the load it carried when its unloading began that it may
             still carry, falling to 0 at lift-off; 1 before that.
         press: How far below the planned contact a landing effector is sent [m]; negative above.
+        press_rate: How fast it is sent down [m/s].
         settling: Whether it may still slide to its place.
         lift: (3,) offset of a flying effector from its planned path [m].
         lift_rate: (3,) rate of that offset [m/s].
@@ -67,6 +68,7 @@ class SupportState:
     load_share: float = 0.0
     unload_share: float = 1.0
     press: float = 0.0
+    press_rate: float = 0.0
     settling: bool = False
     lift: FloatArray = field(default_factory=lambda: _NO_LIFT)
     lift_rate: FloatArray = field(default_factory=lambda: _NO_LIFT)
@@ -229,8 +231,11 @@ class SupportSwitch:
         late = time - max(interval.start, memory.touched)
         height = self._settings.hover if memory.touched < interval.start else 0.0
         contact = interval.contact_at(time)
-        press = min(self._settings.press_depth, self._settings.press_speed_of(contact) * late - height)
-        return SupportState(name, SupportMode.LANDING, contact, press=press, settling=settling)
+        way, rate = self._settings.descent(contact, late)
+        press = min(self._settings.press_depth, way - height)
+        return SupportState(
+            name, SupportMode.LANDING, contact, press=press, press_rate=rate, settling=settling
+        )
 
     def _hovering(self, name: str, interval: SupportInterval, time: float) -> SupportState:
         """Lift the end of a flight smoothly, in the first part of the time in which it might touch."""

@@ -107,30 +107,19 @@ def lifted(reference: EffectorReference, support: SupportState) -> EffectorRefer
     return replace(reference, position=reference.position + support.lift, twist=twist)
 
 
-def landing_reference(
-    support: SupportState, press_speed: float, planned: EffectorReference | None = None
-) -> EffectorReference:
-    """Reference of an effector that is due to touch and does not: go on along the normal.
+def landing_reference(support: SupportState, planned: EffectorReference) -> EffectorReference:
+    """Reference of an effector that is due to touch and does not: as planned, but on along the normal.
 
     Args:
         support: A landing effector.
-        press_speed: Along the normal [m/s].
-        planned: Where a foot that lands on a part of its sole should be; the contact when omitted.
+        planned: Where it should be; its small remaining motion is kept, so that nothing is sudden.
     """
     contact = support.contact
     if contact is None or support.mode is not SupportMode.LANDING:
         raise ValueError(f"{support.effector} is in {support.mode}; valid: a landing effector")
-    twist = np.zeros(6) if planned is None else planned.twist.copy()
-    twist[:3] -= press_speed * contact.normal
-    if planned is not None:
-        position = planned.position - support.press * contact.normal
-        return replace(planned, position=position, twist=twist)
-    return EffectorReference(
-        contact.rotation_contact_to_world,
-        contact.position - support.press * contact.normal,
-        twist,
-        np.zeros(6),
-    )
+    twist = planned.twist.copy()
+    twist[:3] -= support.press_rate * contact.normal
+    return replace(planned, position=planned.position - support.press * contact.normal, twist=twist)
 
 
 def rolling_task(
