@@ -28,7 +28,7 @@ from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
 from manikin.wholebody.forces import plan_forces
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
-from manikin.wholebody.manner import READY, Manner
+from manikin.wholebody.manner import CLOSE, READY, Manner
 from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.swing import SwingLimits
 from manikin.wholebody.targets import FitTargets, Ignored, effector_targets, ignored_pairs, toe_angles
@@ -156,7 +156,8 @@ def plan_whole_body(
 
     Returns:
         The motion with its certificate. When the motion comes too close to something, clearance
-        is given more weight; when it still breaks a requirement, the flight in which it does is
+        is given more weight; when it still breaks a requirement, the arms are kept close to the body;
+        when that does not help either, the flight in which it does is
         searched again with the Bi-RRT before the result is called a failure.
     """
     began = clock.perf_counter()
@@ -194,10 +195,20 @@ class _Planner:
         result = self._attempt(swings, began)
         if not result.succeeded and result.certificate.min_clearance_m < self.settings.requirements.clearance:
             result = _better(result, self._attempt(swings, began, self._more_clearance()))
+        if not result.succeeded and self.settings.manner is READY:
+            result = _better(result, self._attempt_close(swings, began))
         searched = self._search_again(swings, result)
         if searched is not None:
             result = _better(result, self._attempt(searched, began))
         self._report(1.0)
+        return result
+
+    def _attempt_close(self, swings: tuple[PlannedSwing, ...], began: float) -> WholeBodyResult:
+        """Try again with the arms close to the body: raised ones may have to pass through a thigh."""
+        usual = self.settings
+        self.settings = replace(usual, manner=CLOSE)
+        result = self._attempt(swings, began)
+        self.settings = usual
         return result
 
     def _search_again(
