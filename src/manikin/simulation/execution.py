@@ -21,9 +21,11 @@ class Execution:
         fell: Whether the body fell.
         failure: Why the run is no success, in one line; empty for a success.
         failure_time_s: When it failed [s], or None.
-        com_rms_error_m: Of the distance from the planned CoM, over motion and hold [m].
+        com_rms_error_m: Of the distance from the planned CoM, over motion and hold, but only until
+            the body sits down where it does [m].
         com_max_error_m: Largest such distance [m].
-        max_foot_error_m: Largest distance of an effector of the schedule from its plan [m].
+        max_foot_error_m: Largest distance of an effector of the schedule from its plan, but not of one
+            that slides to its place on a seat [m].
         final_com_error_m: Distance of the CoM from its plan at the end of the hold [m].
         min_margin: Least wrench margin [N.m].
         max_penetration_m: Deepest penetration of any contact, at every engine step [m].
