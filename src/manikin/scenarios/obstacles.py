@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from manikin.scenarios.schema import ObstacleSection
+from manikin.scenarios.sections import ObstacleSection
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Sphere, load_mesh
 from manikin.spatial import rotation_from_rpy
 

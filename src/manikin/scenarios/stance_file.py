@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 
 from manikin.contact import Stance
 from manikin.errors import InputError, ScenarioError
-from manikin.scenarios.scenario import BODY_WEIGHTS_CAP, build_contact
-from manikin.scenarios.schema import ContactSection, SoleSection
+from manikin.scenarios.contacts import BODY_WEIGHTS_CAP, build_contact
+from manikin.scenarios.sections import ContactSection, SoleSection
 from manikin.scenarios.validation import Positive, Section, Text, Vector3, place, refuse, validate
 from manikin.scenarios.yaml_reader import read_yaml
 from manikin.spatial import GRAVITY

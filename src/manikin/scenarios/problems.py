@@ -1,0 +1,83 @@
+"""The problems of the centre-of-mass planners that a scenario states."""
+
+from manikin.centroidal import CentroidalProblem, GeometricConstraint, KeyframeProblem, Weights, height_band
+from manikin.contact import StanceSequence
+from manikin.errors import InputError, ScenarioError
+from manikin.scenarios.overhead import overhead_constraints
+from manikin.scenarios.recordings import load_recording
+from manikin.scenarios.sequence import stance_sequence
+from manikin.scenarios.values import ScenarioValues
+from manikin.scenarios.world import build_body, build_scene
+
+
+def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
+    """Build the problem of the timing-free planner, with every height scaled to the body.
+
+    The phases at the end in which the body sits are left out: there the centre of mass is
+    not what keeps the balance ([Qiu2012]_ 7.2.2).
+
+    Raises:
+        ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
+    """
+    options, seat = values.planning, values.seated_from
+    sequence = stance_sequence(values, planning=True)
+    rest = (0.0, 0.0, 0.0) if options.zero_end_accelerations else None
+    given = {"degree": options.degree, "samples": options.samples}
+    try:
+        return CentroidalProblem(
+            values.mass,
+            sequence if seat is None else StanceSequence(sequence.phases[:seat]),
+            values.start_com,
+            values.goal_com,
+            goal_velocity=values.file.task.goal.velocity_m_s if seat is not None else (0.0, 0.0, 0.0),
+            start_acceleration=rest,
+            goal_acceleration=rest if seat is None else None,
+            margin_space=options.margin_space,
+            required_margin=values.required_margin,
+            support_distance=values.max_support_distance,
+            geometric=_height_constraints(values),
+            key_planes=(),
+            max_duration=options.max_duration_s,
+            weights=Weights(**options.weights.model_dump(exclude_none=True)),
+            friction_model=options.friction_model,
+            **{key: value for key, value in given.items() if value is not None},
+        )
+    except ScenarioError:
+        raise
+    except InputError as error:
+        raise values.refused(("planning",), error) from None
+
+
+def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
+    """Build the problem of the keyframe-based planner; None when the file asks for another one.
+
+    Raises:
+        ScenarioError: If the recording cannot be read or was made on other supports.
+    """
+    options = values.planning
+    if options.method != "keyframes" or options.recording is None:
+        return None
+    path, sequence = values.find_file(options.recording), stance_sequence(values, planning=True)
+    try:
+        recording = load_recording(path, sequence, values.file.body.stature_m, values.support_level())
+        return KeyframeProblem.of(centroidal_problem(values), recording, options.control_points)
+    except ScenarioError:
+        raise
+    except InputError as error:
+        raise values.refused(("planning", "recording"), error) from None
+
+
+def _height_constraints(values: ScenarioValues) -> tuple[GeometricConstraint, ...]:
+    band, entry = values.height_band, values.constraint("overhead")
+    found = () if band is None else height_band(band.lower, band.upper)
+    if entry is None or entry.overhead is None:
+        return found
+    names = None if entry.overhead == "automatic" else tuple(entry.overhead)
+    overhead = overhead_constraints(
+        build_body(values),
+        build_scene(values),
+        stance_sequence(values),
+        (values.start_com, values.goal_com),
+        names,
+    )
+    return (*found, *overhead)

@@ -1,0 +1,29 @@
+"""Sections of a scenario file, one pydantic model each; lengths are metres and angles degrees."""
+
+from manikin.scenarios.sections.body import BodySection
+from manikin.scenarios.sections.com_constraint import ComConstraintSection, HeightBandSection
+from manikin.scenarios.sections.contact import ContactSection, SoleSection
+from manikin.scenarios.sections.obstacle import ObstacleSection, RoundSection, SphereSection
+from manikin.scenarios.sections.phase import PhaseSection
+from manikin.scenarios.sections.planning import PlanningSection, WeightsSection
+from manikin.scenarios.sections.push import PushSection
+from manikin.scenarios.sections.supports import SupportsSection
+from manikin.scenarios.sections.task import StateSection, TaskSection
+
+__all__ = [
+    "BodySection",
+    "ComConstraintSection",
+    "ContactSection",
+    "HeightBandSection",
+    "ObstacleSection",
+    "PhaseSection",
+    "PlanningSection",
+    "PushSection",
+    "RoundSection",
+    "SoleSection",
+    "SphereSection",
+    "StateSection",
+    "SupportsSection",
+    "TaskSection",
+    "WeightsSection",
+]

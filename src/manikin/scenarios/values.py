@@ -1,0 +1,238 @@
+"""What a scenario file says, scaled to its body, and where it says it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from manikin.errors import InputError, ScenarioError
+from manikin.scenarios.expressions import Expression
+from manikin.scenarios.heights import HeightBand, SupportLevel
+from manikin.scenarios.schema import ScenarioFile
+from manikin.scenarios.sections import (
+    ComConstraintSection,
+    ContactSection,
+    PlanningSection,
+    PushSection,
+    SupportsSection,
+)
+from manikin.scenarios.validation import Path as KeyPath
+from manikin.scenarios.validation import place
+from manikin.spatial import FloatArray, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class ScenarioValues:
+    """A checked scenario file and the numbers in it, scaled to the body.
+
+    Attributes:
+        file: The checked content of the scenario file.
+        source: Name of the file, for messages.
+        folder: Folder that relative paths start from.
+        lines: Place (file and line) of each key, for messages.
+    """
+
+    file: ScenarioFile
+    source: str = "scenario"
+    folder: Path = Path()
+    lines: Mapping[KeyPath, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._check_numbers_of_band()
+
+    @property
+    def name(self) -> str:
+        """Short name."""
+        return self.file.name
+
+    @property
+    def description(self) -> str:
+        """One line about it."""
+        return self.file.description
+
+    @property
+    def seed(self) -> int:
+        """Seed of every random choice, unless the caller gives another."""
+        return self.file.seed
+
+    @property
+    def mass(self) -> float:
+        """Body mass [kg]."""
+        return self.file.body.mass_kg
+
+    @property
+    def is_point_mass(self) -> bool:
+        """Whether the body is a point mass, which is planned but has nothing to execute."""
+        return self.file.body.model == "point_mass"
+
+    @property
+    def planning(self) -> PlanningSection:
+        """Options of the centre-of-mass planner."""
+        return self.file.planning
+
+    @property
+    def manner(self) -> str:
+        """How the body carries itself where the task leaves freedom."""
+        return self.file.manner
+
+    @property
+    def push(self) -> PushSection | None:
+        """Disturbance during the execution, or None."""
+        return self.file.push
+
+    @property
+    def stature_scale(self) -> float:
+        """Stature over the reference stature of the task's heights."""
+        reference = self.file.reference_stature_m
+        return 1.0 if reference is None else self.file.body.stature_m / reference
+
+    @property
+    def start_com(self) -> FloatArray:
+        """(3,) centre of mass at the start, scaled to the body [m].
+
+        Raises:
+            ScenarioError: If the file gives no CoM.
+        """
+        return self._scaled_com("start")
+
+    @property
+    def goal_com(self) -> FloatArray:
+        """(3,) centre of mass at the goal, scaled to the body [m].
+
+        Raises:
+            ScenarioError: If the file gives no CoM.
+        """
+        return self._scaled_com("goal")
+
+    @property
+    def height_band(self) -> HeightBand | None:
+        """Bounds of the CoM's height, scaled to the body, or None."""
+        constraint = self.constraint("height_band")
+        if constraint is None or constraint.height_band is None:
+            return None
+        band = constraint.height_band
+        return HeightBand(
+            Expression(band.lower), Expression(band.upper), self.support_level(), self.stature_scale
+        )
+
+    @property
+    def max_support_distance(self) -> float | None:
+        """Largest distance from the CoM to every foot in contact, scaled to the body [m], or None."""
+        constraint = self.constraint("max_support_distance_m")
+        if constraint is None or constraint.max_support_distance_m is None:
+            return None
+        return self.stature_scale * constraint.max_support_distance_m
+
+    @property
+    def required_margin(self) -> float:
+        """Smallest margin allowed, scaled to the body like a weight times a length [N.m] or [N]."""
+        reference = self.file.reference_mass_kg
+        mass_scale = 1.0 if reference is None else self.mass / reference
+        length_scale = self.stature_scale if self.planning.margin_space == "wrench" else 1.0
+        return self.planning.min_margin * mass_scale * length_scale
+
+    @property
+    def friction_share(self) -> float:
+        """Share of the real friction for the controller: half way from planning's to all of it."""
+        supports = self.file.supports
+        if supports is None or supports.planning_friction is None:
+            return 1.0
+        return 0.5 * (1.0 + supports.planning_friction / supports.friction)
+
+    @property
+    def padded(self) -> tuple[str, ...]:
+        """Names of the obstacles that any part of the body may lean on."""
+        return tuple(obstacle.name for obstacle in self.file.scene if obstacle.padded)
+
+    @property
+    def seated_from(self) -> int | None:
+        """First phase of those, up to the last, in which the body sits; None when it ends on its feet."""
+        if self.file.supports is None:
+            return None
+        sits = ["buttocks" in contacts for contacts in self.file.supports.resolved_phases()]
+        if not sits[-1]:
+            return None
+        return len(sits) - next((k for k, held in enumerate(reversed(sits)) if not held), len(sits))
+
+    def find_file(self, name: str) -> Path:
+        """Path of a file that the scenario names: in its folder, or else from the current one."""
+        inside = self.folder / name
+        return inside if inside.exists() else Path(name)
+
+    def support_level(self) -> SupportLevel:
+        """Height of the supports below the CoM, from the start to the goal."""
+        ends = [np.array(self._com(end)[:2]) for end in ("start", "goal")]
+        if self.file.supports is None:
+            floor = self.file.floor_height_m or 0.0
+            return SupportLevel(ends[0], ends[1], floor, floor)
+        phases = self.explicit_supports().resolved_phases()
+        return SupportLevel(ends[0], ends[1], _level(phases[0]), _level(phases[-1]))
+
+    def explicit_supports(self) -> SupportsSection:
+        """The sequence of supports that the file lists.
+
+        Raises:
+            ScenarioError: If it lists none.
+        """
+        if self.file.supports is None:
+            raise self.error(
+                ("supports",),
+                "is missing; valid: an explicit sequence of phases, contacts are not planned yet",
+            )
+        return self.file.supports
+
+    def constraint(self, key: str) -> ComConstraintSection | None:
+        """The constraint on the centre of mass that has the key, or None."""
+        return next((c for c in self.file.com_constraints if getattr(c, key) is not None), None)
+
+    def refused(self, path: KeyPath, error: InputError) -> ScenarioError:
+        """The library's error as one of this file, with the place of the key."""
+        return ScenarioError(f"{place(self.source, path, self.lines)}: {error}")
+
+    def error(self, path: KeyPath, text: str) -> ScenarioError:
+        """An error that begins with the place of the key and goes on with the text."""
+        return ScenarioError(f"{place(self.source, path, self.lines)} {text}")
+
+    def _com(self, end: str) -> tuple[float, float, float]:
+        com = getattr(self.file.task, end).com
+        if com is None:
+            raise self.error(("task", end, "com"), "is missing; valid: [x, y, z] in metres")
+        return com
+
+    def _scaled_com(self, end: str) -> FloatArray:
+        x, y, z = self._com(end)
+        level = self.support_level()
+        base = level.start_level if end == "start" else level.goal_level
+        if self.stature_scale != 1.0:
+            z = base + self.stature_scale * (z - base)
+        return frozen_array([x, y, z], f"{end} com [m]", (3,))
+
+    def _check_numbers_of_band(self) -> None:
+        index = next((i for i, c in enumerate(self.file.com_constraints) if c.height_band is not None), None)
+        if index is None or self.file.supports is None:
+            return
+        band = self.height_band
+        if band is None:
+            return
+        path: KeyPath = ("com_constraints", index, "height_band")
+        for end in ("start", "goal"):
+            x, y, z = (np.float64(value) for value in self._scaled_com(end))
+            with np.errstate(all="ignore"):
+                low, high = float(band.lower(x, y, z)), float(band.upper(x, y, z))
+            for key, value in (("lower", low), ("upper", high)):
+                if not math.isfinite(value):
+                    raise self.error((*path, key), f"is {value} at the {end} CoM; valid: a finite height [m]")
+            if low > high:
+                raise self.error(
+                    path,
+                    f"has lower {low:.4g} above upper {high:.4g} at the {end} CoM; valid: lower <= upper",
+                )
+
+
+def _level(contacts: Mapping[str, ContactSection]) -> float:
+    feet = [c.position[2] for name, c in contacts.items() if "foot" in name]
+    return float(np.mean(feet or [c.position[2] for c in contacts.values()]))
