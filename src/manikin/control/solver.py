@@ -112,14 +112,9 @@ class ProxqpSolver(QPSolver):
         self._shape = (-1, -1)
 
     def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
-        split = program.equalities
-        values = (
-            program.hessian, program.gradient, program.rows[:split], program.rows_lower[:split],
-            program.rows[split:], program.rows_lower[split:], program.rows_upper[split:],
-            program.lower, program.upper,
-        )  # fmt: skip
+        values = _split(program)
         if self._qp is None or self._shape != program.rows.shape:
-            size, rows = len(program.gradient), len(program.rows)
+            size, rows, split = len(program.gradient), len(program.rows), program.equalities
             self._qp = self._module.dense.QP(size, split, rows - split, True)
             self._qp.settings.eps_abs = 1e-5
             self._qp.settings.initial_guess = self._module.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
@@ -144,12 +139,7 @@ class PiqpSolver(QPSolver):
         self._shape = (-1, -1)
 
     def _solve(self, program: QuadraticProgram) -> tuple[FloatArray, bool, str, int]:
-        split = program.equalities
-        values = (
-            program.hessian, program.gradient, program.rows[:split], program.rows_lower[:split],
-            program.rows[split:], program.rows_lower[split:], program.rows_upper[split:],
-            program.lower, program.upper,
-        )  # fmt: skip
+        values = _split(program)
         if self._qp is None or self._shape != program.rows.shape:
             self._qp = self._module.DenseSolver()
             self._shape = program.rows.shape
@@ -159,6 +149,16 @@ class PiqpSolver(QPSolver):
         status = self._qp.solve()
         solved = status == self._module.PIQP_SOLVED
         return np.array(self._qp.result.x), solved, str(status), int(self._qp.result.info.iter)
+
+
+def _split(program: QuadraticProgram) -> tuple[FloatArray, ...]:
+    """Cost, equalities, inequalities and bounds in the order that ProxQP and PIQP take them."""
+    split = program.equalities
+    return (
+        program.hessian, program.gradient, program.rows[:split], program.rows_lower[:split],
+        program.rows[split:], program.rows_lower[split:], program.rows_upper[split:],
+        program.lower, program.upper,
+    )  # fmt: skip
 
 
 _SOLVERS: dict[str, type[QPSolver]] = {"daqp": DaqpSolver, "proxqp": ProxqpSolver, "piqp": PiqpSolver}

@@ -3,17 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.figures.style import (
-    STYLES,
-    draw_contact_strip,
-    draw_phases,
-    dress,
-    end_of,
-    label_room,
-    legend_in_title,
-    need,
-    new_grid,
-)
+from manikin.figures.style import STYLES, legend_in_title, need
+from manikin.figures.timeline import timeline
 from manikin.record import RunRecord
 from manikin.spatial import FloatArray
 
@@ -30,32 +21,31 @@ def com_figure(record: RunRecord) -> Figure:
         FigureError: If it has neither.
     """
     tracks = need(record.tracks, "a motion of the centre of mass")
-    phases = need(record.phases, "phases")
-    end = end_of(record)
-    figure, grid = new_grid(
-        14.0, 7.0, "Centre of mass", 4, 3, left=label_room(record.effectors), top=0.75, between=0.22,
-        across=0.75, height_ratios=[0.14 * max(len(record.effectors), 2), 1, 1, 1],
-    )  # fmt: skip
+    shown = timeline(
+        record,
+        (14.0, 7.0),
+        "Centre of mass",
+        3,
+        len(QUANTITIES),
+        strip=0.14,
+        top=0.75,
+        between=0.22,
+        across=0.75,
+    )
     for column, (quantity, unit) in enumerate(QUANTITIES):
-        strip = figure.add_subplot(grid[0, column])
-        draw_contact_strip(strip, phases, end)
-        strip.set_title(quantity.capitalize(), fontsize=10, loc="left", pad=12)
-        if column > 0:
-            strip.set_yticklabels([])
+        shown.strip(column, quantity.capitalize(), named=column == 0)
         for row, axis in enumerate("xyz"):
-            axes = figure.add_subplot(grid[row + 1, column])
-            draw_phases(axes, phases, end)
-            shown = []
+            axes = shown.panel(row + 1, column)
+            drawn = []
             for name, track in tracks.items():
                 values = getattr(track, quantity)[:, row]
                 axes.plot(track.time, values, label=name, **STYLES[name])
-                shown.append(values)
+                drawn.append(values)
             if quantity == "acceleration":
-                axes.set_ylim(_without_spikes(np.concatenate(shown)))
-            dress(axes, f"{axis} [{unit}]", "time [s]" if row == 2 else "")
-            axes.tick_params(labelbottom=row == 2)
-    legend_in_title(figure, axes)
-    return figure
+                axes.set_ylim(_without_spikes(np.concatenate(drawn)))
+            shown.label(axes, f"{axis} [{unit}]")
+    legend_in_title(shown.figure, axes)
+    return shown.figure
 
 
 def _without_spikes(values: FloatArray) -> tuple[float, float]:

@@ -8,9 +8,9 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.comparison import RunComparison
 from manikin.figures.compare_timing import RUN_COLOURS
-from manikin.figures.planes import draw_paths, mark_instants, planes_grid
+from manikin.figures.planes import draw_paths, frame_plane, mark_instants, planes_grid
 from manikin.figures.scene import draw_scene, draw_soles, frame
-from manikin.figures.style import dress, legend_in_title, need, new_figure
+from manikin.figures.style import legend_in_title, need, new_figure
 from manikin.figures.views import VIEWS
 from manikin.record import ComTrack
 
@@ -33,11 +33,7 @@ def compare_planes_figure(comparison: RunComparison) -> Figure:
         for run, track, colour in zip(comparison.runs, tracks.values(), RUN_COLOURS, strict=True):
             if run.phases is not None:
                 mark_instants(axes, view, track.at(run.phases.instants), colour)
-        (left, bottom), (right, top) = view(low), view(high)
-        axes.set(xlim=(left, right), ylim=(bottom, top))
-        axes.set_aspect("equal", adjustable="box", anchor="SW")
-        horizontal, vertical = view.labels
-        dress(axes, vertical, horizontal, f"{view.name[0]}-{view.name[1]}, {view.words}")
+        frame_plane(axes, view, low, high)
     legend_in_title(figure, axes)
     return figure
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from manikin.comparison import RunComparison, TimingRow
 from manikin.comparison.compare import STAGES, tracks_of
 from manikin.figures.compare_timing import RUN_COLOURS
-from manikin.figures.style import COLOURS, dress, legend_in_title, need, new_grid, readable
+from manikin.figures.style import COLOURS, dress, legend_in_title, named_below, need, new_grid
 from manikin.record import ComTrack
 
 
@@ -41,7 +41,7 @@ def compare_margin_figure(comparison: RunComparison) -> Figure:
         last = number == len(stages) - 1
         dress(axes, f"{stage} [{unit}]", "supports of the phase" if last else "")
         axes.set_xticks(np.arange(len(rows)) + 0.5)
-        axes.set_xticklabels(["\n".join(map(readable, r.supports)) or "flight" for r in rows] if last else [])
+        axes.set_xticklabels([named_below(row.supports) for row in rows] if last else [])
         axes.tick_params(axis="x", labelsize=7, length=0)
         axes.grid(False, axis="x")
         for edge in range(1, len(rows)):

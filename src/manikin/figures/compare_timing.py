@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from manikin.comparison import RunComparison, TimingRow
-from manikin.figures.style import COLOURS, dress, need, new_grid, readable, support_colour
+from manikin.figures.style import COLOURS, dress, named_below, need, new_grid, support_colour, support_keys
 
 RUN_COLOURS = (COLOURS["first run"], COLOURS["second run"])
 
@@ -57,9 +57,7 @@ def _draw_bars(axes: Axes, comparison: RunComparison) -> None:
     dress(axes, "", "time [s]")
     axes.set_yticks([1.0, 0.0], list(comparison.names))
     axes.grid(False, axis="y")
-    counts = sorted({min(len(row.supports), 3) for row in comparison.rows})
-    words = {0: "flight", 1: "one support", 2: "two supports", 3: "three or more"}
-    keys = [Patch(color=support_colour(count), alpha=0.8, label=words[count]) for count in counts]
+    keys = support_keys(len(row.supports) for row in comparison.rows)
     if any(row.first is None or row.second is None for row in comparison.rows):
         keys.append(Patch(facecolor=COLOURS["soft"], edgecolor="white", hatch="xx", label="no match"))
     _legend(axes, keys)
@@ -76,7 +74,7 @@ def _draw_durations(axes: Axes, rows: Sequence[TimingRow], names: tuple[str, str
                           textcoords="offset points", ha="center", fontsize=7)  # fmt: skip
             longest = max(longest, phase.duration_s)
     dress(axes, "duration [s]")
-    axes.set_xticks(range(len(rows)), ["\n".join(map(readable, row.supports)) or "flight" for row in rows])
+    axes.set_xticks(range(len(rows)), [named_below(row.supports) for row in rows])
     axes.tick_params(axis="x", labelsize=7)
     axes.set_ylim(0.0, 1.14 * longest)
     axes.grid(False, axis="x")

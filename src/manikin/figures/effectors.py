@@ -3,18 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.figures.style import (
-    STYLES,
-    draw_contact_strip,
-    draw_phases,
-    dress,
-    end_of,
-    label_room,
-    legend_in_title,
-    need,
-    new_grid,
-    readable,
-)
+from manikin.figures.style import STYLES, legend_in_title, need, readable
+from manikin.figures.timeline import timeline
 from manikin.figures.tracking import interpolated
 from manikin.record import RunRecord
 
@@ -31,30 +21,22 @@ def effectors_figure(record: RunRecord) -> Figure:
     paths = need(record.effector_paths, "a whole-body motion and the body")
     names = list(next(iter(paths.values())))
     need(names, "an effector in contact")
-    phases = need(record.phases, "phases")
-    end = end_of(record)
-    figure, grid = new_grid(
-        max(4.4 * len(names), 7.0), 7.0, "Feet and hands", 4, len(names), left=label_room(names), top=0.75,
-        between=0.22, across=0.5, height_ratios=[0.14 * max(len(names), 2), 1, 1, 1],
-    )  # fmt: skip
+    size = max(4.4 * len(names), 7.0), 7.0
+    shown = timeline(
+        record, size, "Feet and hands", 3, len(names), strip=0.14, top=0.75, between=0.22, across=0.5
+    )
     for column, name in enumerate(names):
-        strip = figure.add_subplot(grid[0, column])
-        draw_contact_strip(strip, phases, end)
-        strip.set_title(_title(record, name), fontsize=10, loc="left", pad=12)
-        if column > 0:
-            strip.set_yticklabels([])
+        shown.strip(column, _title(record, name), named=column == 0)
         for row, axis in enumerate("xyz"):
-            axes = figure.add_subplot(grid[row + 1, column])
-            draw_phases(axes, phases, end)
+            axes = shown.panel(row + 1, column)
             for kind, found in paths.items():
                 axes.plot(record.motions[kind].time, found[name][:, row], label=kind, **STYLES[kind])
-            dress(axes, f"{axis} [m]" if column == 0 else "", "time [s]" if row == 2 else "")
-            axes.tick_params(labelbottom=row == 2)
+            shown.label(axes, f"{axis} [m]" if column == 0 else "")
             low, high = axes.get_ylim()
             if high - low < 0.02:  # what hardly moves is not magnified
                 axes.set_ylim((low + high) / 2 - 0.01, (low + high) / 2 + 0.01)
-    legend_in_title(figure, axes)
-    return figure
+    legend_in_title(shown.figure, axes)
+    return shown.figure
 
 
 def _title(record: RunRecord, name: str) -> str:

@@ -4,18 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from manikin.figures.style import (
-    COLOURS,
-    STYLES,
-    draw_contact_strip,
-    draw_phases,
-    dress,
-    end_of,
-    label_room,
-    legend_in_title,
-    need,
-    new_grid,
-)
+from manikin.figures.style import COLOURS, STYLES, legend_in_title, need
+from manikin.figures.timeline import timeline
 from manikin.motion.derived import PhaseTable
 from manikin.record import ComTrack, RunRecord
 
@@ -43,23 +33,17 @@ def margin_figure(record: RunRecord) -> Figure:
     ceiling = _zoom_ceiling(curves, phases)
     if len(units) == 1 and ceiling is not None:
         panels.append((units[0], ceiling))
-    figure, grid = new_grid(
-        13.5, 4.8 + 2.6 * (len(panels) - 1), "Stability margin", 1 + len(panels), 1,
-        left=label_room(record.effectors), between=0.15,
-        height_ratios=[0.075 * max(len(record.effectors), 2)] + [1.0] * len(panels),
-    )  # fmt: skip
-    end = end_of(record)
-    draw_contact_strip(figure.add_subplot(grid[0]), phases, end)
+    size = 13.5, 4.8 + 2.6 * (len(panels) - 1)
+    drawing = timeline(record, size, "Stability margin", len(panels), strip=0.075, between=0.15)
+    drawing.strip()
     for row, (unit, top) in enumerate(panels):
-        axes = figure.add_subplot(grid[row + 1])
+        axes = drawing.panel(row + 1)
         shown = {name: curve for name, curve in curves.items() if curve.margin_unit == unit}
-        _draw_curves(axes, shown, phases, end, top)
-        last = row == len(panels) - 1
+        _draw_curves(axes, shown, phases, top)
         zoomed = "" if top is None else ", lower part"
-        dress(axes, f"margin{zoomed} [{unit}]", "time [s]" if last else "")
-        axes.tick_params(labelbottom=last)
-    legend_in_title(figure, *figure.axes[1 : 1 + len(units)])
-    return figure
+        drawing.label(axes, f"margin{zoomed} [{unit}]")
+    legend_in_title(drawing.figure, *drawing.figure.axes[1 : 1 + len(units)])
+    return drawing.figure
 
 
 def margin_curves(record: RunRecord) -> dict[str, ComTrack]:
@@ -91,10 +75,7 @@ def _zoom_ceiling(curves: dict[str, ComTrack], phases: PhaseTable) -> float | No
     return ZOOM * lowest if lowest > 0.0 and max(peaks) > ZOOM_FROM * lowest else None
 
 
-def _draw_curves(
-    axes: Axes, curves: dict[str, ComTrack], phases: PhaseTable, end: float, top: float | None
-) -> None:
-    draw_phases(axes, phases, end)
+def _draw_curves(axes: Axes, curves: dict[str, ComTrack], phases: PhaseTable, top: float | None) -> None:
     axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
     for name, curve in curves.items():
         label = f"{name} ({_lowest(curve, phases)})"

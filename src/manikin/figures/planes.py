@@ -51,11 +51,7 @@ def planes_figure(record: RunRecord) -> Figure:
         mark_instants(axes, view, first.at(phases.instants), COLOURS["ink"])
         for name, colour in colours.items():
             axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
-        (left, bottom), (right, top) = view(low), view(high)
-        axes.set(xlim=(left, right), ylim=(bottom, top))
-        axes.set_aspect("equal", adjustable="box", anchor="SW")
-        horizontal, vertical = view.labels
-        dress(axes, vertical, horizontal, f"{view.name[0]}-{view.name[1]}, {view.words}")
+        frame_plane(axes, view, low, high)
     legend_in_title(figure, axes)
     return figure
 
@@ -71,6 +67,15 @@ def planes_grid(title: str, spans: FloatArray) -> tuple[Figure, GridSpec]:
     heights = [float(view(spans)[1]) for view in VIEWS]
     height = float(np.clip(max(heights) * 12.8 / sum(widths), 2.5, 6.0))
     return new_grid(15.0, height + 1.4, title, 1, 3, top=0.85, width_ratios=widths)
+
+
+def frame_plane(axes: Axes, view: View, low: FloatArray, high: FloatArray) -> None:
+    """Show the box from ``low`` to ``high``, (3,) each [m], to scale, with the names of the axes."""
+    (left, bottom), (right, top) = view(low), view(high)
+    axes.set(xlim=(left, right), ylim=(bottom, top))
+    axes.set_aspect("equal", adjustable="box", anchor="SW")
+    horizontal, vertical = view.labels
+    dress(axes, vertical, horizontal, f"{view.name[0]}-{view.name[1]}, {view.words}")
 
 
 def draw_paths(

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
+from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from manikin.errors import FigureError
@@ -136,6 +137,24 @@ def colours_of(effectors: Iterable[str]) -> dict[str, str]:
 def support_colour(count: int) -> str:
     """Colour of a phase with this many supports."""
     return COLOURS[("one support", "one support", "two supports")[count] if count < 3 else "more supports"]
+
+
+def support_words(count: int) -> str:
+    """Words for a phase with this many supports."""
+    return ("flight", "one support", "two supports", "three or more")[min(count, 3)]
+
+
+def support_keys(counts: Iterable[int]) -> list[Patch]:
+    """Entries of a legend for the colours of phases with these numbers of supports."""
+    return [
+        Patch(color=support_colour(count), alpha=0.8, label=support_words(count))
+        for count in sorted({min(count, 3) for count in counts})
+    ]
+
+
+def named_below(effectors: Iterable[str]) -> str:
+    """The supports of a phase below each other, for the label of a bar."""
+    return "\n".join(readable(name) for name in effectors) or "flight"
 
 
 def need(value: T | None, what: str) -> T:

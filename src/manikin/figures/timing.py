@@ -13,10 +13,12 @@ from manikin.figures.style import (
     dress,
     end_of,
     label_room,
+    named_below,
     need,
     new_grid,
     readable,
     support_colour,
+    support_keys,
 )
 from manikin.motion import Motion
 from manikin.record import RunRecord
@@ -76,7 +78,9 @@ def _draw_durations(axes: Axes, schedule: ContactSchedule) -> None:
                             linestyle=style, zorder=4)  # fmt: skip
         axes.annotate(f"{duration:.2f}", (number, max(duration, least)), (0, 3), textcoords="offset points",
                       ha="center", fontsize=8)  # fmt: skip
-    axes.set_xticks(range(len(durations)), [_supports(phase.stance.effectors) for phase in schedule.sequence])
+    axes.set_xticks(
+        range(len(durations)), [named_below(phase.stance.effectors) for phase in schedule.sequence]
+    )
     dress(axes, "duration [s]", "", f"total {float(durations.sum()):.2f} s")
     axes.tick_params(axis="x", labelsize=7 if len(durations) <= 12 else 5.5)
     axes.set_ylim(0.0, 1.14 * max(float(durations.max()), max(p.min_duration for p in schedule.sequence)))
@@ -86,15 +90,9 @@ def _draw_durations(axes: Axes, schedule: ContactSchedule) -> None:
 
 
 def _keys(schedule: ContactSchedule) -> list[Patch]:
-    counts = sorted({min(len(phase.stance), 3) for phase in schedule.sequence})
-    words = {0: "flight", 1: "one support", 2: "two supports", 3: "three or more"}
-    keys = [Patch(color=support_colour(count), alpha=0.8, label=words[count]) for count in counts]
+    keys = support_keys(len(phase.stance) for phase in schedule.sequence)
     shortest = Patch(facecolor=COLOURS["soft"], hatch="///", edgecolor="white", label="as short as allowed")
     return [*keys, shortest, Patch(color=COLOURS["ink"], label="bound")]
-
-
-def _supports(effectors: tuple[str, ...]) -> str:
-    return "\n".join(readable(name) for name in effectors) or "flight"
 
 
 def _bars(schedule: ContactSchedule, name: str, end: float) -> list[tuple[float, float]]:

@@ -11,20 +11,16 @@ from manikin.figures.style import (
     COLOURS,
     STYLES,
     colours_of,
-    draw_contact_strip,
-    draw_phases,
     dress,
-    end_of,
     label_room,
     need,
-    new_grid,
     support_colour,
+    support_words,
     white_edge,
 )
+from manikin.figures.timeline import timeline
 from manikin.figures.views import ABOVE, distinct_contacts, draw_contact, sections
 from manikin.record import RunRecord
-
-_COUNTS = {1: "one support", 2: "two supports", 3: "three or more"}
 
 
 def zmp_figure(record: RunRecord) -> Figure:
@@ -43,24 +39,21 @@ def zmp_figure(record: RunRecord) -> Figure:
     paths = need(record.zmp, "a motion of the centre of mass")
     if not any(np.any(path.decisive) for path in paths.values()):
         need(None, "a phase that stands on one plane without grasping")
-    phases = need(record.phases, "phases")
-    end = end_of(record)
-    figure, grid = new_grid(
-        14.0, 6.4, "Zero moment point", 2, 2, across=label_room(record.effectors) + 0.15, between=0.1,
-        top=0.65, height_ratios=[0.07 * max(len(record.effectors), 2), 1], width_ratios=[1, 1.15],
+    shown = timeline(
+        record, (14.0, 6.4), "Zero moment point", 1, 2, strip=0.07, left=0.65, top=0.65, between=0.1,
+        across=label_room(record.effectors) + 0.15, width_ratios=[1, 1.15],
     )  # fmt: skip
     name, path = next(iter(paths.items()))
-    _draw_plan(figure.add_subplot(grid[:, 0]), schedule, name, path)
-    draw_contact_strip(figure.add_subplot(grid[0, 1]), phases, end)
-    axes = figure.add_subplot(grid[1, 1])
-    draw_phases(axes, phases, end)
+    _draw_plan(shown.figure.add_subplot(shown.grid[:, 0]), schedule, name, path)
+    shown.strip(1)
+    axes = shown.panel(1, 1)
     axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
     for kind, one in paths.items():
         _draw_distance(axes, kind, one)
-    dress(axes, "distance to the edge of the support polygon [mm]", "time [s]")
+    shown.label(axes, "distance to the edge of the support polygon [mm]")
     _frame_distance(axes, list(paths.values()))
     axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
-    return figure
+    return shown.figure
 
 
 def _draw_plan(axes: Axes, schedule: ContactSchedule, name: str, path: ZmpPath) -> None:
@@ -84,7 +77,9 @@ def _draw_plan(axes: Axes, schedule: ContactSchedule, name: str, path: ZmpPath) 
             axes.plot(*place, "*", color=COLOURS["ink"], markersize=8, zorder=6)
             axes.annotate(f"{number}|{number + 1}", (place[0], place[1]), (5, 5), fontsize=7.5, zorder=7,
                           textcoords="offset points", path_effects=[white_edge()])  # fmt: skip
-    handles = [Line2D([], [], color=support_colour(c), label=f"ZMP, {_COUNTS[max(c, 1)]}") for c in shown]
+    handles = [
+        Line2D([], [], color=support_colour(c), label=f"ZMP, {support_words(max(c, 1))}") for c in shown
+    ]
     handles.append(Line2D([], [], color=COLOURS["ink"], marker="*", linestyle="", label="change of phase"))
     handles.append(Line2D([], [], color="#AEB4BE", linestyle=(0, (5, 3)), label="support polygon"))
     points = np.vstack([contact.points_in_world[:, :2] for contact in contacts])
