@@ -3,7 +3,7 @@ import pytest
 
 from manikin.contact import ContactSchedule, Phase, SolePart, Stance, StanceSequence, roll_feet
 from manikin.control import SupportMode, SupportSettings
-from manikin.control.supports import SupportSwitch, support_intervals
+from manikin.control.supports import EARLY_SHARE, LONG_FLIGHT, SupportSwitch, support_intervals
 
 LIFT, LAND, END = 1.0, 1.6, 2.6
 
@@ -110,6 +110,20 @@ def test_intervals_cover_the_schedule(stepping):
     assert (second.start, second.end) == (LAND, np.inf)
     assert second.early == pytest.approx(LAND - (LAND - LIFT) / 3)
     assert len(support_intervals(stepping, "left_foot", 0.1)) == 1
+
+
+def test_a_long_flight_rises_and_comes_down_slowly(contacts):
+    """A touch counts as landing, or as not yet left, for a share of a flight of over a second."""
+
+    def windows(flight):
+        both = Phase(Stance(contacts))
+        sequence = StanceSequence([both, Phase(Stance(contacts[:1])), both])
+        schedule = ContactSchedule(sequence, [0.0, LIFT, LIFT + flight, LIFT + flight + 1.0])
+        first, second = support_intervals(schedule, "right_foot", 0.1)
+        return first.late - first.end, second.start - second.early
+
+    assert windows(LONG_FLIGHT - 0.01) == pytest.approx((0.1, 0.1))
+    assert windows(4.0) == pytest.approx((4.0 * EARLY_SHARE, 4.0 * EARLY_SHARE))
 
 
 @pytest.fixture
