@@ -34,6 +34,7 @@ from manikin.scene import Scene
 from manikin.simulation import Execution, Push, execute
 from manikin.spatial import rotation_from_yaw
 from manikin.wholebody import (
+    Eligibility,
     KeyPostures,
     WholeBodyResult,
     WholeBodySettings,
@@ -61,22 +62,32 @@ class ExecutionRequirements:
         com_rms_error: Root mean square distance of the CoM from its plan [m].
         foot_error: Largest distance of an effector from its plan [m].
         margin: Least margin, exclusive [N.m].
-        penetration: Deepest penetration [m].
+        penetration: Deepest penetration of hard contacts [m]; ``padding_compression`` where the motion
+            ends on a seat, whose impact shakes every contact.
+        padding_compression: Deepest one of padded obstacles, which give way [m].
     """
 
     com_rms_error: float = 0.015
     foot_error: float = 0.02
     margin: float = 0.0
     penetration: float = 0.005
+    padding_compression: float = 0.01
 
-    def violation(self, execution: Execution) -> str | None:
-        """Explain the first requirement that is not kept, or None."""
+    def violation(self, execution: Execution, seated: bool = False) -> str | None:
+        """Explain the first requirement that is not kept, or None.
+
+        Args:
+            execution: What happened.
+            seated: Whether the motion ends on a seat.
+        """
+        penetration = self.padding_compression if seated else self.penetration
         if execution.min_margin <= self.margin:
             return f"executed margin falls to {execution.min_margin:.2f} N.m; allowed > {self.margin:g}"
         for value, limit, what in (
             (execution.com_rms_error_m, self.com_rms_error, "RMS error of the centre of mass"),
             (execution.max_foot_error_m, self.foot_error, "effector error"),
-            (execution.max_penetration_m, self.penetration, "penetration"),
+            (execution.max_penetration_m, penetration, "penetration"),
+            (execution.max_padding_compression_m, self.padding_compression, "compression of padding"),
         ):
             if value > limit:
                 return f"{what} is {value:.4f} m; allowed {limit:g} m"
@@ -268,9 +279,11 @@ class _Run:
         """The plan, or another one where a key posture fails, with its trajectory if it can be done."""
         if planned.trajectory is None:
             return planned, None
-        found = find_eligible_plan(
-            planned, self._on_real_supports, self._key_postures, replan=self._keyframes is None
-        )
+        # The fit keeps its distance from the ends of the ranges: the key postures leave room for that,
+        # if they can.
+        found = self._eligible(planned, self._settings.fit.joint_buffer)
+        if found.failure is not None:
+            found = self._eligible(planned, 0.0)
         block = centroidal_summary(found.centroidal) | {
             "replans": found.replans,
             "key_postures": None if found.postures is None else found.postures.summary(),
@@ -286,11 +299,16 @@ class _Run:
         self._fail(found.failure.stage, found.failure.reason, posture.time, place)
         return found.centroidal, None
 
-    def _key_postures(self, trajectory: CentroidalTrajectory) -> KeyPostures:
-        return find_key_postures(
-            self._body, self._scene, trajectory, manner=self._settings.manner,
-            requirements=self._settings.requirements,
-        )  # fmt: skip
+    def _eligible(self, planned: CentroidalResult, range_margin: float) -> Eligibility:
+        """Test the key postures of a plan, and plan again where they fail."""
+
+        def look(trajectory: CentroidalTrajectory) -> KeyPostures:
+            return find_key_postures(
+                self._body, self._scene, trajectory, manner=self._settings.manner,
+                requirements=self._settings.requirements, range_margin=range_margin,
+            )  # fmt: skip
+
+        return find_eligible_plan(planned, self._on_real_supports, look, replan=self._keyframes is None)
 
     def _on_real_supports(self, planned: CentroidalTrajectory) -> CentroidalTrajectory | None:
         """The plan on the real soles, friction and caps, with the seated part where there is one."""
@@ -333,7 +351,8 @@ class _Run:
             progress=lambda share: self._progress("execution", share),
         )  # fmt: skip
         self._finish("execution", result.summary())
-        reason = result.failure or self._requirements.violation(result)
+        seated = self._scenario.seated_from is not None
+        reason = result.failure or self._requirements.violation(result, seated)
         if reason:
             worst = float(result.motion.time[int(np.argmin(result.motion.margin))])
             time = worst if result.failure_time_s is None else result.failure_time_s

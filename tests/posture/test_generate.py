@@ -1,5 +1,7 @@
 """The posture generator: requirements exact, limits and clearances kept, failures explained."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -256,3 +258,20 @@ def test_bad_settings_and_starts_are_refused(on_the_floor):
         generate_posture(on_the_floor(), np.zeros(4))
     with pytest.raises(InputError, match="rotation"):
         Placement(rotation=np.ones((3, 3)))
+
+
+def test_a_range_margin_keeps_hinges_inside_their_ranges(platform):
+    """With the centre of mass as high as 1.0 m a knee is stretched; with a margin it keeps 0.1 rad."""
+    problem, margin = platform.problem(0), 0.1
+    stretched = replace(problem, com=com_target(z=1.0), proximity=None)
+    body = problem.body
+    room = np.minimum(margin, 0.25 * (body.upper - body.lower))
+
+    def least_room(found):
+        angles = certify(stretched, found).q[7:]
+        return float(np.min(np.minimum(angles - body.lower, body.upper - angles) - room))
+
+    assert least_room(generate_posture(stretched)) < -0.05
+    assert least_room(generate_posture(replace(stretched, range_margin=margin))) >= -1e-9
+    with pytest.raises(InputError, match="range_margin"):
+        replace(problem, range_margin=-1.0)

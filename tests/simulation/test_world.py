@@ -143,3 +143,32 @@ def test_misuse_is_refused(world):
         world.apply_push("thorax", (1, 0, 0), 0.0, 0.0)
     with pytest.raises(InputError, match="planned touch of obstacle 'moon'"):
         world.plan_touches([(("left_foot",), "moon")])
+
+
+def test_what_the_body_leans_on_counts_as_a_push(body):
+    """Two blocks under the feet, one of them padded: the mean wrench is that of the other foot alone."""
+    blocks = [
+        Obstacle("block", Box((0.4, 0.3, 0.2)), translation=(0.1, 0.15, -0.1)),
+        Obstacle("cushion", Box((0.4, 0.3, 0.2)), translation=(0.1, -0.15, -0.1)),
+    ]
+    world = World(compile_model(body, Scene(blocks, floor_height=None)), padded=("cushion",))
+    everything = tuple(segment.name for segment in body.segments)
+    world.plan_touches([(everything, "block")], leaning=[(everything, "cushion")])
+    world.reset(body.standing_posture())
+    world.mean_wrench()
+    on_block, on_cushion, deepest = np.zeros(6), np.zeros(6), {"block": 0.0, "cushion": 0.0}
+    for _ in range(8):
+        world.advance(np.zeros(body.nv - 6), 1)
+        sensed = world.sense()
+        for position, force, other, depth in zip(
+            sensed.positions, sensed.forces, sensed.others, sensed.depths, strict=True
+        ):
+            wrench = np.concatenate((force, np.cross(position, force)))
+            total = on_cushion if other == "cushion" else on_block
+            total += wrench / 8
+            deepest[other] = max(deepest[other], depth)
+    assert on_cushion[2] > 100.0
+    assert world.mean_wrench() == pytest.approx(on_block, abs=1e-6)
+    assert world.touches == ()
+    assert world.penetration == pytest.approx(deepest["block"], abs=1e-12)
+    assert world.padding_compression == pytest.approx(deepest["cushion"], abs=1e-12)

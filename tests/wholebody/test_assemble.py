@@ -5,10 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from manikin.scene import Box, Obstacle, Scene
 from manikin.wholebody import WholeBodyRequirements, WholeBodySettings, flights, plan_whole_body
-from manikin.wholebody.assemble import phase_knots, sample_times
+from manikin.wholebody.fit_scales import FitScales
+from manikin.wholebody.knots import CLOSEST_KNOTS, phase_knots, refined, sample_times
+from manikin.wholebody.reweigh import reweighed
 
 
 def test_knots_hold_every_key_instant_and_are_dense_enough():
@@ -138,3 +142,35 @@ def test_the_certificate_refuses_forces_beyond_the_body_or_its_contacts(step_mot
     assert found is not None
     assert found[0].startswith(what)
     assert found[1] == residuals.worst_times_s[f"max_{name}"]
+
+
+@given(
+    st.lists(st.floats(0.02, 1.0), min_size=1, max_size=6),
+    st.floats(0.02, 0.2),
+)
+def test_refined_knots_keep_the_old_ones_and_halve_the_spans_at_key_instants(durations, spacing):
+    """The spline space grows: whatever was fitted before can still be fitted."""
+    instants = np.concatenate([[0.0], np.cumsum(durations)])
+    knots = phase_knots(instants, spacing, 5)
+    fine = refined(knots, instants, 5, within=0.05)
+    assert set(np.unique(knots)) <= set(fine)
+    assert np.all(fine[:6] == instants[0])
+    assert np.all(fine[-6:] == instants[-1])
+    middle = 0.5 * (fine[1:] + fine[:-1])[np.diff(fine) > 0]
+    near = np.abs(middle[:, None] - instants).min(axis=1) < 0.02
+    widest = np.diff(np.unique(knots)).max()
+    assert np.all(np.diff(np.unique(fine))[near] <= max(0.5 * widest, 2.0 * CLOSEST_KNOTS) + 1e-9)
+
+
+def test_what_is_broken_weighs_more():
+    """Scales of the broken requirements become finer, the others stay."""
+    scales = FitScales()
+    changed = reweighed(scales, frozenset({"min_clearance_m", "max_support_error_m"}))
+    assert changed.clearance < scales.clearance
+    assert changed.multiplier_rounds > 0
+    for name in ("joint_limit", "joint_velocity", "force", "moment_share", "position", "com"):
+        assert getattr(changed, name) == getattr(scales, name)
+    again = reweighed(changed, frozenset({"max_missing_wrench"}))
+    assert again.force < scales.force
+    assert again.moment_share < scales.moment_share
+    assert again.clearance == changed.clearance

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from manikin.scene import Box, Obstacle, Proximity, Scene
-from manikin.wholebody.assemble import phase_knots, sample_times
 from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
 from manikin.wholebody.fit_scales import FitScales
+from manikin.wholebody.knots import phase_knots, sample_times
 from manikin.wholebody.objective import MotionObjective
 from manikin.wholebody.targets import EffectorTarget, FitTargets
 

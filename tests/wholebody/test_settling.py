@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from manikin.contact import ContactSchedule, Stance, StanceSequence, grasp, sole
 from manikin.contact.sequence import Phase
 from manikin.control.contact_forces import SLIDING_SPEED, pyramid_edges, sliding_edges
-from manikin.wholebody.assemble import phase_knots, touch_downs_at_speed
+from manikin.wholebody.knots import phase_knots, touch_downs_at_speed
 from manikin.wholebody.targets import settled_share, settling_map
 
 FOOT = sole("left_foot", (0.0, 0.1, 0.0), length=0.26, width=0.1, friction=0.7)

@@ -315,8 +315,7 @@ class PostureSolver:
         )
 
     def _inside_limits(self, q: FloatArray) -> FloatArray:
-        body = self.problem.body
-        return np.concatenate([q[:7], np.clip(q[7:], body.lower, body.upper)])
+        return np.concatenate([q[:7], np.clip(q[7:], self._limits.lower, self._limits.upper)])
 
     def _merit(self, iterate: _Iterate) -> float:
         intrusion = np.minimum(iterate.clearance.residual - self.settings.buffer, 0.0)
@@ -354,10 +353,10 @@ class PostureSolver:
 
     def _bounds(self, q: FloatArray, trust: float) -> tuple[FloatArray, FloatArray]:
         """Trust region cut by the hinge ranges."""
-        angles, body = q[7:], self.problem.body
-        lower, upper = np.full(body.nv, -trust), np.full(body.nv, trust)
-        lower[6:] = np.maximum(lower[6:], np.minimum(body.lower - angles, 0.0))
-        upper[6:] = np.minimum(upper[6:], np.maximum(body.upper - angles, 0.0))
+        angles, limits, nv = q[7:], self._limits, self.problem.body.nv
+        lower, upper = np.full(nv, -trust), np.full(nv, trust)
+        lower[6:] = np.maximum(lower[6:], np.minimum(limits.lower - angles, 0.0))
+        upper[6:] = np.minimum(upper[6:], np.maximum(limits.upper - angles, 0.0))
         return lower, upper
 
     def _misses(self, iterate: _Iterate) -> tuple[str, ...]:

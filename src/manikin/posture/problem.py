@@ -100,6 +100,7 @@ class PostureProblem:
         clearance: Distance to keep to obstacles [m].
         self_clearance: Distance to keep between body parts [m].
         ignore: Pairs (segment, obstacle) or (segment, segment) that may touch.
+        range_margin: Angle to keep from the ends of the hinge ranges [rad].
         reference: (nq,) posture to stay near, with its root ignored; standing when omitted.
         preferences: Weights of what is not required.
         upright: Whether pelvis, trunk, head and arms should be upright (a human habit).
@@ -114,6 +115,7 @@ class PostureProblem:
     clearance: float = 0.02
     self_clearance: float = 0.005
     ignore: Ignored = NOTHING
+    range_margin: float = 0.0
     reference: FloatArray | None = None
     preferences: Preferences = field(default_factory=Preferences)
     upright: bool = True
@@ -137,6 +139,7 @@ class PostureProblem:
         object.__setattr__(self, "reference", frozen_array(reference, "posture reference", shape, BodyError))
         finite_number(self.clearance, "posture clearance [m]")
         finite_number(self.self_clearance, "posture self_clearance [m]")
+        finite_number(self.range_margin, "posture range_margin [rad]", at_least=0.0)
 
     def requirements(self) -> tuple[Term, ...]:
         """Terms that must be zero."""
@@ -186,7 +189,7 @@ class PostureProblem:
 
     def limits(self) -> LimitTerm:
         """The hinge ranges."""
-        return LimitTerm(self.body)
+        return LimitTerm(self.body, self.range_margin)
 
     def clearances(self, activation: float) -> ClearanceTerm | None:
         """The distances to keep, or None without a scene."""

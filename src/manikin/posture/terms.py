@@ -6,6 +6,7 @@ for a tangent vector ``v`` of Pinocchio's ``integrate``.
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -178,16 +179,30 @@ class LimitTerm:
 
     Attributes:
         body: The body with its ranges.
-        margin: Kept from both ends of each range [rad].
+        margin: Kept from both ends of each range [rad]; at most a quarter of the range.
     """
 
     body: BodyModel
     margin: float = 0.0
 
+    @cached_property
+    def lower(self) -> FloatArray:
+        """(nv - 6,) smallest angles [rad]."""
+        return self.body.lower + self._margins
+
+    @cached_property
+    def upper(self) -> FloatArray:
+        """(nv - 6,) largest angles [rad]."""
+        return self.body.upper - self._margins
+
+    @property
+    def _margins(self) -> FloatArray:
+        return np.minimum(self.margin, 0.25 * (self.body.upper - self.body.lower))
+
     def bounds(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
         """(nv - 6,) smallest and largest change of each hinge that stays inside."""
         angles = configuration.q[7:]
-        return self.body.lower + self.margin - angles, self.body.upper - self.margin - angles
+        return self.lower - angles, self.upper - angles
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """Slack of each hinge to its nearer end, and its Jacobian."""

@@ -135,7 +135,7 @@ class _Run:
         damping = np.full(body.nv - 6, physics.joint_damping)
         self.controller = Controller(body, motion, schedule, settings, joint_damping=damping)
         self.holds = _holds(body, scene, schedule)
-        self.world = World(compile_model(body, scene, physics))
+        self.world = World(compile_model(body, scene, physics), padded)
         for push in pushes:
             self.world.apply_push(push.segment, push.force, push.start, push.duration)
         segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
@@ -181,7 +181,7 @@ class _Run:
         now = tuple(number for number, hold in enumerate(self.holds) if _expected(hold.interval, time))
         if now != self._planned_now:
             planned = [(self.holds[i].segments, self.holds[i].obstacle) for i in now]
-            self.world.plan_touches([*planned, *self._leaning])
+            self.world.plan_touches(planned, self._leaning)
             self._planned_now = now
         grasps = [item.interval for item in self.holds if item.interval.contact.kind is ContactKind.GRASP]
         held = {item.contact.effector: item.contact for item in grasps if item.start <= time < item.end}
@@ -236,6 +236,7 @@ class _Run:
             final_com_error_m=float(com[-1]),
             min_margin=float(executed.margin.min()),
             max_penetration_m=world.penetration,
+            max_padding_compression_m=world.padding_compression,
             peak_torque_Nm=dict(zip(self.body.joint_names, peak.tolist(), strict=True)),
             max_limit_use=float((peak / self.body.torque_limit).max()),
             realtime_factor=simulated / wall,

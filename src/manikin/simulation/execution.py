@@ -28,7 +28,8 @@ class Execution:
             that slides to its place on a seat [m].
         final_com_error_m: Distance of the CoM from its plan at the end of the hold [m].
         min_margin: Least wrench margin [N.m].
-        max_penetration_m: Deepest penetration of any contact, at every engine step [m].
+        max_penetration_m: Deepest penetration of any hard contact, at every engine step [m].
+        max_padding_compression_m: How far the body sank into something padded [m].
         peak_torque_Nm: Largest absolute torque by joint [N.m].
         max_limit_use: Largest ratio of a joint's torque to its limit.
         realtime_factor: Simulated time per wall time.
@@ -49,6 +50,7 @@ class Execution:
     final_com_error_m: float
     min_margin: float
     max_penetration_m: float
+    max_padding_compression_m: float
     peak_torque_Nm: dict[str, float]
     max_limit_use: float
     realtime_factor: float
@@ -67,6 +69,7 @@ class Execution:
         """The "execution" block of the run's summary."""
         names = (
             "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m",
-            "min_margin", "max_penetration_m", "peak_torque_Nm", "realtime_factor", "wall_s",
+            "min_margin", "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm",
+            "realtime_factor", "wall_s",
         )  # fmt: skip
         return {name: getattr(self, name) for name in names}

@@ -1,5 +1,6 @@
 """Collects what happens during an execution and turns it into a motion and its measures."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +17,10 @@ from manikin.spatial import GRAVITY, FloatArray
 
 SWITCHING = 0.1
 """A support may touch its surface this long before and after its planned interval [s]."""
+
+EARLY_SEAT = 0.03
+"""What is made at speed may press this long before its time: a soft seat gives way, and its surface is
+met where it is [s]."""
 
 _PRESSES = 1.0
 """Force from which an effector counts as a support of the executed motion [N]."""
@@ -129,8 +134,8 @@ class Recorder:
         """(n,) wrench margin of the mean measured wrenches [N.m].
 
         The stance is the one planned for the beginning of the step, at its planned placements; what
-        slides to its place on a seat is taken where it is. A foot that presses before its time or
-        after it is no support.
+        slides to its place on a seat is taken where it is, and from when it presses, up to
+        ``EARLY_SEAT`` before it should. A foot that presses before its time or after it is no support.
 
         Args:
             mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
@@ -139,12 +144,17 @@ class Recorder:
         phases = self._schedule.phase_at([sample.sensed.time for sample in self.samples])
         margins = np.empty(len(self.samples))
         settling = self._settling_rows()
+        early = self._early_seats()
+        settling[list(early)] = True
         for index, phase in enumerate(self._schedule.sequence):
             rows = (phases == index) & ~settling
             if np.any(rows):
                 margins[rows] = wrench_polytope(_bounded(phase.stance, mass)).margin(totals[rows])
-        for row in np.flatnonzero(settling):
-            stance = self._as_measured(self._schedule.sequence[int(phases[row])].stance, self.samples[row])
+        for row in (int(number) for number in np.flatnonzero(settling)):
+            stance = self._schedule.sequence[int(phases[row])].stance
+            if row in early:
+                stance = Stance((*stance, *early[row]), stance.normal_force_cap)
+            stance = self._as_measured(stance, self.samples[row])
             margins[row] = wrench_polytope(_bounded(stance, mass)).margin(totals[row])
         return margins
 
@@ -156,11 +166,25 @@ class Recorder:
             rows |= self._schedule.settling(times, name)
         return rows
 
+    def _early_seats(self) -> dict[int, list[Contact]]:
+        """Contacts made at speed that press a little before their time, by sample."""
+        found: dict[int, list[Contact]] = {}
+        for column, name in enumerate(self.effectors):
+            for interval in self._intervals[name]:
+                if interval.contact.settle == 0.0:
+                    continue
+                for row, (sample, after) in enumerate(itertools.pairwise(self.samples)):
+                    force = np.maximum(*(np.abs(s.wrenches[column, :3]).max() for s in (sample, after)))
+                    if 0.0 < interval.start - sample.sensed.time <= EARLY_SEAT and force > _PRESSES:
+                        found.setdefault(row, []).append(interval.contact)
+        return found
+
     def _as_measured(self, stance: Stance, sample: Sample) -> Stance:
         """The stance with what is settling where it is now."""
         contacts = []
         for contact in stance:
-            if self._schedule.settling(sample.sensed.time, contact.effector)[0]:
+            early = contact.effector not in self._schedule.stance_at(sample.sensed.time)
+            if early or self._schedule.settling(sample.sensed.time, contact.effector)[0]:
                 here = sample.output.state.frames[contact.effector].position
                 contact = replace(contact, position=here)
             contacts.append(contact)

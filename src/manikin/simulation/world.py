@@ -131,11 +131,12 @@ class World:
     States go in and come out in Pinocchio's convention.
     """
 
-    def __init__(self, model: SimulationModel) -> None:
+    def __init__(self, model: SimulationModel, padded: Sequence[str] = ()) -> None:
         """Make a world at rest in the zero configuration.
 
         Args:
             model: The compiled body and scene.
+            padded: Obstacles that give way.
         """
         self.model = model
         self._model = copy.copy(model.mujoco)
@@ -144,12 +145,14 @@ class World:
         self._owners = tuple(_owner(model, geom) for geom in range(self._model.ngeom))
         self._segments = frozenset(segment.name for segment in model.body.segments)
         self._planned = np.zeros((self._model.ngeom, self._model.ngeom), dtype=bool)
+        self._leaning = np.zeros_like(self._planned)
+        self._padded = np.array([name in padded and not segment for name, segment in self._owners])
         self._masks: dict[tuple[tuple[str, ...], bool], NDArray[np.bool_]] = {}
         self._pushes: list[Push] = []
         self._grips: dict[str, Grip] = {}
         self._grip_forces: dict[str, FloatArray] = {}
         self._touches: dict[tuple[str, str], Touch] = {}
-        self._depth = 0.0
+        self._depth, self._padded_depth = 0.0, 0.0
         self._total, self._steps = np.zeros(6), 0
 
     # --- state -----------------------------------------------------------------------------
@@ -185,9 +188,9 @@ class World:
         self.forget()
 
     def forget(self) -> None:
-        """Forget unplanned touches, the deepest penetration and the wrenches so far."""
+        """Forget unplanned touches, the deepest penetrations and the wrenches so far."""
         self._touches.clear()
-        self._depth = 0.0
+        self._depth, self._padded_depth = 0.0, 0.0
         self._total[:], self._steps = 0.0, 0
 
     # --- what acts -------------------------------------------------------------------------
@@ -240,22 +243,34 @@ class World:
             compiled.geom_conaffinity[mask] if enabled else compiled.geom_conaffinity[mask] & 1
         )
 
-    def plan_touches(self, pairs: Sequence[tuple[Sequence[str], str]]) -> None:
+    def plan_touches(
+        self,
+        pairs: Sequence[tuple[Sequence[str], str]],
+        leaning: Sequence[tuple[Sequence[str], str]] = (),
+    ) -> None:
         """Say which touches are planned from now on; all others are reported.
 
         Args:
-            pairs: Segments and the obstacle that they may touch.
+            pairs: Segments and the obstacle that they are supported by.
+            leaning: Segments and an obstacle that they may lean on besides.
 
         Raises:
             InputError: If an obstacle is not in the scene.
         """
-        self._planned[:] = False
+        supports = self._touching(pairs)
+        self._leaning = self._touching(leaning) & ~supports
+        self._planned = supports | self._leaning
+
+    def _touching(self, pairs: Sequence[tuple[Sequence[str], str]]) -> NDArray[np.bool_]:
+        """(geometries, geometries) whether two geometries are a segment and the obstacle of a pair."""
+        found = np.zeros_like(self._planned)
         for segments, obstacle in pairs:
             body, scene = self._mask(tuple(segments), True), self._mask((obstacle,), False)
             if not scene.any():
                 names = sorted({name for name, segment in self._owners if not segment})
                 raise InputError(f"planned touch of obstacle {obstacle!r}; valid: one of {names}")
-            self._planned |= np.outer(body, scene) | np.outer(scene, body)
+            found |= np.outer(body, scene) | np.outer(scene, body)
+        return found
 
     # --- time ------------------------------------------------------------------------------
 
@@ -272,14 +287,15 @@ class World:
             self._act()
             mujoco.mj_step(self._model, self._data)
             self._note_contacts()
-            self._total += self._constraint_wrench()
+            self._total += self._constraint_wrench() - self._leaning_wrench()
             self._steps += 1
 
     def mean_wrench(self) -> FloatArray:
         """(6,) mean wrench of the scene on the body since the last call, grips included.
 
-        Moments are about the world origin. Of all engine steps since then, not only of the
-        last: an impact of one step counts with the share of time that it lasts.
+        What presses where the body only leans does not count: it acts like a push. Moments are about
+        the world origin. Of all engine steps since then, not only of the last: an impact of one step
+        counts with the share of time that it lasts.
         """
         mean = self._total / max(self._steps, 1)
         self._total[:], self._steps = 0.0, 0
@@ -293,6 +309,17 @@ class World:
         total = np.concatenate((force, cross(qpos[:3], force) + moment))
         for pull, position in self._grip_forces.values():
             total += np.concatenate((pull, cross(position, pull)))
+        return total
+
+    def _leaning_wrench(self) -> FloatArray:
+        """Wrench of the contacts of the last step in which the body only leans on something."""
+        total, local = np.zeros(6), np.zeros(6)
+        geoms = self._data.contact.geom
+        for number in np.flatnonzero(self._leaning[geoms[:, 0], geoms[:, 1]]):
+            mujoco.mj_contactForce(self._model, self._data, number, local)
+            *_, swapped = self._parties(*(int(geom) for geom in geoms[number]))
+            force = local[:3] @ self._data.contact.frame[number].reshape(3, 3) * (-1.0 if swapped else 1.0)
+            total += np.concatenate((force, cross(self._data.contact.pos[number], force)))
         return total
 
     def _act(self) -> None:
@@ -319,8 +346,10 @@ class World:
         if self._data.ncon == 0:
             return
         contact = self._data.contact
-        self._depth = max(self._depth, -float(contact.dist.min()))
         geoms = contact.geom
+        padded = self._padded[geoms[:, 0]] | self._padded[geoms[:, 1]]
+        self._depth = max(self._depth, float((-contact.dist[~padded]).max(initial=0.0)))
+        self._padded_depth = max(self._padded_depth, float((-contact.dist[padded]).max(initial=0.0)))
         planned = self._planned[geoms[:, 0], geoms[:, 1]]
         if planned.all():
             return
@@ -383,8 +412,13 @@ class World:
 
     @property
     def penetration(self) -> float:
-        """Deepest penetration of any contact since the last reset [m]."""
+        """Deepest penetration of any contact since the last reset [m], but for those of paddings."""
         return self._depth
+
+    @property
+    def padding_compression(self) -> float:
+        """How far the body has sunk into something padded since the last reset [m]."""
+        return self._padded_depth
 
     @property
     def divergence(self) -> str:

@@ -5,7 +5,6 @@ Swings are smooth curves where that suffices and Bi-RRT paths where it does not
 and centre of mass as one spline, and the result is certified at 1 kHz.
 """
 
-import itertools
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,6 @@ import pinocchio as pin
 from manikin.balance import pseudo_wrench, wrench_polytope
 from manikin.body import BodyModel
 from manikin.centroidal import CentroidalTrajectory
-from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
@@ -28,8 +26,10 @@ from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
 from manikin.wholebody.forces import plan_forces
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
+from manikin.wholebody.knots import phase_knots, refined, sample_times, touch_downs_at_speed
 from manikin.wholebody.manner import CLOSE, READY, Manner
 from manikin.wholebody.reference import reference_motion
+from manikin.wholebody.reweigh import reweighed
 from manikin.wholebody.swing import SwingLimits
 from manikin.wholebody.targets import FitTargets, Ignored, effector_targets, ignored_pairs, toe_angles
 
@@ -38,12 +38,6 @@ DEGREE = 5
 
 NEAR_FLIGHT = 0.05
 """A requirement that breaks this close to a flight is put down to it [s]."""
-
-SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09, 0.13])
-"""Further knots around a touch-down at speed, from it [s]."""
-
-CLOSEST_KNOTS = 4.0e-3
-"""Knots closer than this are one [s]."""
 
 SITTING_FIT: Mapping[str, Any] = {"joint_limit": 2.0e-3, "multiplier_rounds": 24}
 """Changed scales of a motion that ends on a seat: its touch is sudden, and harder to fit."""
@@ -56,6 +50,16 @@ SECOND_SEARCH = 600
 
 ROLLING_TOES = 2.0e-3
 """Deviation of toes from lying flat, or straight, that costs one unit where feet roll [rad]."""
+
+REPAIRS = 3
+"""Most fits that follow a failed one with other weights."""
+
+CAUGHT = -0.02
+"""Below this clearance a part of the body is caught on the wrong side of another: the fit begins anew,
+with more weight on clearance, because no small step leads out [m]."""
+
+INEXACT = frozenset({"max_support_error_m", "max_com_error_m"})
+"""Broken requirements that a spline with more knots may keep."""
 
 Progress = Callable[[float], None]
 """Told the share of the work that is done, in [0, 1]."""
@@ -155,10 +159,10 @@ def plan_whole_body(
         progress: Called now and then with the share done.
 
     Returns:
-        The motion with its certificate. When the motion comes too close to something, clearance
-        is given more weight; when it still breaks a requirement, the arms are kept close to the body;
-        when that does not help either, the flight in which it does is
-        searched again with the Bi-RRT before the result is called a failure.
+        The motion with its certificate. When the motion breaks a requirement, the fit goes on with more
+        weight on it; when it still does, the arms are kept close to the body; when that does not help
+        either, the flight in which it does is searched again with the Bi-RRT before the result is
+        called a failure.
     """
     began = clock.perf_counter()
     planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), progress)
@@ -193,8 +197,6 @@ class _Planner:
         swings = tuple(self.flights.plan(swing) for swing in self.flights.flights())
         self._report(0.2)
         result = self._attempt(swings, began)
-        if not result.succeeded and result.certificate.min_clearance_m < self.settings.requirements.clearance:
-            result = _better(result, self._attempt(swings, began, self._more_clearance()))
         if not result.succeeded and self.settings.manner is READY:
             result = _better(result, self._attempt_close(swings, began))
         searched = self._search_again(swings, result)
@@ -226,17 +228,51 @@ class _Planner:
                     return (*swings[:index], other, *swings[index + 1 :])
         return None
 
-    def _more_clearance(self) -> FitScales:
-        """Scales at which a missing clearance weighs more, at the expense of the rest."""
-        return replace(self.settings.fit, clearance=0.5 * self.settings.fit.clearance)
-
-    def _attempt(
-        self, swings: tuple[PlannedSwing, ...], began: float, scales: FitScales | None = None
-    ) -> WholeBodyResult:
+    def _attempt(self, swings: tuple[PlannedSwing, ...], began: float) -> WholeBodyResult:
+        """Fit a motion to the swings; where it misses a little, fit on with more weight on that."""
         guide = self._guide(swings)
         self._report(0.4)
-        fit = self._fit(swings, guide, scales or self.settings.fit)
+        scales = self._scales()
+        fit, start = self._prepare(swings, guide, self._knots(), scales)
+        found = fit.solve(start)
         self._report(0.8)
+        result = last = self._judged(found, swings, guide, began)
+        for number in range(REPAIRS):
+            if result.succeeded:
+                break
+            broken = last.certificate.broken(self.settings.requirements)
+            if last.certificate.min_clearance_m < CAUGHT:
+                scales = reweighed(scales, broken & {"min_clearance_m"})
+                fit, start = self._prepare(swings, guide, self._knots(), scales)
+                found = fit.solve(start)
+            elif number == 0 and broken & INEXACT:
+                scales = reweighed(scales, broken)
+                fit, start = self._prepare(swings, guide, self._knots(fine=True), scales, found.spline)
+                found = fit.improve(start, scales)
+            else:
+                scales = reweighed(scales, broken)
+                found = fit.improve(found.spline, scales)
+            last = self._judged(found, swings, guide, began)
+            result = _better(result, last)
+        return result
+
+    def _prepare(
+        self,
+        swings: tuple[PlannedSwing, ...],
+        guide: Guide,
+        knots: FloatArray,
+        scales: FitScales,
+        near: ConfigurationSpline | None = None,
+    ) -> tuple[MotionFit, ConfigurationSpline]:
+        """A fit and where it begins: near the guide, or an earlier spline."""
+        targets = self._targets(swings, guide, knots)
+        fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, scales)
+        return fit, fit.initial_spline(targets.reference if near is None else near.evaluate(targets.time)[0])
+
+    def _judged(
+        self, fit: FitResult, swings: tuple[PlannedSwing, ...], guide: Guide, began: float
+    ) -> WholeBodyResult:
+        """Sample a fitted motion and certify it."""
         motion, wrench = self._sample(fit.spline)
         ignored = ignored_pairs(self.body, self.scene, self.trajectory.schedule, motion.time)
         if self.leaning:
@@ -245,6 +281,10 @@ class _Planner:
         failure = self._failure(swings, guide, certificate)
         wall = clock.perf_counter() - began
         return WholeBodyResult(motion, fit.spline, certificate, swings, guide, failure, fit.iterations, wall)
+
+    def _scales(self) -> FitScales:
+        share = self.settings.manner.moment_factor * self.settings.fit.moment_share
+        return replace(self.settings.fit, moment_share=share)
 
     def _guide(self, swings: tuple[PlannedSwing, ...]) -> Guide:
         schedule = self.trajectory.schedule
@@ -264,15 +304,21 @@ class _Planner:
         com[~self.trajectory.binds(time)] = np.nan
         return com
 
-    def _targets(self, swings: tuple[PlannedSwing, ...], guide: Guide) -> tuple[FitTargets, FloatArray]:
-        """What the fit has to do, and the knots of its spline."""
+    def _knots(self, fine: bool = False) -> FloatArray:
+        """Knots of the spline; fine ones let legs that are almost straight bend suddenly."""
+        schedule = self.trajectory.schedule
+        sudden = touch_downs_at_speed(schedule)
+        knots = phase_knots(schedule.instants, self.settings.knot_spacing, DEGREE, sudden)
+        return refined(knots, schedule.instants, DEGREE) if fine else knots
+
+    def _targets(self, swings: tuple[PlannedSwing, ...], guide: Guide, knots: FloatArray) -> FitTargets:
+        """What the fit has to do."""
         schedule, settings = self.trajectory.schedule, self.settings
-        knots = phase_knots(schedule.instants, settings.knot_spacing, DEGREE, touch_downs_at_speed(schedule))
         time = sample_times(knots, settings.samples_per_span)
         toes = toe_angles(self.body, swings, time)
         scale = self.settings.manner.scale(self.body)
         scale[[6 + joint for joint in toes]] = ROLLING_TOES
-        targets = FitTargets(
+        return FitTargets(
             time=time,
             effectors=effector_targets(schedule, swings, time),
             com=self.trajectory.position(time),
@@ -283,14 +329,6 @@ class _Planner:
             reference_scale=scale,
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
         )
-        return targets, knots
-
-    def _fit(self, swings: tuple[PlannedSwing, ...], guide: Guide, scales: FitScales) -> FitResult:
-        targets, knots = self._targets(swings, guide)
-        share = self.settings.manner.moment_factor * scales.moment_share
-        scales = replace(scales, moment_share=share)
-        fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, scales)
-        return fit.solve(fit.initial_spline(targets.reference))
 
     def _sample(self, spline: ConfigurationSpline) -> tuple[Motion, FloatArray]:
         """The motion at 1 kHz with its whole-body pseudo-wrench (n, 6)."""
@@ -368,45 +406,3 @@ def _with_joints(configurations: FloatArray, angles: Mapping[int, FloatArray]) -
 def _better(first: WholeBodyResult, second: WholeBodyResult) -> WholeBodyResult:
     """Prefer a success; of two failures, the first."""
     return second if second.succeeded and not first.succeeded else first
-
-
-def touch_downs_at_speed(schedule: ContactSchedule) -> FloatArray:
-    """(k,) times at which a contact is made that still has to settle [s]."""
-    found = [
-        float(start)
-        for number, (phase, start) in enumerate(zip(schedule.sequence, schedule.instants, strict=False))
-        if any(
-            item.settle > 0.0 and (number == 0 or item.effector not in schedule.sequence[number - 1].stance)
-            for item in phase.stance
-        )
-    ]
-    return np.array(found)
-
-
-def phase_knots(
-    instants: FloatArray, spacing: float, degree: int, sudden: FloatArray | Sequence[float] = ()
-) -> FloatArray:
-    """Clamped knots with every key instant among them and at most ``spacing`` [s] apart.
-
-    Args:
-        instants: (phases + 1,) key instants [s].
-        spacing: Largest distance of two knots [s].
-        degree: Of the spline.
-        sudden: Times around which the knots lie closer, because the motion changes suddenly [s].
-    """
-    fine = np.concatenate([np.zeros(0), *(time + SUDDEN_KNOTS for time in sudden)])
-    breaks = np.unique(np.concatenate([instants, fine[(fine > instants[0]) & (fine < instants[-1])]]))
-    breaks = breaks[np.append(True, np.diff(breaks) > CLOSEST_KNOTS)]
-    inner: list[float] = []
-    for start, end in itertools.pairwise(breaks):
-        count = max(1, int(np.ceil((end - start) / spacing)))
-        inner.extend(np.linspace(start, end, count, endpoint=False))
-    ends = np.full(degree, instants[0]), np.full(degree + 1, instants[-1])
-    return np.concatenate([ends[0], inner, ends[1]])
-
-
-def sample_times(knots: FloatArray, per_span: int) -> FloatArray:
-    """Times that split every knot span into equal parts, both ends included."""
-    breaks = np.unique(knots)
-    spans = [np.linspace(a, b, per_span, endpoint=False) for a, b in itertools.pairwise(breaks)]
-    return np.append(np.concatenate(spans), breaks[-1])

@@ -79,9 +79,20 @@ class WholeBodyResiduals:
 
     def violation(self, requirements: WholeBodyRequirements) -> tuple[str, float] | None:
         """Explain the first requirement that is not kept, with its time [s]; None when all are."""
+        for name, value, limit, what in self._checks(requirements):
+            if value > limit:
+                return f"{what} is {value:.4g}; allowed {limit:.4g}", self.worst_times_s[name]
+        return None
+
+    def broken(self, requirements: WholeBodyRequirements) -> frozenset[str]:
+        """Names of the fields that are not kept."""
+        return frozenset(name for name, value, limit, _ in self._checks(requirements) if value > limit)
+
+    def _checks(self, requirements: WholeBodyRequirements) -> list[tuple[str, float, float, str]]:
+        """Field, value, limit and wording of every requirement."""
         r = requirements
         pair = " and ".join(self.closest_pair)
-        checks = [
+        return [
             ("max_support_error_m", self.max_support_error_m, r.support_error, "support error [m]"),
             ("max_support_turn_rad", self.max_support_turn_rad, r.support_turn, "support turn [rad]"),
             ("max_com_error_m", self.max_com_error_m, r.com_error, "centre-of-mass error [m]"),
@@ -92,10 +103,6 @@ class WholeBodyResiduals:
             ("max_missing_wrench", self.max_missing_wrench, r.missing_wrench, "missing wrench [N, N.m]"),
             ("max_torque_share", self.max_torque_share, r.torque_share, "share of a torque limit"),
         ]  # fmt: skip
-        for name, value, limit, what in checks:
-            if value > limit:
-                return f"{what} is {value:.4g}; allowed {limit:.4g}", self.worst_times_s[name]
-        return None
 
 
 def certify(

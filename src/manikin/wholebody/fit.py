@@ -97,21 +97,31 @@ class MotionFit:
         The last scales stay soft; the method of multipliers makes contacts and centre of mass
         exact without the stiff valleys of a large penalty.
         """
+        return self._solve(start, self._final, self._final.stages)
+
+    def improve(self, start: ConfigurationSpline, scales: FitScales) -> FitResult:
+        """Go on from an earlier solution ``start`` with other scales, at its multipliers."""
+        return self._solve(start, scales, scales.stages[-1:])
+
+    def _solve(self, start: ConfigurationSpline, final: FitScales, stages: tuple[float, ...]) -> FitResult:
         points, iterations = np.array(start.control_points), 0
-        scales, state = self._final, None
-        for factor in self._final.stages:
-            scales = self._final.loosened(factor)
-            state = self.objective.linearise(points, scales, self._multiplier)
+        scales = final.loosened(stages[0])
+        state = self.objective.linearise(points, scales, self._multiplier)
+        for number, factor in enumerate(stages):
+            if number > 0:
+                scales = final.loosened(factor)
+                state = self.objective.linearise(points, scales, self._multiplier)
             points, state, taken = self._descend(points, state, scales, scales.max_iterations)
             iterations += taken
-        if state is None:
-            state = self.objective.linearise(points, scales, self._multiplier)
-        for _ in range(self._final.multiplier_rounds):
+        moved = True
+        for _ in range(final.multiplier_rounds):
             if state.support_error < scales.tolerance and state.com_error < 3.0 * scales.tolerance:
                 break
-            self._update_multipliers(state)
+            if moved:  # At a point that no step has left, another push says nothing new.
+                self._update_multipliers(state)
+            before = state
             points, state, taken = self._descend(points, state, scales, scales.iterations_per_round)
-            iterations += taken
+            iterations, moved = iterations + taken, state is not before
         spline = ConfigurationSpline(self._knots, points, self._degree)
         return FitResult(
             spline, iterations, state.support_error, state.com_error, state.clearance, state.closest,
@@ -149,5 +159,8 @@ class MotionFit:
 
     def _adapt_damping(self, before: Linearised, after: Linearised) -> None:
         old, new = (self._basis.gather(state.sample_cost) for state in (before, after))
-        factor = np.where(new > 1.02 * old + 0.1, 8.0, np.where(new < old, 0.4, 1.0))
+        if after.cost < before.cost:
+            factor = np.where(new > 1.02 * old + 0.1, 8.0, np.where(new < old, 0.4, 1.0))
+        else:
+            factor = np.where(new > old, 8.0, 1.0)
         self._damping = np.clip(self._damping * factor, LEAST_DAMPING, MOST_DAMPING)

@@ -117,6 +117,7 @@ def find_key_postures(
     *,
     manner: Manner = READY,
     requirements: WholeBodyRequirements | None = None,
+    range_margin: float = 0.0,
 ) -> KeyPostures:
     """Look for a posture at every key instant until which the trajectory binds.
 
@@ -126,10 +127,12 @@ def find_key_postures(
         trajectory: Planned centre of mass with its contacts in time.
         manner: How the body carries itself where the task leaves freedom.
         requirements: What the finished motion must keep; the clearance is asked of the postures.
+        range_margin: Angle that the postures keep from the ends of the hinge ranges [rad].
     """
     instants = trajectory.schedule.instants
     time = instants[trajectory.binds(instants)]
     search = _Search(body, scene, trajectory, time, manner, requirements or WholeBodyRequirements())
+    search.range_margin = range_margin
     return KeyPostures(search.run())
 
 
@@ -152,6 +155,7 @@ class _Search:
         self._rolls = rolls_of(body, trajectory.schedule)
         self._reference = reference_motion(body, trajectory, time, manner)
         _extend_toes(body, self._rolls, time, self._reference)
+        self.range_margin = 0.0
         self._explained_one = False  # An examination takes seconds; the first is the one that is reported.
         self._ignored = _ignored(body, scene, trajectory.schedule, time)
 
@@ -170,6 +174,7 @@ class _Search:
             self._body, contacts, placements, com=self._com[key], proximity=self._proximity,
             clearance=self._clearance, self_clearance=self._clearance, ignore=self._ignored[key],
             reference=self._reference[key], preferences=self._manner.preferences,
+            range_margin=self.range_margin,
         )  # fmt: skip
 
     def _posture(self, key: int, problem: PostureProblem, result: PostureResult) -> KeyPosture:

@@ -233,7 +233,7 @@ def check_swing(
 def _first_clear(
     family: Iterator[SwingCurve], clearance: Clearance, limits: SwingLimits
 ) -> tuple[SwingCurve, SwingCheck, int]:
-    """First curve that keeps the limits, or the one that misses the clearance least; how many were tried."""
+    """First curve that keeps the limits, or else the first of those nearest to clear; how many were tried."""
     found: list[tuple[SwingCurve, SwingCheck]] = []
     for curve in family:
         check = check_swing(curve, clearance, limits, instants=COARSE)
@@ -242,7 +242,7 @@ def _first_clear(
         found.append((curve, check))
         if check.kept:
             return curve, check, len(found)
-    curve, _ = max(found, key=lambda item: item[1].slack)
+    curve, _ = max(found, key=lambda item: min(item[1].slack, 0.0))
     return curve, check_swing(curve, clearance, limits), len(found)
 
 

@@ -1,0 +1,42 @@
+"""Other weights for a whole-body fit that has missed a requirement by a little.
+
+The fit weighs everything that is wanted of a motion against everything else; what the certificate
+finds broken gets more weight, and the fit goes on from where it was.
+"""
+
+from dataclasses import replace
+from types import MappingProxyType
+
+from manikin.wholebody.fit_scales import FitScales
+
+STRONGER = 0.5
+"""Factor of the scales of what was missed."""
+
+MORE_ROUNDS = 12
+"""Further rounds of the multipliers for contacts and centre of mass."""
+
+CLOSER = 0.02
+"""Relative decrease of the objective below which the iteration stops: a near miss asks for patience."""
+
+_SCALES = MappingProxyType(
+    {
+        "min_clearance_m": ("clearance",),
+        "max_joint_limit_violation_rad": ("joint_limit",),
+        "max_velocity_share": ("joint_velocity",),
+        "max_missing_wrench": ("force", "moment_share"),
+        "max_torque_share": ("force", "moment_share"),
+    }
+)
+"""Scales that decide each field of the certificate.  Contacts and the centre of mass have multipliers."""
+
+
+def reweighed(scales: FitScales, broken: frozenset[str]) -> FitScales:
+    """Return scales at which the broken requirements weigh more.
+
+    Args:
+        scales: Those of the fit before.
+        broken: Names of fields of the certificate, see :meth:`WholeBodyResiduals.broken`.
+    """
+    names = {scale for field in broken for scale in _SCALES.get(field, ())}
+    finer = {name: STRONGER * getattr(scales, name) for name in sorted(names)}
+    return replace(scales, **finer, multiplier_rounds=MORE_ROUNDS, decrease=CLOSER)
