@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
 
 from manikin.errors import InputError
 
@@ -160,3 +161,29 @@ def check_rotation(rotation: ArrayLike, name: str, error: type[InputError] = Inp
     if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-6 or np.linalg.det(matrix) < 0:
         raise error(f"{name} is not a rotation matrix; valid: orthonormal rows, determinant +1")
     return matrix
+
+
+def rotation_vector(rotations: FloatArray) -> FloatArray:
+    """(n, 3) rotation vectors of rotations (n, 3, 3), not longer than pi [rad]."""
+    return np.asarray(Rotation.from_matrix(rotations).as_rotvec(), dtype=np.float64)
+
+
+def rotation_vector_jacobian(vectors: FloatArray) -> FloatArray:
+    """Derivative of rotation vectors by a turn of the rotated frame about its own axes.
+
+    ``I + [w] / 2 + (1 - (a / 2) cot(a / 2)) / a^2 [w]^2`` with ``a = |w|``, the inverse of the right
+    Jacobian of SO(3).
+
+    Args:
+        vectors: (n, 3) rotation vectors ``w`` [rad].
+
+    Returns:
+        (n, 3, 3).
+    """
+    angle = np.linalg.norm(vectors, axis=-1)
+    safe = np.where(angle < 0.02, 1.0, angle)
+    exact = (1.0 - 0.5 * safe / np.tan(0.5 * safe)) / safe**2
+    # By the Taylor series near zero, where the difference above loses its digits.
+    factor = np.where(angle < 0.02, 1.0 / 12.0 + angle**2 / 720.0, exact)
+    cross = skew(vectors)
+    return np.eye(3) + 0.5 * cross + factor[..., None, None] * (cross @ cross)

@@ -74,17 +74,25 @@ class PairBounds:
             table[:, :, self._count :] = self._to_parts(centres)
         return table[:, self.first, self.second]
 
-    def moved(self, rotations: FloatArray, translations: FloatArray) -> FloatArray:
-        """(n, pairs) by how much a pair's distance may have changed since the sample before [m].
+    def corners(self, rotations: FloatArray, translations: FloatArray) -> FloatArray:
+        """(n, shapes, 8, 3) corners of the boxes around the shapes in the world [m].
 
         Args:
             rotations: (n, shapes, 3, 3) shape-to-world rotations.
             translations: (n, shapes, 3) [m].
         """
-        corners = self._corners @ np.swapaxes(rotations, -1, -2) + translations[:, :, None]
-        path = np.zeros((len(corners), self._count + len(self._part_low)))
-        steps = np.diff(corners, axis=0)
-        path[1:, : self._count] = np.sqrt(np.einsum("nsci,nsci->nsc", steps, steps).max(axis=2))
+        return self._corners @ np.swapaxes(rotations, -1, -2) + translations[:, :, None]
+
+    def moved(self, before: FloatArray, after: FloatArray) -> FloatArray:
+        """(n, pairs) by how much a pair's distance may change when its shapes move [m].
+
+        Args:
+            before: (n, shapes, 8, 3) their :meth:`corners`.
+            after: The same after the movement.
+        """
+        path = np.zeros((len(before), self._count + len(self._part_low)))
+        steps = after - before
+        path[:, : self._count] = np.sqrt(np.einsum("nsci,nsci->nsc", steps, steps).max(axis=2))
         return path[:, self.first] + path[:, self.second]
 
     def displacement(

@@ -16,6 +16,7 @@ from manikin.scene.collision import CollisionPart, collision_parts
 from manikin.scene.depth import part_meter
 from manikin.scene.mesh import IntArray
 from manikin.scene.pair import Measured, Meter, pair_meter
+from manikin.scene.placed import KnownDistances, PlacedShapes, PlacementReader
 from manikin.scene.scene import Scene
 from manikin.spatial import FloatArray
 
@@ -134,6 +135,7 @@ class Proximity:
         self._model, self._shapes = body.pinocchio, body.geometry
         self._data = self._model.createData()
         self._geometry_data = pin.GeometryData(self._shapes)
+        self._reader = PlacementReader(self._geometry_data.oMg)
         self._count = len(self._shapes.geometryObjects)
         parts = tuple(part for obstacle in scene for part in collision_parts(obstacle))
         first, second = _pair_table(self._count, len(parts), self_pairs(body) if self_collision else [])
@@ -177,7 +179,7 @@ class Proximity:
         pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
         placements = self._placements()
         near = np.flatnonzero((self._lower(placements) < activation) & self._considered(ignore))
-        measured = self._measure(near.tolist(), placements)
+        measured = self._measure(near.tolist(), *_split(placements))
         kept = [row for row, item in enumerate(measured) if item[0] < activation]
         rows = near[kept]
         distance = np.array([measured[row][0] for row in kept])
@@ -197,9 +199,6 @@ class Proximity:
     ) -> ProximitySamples:
         """Measure every close pair of many configurations; like :meth:`evaluate`, with one broad phase.
 
-        A pair that was found far is measured again only when its shapes have moved so much
-        that it may be near; the result is the same as if it were measured at every sample.
-
         Args:
             q_samples: (n, nq).
             activation: [m]; farther pairs are left out.
@@ -209,42 +208,63 @@ class Proximity:
             SceneError: If the number of ignore sets is not n, or a sample is not a finite
                 vector of the body's size.
         """
-        n = len(q_samples)
-        considered = self._considered_over(ignore, n)
-        jacobians = np.empty((n, 6, self.nv))
-        placements = np.empty((n, self._count, 4, 4))
-        for sample, q in enumerate(q_samples):
-            jacobians[sample] = pin.computeJointJacobians(
-                self._model, self._data, checked_configuration(self._model, q)
-            )
-            pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
-            placements[sample] = self._placements()
-        rotations, translations = placements[..., :3, :3], placements[..., :3, 3]
-        lower = self._bounds.lower(rotations[::STRIDE], translations[::STRIDE])
-        moved = self._bounds.moved(rotations, translations)
-        known = np.full(len(self.pairs), -np.inf)
-        found = []
-        for sample in range(n):
-            known -= moved[sample]
-            if sample % STRIDE == 0:
-                np.maximum(known, lower[sample // STRIDE], out=known)
-            pairs = np.flatnonzero((known < activation) & considered[sample])
-            for pair, item in self._measured(pairs, placements[sample]):
-                known[pair] = item[0] - SLACK
-                if item[0] < activation:
-                    # The measurement's vectors are buffers that the next sample overwrites.
-                    found.append((sample, pair, item[0], np.array(item[1]), np.array(item[2])))
-        samples, pairs = (np.array([row[part] for row in found], dtype=np.int64) for part in (0, 1))
-        normal, on_body = (np.array([row[part] for row in found]).reshape(-1, 3) for part in (3, 4))
-        wrench = np.hstack([normal, np.cross(on_body, normal)])
-        gradient = (wrench[:, None, :] @ jacobians[samples])[:, 0] * self._sensitivity[pairs]
-        return ProximitySamples(
-            samples, np.array([row[2] for row in found]), gradient, tuple(self.pairs[pair] for pair in pairs)
-        )
+        return self.evaluate_placed(self._placed(q_samples), activation, ignore)
 
-    def _measured(self, indices: NDArray[np.int64], placements: FloatArray) -> list[tuple[int, Measured]]:
-        rows = indices.tolist()
-        return list(zip(rows, self._measure(rows, placements), strict=True))
+    def evaluate_placed(
+        self,
+        placed: PlacedShapes,
+        activation: float = 0.1,
+        ignore: Ignored | Sequence[Ignored] = NOTHING,
+        known: KnownDistances | None = None,
+    ) -> ProximitySamples:
+        """Measure every close pair of many configurations whose kinematics are known.
+
+        A pair that was found far is measured again only when its shapes have moved so much
+        that it may be near; the result is the same as if it were measured at every sample.
+
+        Args:
+            placed: Shapes and Jacobians of n configurations.
+            activation: [m]; farther pairs are left out.
+            ignore: One set for all samples, or n sets.
+            known: What an earlier evaluation of a similar motion has found; this one is kept there.
+
+        Raises:
+            SceneError: If the number of ignore sets is not n.
+        """
+        rotations, translations = _split(placed.placements)
+        corners = self._bounds.corners(rotations, translations)
+        lower = None if known is None else known.lower(self._bounds, corners)
+        if lower is None:
+            lower = np.full((len(corners), len(self.pairs)), -np.inf)
+            lower[::STRIDE] = self._bounds.lower(rotations[::STRIDE], translations[::STRIDE])
+        moved = self._bounds.moved(corners[:-1], corners[1:])
+        considered = self._considered_over(ignore, len(corners))
+        rows: list[tuple[int, int, float]] = []
+        vectors: list[float] = []
+        for sample, now in enumerate(lower):
+            if sample > 0:
+                np.maximum(now, lower[sample - 1] - moved[sample - 1], out=now)
+            pairs = np.flatnonzero((now < activation) & considered[sample]).tolist()
+            measured = self._measure(pairs, rotations[sample], translations[sample])
+            for pair, (distance, normal, on_body, _) in zip(pairs, measured, strict=True):
+                now[pair] = distance - SLACK
+                if distance < activation:
+                    rows.append((sample, pair, distance))
+                    vectors += normal.tolist() + on_body.tolist()
+        if known is not None:
+            known.keep(corners, lower)
+        return self._samples(rows, np.array(vectors).reshape(-1, 6), placed.jacobians)
+
+    def _samples(
+        self, rows: list[tuple[int, int, float]], vectors: FloatArray, jacobians: FloatArray
+    ) -> ProximitySamples:
+        """Close pairs (sample, pair, distance) with normal and nearest point (k, 6), and their gradients."""
+        sample, pair = (np.array([row[part] for row in rows], dtype=np.int64) for part in (0, 1))
+        wrench = np.hstack([vectors[:, :3], np.cross(vectors[:, 3:], vectors[:, :3])])
+        gradient = (wrench[:, None, :] @ jacobians[sample])[:, 0] * self._sensitivity[pair]
+        return ProximitySamples(
+            sample, np.array([row[2] for row in rows]), gradient, tuple(self.pairs[item] for item in pair)
+        )
 
     def minimum(self, q: FloatArray, ignore: Ignored = NOTHING) -> Clearance:
         """Smallest signed distance of all pairs at ``q``; see :meth:`evaluate` for ``ignore``."""
@@ -254,7 +274,7 @@ class Proximity:
         for index in np.argsort(lower, kind="stable").tolist():
             if lower[index] == np.inf or lower[index] > max(best.distance, 0.0):
                 break
-            distance = self._measure([index], placements)[0][0]
+            distance = self._measure([index], *_split(placements))[0][0]
             if distance < best.distance:
                 best = Clearance(distance, self.pairs[index])
         return best
@@ -281,7 +301,7 @@ class Proximity:
         samples = [checked_configuration(self._model, q) for q in q_samples]
         considered = self._considered_over(ignore, len(samples))
         placements = np.array([self._placements_at(q) for q in samples])
-        rotations, translations = placements[..., :3, :3], placements[..., :3, 3]
+        rotations, translations = _split(placements)
         lower = self._bounds.lower(rotations, translations)
         lower = np.where(considered, np.where(lower > 0.0, lower, -np.inf), np.inf)
         queue = [(float(bound), pair) for pair, bound in enumerate(lower.min(axis=0)) if bound < np.inf]
@@ -291,7 +311,7 @@ class Proximity:
             _, pair = heapq.heappop(queue)
             column = lower[:, pair]
             sample = int(np.argmin(column))
-            distance = self._measure([pair], placements[sample])[0][0]
+            distance = self._measure([pair], rotations[sample], translations[sample])[0][0]
             if distance < best.distance:
                 best = Clearance(distance, self.pairs[pair], sample)
             # Far from the sample the shape has moved too much for the bound to say anything.
@@ -303,13 +323,27 @@ class Proximity:
             heapq.heappush(queue, (float(column.min()), pair))
         return best
 
+    def _placed(self, q_samples: FloatArray) -> PlacedShapes:
+        """Shapes and Jacobians of configurations (n, nq)."""
+        jacobians = np.empty((len(q_samples), 6, self.nv))
+        placements = np.empty((len(q_samples), self._count, 4, 4))
+        for sample, q in enumerate(q_samples):
+            jacobians[sample] = pin.computeJointJacobians(
+                self._model, self._data, checked_configuration(self._model, q)
+            )
+            pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
+            self._reader.read(placements[sample])
+        return PlacedShapes(placements, jacobians)
+
     def _placements_at(self, q: FloatArray) -> FloatArray:
         pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data, q)
         return self._placements()
 
     def _placements(self) -> FloatArray:
         """(shapes, 4, 4) shape-to-world transforms, as last updated."""
-        return np.array([item.homogeneous for item in self._geometry_data.oMg]).reshape(-1, 4, 4)
+        out = np.empty((self._count, 4, 4))
+        self._reader.read(out)
+        return out
 
     def _lower(self, placements: FloatArray) -> FloatArray:
         return self._bounds.lower(placements[None, :, :3, :3], placements[None, :, :3, 3])[0]
@@ -328,23 +362,29 @@ class Proximity:
             )
         return np.array([self._considered(frozenset(item)) for item in ignore])
 
-    def _measure(self, indices: list[int], placements: FloatArray) -> list[Measured]:
-        """Distance, normal and the two nearest points of each pair."""
+    def _measure(
+        self, indices: list[int], rotations: FloatArray, translations: FloatArray
+    ) -> list[Measured]:
+        """Distance, normal and the two nearest points of each pair, the body's shapes being placed.
+
+        The vectors are buffers that the next measurement of the same pair overwrites.
+        """
         places = dict(self._fixed)
         found = []
         for index in indices:
             shape, other = self._first[index], self._second[index]
             for key in (shape, other):
                 if key not in places:
-                    places[key] = self._place(key, placements[key])
+                    # The shape's own transform: making new ones takes longer than many a distance.
+                    places[key] = self._moving[key]
+                    places[key].setTransform(rotations[key], translations[key])
             found.append(self._meters[index](places[shape], places[other]))
         return found
 
-    def _place(self, shape: int, placement: FloatArray) -> coal.Transform3s:
-        """The shape's own transform, set; making new ones takes longer than many a distance."""
-        transform = self._moving[shape]
-        transform.setTransform(placement[:3, :3], placement[:3, 3])
-        return transform
+
+def _split(placements: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rotations (..., 3, 3) and translations (..., 3) of transforms (..., 4, 4)."""
+    return placements[..., :3, :3], placements[..., :3, 3]
 
 
 def segment_of(shape_name: str) -> str:

@@ -1,5 +1,6 @@
 """Signed distance of one pair of Coal geometries."""
 
+import math
 from collections.abc import Callable
 
 import coal
@@ -46,7 +47,7 @@ class PairMeter:
             result.clear()
             distance = self._compute(place, other, _request(_SAFE), result)
         normal = result.normal
-        if not np.isfinite(normal[0]):
+        if not math.isfinite(normal[0]):
             normal = _fallback_normal(place, other)
         return distance, normal, result.getNearestPoint1(), result.getNearestPoint2()
 

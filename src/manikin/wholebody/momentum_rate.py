@@ -40,6 +40,11 @@ class MomentumRateSamples:
         self._value[sample] = data.dhg.vector
         self._by_q[sample], self._by_v[sample], self._by_a[sample] = by_q, by_v, by_a
 
+    @property
+    def linear_by_acceleration(self) -> FloatArray:
+        """(n, 3, nv) derivative of the linear momentum's rate by the acceleration: mass times the CoM's Jacobian."""
+        return self._by_a[:, :3]
+
     def by_raw(
         self, states: StateSamples, raw: tuple[FloatArray, FloatArray, FloatArray], tangent: FloatArray
     ) -> MomentumRate:

@@ -9,17 +9,18 @@ each residual divided by the scale at which it matters (:class:`FitScales`).
 from dataclasses import dataclass, field
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 from scipy.special import expit
 
 from manikin.body import BodyModel
 from manikin.scene import Proximity
-from manikin.spatial import FloatArray
+from manikin.scene.placed import KnownDistances
+from manikin.spatial import FloatArray, rotation_vector, rotation_vector_jacobian
 from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
-from manikin.wholebody.configuration_spline import StateSamples, states_from_raw, tangent_map
 from manikin.wholebody.fit_scales import FitScales
-from manikin.wholebody.momentum_rate import MomentumRate, MomentumRateSamples
+from manikin.wholebody.momentum_rate import MomentumRate
+from manikin.wholebody.motion_samples import MotionSampler, MotionSamples
 from manikin.wholebody.targets import EffectorTarget, FitTargets
 
 LEAST_MARGIN = 10.0
@@ -68,7 +69,10 @@ class Linearised:
         return float(self.sample_cost.sum())
 
     def add(self, order: int, jacobian: FloatArray, residual: FloatArray) -> None:
-        """Add residuals (n, m) with derivatives (n, m, nq) by the raw derivative of ``order``."""
+        """Add residuals (n, m) with derivatives (n, m, k) by the first k raw coordinates' derivative of ``order``.
+
+        The first residuals of an order come with the derivatives by all coordinates.
+        """
         transposed = jacobian.transpose(0, 2, 1)
         self._add_terms(order, transposed @ jacobian, (transposed @ residual[:, :, None])[:, :, 0])
         self.sample_cost += 0.5 * np.sum(residual**2, axis=1)
@@ -76,8 +80,8 @@ class Linearised:
     def add_diagonal(self, order: int, weight: FloatArray, residual: FloatArray) -> None:
         """Add residuals (n, nq), one per coordinate, with derivative ``weight`` (n, nq)."""
         if order in self.hessian:
-            index = np.arange(weight.shape[1])
-            self.hessian[order][:, index, index] += weight**2
+            diagonal = np.einsum("nii->ni", self.hessian[order])
+            diagonal += weight**2
             self.gradient[order] += weight * residual
         else:
             before, gradient = self.diagonal.get(order, (0.0, 0.0))
@@ -102,8 +106,9 @@ class Linearised:
 
     def _add_terms(self, order: int, hessian: FloatArray, gradient: FloatArray) -> None:
         if order in self.hessian:
-            self.hessian[order] += hessian
-            self.gradient[order] += gradient
+            count = gradient.shape[1]
+            self.hessian[order][:, :count, :count] += hessian
+            self.gradient[order][:, :count] += gradient
         else:
             self.hessian[order], self.gradient[order] = hessian, gradient
 
@@ -121,13 +126,12 @@ class MotionObjective:
     def __init__(
         self, body: BodyModel, proximity: Proximity | None, targets: FitTargets, basis: SampledBasis
     ) -> None:
-        self._body, self._proximity, self._targets, self._basis = body, proximity, targets, basis
-        self._model: pin.Model = body.pinocchio
-        self._data = self._model.createData()
-        self._frames = {name: body.effector_frame(name) for name in targets.effectors}
+        self._body, self._proximity, self._targets = body, proximity, targets
+        self._sampler = MotionSampler(body, tuple(targets.effectors), basis)
+        self._known = KnownDistances()
         with np.errstate(divide="ignore"):
             self._reference_weight = 1.0 / targets.reference_scale
-        self.task_rows = 6 * len(self._frames) + 3
+        self.task_rows = 6 * len(targets.effectors) + 3
         held = [_held_rows(target) for target in targets.effectors.values()]
         self.exact_rows = np.hstack([*held, np.repeat(targets.com_weight[:, None] >= 1.0, 3, axis=1)])
         """(n, task_rows) whether a task has to be met exactly: contacts and centre of mass."""
@@ -140,79 +144,45 @@ class MotionObjective:
             scales: Scales of the residuals.
             shift: (n, task_rows) constants added to the scaled task residuals (multipliers).
         """
-        raw = (
-            self._basis.evaluate(points), self._basis.evaluate(points, 1), self._basis.evaluate(points, 2)
-        )  # fmt: skip
-        states, tangent = states_from_raw(*raw), tangent_map(raw[0])
-        out = Linearised(np.zeros(len(states.q)))
-        momentum = self._add_kinematics(out, states, tangent, scales, shift)
-        self._add_radial(out, raw[0], tangent)
+        motion = self._sampler.sample(points)
+        raw = motion.raw
+        out = Linearised(np.zeros(len(motion.com)))
+        self._add_tasks(out, motion, scales, shift)
+        self._add_clearance(out, motion, scales)
+        self._add_reference(out, motion)
+        self._add_radial(out, raw[0], motion.tangent)
         self._add_ranges(out, raw[0], scales)
         self._add_rates(out, raw[1], scales)
         self._add_accelerations(out, raw[2], scales)
-        self._add_momentum_rate(out, momentum.by_raw(states, raw, tangent), scales)
+        self._add_momentum_rate(out, motion.momentum, scales)
         return out
 
-    def _add_kinematics(
-        self, out: Linearised, states: StateSamples, tangent: FloatArray, scales: FitScales, shift: FloatArray
-    ) -> MomentumRateSamples:
-        """Everything that needs the kinematics of each sample."""
-        n, nv = len(states.q), self._model.nv
-        jacobian, residual = np.zeros((n, self.task_rows, nv)), np.zeros((n, self.task_rows))
-        momentum = MomentumRateSamples(self._model, n)
-        for s in range(n):
-            momentum.record(s, self._data, states)
-            pin.updateFramePlacements(self._model, self._data)
-            self._task_rows(s, states.q[s], jacobian[s], residual[s], scales, out)
-        out.task_residual, out.task_jacobian = residual, _to_raw(jacobian, tangent)
-        out.add(0, out.task_jacobian, residual + shift)
-        self._add_clearance(out, states, tangent, scales)
-        self._add_reference(out, states, tangent)
-        return momentum
-
-    def _task_rows(
-        self, s: int, q: FloatArray, jacobian: FloatArray, residual: FloatArray, scales: FitScales,
-        out: Linearised,
-    ) -> None:  # fmt: skip
-        for number, (name, frame) in enumerate(self._frames.items()):
-            target, rows = self._targets.effectors[name], slice(6 * number, 6 * number + 6)
-            if target.weight[s] > 0.0:
-                self._effector_rows(s, frame, target, jacobian[rows], residual[rows], scales, out)
-        weight = self._targets.com_weight[s]
-        jacobian[-3:] = pin.jacobianCenterOfMass(self._model, self._data, q) * (weight / scales.com)
-        error = self._data.com[0] - self._targets.com[s]
-        residual[-3:] = error * (weight / scales.com)
-        if weight >= 1.0:
-            out.com_error = max(out.com_error, float(np.linalg.norm(error)))
-
-    def _effector_rows(
-        self, s: int, frame: int, target: EffectorTarget, jacobian: FloatArray, residual: FloatArray,
-        scales: FitScales, out: Linearised,
-    ) -> None:  # fmt: skip
-        placement = self._data.oMf[frame]
-        full = pin.getFrameJacobian(self._model, self._data, frame, pin.LOCAL_WORLD_ALIGNED)
-        error = placement.translation - target.position[s]
-        weight = target.weight[s] / scales.position
-        if target.along is None:
-            jacobian[:3], residual[:3] = weight * full[:3], weight * error
-        else:
-            jacobian[:3] = weight * target.along[s] @ full[:3]
-            residual[:3] = weight * target.along[s] @ error
-        if target.weight[s] >= 1.0:
-            out.support_error = max(out.support_error, float(np.linalg.norm(error)))
-        if target.rotation is not None:
-            relative = placement.rotation @ target.rotation[s].T
-            weight = target.rotation_weight[s] / scales.rotation
-            jacobian[3:] = weight * pin.Jlog3(relative) @ relative.T @ full[3:]
-            residual[3:] = weight * pin.log3(relative)
-
-    def _add_clearance(
-        self, out: Linearised, states: StateSamples, tangent: FloatArray, scales: FitScales
+    def _add_tasks(
+        self, out: Linearised, motion: MotionSamples, scales: FitScales, shift: FloatArray
     ) -> None:
+        """Places of the effectors and of the centre of mass."""
+        n, nv = motion.com_jacobian.shape[0], motion.com_jacobian.shape[2]
+        jacobian, residual = np.zeros((n, self.task_rows, nv)), np.zeros((n, self.task_rows))
+        for number, target in enumerate(self._targets.effectors.values()):
+            rows = slice(6 * number, 6 * number + 6)
+            place = motion.frames[:, number]
+            by_joints = self._sampler.frame_jacobian(motion, number)
+            jacobian[:, rows], residual[:, rows] = _effector_rows(target, place, by_joints, scales)
+            error = np.linalg.norm(place[:, :3, 3] - target.position, axis=1)
+            out.support_error = max(out.support_error, float(error[target.weight >= 1.0].max(initial=0.0)))
+        weight = self._targets.com_weight
+        error = motion.com - self._targets.com
+        jacobian[:, -3:] = (weight / scales.com)[:, None, None] * motion.com_jacobian
+        residual[:, -3:] = (weight / scales.com)[:, None] * error
+        out.com_error = float(np.linalg.norm(error[weight >= 1.0], axis=1).max(initial=0.0))
+        out.task_residual, out.task_jacobian = residual, _to_raw(jacobian, motion.tangent)
+        out.add(0, out.task_jacobian, residual + shift)
+
+    def _add_clearance(self, out: Linearised, motion: MotionSamples, scales: FitScales) -> None:
         if self._proximity is None:
             return
         reach = scales.safe_distance + 4.0 * scales.softness
-        found = self._proximity.evaluate_over(states.q, reach, self._targets.ignored)
+        found = self._proximity.evaluate_placed(motion.shapes, reach, self._targets.ignored, self._known)
         if len(found.distance) == 0:
             return
         worst = int(np.argmin(found.distance))
@@ -221,30 +191,24 @@ class MotionObjective:
         missing = (scales.safe_distance - found.distance) / scales.softness
         value = scales.softness * np.logaddexp(0.0, missing) / scales.clearance
         rows = -expit(missing)[:, None] * found.gradient / scales.clearance
-        jacobian, residual = _padded(found.sample, rows, value, len(states.q))
-        out.add(0, _to_raw(jacobian, tangent), residual)
+        jacobian, residual = _padded(found.sample, rows, value, len(motion.com))
+        out.add(0, _to_raw(jacobian, motion.tangent), residual)
 
-    def _add_reference(self, out: Linearised, states: StateSamples, tangent: FloatArray) -> None:
+    def _add_reference(self, out: Linearised, motion: MotionSamples) -> None:
         """Deviation from the reference posture; the pelvis' place does not count."""
-        n, weight = len(states.q), self._reference_weight
-        turn, turn_jacobian = np.zeros((n, 3)), np.zeros((n, 3, 3))
-        for s, reference in enumerate(self._targets.reference):
-            relative = (pin.Quaternion(reference[3:7]).inverse() * pin.Quaternion(states.q[s, 3:7])).matrix()
-            turn[s], turn_jacobian[s] = pin.log3(relative), pin.Jlog3(relative)
-        rows = np.zeros((n, 3, states.q.shape[1]))
-        rows[:, :, :7] = weight[3:6, None] * (turn_jacobian @ tangent[:, 3:6])
-        out.add(0, rows, weight[3:6] * turn)
-        diagonal, residual = np.zeros_like(states.q), np.zeros_like(states.q)
+        q, reference, weight = motion.states.q, self._targets.reference, self._reference_weight
+        relative = Rotation.from_quat(reference[:, 3:7]).inv() * Rotation.from_quat(q[:, 3:7])
+        turn = relative.as_rotvec()
+        out.add(0, weight[3:6, None] * (rotation_vector_jacobian(turn) @ motion.tangent[:, 3:6]), weight[3:6] * turn)
+        diagonal, residual = np.zeros_like(q), np.zeros_like(q)
         diagonal[:, 7:] = weight[6:]
-        residual[:, 7:] = weight[6:] * (states.q[:, 7:] - self._targets.reference[:, 7:])
+        residual[:, 7:] = weight[6:] * (q[:, 7:] - reference[:, 7:])
         out.add_diagonal(0, diagonal, residual)
 
     def _add_radial(self, out: Linearised, raw: FloatArray, tangent: FloatArray) -> None:
         """Keep the raw quaternions near unit length, where the spline is well conditioned."""
-        rows = np.zeros((len(raw), 1, raw.shape[1]))
-        rows[:, 0, :7] = tangent[:, 6] / _RADIAL_SCALE
         size = np.linalg.norm(raw[:, 3:7], axis=1)
-        out.add(0, rows, (size - 1.0)[:, None] / _RADIAL_SCALE)
+        out.add(0, tangent[:, 6:] / _RADIAL_SCALE, (size - 1.0)[:, None] / _RADIAL_SCALE)
 
     def _add_ranges(self, out: Linearised, raw: FloatArray, scales: FitScales) -> None:
         buffer = np.minimum(scales.joint_buffer, 0.25 * (self._body.upper - self._body.lower))
@@ -282,6 +246,27 @@ class MotionObjective:
         first, second, third = (jacobian / scale[:, :, None] for jacobian in momentum.jacobians)
         out.momentum = MomentumRate(residual / scale, (first, second, third))
         out.sample_cost += 0.5 * np.sum(out.momentum.value**2, axis=1)
+
+
+def _effector_rows(
+    target: EffectorTarget, place: FloatArray, by_joints: FloatArray, scales: FitScales
+) -> tuple[FloatArray, FloatArray]:
+    """Scaled residuals (n, 6) of an effector at its places (n, 4, 4) and their derivatives (n, 6, nv)."""
+    along = np.eye(3) if target.along is None else target.along
+    along = (target.weight / scales.position)[:, None, None] * along
+    error = place[:, :3, 3] - target.position
+    jacobian, residual = np.zeros_like(by_joints), np.zeros((len(error), 6))
+    jacobian[:, :3] = along @ by_joints[:, :3]
+    residual[:, :3] = (along @ error[:, :, None])[:, :, 0]
+    if target.rotation is not None:
+        relative = place[:, :3, :3] @ target.rotation.transpose(0, 2, 1)
+        turn = rotation_vector(relative)
+        weight = np.where(target.weight > 0.0, target.rotation_weight / scales.rotation, 0.0)
+        # Turning the world axes is a left perturbation: log(exp(w) E) = log(E exp(E^T w)).
+        by_turn = rotation_vector_jacobian(turn) @ relative.transpose(0, 2, 1)
+        jacobian[:, 3:] = weight[:, None, None] * by_turn @ by_joints[:, 3:]
+        residual[:, 3:] = weight[:, None] * turn
+    return jacobian, residual
 
 
 def _held_rows(target: EffectorTarget) -> NDArray[np.bool_]:
