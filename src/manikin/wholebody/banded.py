@@ -12,6 +12,7 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
+from scipy.linalg.blas import dsyrk
 from scipy.sparse import csr_matrix
 
 from manikin.spatial import FloatArray
@@ -61,7 +62,7 @@ class BlockBandedSystem:
         self._basis = basis
         self._dimension = dimension
         self._bandwidth = basis.values.shape[2]
-        self._lower = np.tril_indices(self._bandwidth)
+        self._spans = _spans(basis.first)
         self._products = [self._pair_products(order) for order in range(3)]
         self._rows = [self._row_weights(order) for order in range(3)]
         self.reset()
@@ -70,6 +71,7 @@ class BlockBandedSystem:
         """Forget every term."""
         size, d = self._basis.size, self._dimension
         self._blocks = np.zeros((self._bandwidth * size, d * d))
+        self._coupled: list[FloatArray] = []
         self._right = np.zeros((size, d))
 
     def add(self, hessian: FloatArray | None, gradient: FloatArray, order: int = 0) -> None:
@@ -103,20 +105,11 @@ class BlockBandedSystem:
             residual: (n, m).
         """
         n, m, d = jacobians[0].shape
-        width, size = self._bandwidth, self._basis.size
-        local = np.zeros((n, m, width, d))
+        local = np.zeros((n, m, self._bandwidth, d))
         for order, jacobian in enumerate(jacobians):
             local += self._basis.values[order][:, None, :, None] * jacobian[:, :, None, :]
-        local = local.reshape(n, m, width * d)
-        row, column = self._lower
-        places = (row - column) * size + column
-        spans, start = np.unique(self._basis.first, return_index=True)
-        stop = np.append(start[1:], n)
-        for first, a, b in zip(spans, start, stop, strict=True):
-            rows = local[a:b].reshape(-1, width * d)
-            hessian = (rows.T @ rows).reshape(width, d, width, d)
-            self._blocks[places + first] += hessian[row, :, column].reshape(len(row), d * d)
-            self._right[first : first + width] -= (rows.T @ residual[a:b].ravel()).reshape(width, d)
+            self._right -= self._rows[order] @ (residual[:, None, :] @ jacobian)[:, 0]
+        self._coupled.append(local.reshape(n, m, -1))
 
     def solve(self, damping: float | FloatArray) -> FloatArray:
         """Return the step of every control point, (size, d), with Levenberg damping.
@@ -132,20 +125,29 @@ class BlockBandedSystem:
         ).reshape(size, d)
 
     def _band(self) -> FloatArray:
-        """The matrix in LAPACK's lower banded storage: (bandwidth d, size d), column by column."""
+        """The matrix in LAPACK's lower banded storage: (bandwidth d + 1, size d), column by column.
+
+        The last row is zero; with it, a block of the matrix is an array that BLAS can add to in place.
+        """
         size, d, width = self._basis.size, self._dimension, self._bandwidth
         depth = width * d
-        memory = np.zeros(size * d * depth)
+        memory = np.zeros(size * d * (depth + 1))
         # Below a diagonal element follow the rows of its own block column, so that the same
         # row of the next column lies one place earlier.
         by_column = as_strided(
-            memory, (size, d, width, d), [memory.itemsize * step for step in (d * depth, depth - 1, d, 1)]
+            memory, (size, d, width, d), [memory.itemsize * step for step in (d * (depth + 1), depth, d, 1)]
         )
         blocks = self._blocks.reshape(width, size, d, d)
-        # The zeros above the diagonal fall on places of the previous column that come next.
+        # What is above the diagonal would fall on places of the previous column.
         by_column[:, :, 0] = np.tril(blocks[0]).transpose(0, 2, 1)
         by_column[:, :, 1:] = blocks[1:].transpose(1, 3, 0, 2)
-        return memory.reshape(size * d, depth).T
+        for local in self._coupled:
+            for first, start, stop in self._spans:
+                begin = first * d * (depth + 1)
+                block = memory[begin : begin + depth**2].reshape(depth, depth).T
+                rows = local[start:stop].reshape(-1, depth)
+                dsyrk(1.0, rows.T, beta=1.0, c=block, lower=1, overwrite_c=1)
+        return memory.reshape(size * d, depth + 1).T
 
     def _pair_products(self, order: int) -> csr_matrix:
         values, first, size = self._basis.values[order], self._basis.first, self._basis.size
@@ -166,3 +168,10 @@ class BlockBandedSystem:
         n, width = values.shape
         rows = (first[:, None] + np.arange(width)).ravel()
         return csr_matrix((values.ravel(), (rows, np.repeat(np.arange(n), width))), shape=(size, n))
+
+
+def _spans(first: NDArray[np.int64]) -> list[tuple[int, int, int]]:
+    """Index of the first control point, first sample and sample after the last of each span with samples."""
+    points, start = np.unique(first, return_index=True)
+    stop = np.append(start[1:], len(first))
+    return list(zip(points.tolist(), start.tolist(), stop.tolist(), strict=True))
