@@ -25,6 +25,7 @@ from manikin.scene import (
 )
 from manikin.scene.collision import ClosedSurface, triangle_geometry
 from manikin.scene.covering import winding_inside
+from manikin.scene.placed import KnownDistances
 from manikin.spatial import rotation_from_rpy
 
 FAR = 100.0
@@ -464,3 +465,25 @@ def test_no_near_pair_is_skipped_along_a_smooth_motion():
         alone, mine = proximity.evaluate(q, 0.05), together.sample == k
         np.testing.assert_array_equal(together.distance[mine], alone.distance)
         np.testing.assert_allclose(together.gradient[mine], alone.gradient, atol=1e-12)
+
+
+def test_what_is_known_from_before_changes_no_result():
+    """Small, large and no changes of a motion: the same pairs, distances and gradients to the last bit."""
+    body = human()
+    rng = np.random.default_rng(5)
+    start, end = (random_configuration(body, rng) for _ in range(2))
+    scene = Scene([Obstacle("table", Box((0.5, 0.5, 0.4)), translation=(0.2, 0.1, 0.3))])
+    proximity, known = Proximity(body, scene), KnownDistances()
+    for size in (0.0, 0.01, 0.0, 0.5, 0.002):
+        end = pin.integrate(body.pinocchio, end, size * rng.normal(size=body.nv))
+        samples = np.array(
+            [pin.interpolate(body.pinocchio, start, end, s) for s in np.linspace(0.0, 1.0, 30)]
+        )
+        placed = proximity.place(samples)
+        fresh = proximity.evaluate_placed(placed, 0.05)
+        again = proximity.evaluate_placed(placed, 0.05, known=known)
+        assert len(fresh.distance)
+        assert again.pairs == fresh.pairs
+        np.testing.assert_array_equal(again.sample, fresh.sample)
+        np.testing.assert_array_equal(again.distance, fresh.distance)
+        np.testing.assert_array_equal(again.gradient, fresh.gradient)

@@ -208,7 +208,7 @@ class Proximity:
             SceneError: If the number of ignore sets is not n, or a sample is not a finite
                 vector of the body's size.
         """
-        return self.evaluate_placed(self._placed(q_samples), activation, ignore)
+        return self.evaluate_placed(self.place(q_samples), activation, ignore)
 
     def evaluate_placed(
         self,
@@ -323,8 +323,12 @@ class Proximity:
             heapq.heappush(queue, (float(column.min()), pair))
         return best
 
-    def _placed(self, q_samples: FloatArray) -> PlacedShapes:
-        """Shapes and Jacobians of configurations (n, nq)."""
+    def place(self, q_samples: FloatArray) -> PlacedShapes:
+        """Shapes and Jacobians of configurations (n, nq).
+
+        Raises:
+            SceneError: If a sample is not a finite vector of the body's size.
+        """
         jacobians = np.empty((len(q_samples), 6, self.nv))
         placements = np.empty((len(q_samples), self._count, 4, 4))
         for sample, q in enumerate(q_samples):
@@ -362,9 +366,7 @@ class Proximity:
             )
         return np.array([self._considered(frozenset(item)) for item in ignore])
 
-    def _measure(
-        self, indices: list[int], rotations: FloatArray, translations: FloatArray
-    ) -> list[Measured]:
+    def _measure(self, indices: list[int], rotations: FloatArray, translations: FloatArray) -> list[Measured]:
         """Distance, normal and the two nearest points of each pair, the body's shapes being placed.
 
         The vectors are buffers that the next measurement of the same pair overwrites.

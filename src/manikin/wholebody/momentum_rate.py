@@ -42,7 +42,7 @@ class MomentumRateSamples:
 
     @property
     def linear_by_acceleration(self) -> FloatArray:
-        """(n, 3, nv) derivative of the linear momentum's rate by the acceleration: mass times the CoM's Jacobian."""
+        """(n, 3, nv) derivative of the linear part by ``a``: mass times the centre of mass' Jacobian."""
         return self._by_a[:, :3]
 
     def by_raw(

@@ -82,7 +82,7 @@ class MotionSampler:
         )  # fmt: skip
 
     def frame_jacobian(self, motion: MotionSamples, number: int) -> FloatArray:
-        """(n, 6, nv) linear, then angular velocity of a frame in world axes, by its place among the frames."""
+        """(n, 6, nv) linear, then angular velocity of frame ``number`` in world axes, per ``v``."""
         columns = self._moving[number]
         joints = motion.shapes.jacobians[:, :, columns]
         out = np.zeros_like(motion.shapes.jacobians)

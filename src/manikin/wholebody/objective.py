@@ -69,9 +69,9 @@ class Linearised:
         return float(self.sample_cost.sum())
 
     def add(self, order: int, jacobian: FloatArray, residual: FloatArray) -> None:
-        """Add residuals (n, m) with derivatives (n, m, k) by the first k raw coordinates' derivative of ``order``.
+        """Add residuals (n, m) with derivatives (n, m, k) by the raw derivative of ``order``.
 
-        The first residuals of an order come with the derivatives by all coordinates.
+        The derivatives are by the first ``k`` coordinates; for the first residuals of an order, by all.
         """
         transposed = jacobian.transpose(0, 2, 1)
         self._add_terms(order, transposed @ jacobian, (transposed @ residual[:, :, None])[:, :, 0])
@@ -129,6 +129,7 @@ class MotionObjective:
         self._body, self._proximity, self._targets = body, proximity, targets
         self._sampler = MotionSampler(body, tuple(targets.effectors), basis)
         self._known = KnownDistances()
+        self._last: tuple[FloatArray, MotionSamples] | None = None
         with np.errstate(divide="ignore"):
             self._reference_weight = 1.0 / targets.reference_scale
         self.task_rows = 6 * len(targets.effectors) + 3
@@ -144,7 +145,7 @@ class MotionObjective:
             scales: Scales of the residuals.
             shift: (n, task_rows) constants added to the scaled task residuals (multipliers).
         """
-        motion = self._sampler.sample(points)
+        motion = self._sampled(points)
         raw = motion.raw
         out = Linearised(np.zeros(len(motion.com)))
         self._add_tasks(out, motion, scales, shift)
@@ -156,6 +157,12 @@ class MotionObjective:
         self._add_accelerations(out, raw[2], scales)
         self._add_momentum_rate(out, motion.momentum, scales)
         return out
+
+    def _sampled(self, points: FloatArray) -> MotionSamples:
+        """The spline at its samples; those of the last one, when only the scales have changed since."""
+        if self._last is None or not np.array_equal(self._last[0], points):
+            self._last = points.copy(), self._sampler.sample(points)
+        return self._last[1]
 
     def _add_tasks(
         self, out: Linearised, motion: MotionSamples, scales: FitScales, shift: FloatArray
@@ -199,7 +206,11 @@ class MotionObjective:
         q, reference, weight = motion.states.q, self._targets.reference, self._reference_weight
         relative = Rotation.from_quat(reference[:, 3:7]).inv() * Rotation.from_quat(q[:, 3:7])
         turn = relative.as_rotvec()
-        out.add(0, weight[3:6, None] * (rotation_vector_jacobian(turn) @ motion.tangent[:, 3:6]), weight[3:6] * turn)
+        out.add(
+            0,
+            weight[3:6, None] * (rotation_vector_jacobian(turn) @ motion.tangent[:, 3:6]),
+            weight[3:6] * turn,
+        )
         diagonal, residual = np.zeros_like(q), np.zeros_like(q)
         diagonal[:, 7:] = weight[6:]
         residual[:, 7:] = weight[6:] * (q[:, 7:] - reference[:, 7:])
