@@ -53,7 +53,7 @@ class KnownDistances:
         self._lower: FloatArray | None = None
 
     def lower(self, bounds: PairBounds, corners: FloatArray) -> FloatArray | None:
-        """(n, pairs) lower bounds [m] of shapes at ``corners`` (n, shapes, 8, 3); None if nothing is known."""
+        """(n, pairs) lower bounds [m] with shapes at ``corners`` (n, shapes, 8, 3), or None."""
         if self._corners is None or self._lower is None or len(corners) != len(self._corners):
             return None
         return self._lower - bounds.moved(self._corners, corners)

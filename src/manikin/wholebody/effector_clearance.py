@@ -84,6 +84,7 @@ class EffectorClearance:
         self._reach = max((2.0 * float(np.linalg.norm(o - self._hinge.place)) for o in hanging), default=0.0)
         self._com = com
         self._placed: dict[float, list[Placed]] = {}
+        self._bents: dict[float, list[tuple[Any, FloatArray, FloatArray]]] = {}
         self._request = coal.DistanceRequest()
         self._result = coal.DistanceResult()
 
@@ -110,7 +111,13 @@ class EffectorClearance:
 
     def _bent(self, time: float) -> list[tuple[Any, FloatArray, FloatArray]]:
         """The own shapes in the effector frame, those of the hanging segment turned about its hinge."""
-        angle = 0.0 if self._bend is None else self._bend(time)
+        if self._bend is None:
+            return self._own
+        if time not in self._bents:
+            self._bents[time] = self._turned(self._bend(time))
+        return self._bents[time]
+
+    def _turned(self, angle: float) -> list[tuple[Any, FloatArray, FloatArray]]:
         if angle == 0.0:
             return self._own
         turn = Rotation.from_rotvec(angle * self._hinge.axis).as_matrix()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -151,9 +152,14 @@ class FlightPlanner:
         assert swing.end is not None
         distance = self._clearance(swing, lambda time: float(roll.toe_extension(np.array([time]))[0]))
 
+        @cache
+        def tilt(time: float) -> tuple[FloatArray, FloatArray]:
+            turn, offset = roll.tilt(np.array([time]))
+            return turn[0], offset[0]
+
         def clearance(time: float, pivot: Pose) -> float:
-            position, rotation = roll.pose(pivot.position[None], pivot.rotation[None], np.array([time]))
-            return distance(time, Pose(position[0], rotation[0]))
+            turn, offset = tilt(time)
+            return distance(time, Pose(pivot.position - pivot.rotation @ offset, pivot.rotation @ turn))
 
         start, end = self.schedule.swing_interval(swing)
         limits = replace(

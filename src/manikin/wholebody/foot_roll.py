@@ -89,18 +89,22 @@ class FootRoll:
         Returns:
             Positions (n, 3) and rotations (n, 3, 3) of the sole's frame.
         """
+        turn, offset = self.tilt(time)
+        return position - np.einsum("nij,nj->ni", rotation, offset), rotation @ turn
+
+    def tilt(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Turns (n, 3, 3) by the pitch, and the pivot (n, 3) seen from the sole's origin before them [m]."""
         angle = self.pitch(time)
         turn = np.zeros((len(time), 3, 3))
         turn[:, 0, 0] = turn[:, 2, 2] = np.cos(angle)
         turn[:, 0, 2], turn[:, 2, 0] = np.sin(angle), -np.sin(angle)
         turn[:, 1, 1] = 1.0
-        turned = rotation @ turn
         _, off, land, _ = self.instants
         first, last = PIVOT_SHIFT
         share = np.clip(((time - off) / (land - off) - first) / (last - first), 0.0, 1.0)[:, None]
         blend = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
         pivot = (1.0 - blend) * self.hinge + blend * self.heel
-        return position - np.einsum("nij,nj->ni", turned, pivot), turned
+        return turn, np.einsum("nij,nj->ni", turn, pivot)
 
     @property
     def _at_lift_off(self) -> list[float]:
