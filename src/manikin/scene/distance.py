@@ -470,10 +470,15 @@ def _shape_index(key: str | int, indices: dict[str, int]) -> int:
 
 def moves_by_shape(model: pin.Model, shapes: pin.GeometryModel, parts: int) -> FloatArray:
     """(shapes + parts, nv): 1 where a velocity coordinate moves the shape; parts never move."""
+    joints = [item.parentJoint for item in shapes.geometryObjects] + [0] * parts
+    return moves_by_joint(model)[joints]
+
+
+def moves_by_joint(model: pin.Model) -> FloatArray:
+    """(joints, nv): 1 where a velocity coordinate moves the joint; the world, joint 0, never moves."""
     table = np.zeros((model.njoints, model.nv))
     for joint in range(1, model.njoints):
         start, width = model.idx_vs[joint], model.nvs[joint]
         table[joint] = table[model.parents[joint]]
         table[joint, start : start + width] = 1.0
-    joints = [item.parentJoint for item in shapes.geometryObjects] + [0] * parts
-    return table[joints]
+    return table

@@ -6,18 +6,21 @@ the edges of their friction pyramids; contacts that have just been made, or are 
 left, cost more, so that load passes smoothly from one to the next.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import daqp
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 from scipy.optimize import lsq_linear, nnls
 
 from manikin.body import BodyModel
 from manikin.body.limb import carrying_segment, hinge_line
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
-from manikin.spatial import FloatArray, skew
+from manikin.scene.distance import moves_by_joint
+from manikin.spatial import FloatArray
 from manikin.wholebody.configuration_spline import rotation_from_quaternion
 
 _RAMP = 0.08
@@ -32,6 +35,9 @@ TORQUE_SHARE = 0.98
 _WRENCH_WEIGHT = 1.0e3
 """Cost of missing the wrench relative to the cost of force."""
 
+
+_NEWTON_STEPS = 40
+"""Steps after which the sharing of a wrench is left to a general solver."""
 
 _ARM = 0.1
 """Length that makes moments comparable with forces [m]."""
@@ -68,6 +74,7 @@ class _Generators:
         carrier: (g,) joint of the segment that it acts on.
         cost: (g,) cost of its magnitude, more where it bends the toes.
         limit: (g,) largest magnitude: the force limit of a grasp, infinite for the others [N].
+        moves: (joints, nv) 1 where a velocity coordinate moves a joint, else 0.
     """
 
     point: FloatArray
@@ -76,6 +83,7 @@ class _Generators:
     carrier: np.ndarray
     cost: FloatArray
     limit: FloatArray
+    moves: FloatArray
 
     @cached_property
     def wrenches(self) -> FloatArray:
@@ -94,10 +102,13 @@ class _Generators:
         return replace(self, point=self.point + np.outer(self.contact == contact, offset))
 
     @cached_property
-    def by_carrier(self) -> tuple[tuple[int, FloatArray], ...]:
-        """Joint and (6, g) wrenches of the generators that act on it, zero for the others."""
+    def by_carrier(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """For each joint that carries generators: which velocities move it, and the (6, g) wrenches on it.
+
+        The first is (nv,), 1 or 0; the wrenches of the generators on other joints are zero.
+        """
         return tuple(
-            (int(joint), self.wrenches * (self.carrier == joint)) for joint in np.unique(self.carrier)
+            (self.moves[joint], self.wrenches * (self.carrier == joint)) for joint in np.unique(self.carrier)
         )
 
     @cached_property
@@ -124,42 +135,82 @@ def plan_forces(
         v: (n, nv) velocities.
         a: (n, nv) accelerations.
     """
-    model = body.pinocchio
-    data = model.createData()
+    dynamics = _Dynamics.of(body, q, v, a)
     names = schedule.sequence.effectors
-    stances = [_generators(body, phase.stance, names) for phase in schedule.sequence]
     shares = load_shares(schedule, time, names)
-    settling = {name: schedule.settling(time, name) for name in names}
-    sliding = [name for name in names if np.any(settling[name])]
-    phases = schedule.phase_at(time)
-    rotations = rotation_from_quaternion(q[:, 3:7])
-    tau = np.zeros((len(time), model.nv))
+    tau = np.zeros((len(time), body.nv))
     forces = np.zeros((len(time), len(names), 6))
-    for k in range(len(time)):
-        needed = pin.rnea(model, data, q[k], v[k], a[k]).copy()
-        generators, stance = stances[phases[k]], schedule.sequence[int(phases[k])].stance
-        for name in sliding:
-            if settling[name][k]:
-                here = effector_position(body, data, q[k], name)
-                generators = generators.shifted(names.index(name), here - stance[name].position)
-        wrench = _base_wrench_in_world(needed[:6], q[k], rotations[k])
-        magnitude = _share_wrench(generators, wrench, shares[k])
-        pin.computeJointJacobians(model, data, q[k])
-        tau[k] = needed - _apply(model, data, generators, magnitude)
-        if np.any(np.abs(tau[k, 6:]) > body.torque_limit) or np.any(magnitude > generators.limit):
+    for rows, generators, stance in _alike(body, schedule, time, q):
+        part = dynamics.part(rows)
+        cost = generators.cost / shares[rows][:, generators.contact]
+        matrix, target = _centred(generators, part.wrench)
+        magnitude = share_wrenches(matrix, target, cost)
+        tau[rows] = part.needed - _apply(part.jacobians, generators, magnitude)
+        over = np.any(np.abs(tau[rows, 6:]) > body.torque_limit, axis=1)
+        over |= np.any(magnitude > generators.limit, axis=1)
+        for k in np.flatnonzero(over):
+            joint_map = _joint_map(part.jacobians[k], generators)
             other = _share_within_limits(
-                generators,
-                wrench,
-                shares[k],
-                needed[6:],
-                _joint_map(model, data, generators)[6:],
+                generators, matrix, target[k], cost[k], part.needed[k, 6:], joint_map[6:],
                 TORQUE_SHARE * body.torque_limit,
-            )
+            )  # fmt: skip
             if other is not None:
-                magnitude = other
-                tau[k] = needed - _apply(model, data, generators, magnitude)
-        forces[k] = _by_contact(generators, magnitude, stance, names)
+                magnitude[k] = other
+                tau[rows[k]] = part.needed[k] - joint_map @ other
+        forces[rows] = _by_contact(generators, magnitude, stance, names)
     return ContactForces(tau, forces, np.linalg.norm(tau[:, :6], axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Dynamics:
+    """Inverse dynamics of samples of a motion, without contacts.
+
+    Attributes:
+        needed: (n, nv) generalised forces [N, N.m].
+        wrench: (n, 6) their part on the pelvis as a wrench about the world origin.
+        jacobians: (n, 6, nv) joint Jacobians in the world.
+    """
+
+    needed: FloatArray
+    wrench: FloatArray
+    jacobians: FloatArray
+
+    @classmethod
+    def of(cls, body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray) -> "_Dynamics":
+        model, data = body.pinocchio, body.pinocchio.createData()
+        needed, jacobians = np.empty((len(q), model.nv)), np.empty((len(q), 6, model.nv))
+        for k in range(len(q)):
+            needed[k] = pin.rnea(model, data, q[k], v[k], a[k])
+            jacobians[k] = pin.computeJointJacobians(model, data, q[k])
+        rotation = rotation_from_quaternion(q[:, 3:7])
+        force = np.einsum("nij,nj->ni", rotation, needed[:, :3])
+        moment = np.einsum("nij,nj->ni", rotation, needed[:, 3:6]) + np.cross(q[:, :3], force)
+        return cls(needed, np.hstack([force, moment]), jacobians)
+
+    def part(self, rows: NDArray[np.int64]) -> "_Dynamics":
+        return _Dynamics(self.needed[rows], self.wrench[rows], self.jacobians[rows])
+
+
+def _alike(
+    body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray
+) -> Iterator[tuple[NDArray[np.int64], _Generators, Stance]]:
+    """Indices of the samples that have the same force directions, with these and the stance."""
+    names = schedule.sequence.effectors
+    data = body.pinocchio.createData()
+    phases = schedule.phase_at(time)
+    settling = {name: schedule.settling(time, name) for name in names}
+    for number, phase in enumerate(schedule.sequence):
+        generators, rows = _generators(body, phase.stance, names), phases == number
+        sliding = np.any([settling[name] for name in names], axis=0) & rows
+        if np.any(rows & ~sliding):
+            yield np.flatnonzero(rows & ~sliding), generators, phase.stance
+        for k in np.flatnonzero(sliding):
+            shifted = generators
+            for index, name in enumerate(names):
+                if settling[name][k]:
+                    here = effector_position(body, data, q[k], name)
+                    shifted = shifted.shifted(index, here - phase.stance[name].position)
+            yield np.array([k]), shifted, phase.stance
 
 
 def effector_position(body: BodyModel, data: pin.Data, q: FloatArray, effector: str) -> FloatArray:
@@ -204,7 +255,7 @@ def _generators(body: BodyModel, stance: Stance, names: tuple[str, ...]) -> _Gen
                 limits.append(contact.max_force if contact.kind is ContactKind.GRASP else np.inf)
     return _Generators(
         np.array(points), np.array(directions), np.array(contacts), np.array(carriers), np.array(costs),
-        np.array(limits),
+        np.array(limits), moves_by_joint(body.pinocchio),
     )  # fmt: skip
 
 
@@ -231,20 +282,46 @@ def _edges(contact: Contact) -> FloatArray:
     return local @ contact.rotation_contact_to_world.T
 
 
-def _base_wrench_in_world(base: FloatArray, q: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Wrench about the world origin of the pelvis part of a generalised force."""
-    force = rotation @ base[:3]
-    return np.concatenate([force, rotation @ base[3:6] + skew(q[:3]) @ force])
+def share_wrenches(matrix: FloatArray, targets: FloatArray, cost: FloatArray) -> FloatArray:
+    """Magnitudes ``x >= 0`` that supply wrenches with the least weighted square, for many samples at once.
 
+    They minimise ``w^2 |A x - b|^2 + sum_j (c_j x_j)^2``.  With the multiplier ``y`` of the wrench,
+    ``x_j = max(0, a_j . y) / c_j^2``, and ``y`` minimises a convex, piecewise quadratic function of six
+    unknowns.  Newton's method finds it in a few steps; a sample for which it does not end within
+    :data:`_NEWTON_STEPS` is left to a general solver.
 
-def _share_wrench(generators: _Generators, wrench: FloatArray, shares: FloatArray) -> FloatArray:
-    """Magnitudes (g,) >= 0 that supply the wrench with the least weighted square.
+    Args:
+        matrix: (6, g) wrench ``a_j`` of each unit magnitude.
+        targets: (n, 6) wrenches ``b`` to supply.
+        cost: (n, g) cost ``c`` of each magnitude.
 
-    The wrench is taken about the mean contact point, in units of its force, for conditioning.
+    Returns:
+        (n, g).
     """
-    matrix, target = _centred(generators, wrench)
-    cost = np.diag(generators.cost / shares[generators.contact])
-    stacked = np.vstack([_WRENCH_WEIGHT * matrix, cost])
+    inverse_cost = cost**-2.0
+    active = np.ones(cost.shape, dtype=bool)
+    magnitude = np.empty(cost.shape)
+    open_ones = np.arange(len(cost))
+    for _ in range(_NEWTON_STEPS):
+        weight = np.where(active[open_ones], inverse_cost[open_ones], 0.0)
+        system = (matrix * weight[:, None, :]) @ matrix.T + np.eye(6) / _WRENCH_WEIGHT**2
+        multiplier = np.linalg.solve(system, targets[open_ones, :, None])[:, :, 0]
+        along = multiplier @ matrix
+        settled = np.all((along > 0.0) == active[open_ones], axis=1)
+        active[open_ones] = along > 0.0
+        done = open_ones[settled]
+        magnitude[done] = (weight * along)[settled]
+        open_ones = open_ones[~settled]
+        if len(open_ones) == 0:
+            break
+    for k in open_ones:
+        magnitude[k] = _share_wrench(matrix, targets[k], cost[k])
+    return magnitude
+
+
+def _share_wrench(matrix: FloatArray, target: FloatArray, cost: FloatArray) -> FloatArray:
+    """Like :func:`share_wrenches` for one sample, by an active-set method."""
+    stacked = np.vstack([_WRENCH_WEIGHT * matrix, np.diag(cost)])
     wanted = np.concatenate([_WRENCH_WEIGHT * target, np.zeros(len(cost))])
     try:
         return nnls(stacked, wanted)[0]
@@ -253,21 +330,20 @@ def _share_wrench(generators: _Generators, wrench: FloatArray, shares: FloatArra
 
 
 def _centred(generators: _Generators, wrench: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Wrenches (6, g) of the generators and the wanted one (6,) about the mean contact point."""
+    """Wrenches (6, g) of the generators and the wanted ones (n, 6) about the mean contact point.
+
+    In units of force, for conditioning.
+    """
     centre, matrix = generators.balance
-    force, moment = wrench[:3], wrench[3:]
-    turned = np.array([
-        centre[1] * force[2] - centre[2] * force[1],
-        centre[2] * force[0] - centre[0] * force[2],
-        centre[0] * force[1] - centre[1] * force[0],
-    ])  # fmt: skip
-    return matrix, np.concatenate([force, (moment - turned) / _ARM])
+    force, moment = wrench[:, :3], wrench[:, 3:]
+    return matrix, np.hstack([force, (moment - np.cross(centre, force)) / _ARM])
 
 
 def _share_within_limits(
     generators: _Generators,
-    wrench: FloatArray,
-    shares: FloatArray,
+    matrix: FloatArray,
+    target: FloatArray,
+    cost: FloatArray,
     needed: FloatArray,
     joint_map: FloatArray,
     torque_limit: FloatArray,
@@ -276,14 +352,14 @@ def _share_within_limits(
 
     Args:
         generators: Force directions of the stance.
-        wrench: (6,) to supply, about the world origin.
-        shares: (c,) readiness of each contact to carry load.
+        matrix: (6, g) their wrenches about the mean contact point.
+        target: (6,) wrench to supply, about that point.
+        cost: (g,) cost of each magnitude.
         needed: (nv - 6,) joint torques without contacts [N.m].
         joint_map: (nv - 6, g) torque that a unit magnitude takes from each joint.
         torque_limit: (nv - 6,) [N.m].
     """
-    matrix, target = _centred(generators, wrench)
-    cost = (generators.cost / shares[generators.contact]) ** 2
+    cost = cost**2
     count = len(cost)
     limit = np.where(np.isfinite(generators.limit), generators.limit, 1e6)
     solution, _, flag, _ = daqp.solve(
@@ -301,30 +377,29 @@ _EQUALITY = 5
 """DAQP's mark of an equality."""
 
 
-def _joint_map(model: pin.Model, data: pin.Data, generators: _Generators) -> FloatArray:
-    """(nv, g) generalised force of a unit magnitude of each generator."""
-    total = np.zeros((model.nv, len(generators.cost)))
-    for joint, wrenches in generators.by_carrier:
-        total += pin.getJointJacobian(model, data, joint, pin.WORLD).T @ wrenches
-    return total
+def _joint_map(jacobians: FloatArray, generators: _Generators) -> FloatArray:
+    """(nv, g) generalised force of a unit magnitude of each generator, from joint Jacobians (6, nv)."""
+    return sum((jacobians * moved).T @ wrenches for moved, wrenches in generators.by_carrier) + np.zeros(
+        (jacobians.shape[1], len(generators.cost))
+    )
 
 
-def _apply(model: pin.Model, data: pin.Data, generators: _Generators, magnitude: FloatArray) -> FloatArray:
-    """Generalised force of the contact forces."""
-    total = np.zeros(model.nv)
-    for joint, wrenches in generators.by_carrier:
-        jacobian = pin.getJointJacobian(model, data, joint, pin.WORLD)
-        total += jacobian.T @ (wrenches @ magnitude)
+def _apply(jacobians: FloatArray, generators: _Generators, magnitude: FloatArray) -> FloatArray:
+    """(n, nv) generalised forces of contact forces (n, g), from joint Jacobians (n, 6, nv)."""
+    total = np.zeros((len(jacobians), jacobians.shape[2]))
+    for moved, wrenches in generators.by_carrier:
+        total += moved * ((magnitude @ wrenches.T)[:, None, :] @ jacobians)[:, 0]
     return total
 
 
 def _by_contact(
     generators: _Generators, magnitude: FloatArray, stance: Stance, names: tuple[str, ...]
 ) -> FloatArray:
-    out = np.zeros((len(names), 6))
+    """(n, c, 6) force and moment about each contact's origin of magnitudes (n, g)."""
+    out = np.zeros((len(magnitude), len(names), 6))
     for contact in stance:
         index = names.index(contact.effector)
-        resultant = generators.by_contact[index] @ magnitude
-        out[index, :3] = resultant[:3]
-        out[index, 3:] = resultant[3:] - skew(contact.position) @ resultant[:3]
+        resultant = magnitude @ generators.by_contact[index].T
+        out[:, index, :3] = resultant[:, :3]
+        out[:, index, 3:] = resultant[:, 3:] - np.cross(contact.position, resultant[:, :3])
     return out

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from manikin.body import BodyModel
+from manikin.scene.distance import moves_by_joint
 from manikin.scene.placed import PlacedShapes, PlacementReader
 from manikin.spatial import FloatArray, skew
 from manikin.wholebody.banded import SampledBasis
@@ -56,7 +56,8 @@ class MotionSampler:
         indices = [body.effector_frame(name) for name in frames]
         self._shape_reader = PlacementReader(self._geometry_data.oMg)
         self._frame_reader = PlacementReader([self._data.oMf[index] for index in indices])
-        self._moving = [_moving_columns(self._model, index) for index in indices]
+        moves = moves_by_joint(self._model)
+        self._moving = [np.flatnonzero(moves[self._model.frames[index].parentJoint]) for index in indices]
 
     def sample(self, points: FloatArray) -> MotionSamples:
         """Evaluate the spline with control points (k, nq)."""
@@ -89,9 +90,3 @@ class MotionSampler:
         out[:, :3, columns] = joints[:, :3] - skew(motion.frames[:, number, :3, 3]) @ joints[:, 3:]
         out[:, 3:, columns] = joints[:, 3:]
         return out
-
-
-def _moving_columns(model: pin.Model, frame: int) -> NDArray[np.int64]:
-    """Indices of the velocity coordinates that move a frame."""
-    joints = [joint for joint in model.supports[model.frames[frame].parentJoint] if joint > 0]
-    return np.concatenate([np.arange(model.idx_vs[j], model.idx_vs[j] + model.nvs[j]) for j in joints])
