@@ -9,6 +9,7 @@ import pytest
 import typer
 
 import manikin
+from manikin import figures
 from manikin.cli import app
 from manikin.motion.file import write_motions
 from manikin.scenarios import list_variants, load_scenario
@@ -123,6 +124,15 @@ def test_commands_and_options_exist(name):
         assert {word for word in words if word.startswith("--")} <= known, line
     for command in re.findall(r"`manikin (\w+)", PAGES[name]):
         assert command in COMMANDS
+
+
+def test_every_figure_is_set_beside_those_of_the_thesis():
+    """Each function is named, and so is each figure that shows what a run of a scenario shows."""
+    text = PAGES["figures.md"]
+    assert set(re.findall(r"\w+_figure\b", text)) == {n for n in figures.__all__ if n.endswith("_figure")}
+    rows = " ".join(re.findall(r"^\| ([^:|]*):", text, re.M))
+    evaluated = "5.12 5.13 5.14 5.15 5.16 5.22 5.23 6.7 6.9 6.10 7.8 7.9 7.14 7.15 7.16 7.17 7.18"
+    assert set(evaluated.split()) <= set(re.findall(r"\d\.\d+", rows))
 
 
 def test_every_module_is_in_the_api_reference():

@@ -3,12 +3,15 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.figures.style import STYLES, legend_in_title, need
+from manikin.figures.style import STYLES, legend_in_title, need, span_at_least
 from manikin.figures.timeline import timeline
 from manikin.record import RunRecord
 from manikin.spatial import FloatArray
 
 QUANTITIES = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s²"))
+
+LEAST_SPAN = 4e-3
+"""Height of a panel at the least, in its unit."""
 
 
 def com_figure(record: RunRecord) -> Figure:
@@ -43,6 +46,7 @@ def com_figure(record: RunRecord) -> Figure:
                 drawn.append(values)
             if quantity == "acceleration":
                 axes.set_ylim(_without_spikes(np.concatenate(drawn)))
+            span_at_least(axes, LEAST_SPAN)
             shown.label(axes, f"{axis} [{unit}]")
     legend_in_title(shown.figure, axes)
     return shown.figure

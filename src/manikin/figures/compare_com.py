@@ -8,6 +8,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.comparison import RunComparison
 from manikin.figures.compare_timing import RUN_COLOURS
+from manikin.figures.labels import Labels
 from manikin.figures.planes import draw_paths, frame_plane, mark_instants, planes_grid
 from manikin.figures.scene import draw_scene, draw_soles, frame
 from manikin.figures.style import legend_in_title, need, new_figure
@@ -30,10 +31,11 @@ def compare_planes_figure(comparison: RunComparison) -> Figure:
     for column, view in enumerate(VIEWS):
         axes = figure.add_subplot(grid[column])
         draw_paths(axes, view, tracks, _styles(comparison))
+        frame_plane(axes, view, low, high)
+        labels = Labels(axes)
         for run, track, colour in zip(comparison.runs, tracks.values(), RUN_COLOURS, strict=True):
             if run.phases is not None:
-                mark_instants(axes, view, track.at(run.phases.instants), colour)
-        frame_plane(axes, view, low, high)
+                mark_instants(labels, axes, view, track.at(run.phases.instants), colour)
     legend_in_title(figure, axes)
     return figure
 

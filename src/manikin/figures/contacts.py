@@ -21,6 +21,12 @@ from manikin.record import ComTrack, RunRecord
 COLUMNS = 6
 PANEL = 2.3
 """Width of a panel [inch]; of a tall one less."""
+TALLEST = 3.6
+"""Height of a panel at the most [inch]."""
+TITLE = 1.2
+"""Room for the title above a panel [inch]."""
+WIDEST = 13.0
+"""Narrow panels stand beside each other up to this width [inch]."""
 MOST = 24
 """More phases than this are not drawn one by one."""
 
@@ -42,15 +48,16 @@ def contacts_figure(record: RunRecord) -> Figure:
     view = best_view(schedule)
     track = next(iter(record.tracks.values()), None)
     count = len(schedule.sequence)
-    columns = min(count, COLUMNS if count != 7 else 4)
-    rows = -(-count // columns)
     points = [c.points_in_world for c in distinct_contacts(schedule)]
     seen = np.vstack(points + ([] if track is None else [track.position]))
     low, high = seen.min(axis=0) - 0.1, seen.max(axis=0) + 0.1
     width, height = view(high - low)
-    panel = PANEL * float(np.clip(1.3 * width / height, 0.55, 1.0))
-    pitch = np.array([1.06 * width, height + 0.45 * width / panel])
+    panel = min(PANEL * float(np.clip(1.3 * width / height, 0.55, 1.0)), TALLEST * width / height)
+    pitch = np.array([max(1.06 * panel, TITLE) * width / panel, height + 0.45 * width / panel])
     scale = panel / width
+    most = max(COLUMNS if count != 7 else 4, int(WIDEST / (pitch[0] * scale)))
+    rows = -(-count // most)
+    columns = min(count, most) if most <= COLUMNS else -(-count // rows)
     figure, grid = new_grid(
         columns * pitch[0] * scale + 0.8, rows * pitch[1] * scale + 1.15,
         f"Contacts of each phase, {view.words}", 1, 1, top=0.75,
@@ -62,7 +69,7 @@ def contacts_figure(record: RunRecord) -> Figure:
         place = view.moved(rights[number % columns], ups[number // columns])
         (left, bottom), (right, top) = place(low), place(high)
         axes.add_patch(Rectangle((left, bottom), right - left, top - bottom, fill=False, edgecolor="#C4C9D1",
-                                 linewidth=0.7, zorder=0.4))  # fmt: skip
+                                 linewidth=0.7, zorder=0.4, clip_on=False))  # fmt: skip
         axes.annotate(_title(schedule, number), (left, top), (0, 3), textcoords="offset points", fontsize=8.5)
         if record.scene is not None:
             draw_obstacles(axes, record.scene, place, low, high)

@@ -3,10 +3,13 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.figures.style import STYLES, legend_in_title, need, readable
+from manikin.figures.style import STYLES, legend_in_title, need, readable, span_at_least
 from manikin.figures.timeline import timeline
 from manikin.figures.tracking import interpolated
 from manikin.record import RunRecord
+
+LEAST_SPAN = 0.02
+"""Height of a panel at the least [m]."""
 
 
 def effectors_figure(record: RunRecord) -> Figure:
@@ -32,9 +35,7 @@ def effectors_figure(record: RunRecord) -> Figure:
             for kind, found in paths.items():
                 axes.plot(record.motions[kind].time, found[name][:, row], label=kind, **STYLES[kind])
             shown.label(axes, f"{axis} [m]" if column == 0 else "")
-            low, high = axes.get_ylim()
-            if high - low < 0.02:  # what hardly moves is not magnified
-                axes.set_ylim((low + high) / 2 - 0.01, (low + high) / 2 + 0.01)
+            span_at_least(axes, LEAST_SPAN)
     legend_in_title(shown.figure, axes)
     return shown.figure
 

@@ -1,5 +1,7 @@
 """The paths of feet and hands between their contacts, in space."""
 
+from collections import Counter
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -51,7 +53,7 @@ def flights_figure(record: RunRecord) -> Figure:
     if "executed" in record.effector_paths:
         height.plot([], [], **_EXECUTED, label="executed")
     dress(height, "height [m]", "time [s]")
-    height.legend(fontsize=8, frameon=False, loc="best")
+    height.legend(fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return figure
 
 
@@ -67,13 +69,15 @@ def _add_executed(record: RunRecord, axes: Axes, schedule: ContactSchedule, swin
 
 
 def _methods(record: RunRecord, swings: list[Swing]) -> list[str]:
-    """How each flight was planned, as far as the summary says."""
+    """How each flight was planned, as far as the summary says; nothing of what just follows the body."""
     block = record.summary.get("wholebody") or {}
-    told = [item for item in block.get("swings", []) if isinstance(item, dict)]
-    names = [swing.effector for swing in swings]
-    if [item.get("effector") for item in told] != names:
-        return [""] * len(swings)
-    return [str(item.get("method", "")) for item in told]
+    told: dict[str, list[str]] = {}
+    for item in block.get("swings", []):
+        if isinstance(item, dict):
+            told.setdefault(str(item.get("effector")), []).append(str(item.get("method", "")))
+    counts = Counter(swing.effector for swing in swings)
+    left = {name: iter(told.get(name, ())) for name in counts if len(told.get(name, ())) == counts[name]}
+    return [next(left.get(swing.effector, iter(())), "") for swing in swings]
 
 
 def _part(

@@ -25,6 +25,9 @@ from manikin.scene import HalfSpace, Plane, Scene
 OVERHEAD = 1.0
 """An obstacle that begins above this height [m] is something to walk under."""
 
+NARROW = 0.75
+"""A way this much narrower than long has its legend beside it."""
+
 LEVEL = 0.3
 """Contacts whose normal has a smaller vertical part are on a wall."""
 
@@ -61,7 +64,9 @@ def footprint_figure(record: RunRecord) -> Figure:
     if record.scene is not None:
         _draw_obstacles(axes, record.scene)
     dress(axes, "y [m]", "x [m]")
-    axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
+    narrow = high[0] - low[0] < NARROW * (high[1] - low[1])
+    beside = {"bbox_to_anchor": (1.02, 1.0)} if narrow else {}
+    axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none", **beside)
     return figure
 
 

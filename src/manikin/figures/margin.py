@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from manikin.figures.labels import Labels
 from manikin.figures.style import COLOURS, STYLES, legend_in_title, need
 from manikin.figures.timeline import timeline
 from manikin.motion.derived import PhaseTable
@@ -80,12 +81,14 @@ def _draw_curves(axes: Axes, curves: dict[str, ComTrack], phases: PhaseTable, to
     for name, curve in curves.items():
         label = f"{name} ({_lowest(curve, phases)})"
         axes.plot(curve.time, curve.margin, label=label, **STYLES[name])
-        if name != POINT_MASS:
-            _mark_minima(axes, curve, phases, name, below=name == "executed", top=top)
     low = min(0.0, *(float(curve.margin.min()) for curve in curves.values()))
     high = max(float(curve.margin.max()) for curve in curves.values()) if top is None else top
     low = low if top is None else max(low, -top)
     axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
+    labels = Labels(axes)
+    for name, curve in curves.items():
+        if name != POINT_MASS:
+            _mark_minima(axes, labels, curve, phases, name, top)
 
 
 def _lowest(curve: ComTrack, phases: PhaseTable) -> str:
@@ -96,16 +99,19 @@ def _lowest(curve: ComTrack, phases: PhaseTable) -> str:
 
 
 def _mark_minima(
-    axes: Axes, curve: ComTrack, phases: PhaseTable, name: str, *, below: bool, top: float | None
+    axes: Axes, labels: Labels, curve: ComTrack, phases: PhaseTable, name: str, top: float | None
 ) -> None:
-    for index in phase_minima(curve, phases):
-        if index is None or (top is not None and curve.margin[index] > top):
-            continue
+    """Mark the least margin of each phase, numbered where there is room, and ring the least of all."""
+    found = [index for index in phase_minima(curve, phases) if index is not None]
+    offset = (0.0, -11.0 if name == "executed" else 4.0)
+    for index in sorted(found, key=lambda index: curve.margin[index]):
         time, margin = float(curve.time[index]), float(curve.margin[index])
+        if top is not None and margin > top:
+            continue
         axes.plot(time, margin, "o", markersize=3.5, color=COLOURS[name], zorder=5)
-        axes.annotate(
-            f"{margin:.0f}", (time, margin), (0, -11 if below else 5), textcoords="offset points", fontsize=7,
-            ha=_alignment(time, phases), color=COLOURS[name], zorder=6,
+        labels.write(
+            f"{margin:.0f}", (time, margin), offset, size=7, ha=_alignment(time, phases), color=COLOURS[name],
+            zorder=6,
         )  # fmt: skip
     index = int(np.argmin(curve.margin))
     axes.plot(

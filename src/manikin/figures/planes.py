@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
+from manikin.figures.labels import Labels
 from manikin.figures.style import (
     COLOURS,
     STYLES,
@@ -17,7 +18,6 @@ from manikin.figures.style import (
     need,
     new_grid,
     readable,
-    white_edge,
 )
 from manikin.figures.views import VIEWS, View, distinct_contacts, draw_contact, draw_obstacles
 from manikin.record import ComTrack, RunRecord
@@ -48,10 +48,10 @@ def planes_figure(record: RunRecord) -> Figure:
         for contact in contacts:
             draw_contact(axes, contact, view, colours[contact.effector])
         draw_paths(axes, view, tracks, STYLES)
-        mark_instants(axes, view, first.at(phases.instants), COLOURS["ink"])
         for name, colour in colours.items():
             axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
         frame_plane(axes, view, low, high)
+        mark_instants(Labels(axes), axes, view, first.at(phases.instants), COLOURS["ink"])
     legend_in_title(figure, axes)
     return figure
 
@@ -86,15 +86,9 @@ def draw_paths(
         axes.plot(*view(track.position).T, label=f"centre of mass, {name}", **styles[name])
 
 
-def mark_instants(axes: Axes, view: View, places: FloatArray, colour: str) -> None:
+def mark_instants(labels: Labels, axes: Axes, view: View, places: FloatArray, colour: str) -> None:
     """Mark (n, 3) places of the key instants, numbered from 0 where there is room."""
     points = view(places)
     axes.plot(*points.T, "o", color=colour, markersize=3.5, zorder=6)
-    room = 0.04 * float(np.ptp(points, axis=0).max())
-    written: list[FloatArray] = []
-    for number, point in enumerate(points):
-        if any(np.linalg.norm(point - other) < room for other in written):
-            continue
-        written.append(point)
-        axes.annotate(f"{number}", point, (4, 4), textcoords="offset points", fontsize=7.5, color=colour,
-                      zorder=7, path_effects=[white_edge()])  # fmt: skip
+    for number, (right, up) in enumerate(points):
+        labels.write(f"{number}", (right, up), (4, 2), color=colour, zorder=7)

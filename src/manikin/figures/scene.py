@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from mpl_toolkits.mplot3d.proj3d import proj_transform
@@ -17,6 +18,9 @@ from manikin.motion.derived import phases_of, segment_positions
 from manikin.record import ComTrack, RunRecord
 from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
 from manikin.spatial import FloatArray
+
+MOST_TICKS = 9
+"""Ticks of the longest axis; the others have fewer."""
 
 
 def scene_figure(record: RunRecord, elevation_deg: float = 14.0, azimuth_deg: float = -62.0) -> Figure:
@@ -192,8 +196,10 @@ def frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     zoom: Any = 1.16  # the annotation says int, the function takes any number
     axes.set_box_aspect(high - low, zoom=zoom)
-    for axis, label in ((axes.xaxis, "x [m]"), (axes.yaxis, "y [m]"), (axes.zaxis, "z [m]")):
-        axis.set_label_text(label, fontsize=9)
+    spans = zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", (high - low) / (high - low).max(), strict=True)
+    for axis, name, share in spans:
+        axis.set_label_text(f"{name} [m]", fontsize=9)
+        axis.set_major_locator(MaxNLocator(max(round(MOST_TICKS * float(share)), 1)))
         axis.set_tick_params(labelsize=7)
         axis.pane.set_facecolor("#FAFBFC")
         axis.pane.set_edgecolor("#D5D9DF")

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from typing import Any, TypeVar
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -12,7 +11,6 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from manikin.errors import FigureError
-from manikin.motion.derived import PhaseTable
 from manikin.record import RunRecord
 
 COLOURS = {
@@ -174,38 +172,11 @@ def end_of(record: RunRecord) -> float:
     return max([*ends, *([] if record.phases is None else [float(record.phases.instants[-1])])])
 
 
-def draw_phases(axes: Axes, phases: PhaseTable, end: float) -> None:
-    """Shade single supports and draw a line at every key instant; time runs to ``end`` [s]."""
-    for start, stop, supports in _spans(phases, end):
-        if len(supports) <= 1:
-            axes.axvspan(start, stop, color=COLOURS["shade"], zorder=0, linewidth=0)
-    for instant in phases.instants:
-        axes.axvline(float(instant), color="#B9BEC6", linewidth=0.7, linestyle=(0, (4, 3)), zorder=1)
-    axes.set_xlim(float(phases.instants[0]), end)
-
-
-def draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
-    """One bar per effector while it is in contact, and the number of each phase, from 0, above."""
-    effectors = list(dict.fromkeys(name for supports in phases.supports for name in supports))
-    colours = colours_of(effectors)
-    for row, effector in enumerate(effectors):
-        bars = [(start, stop - start) for start, stop, on in _spans(phases, end) if effector in on]
-        axes.broken_barh(bars, (row + 0.15, 0.7), facecolors=colours[effector], alpha=0.85)
-    for number, (start, stop) in enumerate(zip(phases.instants, phases.instants[1:], strict=False)):
-        axes.text(
-            (float(start) + float(stop)) / 2, -0.08, f"{number}", ha="center", va="bottom", fontsize=8,
-            color=COLOURS["ink"],
-        )  # fmt: skip
-    if end > phases.instants[-1] + 0.2:
-        middle = (float(phases.instants[-1]) + end) / 2
-        axes.text(middle, -0.08, "rest", ha="center", va="bottom", fontsize=8, color=COLOURS["soft"])
-    axes.set_yticks(np.arange(len(effectors)) + 0.5, [readable(name) for name in effectors], fontsize=8)
-    axes.set_ylim(len(effectors) + 0.05, 0.0)
-    axes.set_xlim(float(phases.instants[0]), end)
-    axes.tick_params(length=0, labelbottom=False)
-    axes.set_xticks([])
-    for side in ("top", "right", "left", "bottom"):
-        axes.spines[side].set_visible(False)
+def span_at_least(axes: Axes, least: float) -> None:
+    """Widen the vertical limits to ``least`` about their middle, so that noise is not magnified."""
+    low, high = axes.get_ylim()
+    if high - low < least:
+        axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
 
 
 def white_edge() -> withStroke:
@@ -235,10 +206,3 @@ def legend_in_title(figure: Figure, *axes: Axes) -> None:
         handles, labels, fontsize=8.5, frameon=False, loc="upper right", ncols=len(labels), borderaxespad=0.3,
         handlelength=1.6, columnspacing=1.2,
     )  # fmt: skip
-
-
-def _spans(phases: PhaseTable, end: float) -> list[tuple[float, float, tuple[str, ...]]]:
-    """Start, end and supports of each phase; the last one lasts until ``end``."""
-    stops = [*(float(t) for t in phases.instants[1:-1]), max(end, float(phases.instants[-1]))]
-    starts = [float(t) for t in phases.instants[:-1]]
-    return list(zip(starts, stops, phases.supports, strict=True))

@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
-from manikin.figures.style import draw_contact_strip, draw_phases, dress, end_of, label_room, need, new_grid
+from manikin.figures.labels import Labels
+from manikin.figures.style import COLOURS, colours_of, dress, end_of, label_room, need, new_grid, readable
 from manikin.motion.derived import PhaseTable
 from manikin.record import RunRecord
 
@@ -33,7 +35,7 @@ class Timeline:
         axes = self.figure.add_subplot(self.grid[0, column])
         draw_contact_strip(axes, self.phases, self.end)
         if title:
-            axes.set_title(title, fontsize=10, loc="left", pad=12)
+            axes.set_title(title, fontsize=10, loc="left", pad=15)
         if not named:
             axes.set_yticklabels([])
 
@@ -80,3 +82,49 @@ def timeline(
     margins = {"left": label_room(record.effectors), **margins}
     figure, grid = new_grid(*size, title, 1 + panels, columns, height_ratios=heights, **margins)
     return Timeline(figure, grid, phases, end_of(record))
+
+
+def draw_phases(axes: Axes, phases: PhaseTable, end: float) -> None:
+    """Shade single supports and draw a line at every key instant; time runs to ``end`` [s]."""
+    for start, stop, supports in _spans(phases, end):
+        if len(supports) <= 1:
+            axes.axvspan(start, stop, color=COLOURS["shade"], zorder=0, linewidth=0)
+    for instant in phases.instants:
+        axes.axvline(float(instant), color="#B9BEC6", linewidth=0.7, linestyle=(0, (4, 3)), zorder=1)
+    axes.set_xlim(float(phases.instants[0]), end)
+
+
+def draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
+    """One bar per effector while it is in contact, and the numbers of the phases, from 0, above."""
+    effectors = list(dict.fromkeys(name for supports in phases.supports for name in supports))
+    colours = colours_of(effectors)
+    for row, effector in enumerate(effectors):
+        bars = [(start, stop - start) for start, stop, on in _spans(phases, end) if effector in on]
+        axes.broken_barh(bars, (row + 0.15, 0.7), facecolors=colours[effector], alpha=0.85)
+    axes.set_yticks(np.arange(len(effectors)) + 0.5, [readable(name) for name in effectors], fontsize=8)
+    axes.set_ylim(len(effectors) + 0.05, 0.0)
+    axes.set_xlim(float(phases.instants[0]), end)
+    axes.tick_params(length=0, labelbottom=False)
+    axes.set_xticks([])
+    for side in ("top", "right", "left", "bottom"):
+        axes.spines[side].set_visible(False)
+    _number_phases(axes, phases, end)
+
+
+def _number_phases(axes: Axes, phases: PhaseTable, end: float) -> None:
+    """Number the phases above a strip where there is room, the long ones first."""
+    labels = Labels(axes)
+    order = np.argsort(-np.diff(phases.instants), kind="stable")
+    for number in order:
+        middle = float(phases.instants[number : number + 2].mean())
+        labels.write(f"{number}", (middle, 0.0), (0.0, 2.0), size=8, ha="center", color=COLOURS["ink"])
+    if end > phases.instants[-1] + 0.2:
+        middle = (float(phases.instants[-1]) + end) / 2
+        labels.write("rest", (middle, 0.0), (0.0, 2.0), size=8, ha="center", color=COLOURS["soft"])
+
+
+def _spans(phases: PhaseTable, end: float) -> list[tuple[float, float, tuple[str, ...]]]:
+    """Start, end and supports of each phase; the last one lasts until ``end``."""
+    stops = [*(float(t) for t in phases.instants[1:-1]), max(end, float(phases.instants[-1]))]
+    starts = [float(t) for t in phases.instants[:-1]]
+    return list(zip(starts, stops, phases.supports, strict=True))

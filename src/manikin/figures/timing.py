@@ -3,13 +3,13 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from manikin.contact import ContactSchedule
 from manikin.figures.style import (
     COLOURS,
     colours_of,
-    draw_phases,
     dress,
     end_of,
     label_room,
@@ -20,11 +20,15 @@ from manikin.figures.style import (
     support_colour,
     support_keys,
 )
+from manikin.figures.timeline import draw_phases
 from manikin.motion import Motion
 from manikin.record import RunRecord
 
 AT_LIMIT = 1e-3
 """A duration this close to its bound is at it [s]."""
+
+_NAME_SIZE = 6.5
+"""Font of the names below the bars [points]."""
 
 
 def timing_figure(record: RunRecord) -> Figure:
@@ -42,8 +46,8 @@ def timing_figure(record: RunRecord) -> Figure:
     rows = 0.4 * len(record.effectors)
     most = max(len(phase.stance) for phase in schedule.sequence)
     figure, grid = new_grid(
-        11.0, 3.9 + 0.13 * most + rows, "Timing of the phases", 2, 1, left=label_room(record.effectors),
-        top=0.7, between=0.5 + 0.13 * most, height_ratios=[2.2, rows],
+        _width(schedule), 4.0 + 0.13 * most + rows, "Timing of the phases", 2, 1,
+        left=label_room(record.effectors), top=0.7, between=0.6 + 0.13 * most, height_ratios=[2.2, rows],
     )  # fmt: skip
     _draw_durations(figure.add_subplot(grid[0]), schedule)
     axes = figure.add_subplot(grid[1])
@@ -78,21 +82,32 @@ def _draw_durations(axes: Axes, schedule: ContactSchedule) -> None:
                             linestyle=style, zorder=4)  # fmt: skip
         axes.annotate(f"{duration:.2f}", (number, max(duration, least)), (0, 3), textcoords="offset points",
                       ha="center", fontsize=8)  # fmt: skip
-    axes.set_xticks(
-        range(len(durations)), [named_below(phase.stance.effectors) for phase in schedule.sequence]
-    )
+    named = [f"{n}\n{named_below(phase.stance.effectors)}" for n, phase in enumerate(schedule.sequence)]
+    axes.set_xticks(range(len(durations)), named)
     dress(axes, "duration [s]", "", f"total {float(durations.sum()):.2f} s")
-    axes.tick_params(axis="x", labelsize=7 if len(durations) <= 12 else 5.5)
+    axes.tick_params(axis="x", labelsize=_NAME_SIZE)
+    axes.set_xlim(-0.6, len(durations) - 0.4)
     axes.set_ylim(0.0, 1.14 * max(float(durations.max()), max(p.min_duration for p in schedule.sequence)))
     axes.grid(False, axis="x")
     axes.legend(handles=_keys(schedule), fontsize=8, frameon=False, loc="lower right",
                 bbox_to_anchor=(1.0, 1.0), ncols=6, borderaxespad=0.1)  # fmt: skip
 
 
-def _keys(schedule: ContactSchedule) -> list[Patch]:
+def _keys(schedule: ContactSchedule) -> list[Patch | Line2D]:
     keys = support_keys(len(phase.stance) for phase in schedule.sequence)
     shortest = Patch(facecolor=COLOURS["soft"], hatch="///", edgecolor="white", label="as short as allowed")
-    return [*keys, shortest, Patch(color=COLOURS["ink"], label="bound")]
+    ink = COLOURS["ink"]
+    bounds = [Line2D([], [], color=ink, linewidth=1.2, label="shortest allowed")]
+    if any(phase.max_duration is not None for phase in schedule.sequence):
+        bounds.append(Line2D([], [], color=ink, linewidth=1.2, linestyle="dotted", label="longest allowed"))
+    return [*keys, shortest, *bounds]
+
+
+def _width(schedule: ContactSchedule) -> float:
+    """Width of the figure [inch] at which the names below neighbouring bars keep apart."""
+    effectors = schedule.sequence.effectors
+    one = _NAME_SIZE / 72.0 * (0.5 * max((len(name) for name in effectors), default=0) + 1.0)
+    return max(11.0, label_room(effectors) + len(schedule.sequence) * one)
 
 
 def _bars(schedule: ContactSchedule, name: str, end: float) -> list[tuple[float, float]]:

@@ -7,6 +7,7 @@ from matplotlib.lines import Line2D
 
 from manikin.balance.zmp_path import ZmpPath
 from manikin.contact import ContactSchedule
+from manikin.figures.labels import Labels
 from manikin.figures.style import (
     COLOURS,
     STYLES,
@@ -16,11 +17,20 @@ from manikin.figures.style import (
     need,
     support_colour,
     support_words,
-    white_edge,
 )
 from manikin.figures.timeline import timeline
 from manikin.figures.views import ABOVE, distinct_contacts, draw_contact, sections
 from manikin.record import RunRecord
+from manikin.spatial import FloatArray
+
+PLAN_HEIGHT = 5.1
+"""Of the view from above [inch]."""
+
+DISTANCE_WIDTH = 7.4
+"""Of the panel over time [inch]."""
+
+EDGE = "#AEB4BE"
+"""Colour of support polygons."""
 
 
 def zmp_figure(record: RunRecord) -> Figure:
@@ -39,9 +49,11 @@ def zmp_figure(record: RunRecord) -> Figure:
     paths = need(record.zmp, "a motion of the centre of mass")
     if not any(np.any(path.decisive) for path in paths.values()):
         need(None, "a phase that stands on one plane without grasping")
+    plan = _plan_width(schedule)
+    across = label_room(record.effectors) + 0.15
     shown = timeline(
-        record, (14.0, 6.4), "Zero moment point", 1, 2, strip=0.07, left=0.65, top=0.65, between=0.1,
-        across=label_room(record.effectors) + 0.15, width_ratios=[1, 1.15],
+        record, (0.8 + plan + across + DISTANCE_WIDTH, PLAN_HEIGHT + 1.35), "Zero moment point", 1, 2,
+        strip=0.07, left=0.65, top=0.85, between=0.1, across=across, width_ratios=[plan, DISTANCE_WIDTH],
     )  # fmt: skip
     name, path = next(iter(paths.items()))
     _draw_plan(shown.figure.add_subplot(shown.grid[:, 0]), schedule, name, path)
@@ -53,6 +65,7 @@ def zmp_figure(record: RunRecord) -> Figure:
     shown.label(axes, "distance to the edge of the support polygon [mm]")
     _frame_distance(axes, list(paths.values()))
     axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
+    _legend_of_plan(shown.figure, schedule)
     return shown.figure
 
 
@@ -63,33 +76,44 @@ def _draw_plan(axes: Axes, schedule: ContactSchedule, name: str, path: ZmpPath) 
         draw_contact(axes, contact, ABOVE, colours[contact.effector])
     for plane in path.planes:
         if plane is not None and len(plane.polygon) > 1:
-            axes.fill(*plane.corners_in_world[:, :2].T, fill=False, edgecolor="#AEB4BE", linewidth=0.8,
+            axes.fill(*plane.corners_in_world[:, :2].T, fill=False, edgecolor=EDGE, linewidth=0.8,
                       linestyle=(0, (5, 3)), zorder=1)  # fmt: skip
-    counts = np.array([len(phase.stance) for phase in schedule.sequence])
-    shown = sorted({min(int(count), 3) for count in counts})
+    counts = [len(phase.stance) for phase in schedule.sequence]
     for part in sections(path.phase):
-        count = int(counts[path.phase[part.start]])
+        count = counts[path.phase[part.start]]
         axes.plot(*path.point[part, :2].T, color=support_colour(count), linewidth=1.6, zorder=4)
-    for number, instant in enumerate(schedule.instants[1:-1]):
-        sample = min(int(np.searchsorted(path.time, instant)), len(path.time) - 1)
-        place = path.point[sample, :2]
-        if np.all(np.isfinite(place)):
-            axes.plot(*place, "*", color=COLOURS["ink"], markersize=8, zorder=6)
-            axes.annotate(f"{number}|{number + 1}", (place[0], place[1]), (5, 5), fontsize=7.5, zorder=7,
-                          textcoords="offset points", path_effects=[white_edge()])  # fmt: skip
-    handles = [
-        Line2D([], [], color=support_colour(c), label=f"ZMP, {support_words(max(c, 1))}") for c in shown
-    ]
-    handles.append(Line2D([], [], color=COLOURS["ink"], marker="*", linestyle="", label="change of phase"))
-    handles.append(Line2D([], [], color="#AEB4BE", linestyle=(0, (5, 3)), label="support polygon"))
-    points = np.vstack([contact.points_in_world[:, :2] for contact in contacts])
-    low, high = points.min(axis=0) - 0.15, points.max(axis=0) + 0.15
+    low, high = _plan_box(schedule)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_aspect("equal", adjustable="box", anchor="NW")
+    labels = Labels(axes)
+    for number, instant in enumerate(schedule.instants[1:-1]):
+        sample = min(int(np.searchsorted(path.time, instant)), len(path.time) - 1)
+        x, y = path.point[sample, :2]
+        if np.isfinite(x) and np.isfinite(y):
+            axes.plot(x, y, "*", color=COLOURS["ink"], markersize=8, zorder=6)
+            labels.write(f"{number}|{number + 1}", (x, y), (5, 4), zorder=7)
     dress(axes, "y [m]", "x [m]", f"{name.capitalize()}, from above")
-    narrow = high[0] - low[0] < 0.75 * (high[1] - low[1])
-    beside = {"bbox_to_anchor": (1.02, 1.0)} if narrow else {}
-    axes.legend(handles=handles, fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none", **beside)
+
+
+def _plan_box(schedule: ContactSchedule) -> tuple[FloatArray, FloatArray]:
+    """Corners (2,) of what is seen from above [m]."""
+    points = np.vstack([contact.points_in_world[:, :2] for contact in distinct_contacts(schedule)])
+    return points.min(axis=0) - 0.15, points.max(axis=0) + 0.15
+
+
+def _plan_width(schedule: ContactSchedule) -> float:
+    """Width that the plan takes at its height [inch]."""
+    low, high = _plan_box(schedule)
+    return float(np.clip(PLAN_HEIGHT * (high - low)[0] / (high - low)[1], 2.0, 6.5))
+
+
+def _legend_of_plan(figure: Figure, schedule: ContactSchedule) -> None:
+    """A legend in one row at the height of the figure's title."""
+    shown = sorted({min(max(len(phase.stance), 1), 3) for phase in schedule.sequence})
+    handles = [Line2D([], [], color=support_colour(c), label=f"ZMP, {support_words(c)}") for c in shown]
+    handles.append(Line2D([], [], color=COLOURS["ink"], marker="*", linestyle="", label="change of phase"))
+    handles.append(Line2D([], [], color=EDGE, linestyle=(0, (5, 3)), label="support polygon"))
+    figure.legend(handles=handles, fontsize=8.5, frameon=False, loc="upper right", ncols=len(handles))
 
 
 def _draw_distance(axes: Axes, name: str, path: ZmpPath) -> None:
