@@ -333,12 +333,14 @@ class _Run:
         return motion
 
     def _plan_whole_body(self, trajectory: CentroidalTrajectory) -> WholeBodyResult:
+        rng = np.random.default_rng(self._scenario.seed)
+        unused = rng.bit_generator.state
         result = plan_whole_body(
-            self._body, self._scene, trajectory, rng=np.random.default_rng(self._scenario.seed),
-            settings=self._settings, padded=self._scenario.padded,
+            self._body, self._scene, trajectory, rng=rng, settings=self._settings, padded=self._scenario.padded,
             progress=lambda share: self._progress("wholebody", share),
         )  # fmt: skip
-        self._finish("wholebody", wholebody_summary(result))
+        drawn = rng.bit_generator.state != unused
+        self._finish("wholebody", wholebody_summary(result) | {"seed_matters": drawn})
         if result.failure is not None:
             self._fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
         self._keep_motions(trajectory, result.motion, None)

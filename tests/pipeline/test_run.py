@@ -17,7 +17,7 @@ KEYS = {
     },
     "wholebody": {
         "max_support_error_m", "max_com_error_m", "min_clearance_m", "closest_pair",
-        "max_joint_limit_violation_rad", "wall_s",
+        "max_joint_limit_violation_rad", "seed_matters", "wall_s",
     },
     "execution": {
         "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m", "min_margin",
@@ -158,6 +158,14 @@ def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_pat
     assert result.summary["wholebody"] is None
     assert result.summary["execution"] is None
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["failure"] == failure
+
+
+@pytest.mark.slow
+def test_a_run_that_draws_no_numbers_has_the_same_bits_for_every_seed(platform):
+    other = run("platform", seed=7)
+    assert not platform.summary["wholebody"]["seed_matters"]
+    assert np.array_equal(other.planned.q, platform.planned.q)
+    assert np.array_equal(other.executed.q, platform.executed.q)
 
 
 @pytest.mark.slow
