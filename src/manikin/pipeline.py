@@ -336,8 +336,8 @@ class _Run:
         rng = np.random.default_rng(self._scenario.seed)
         unused = rng.bit_generator.state
         result = plan_whole_body(
-            self._body, self._scene, trajectory, rng=rng, settings=self._settings, padded=self._scenario.padded,
-            progress=lambda share: self._progress("wholebody", share),
+            self._body, self._scene, trajectory, rng=rng, settings=self._settings,
+            padded=self._scenario.padded, progress=lambda share: self._progress("wholebody", share),
         )  # fmt: skip
         drawn = rng.bit_generator.state != unused
         self._finish("wholebody", wholebody_summary(result) | {"seed_matters": drawn})
