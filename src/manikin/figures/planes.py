@@ -66,7 +66,7 @@ def planes_grid(title: str, spans: FloatArray) -> tuple[Figure, GridSpec]:
     widths = [max(float(view(spans)[0]), 0.3 * float(spans.max())) for view in VIEWS]
     heights = [float(view(spans)[1]) for view in VIEWS]
     height = float(np.clip(max(heights) * 12.8 / sum(widths), 2.5, 6.0))
-    return new_grid(15.0, height + 1.4, title, 1, 3, top=0.85, width_ratios=widths)
+    return new_grid(15.0, height + 1.4, title, 1, 3, left=0.75, top=0.85, width_ratios=widths)
 
 
 def frame_plane(axes: Axes, view: View, low: FloatArray, high: FloatArray) -> None:

@@ -52,8 +52,9 @@ class ScenarioFile(Section):
     planning: PlanningSection = Field(default=PlanningSection(), description="options of the planner")
     manner: Literal["ready", "walking", "close"] = Field(
         default="ready",
-        description="how the body carries itself where the task leaves freedom: arms raised and bent, clear "
-        "of the thighs, or an upright trunk and arms that swing against the legs",
+        description="how the body carries itself where the task leaves freedom: ready, arms raised and bent, "
+        "clear of the thighs; walking, upright with arms that swing against the legs; close, arms bent close "
+        "to the body",
     )
     push: PushSection | None = Field(default=None, description="disturbance during the execution")
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
