@@ -8,7 +8,6 @@ and centre of mass as one spline, and the result is certified at 1 kHz.
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -38,9 +37,6 @@ DEGREE = 5
 
 NEAR_FLIGHT = 0.05
 """A requirement that breaks this close to a flight is put down to it [s]."""
-
-SITTING_FIT: Mapping[str, Any] = {"joint_limit": 2.0e-3, "multiplier_rounds": 24}
-"""Changed scales of a motion that ends on a seat: its touch is sudden, and harder to fit."""
 
 LOOSE_COM = 0.01
 """Importance of a centre of mass that only shows the way."""
@@ -182,8 +178,6 @@ class _Planner:
         settings: WholeBodySettings,
         progress: Progress | None,
     ) -> None:
-        if trajectory.binding_until is not None:
-            settings = replace(settings, fit=replace(settings.fit, **SITTING_FIT))
         self.body, self.scene, self.trajectory, self.settings = body, scene, trajectory, settings
         self.proximity = Proximity(body, scene)
         self.flights = FlightPlanner(
