@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from manikin.scene.axes import ShapeAxes
 from manikin.scene.collision import CollisionPart
 from manikin.scene.covering import cover
 from manikin.scene.shapes import Box, Capsule, Cylinder, Shape, Sphere
@@ -15,6 +16,7 @@ from manikin.spatial import FloatArray
 
 SPHERES_PER_SHAPE = 3
 _BLOCK = 200_000  # numbers per block of samples: keeps temporary arrays in the cache
+_NEARLY_PARALLEL = 1e-5  # [m], more than the distance of axes taken for parallel may be wrong by
 _ROUNDING = 1e-6  # [m], covers the cancellation in |a|^2 + |b|^2 - 2 a.b
 
 
@@ -43,6 +45,9 @@ class PairBounds:
         self._corners = np.array([box_corners(item.geometry) for item in objects]).reshape(-1, 8, 3)
         self.first, self.second = first, second
         self._self_pair = second < self._count
+        self._axes = ShapeAxes.of([item.geometry for item in objects])
+        has_axis = np.append(self._axes.round, np.zeros(len(parts), dtype=bool))
+        self._round = has_axis[first] & has_axis[second]
         axes = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
         origins = np.array([part.rotation.T @ part.translation for part in parts]).reshape(-1, 3)
         self._part_axes = axes.transpose(1, 0, 2).reshape(3, -1)
@@ -94,6 +99,25 @@ class PairBounds:
         steps = after - before
         path[:, : self._count] = np.sqrt(np.einsum("nsci,nsci->nsc", steps, steps).max(axis=2))
         return path[:, self.first] + path[:, self.second]
+
+    def tighten(
+        self, lower: FloatArray, wanted: NDArray[np.bool_], rotations: FloatArray, translations: FloatArray
+    ) -> None:
+        """Raise the lower bounds of pairs of capsules and balls of the body to their distances.
+
+        Args:
+            lower: (n, pairs) lower bounds, changed in place [m].
+            wanted: (n, pairs) which of them matter.
+            rotations: (n, shapes, 3, 3) shape-to-world.
+            translations: (n, shapes, 3) [m].
+        """
+        sample, pair = np.nonzero(wanted & self._round)
+        first, second = self.first[pair], self.second[pair]
+        places = (
+            rotations[sample, first, :, 2], translations[sample, first],
+            rotations[sample, second, :, 2], translations[sample, second],
+        )  # fmt: skip
+        lower[sample, pair] = self._axes.distances(first, second, places) - _NEARLY_PARALLEL
 
     def displacement(
         self, pair: int, sample: int, rotations: FloatArray, translations: FloatArray

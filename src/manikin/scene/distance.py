@@ -237,8 +237,10 @@ class Proximity:
         if lower is None:
             lower = np.full((len(corners), len(self.pairs)), -np.inf)
             lower[::STRIDE] = self._bounds.lower(rotations[::STRIDE], translations[::STRIDE])
-        moved = self._bounds.moved(corners[:-1], corners[1:])
         considered = self._considered_over(ignore, len(corners))
+        doubtful = considered & (lower < activation) & (lower > -np.inf)
+        self._bounds.tighten(lower, doubtful, rotations, translations)
+        moved = self._bounds.moved(corners[:-1], corners[1:])
         rows: list[tuple[int, int, float]] = []
         vectors: list[float] = []
         for sample, now in enumerate(lower):

@@ -1,0 +1,43 @@
+"""Distances between capsules and balls, many at once, against Coal's one by one."""
+
+import coal
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from manikin.scene.axes import ShapeAxes, segment_distances
+
+GEOMETRIES = (coal.Capsule(0.05, 0.4), coal.Capsule(0.03, 0.2), coal.Sphere(0.1), coal.Box(0.1, 0.2, 0.3))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(0, 1), (1, 0), (0, 2), (2, 1), (2, 2)]))
+def test_round_shapes_are_as_far_apart_as_coal_says(seed, pair):
+    """Apart, to 1e-9 m: both are closed forms."""
+    axes = ShapeAxes.of(GEOMETRIES)
+    turns = Rotation.random(2, rng=np.random.default_rng(seed)).as_matrix()
+    centres = np.array([[0.0, 0.0, 0.0], [0.3, 0.5, -0.4]]) + 0.1 * turns[:, 0]
+    places = (turns[:1, :, 2], centres[:1], turns[1:, :, 2], centres[1:])
+    found = axes.distances(np.array([pair[0]]), np.array([pair[1]]), places)
+    first, second = (coal.Transform3s(turn, centre) for turn, centre in zip(turns, centres, strict=True))
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    expected = coal.distance(GEOMETRIES[pair[0]], first, GEOMETRIES[pair[1]], second, request, result)
+    assert found[0] == pytest.approx(expected, abs=1e-9)
+    assert axes.round.tolist() == [True, True, True, False]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-12, 1e-7, 1e-6, 1e-4, 1.0]))
+def test_no_two_points_of_segments_are_nearer(seed, skew):
+    """Also of segments that are parallel, or nearly: to 1e-6 m, well below the margin that is taken off."""
+    rng = np.random.default_rng(seed)
+    centre, half, other_centre = rng.normal(size=(3, 1, 3))
+    other_half = rng.uniform(0.1, 2.0) * half + skew * rng.normal(size=(1, 3))
+    found = segment_distances(centre, half, other_centre, other_half)[0]
+    shares = np.linspace(-1.0, 1.0, 201)
+    points, others = centre + shares[:, None] * half, other_centre + shares[:, None] * other_half
+    sampled = np.linalg.norm(points[:, None] - others[None], axis=2).min()
+    assert found <= sampled + 1e-6
+    assert found >= sampled - 0.03  # the spacing of the points
