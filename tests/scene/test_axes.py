@@ -28,16 +28,19 @@ def test_round_shapes_are_as_far_apart_as_coal_says(seed, pair):
     assert axes.round.tolist() == [True, True, True, False]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-12, 1e-7, 1e-6, 1e-4, 1.0]))
 def test_no_two_points_of_segments_are_nearer(seed, skew):
-    """Also of segments that are parallel, or nearly: to 1e-6 m, well below the margin that is taken off."""
+    """Also of segments that are parallel, or nearly, to 1e-6 m.
+
+    Those within an angle of 1e-6 count as parallel, which is wrong by that times their length.
+    """
     rng = np.random.default_rng(seed)
-    centre, half, other_centre = rng.normal(size=(3, 1, 3))
-    other_half = rng.uniform(0.1, 2.0) * half + skew * rng.normal(size=(1, 3))
+    centre, half, other_centre = 0.2 * rng.normal(size=(3, 1, 3))
+    other_half = rng.uniform(0.1, 1.0) * half + 0.2 * skew * rng.normal(size=(1, 3))
     found = segment_distances(centre, half, other_centre, other_half)[0]
     shares = np.linspace(-1.0, 1.0, 201)
     points, others = centre + shares[:, None] * half, other_centre + shares[:, None] * other_half
     sampled = np.linalg.norm(points[:, None] - others[None], axis=2).min()
     assert found <= sampled + 1e-6
-    assert found >= sampled - 0.03  # the spacing of the points
+    assert found >= sampled - 0.01  # the spacing of the points

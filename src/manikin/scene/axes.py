@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from manikin.spatial import FloatArray
 
-_PARALLEL = 1e-10
+_PARALLEL = 1e-12
 """Squared sine of the angle below which two axes count as parallel."""
 
 
