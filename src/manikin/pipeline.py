@@ -41,6 +41,7 @@ from manikin.wholebody import (
     continue_seated,
     find_eligible_plan,
     find_key_postures,
+    measure_passage,
     plan_whole_body,
 )
 from manikin.wholebody.configuration_spline import rotation_from_quaternion
@@ -218,8 +219,10 @@ class _Run:
         self._directory = None if out is None else RunDirectory(out)
         if self._directory is not None:
             self._directory.write_scenario(scenario.to_yaml())
+        stature = None if scenario.is_point_mass else scenario.file.body.stature_m
         self._summary: dict[str, Any] = {
-            "scenario": scenario.name, "succeeded": False, "failure": None,
+            "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
+            "succeeded": False, "failure": None,
             "centroidal": None, "wholebody": None, "execution": None, "wall_s": 0.0,
         }  # fmt: skip
 
@@ -340,7 +343,8 @@ class _Run:
             padded=self._scenario.padded, progress=lambda share: self._progress("wholebody", share),
         )  # fmt: skip
         drawn = rng.bit_generator.state != unused
-        self._finish("wholebody", wholebody_summary(result) | {"seed_matters": drawn})
+        block = wholebody_summary(result) | self._passage(trajectory, result.motion)
+        self._finish("wholebody", block | {"seed_matters": drawn})
         if result.failure is not None:
             self._fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
         self._keep_motions(trajectory, result.motion, None)
@@ -352,7 +356,7 @@ class _Run:
             padded=self._scenario.padded, settings=self._control_settings(),
             progress=lambda share: self._progress("execution", share),
         )  # fmt: skip
-        self._finish("execution", result.summary())
+        self._finish("execution", result.summary() | self._passage(trajectory, result.motion))
         seated = self._scenario.seated_from is not None
         reason = result.failure or self._requirements.violation(result, seated)
         if reason:
@@ -363,6 +367,11 @@ class _Run:
             self._fail("execution", reason, time, _place(phase, held))
         self._keep_motions(trajectory, planned.motion, result.motion)
         return result
+
+    def _passage(self, trajectory: CentroidalTrajectory, motion: Motion) -> dict[str, float | None]:
+        """How low the body came, and how near its head to the scene."""
+        padded = self._scenario.padded
+        return measure_passage(self._body, self._scene, trajectory.schedule, motion, padded).summary()
 
     def _control_settings(self) -> ControlSettings:
         """The defaults; with the share of the friction that planning keeps to where it has its own."""

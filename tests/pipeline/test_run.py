@@ -17,11 +17,12 @@ KEYS = {
     },
     "wholebody": {
         "max_support_error_m", "max_com_error_m", "min_clearance_m", "closest_pair",
-        "max_joint_limit_violation_rad", "seed_matters", "wall_s",
+        "max_joint_limit_violation_rad", "seed_matters", "lowest_com_m", "head_clearance_m", "wall_s",
     },
     "execution": {
         "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m", "min_margin",
-        "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm", "realtime_factor", "wall_s",
+        "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm", "realtime_factor",
+        "lowest_com_m", "head_clearance_m", "wall_s",
     },
 }  # fmt: skip
 
@@ -37,6 +38,7 @@ def test_the_platform_is_planned_and_stood_on(platform):
     """Every threshold is a requirement of the scenario (metres, newton metres, seconds)."""
     summary = platform.summary
     assert summary["succeeded"], summary["failure"]
+    assert (summary["stature_m"], summary["mass_kg"], summary["seed"]) == (1.75, 79.0, 0)
     com, body, executed = summary["centroidal"], summary["wholebody"], summary["execution"]
     assert com["min_margin"] >= 20.0
     assert com["duration_s"] <= 5.0

@@ -12,6 +12,7 @@ from manikin.wholebody.eligibility import Eligibility, find_eligible_plan
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import PlannedSwing
 from manikin.wholebody.key_postures import KeyPosture, KeyPostures, find_key_postures
+from manikin.wholebody.passage import Passage, head_segments, measure_passage
 from manikin.wholebody.seated import SeatedContinuation, continue_seated
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "FitScales",
     "KeyPosture",
     "KeyPostures",
+    "Passage",
     "PlannedSwing",
     "SeatedContinuation",
     "WholeBodyFailure",
@@ -30,5 +32,7 @@ __all__ = [
     "continue_seated",
     "find_eligible_plan",
     "find_key_postures",
+    "head_segments",
+    "measure_passage",
     "plan_whole_body",
 ]
