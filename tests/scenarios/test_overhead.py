@@ -42,6 +42,23 @@ def test_the_roof_of_the_platform_is_found():
     assert 0.85 < 1.2 - float(bound.violation(np.array([0.9, 0.75, 1.2]))) < 1.0
 
 
+def test_a_seat_beyond_the_beam_is_not_the_ground_below_it(tmp_path):
+    """The beam bounds the height of a person who sits down at the end as that of one who does not."""
+    feet = "{left_foot: {position: [0.6, 0.58, 0]}, right_foot: {position: [0.8, 0.58, 0]}"
+    buttocks = "buttocks: {position: [0.7, 0.2, 0.48], settle_s: 0.6}"
+    path = tmp_path / "seat.yaml"
+    path.write_text(
+        "extends: beam-H2C1\nname: seat\nsupports:\n  phases:\n"
+        f"    - {{right_foot: {{position: [0.8, 0.58, 0]}}}}\n    - {feet}}}\n    - {feet}, {buttocks}}}\n"
+        "scene:\n  - {name: beam, box: [0.05, 2.4, 0.05], position: [0.38, 0.4, 1.325]}\n"
+        "  - {name: seat, padded: true, box: [0.5, 0.4, 0.48], position: [0.7, 0.1, 0.24]}\nvariants: null\n",
+        encoding="utf-8",
+    )
+    (standing,), (seated,) = constraints(name="beam-H2C1"), constraints(name=str(path))
+    under = np.array([0.38, 0.4, 0.8])
+    assert seated.violation(under) == pytest.approx(standing.violation(under), abs=0.01)
+
+
 def test_a_knee_high_beam_ends_in_its_true_cause():
     """0.4 m is less than the body folds to; the failure says so."""
     result = plan_com(load_scenario("beam-H1C1", variant="knee-high").build_centroidal_problem())

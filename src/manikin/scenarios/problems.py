@@ -20,13 +20,12 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
         ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
     """
     options, seat = values.planning, values.seated_from
-    sequence = stance_sequence(values, planning=True)
     rest = (0.0, 0.0, 0.0) if options.zero_end_accelerations else None
     given = {"degree": options.degree, "samples": options.samples}
     try:
         return CentroidalProblem(
             values.mass,
-            sequence if seat is None else StanceSequence(sequence.phases[:seat]),
+            _standing(values, planning=True),
             values.start_com,
             values.goal_com,
             goal_velocity=values.file.task.goal.velocity_m_s if seat is not None else (0.0, 0.0, 0.0),
@@ -67,6 +66,12 @@ def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
         raise values.refused(("planning", "recording"), error) from None
 
 
+def _standing(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
+    """The stances before the body sits: all, where it does not."""
+    sequence = stance_sequence(values, planning=planning)
+    return StanceSequence(sequence.phases[: values.seated_from])
+
+
 def _height_constraints(values: ScenarioValues) -> tuple[GeometricConstraint, ...]:
     band, entry = values.height_band, values.constraint("overhead")
     found = () if band is None else height_band(band.lower, band.upper)
@@ -76,7 +81,7 @@ def _height_constraints(values: ScenarioValues) -> tuple[GeometricConstraint, ..
     overhead = overhead_constraints(
         build_body(values),
         build_scene(values),
-        stance_sequence(values),
+        _standing(values),
         (values.start_com, values.goal_com),
         names,
     )
