@@ -1,24 +1,27 @@
 """Write what the documentation takes from the code: the JSON schema and the generated tables.
 
 Run ``python docs/generate.py`` after a change; a test compares the result with the files.
-``python docs/generate.py REPORT.json`` first takes over new results: what ``manikin run all --json``
-printed, reduced to what the page shows.
+``python docs/generate.py REPORT.json ...`` first takes over new results: what ``manikin run all --json``
+printed, reduced to what the page shows.  Each report replaces the kept one of the same stature or seed,
+the one without either the main one.  Reports that do not say it are told:
+``python docs/generate.py report.json --stature 1.65 small.json --seed 3 third.json``.
 A page marks a generated table with ``<!-- generated: NAME -->`` ... ``<!-- end generated -->``.
 """
 
 import json
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from manikin import collected
 from manikin.body import human
 from manikin.body.range_of_motion import HUMAN_HINGES
 from manikin.motion.file import DATASETS
-from manikin.results import markdown_table, reduced
+from manikin.results import markdown_table
 from manikin.scenarios import json_schema
 from manikin.scenarios.stance_file import StanceFile
 
@@ -150,17 +153,73 @@ def dataset_table() -> str:
 # --- results ---------------------------------------------------------------------------------
 
 
-def take_over_results(report: Path) -> None:
-    """Keep the numbers of a report that the table of results shows."""
-    data = reduced(json.loads(report.read_text(encoding="utf-8")))
-    RESULTS.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+def take_over_results(arguments: Sequence[str]) -> None:
+    """Keep the numbers of reports that the tables of results show.
+
+    Args:
+        arguments: Report files; ``--stature M`` or ``--seed N`` before a file holds for it alone.
+
+    Raises:
+        SystemExit: One line, if an option lacks its value or its file.
+    """
+    kept, told = kept_results(), {}
+    waiting = iter(arguments)
+    for word in waiting:
+        if word in OPTIONS:
+            key, read = OPTIONS[word]
+            try:
+                told[key] = read(next(waiting, ""))
+            except ValueError:
+                raise SystemExit(f"{word} has no number after it; valid: {word} NUMBER REPORT.json") from None
+            continue
+        report = {"stature_m": None, "seed": None, **json.loads(Path(word).read_text(encoding="utf-8"))}
+        kept, told = collected.filed(kept, report | told), {}
+    if told:
+        raise SystemExit(f"{told} has no report after it; valid: [--stature M] [--seed N] REPORT.json")
+    RESULTS.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+
+
+OPTIONS: dict[str, tuple[str, Callable[[str], Any]]] = {
+    "--stature": ("stature_m", float), "--seed": ("seed", int),
+}  # fmt: skip
+"""Options of a report that does not say itself what it was run with."""
+
+
+def kept_results() -> dict[str, Any]:
+    """What was taken over so far; see :func:`manikin.collected.filed`."""
+    return json.loads(RESULTS.read_text(encoding="utf-8"))
 
 
 def results_table() -> str:
     """The kept results, with their summary."""
-    report = json.loads(RESULTS.read_text(encoding="utf-8"))
+    report = kept_results()["main"]
     total = f"{report['succeeded']} of {len(report['runs'])} runs ended as expected."
     return f"{markdown_table(report)}\n{total}\n"
+
+
+def beams_table() -> str:
+    """Lowest centre of mass and head clearance under the beams beside the published heights."""
+    published = json.loads((DOCS / "published.json").read_text(encoding="utf-8"))
+    table = collected.beam_table(kept_results()["main"], published)
+    people, beams = published["source"], published["beam_height_source"]
+    return f"{table}\nPeople: {people}. Heights of the beams: {beams}.\n"
+
+
+def statures_table() -> str:
+    """Every kept report of another stature."""
+    found = kept_results()["statures"]
+    return collected.stature_table(found.values()) if found else NOT_YET
+
+
+def seeds_table() -> str:
+    """What the kept seeds have in common."""
+    found = kept_results()["seeds"]
+    if not found:
+        return NOT_YET
+    return f"{collected.seed_table(found)}\nSeeds: {', '.join(found)}.\n"
+
+
+NOT_YET = "No report has been taken over yet.\n"
 
 
 # --- walls ---------------------------------------------------------------------------------------
@@ -216,13 +275,16 @@ TABLES: dict[str, Callable[[], str]] = {
     "hinges": hinge_table,
     "datasets": dataset_table,
     "results": results_table,
+    "beams": beams_table,
+    "statures": statures_table,
+    "seeds": seeds_table,
     "walls-trials": walls_trials,
     "walls-spacing": walls_spacing,
 }
 
 
 if __name__ == "__main__":
-    for name in sys.argv[1:]:
-        take_over_results(Path(name))
+    if sys.argv[1:]:
+        take_over_results(sys.argv[1:])
     for path, text in files().items():
         path.write_text(text, encoding="utf-8")

@@ -45,17 +45,44 @@ def keys_of(value):
 
 
 @pytest.fixture(scope="module")
-def generated():
-    """What ``docs/generate.py`` would write."""
+def generator():
+    """The script ``docs/generate.py``."""
     spec = importlib.util.spec_from_file_location("generate_docs", DOCS / "generate.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.files()
+    return module
+
+
+@pytest.fixture(scope="module")
+def generated(generator):
+    """What ``docs/generate.py`` would write."""
+    return generator.files()
 
 
 def test_schemas_and_tables_are_up_to_date(generated):
     """After a change: ``python docs/generate.py``."""
     assert [path.name for path, text in generated.items() if path.read_text(encoding="utf-8") != text] == []
+
+
+def test_several_reports_are_taken_over_at_once(generator, tmp_path, monkeypatch):
+    """Those that do not say their stature or seed are told; an option holds for one report."""
+    kept = json.loads((DOCS / "results.json").read_text(encoding="utf-8"))["main"]
+    small = {**kept, "stature_m": None, "seed": None, "runs": kept["runs"][:2]}
+    (tmp_path / "results.json").write_text('{"main": null, "statures": {}, "seeds": {}}')
+    (tmp_path / "report.json").write_text(json.dumps(small))
+    (tmp_path / "tall.json").write_text(json.dumps({**small, "stature_m": 1.85}))
+    monkeypatch.setattr(generator, "RESULTS", tmp_path / "results.json")
+    report, tall = str(tmp_path / "report.json"), str(tmp_path / "tall.json")
+    generator.take_over_results(["--stature", "1.65", report, tall, "--seed", "3", report, report])
+    found = generator.kept_results()
+    assert len(found["main"]["runs"]) == 2
+    assert [*found["statures"]] == ["1.65", "1.85"]
+    assert "3" in found["seeds"]
+    assert "| beam-H1C1 | - | 1.65 |" in generator.statures_table()
+    assert "of 1 |" in generator.seeds_table() or "of 2 |" in generator.seeds_table()
+    for wrong in (["--stature", report], [report, "--seed", "3"]):
+        with pytest.raises(SystemExit, match="valid: "):
+            generator.take_over_results(wrong)
 
 
 def test_every_generated_block_was_found(generated):

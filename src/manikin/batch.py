@@ -218,6 +218,8 @@ def _broken_off(run: _Run, time_limit: float | None) -> dict[str, Any]:
     reason = f"{what}: {lines[-1]}" if lines else what
     failure = {"stage": "run", "reason": reason, "time_s": 0.0, "where": ""}
     stages = dict.fromkeys(("centroidal", "wholebody", "execution"))
+    unknown = dict.fromkeys(("stature_m", "mass_kg", "seed"))
     return {
-        "scenario": run.job.folder, "succeeded": False, "failure": failure, **stages, "wall_s": run.seconds,
+        "scenario": run.job.folder, **unknown, "succeeded": False, "failure": failure, **stages,
+        "wall_s": run.seconds,
     }  # fmt: skip

@@ -146,7 +146,8 @@ def run(
         words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
         _check_values(seed, stature, mass, sex)
         directory = out if out is not None else None if json else Path("runs")
-        return _run_all(directory, tuple(words), context.obj, draw=figures, workers=jobs, json=json)
+        asked = {"stature_m": stature, "seed": seed}
+        return _run_all(directory, asked, tuple(words), context.obj, draw=figures, workers=jobs, json=json)
     _refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
     from manikin.scenarios import load_scenario
 
@@ -287,6 +288,7 @@ def _check_values(seed: int | None, stature: float | None, mass: float | None, s
 
 def _run_all(
     out: Path | None,
+    asked: dict[str, Any],
     arguments: tuple[str, ...],
     interruption: Interruption,
     *,
@@ -311,7 +313,7 @@ def _run_all(
         typer.echo(f"[{done}/{len(runs)}] {name}: {what}, {word}, {entry['wall_s']:.1f} s", err=True)
 
     options = batch.RunOptions(out, draw and out is not None, arguments)
-    found = batch.run_jobs(runs, options.command, workers=workers, report=report)
+    found = asked | batch.run_jobs(runs, options.command, workers=workers, report=report)
     if out is not None:
         write_text(out / RESULTS, to_json(found) + "\n")
     if json:

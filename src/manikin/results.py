@@ -15,12 +15,18 @@ UNITS = ("", "", "s", "", "N.m", "mm", "N.m", "mm", "", "s + s + s", "")
 
 NOTHING = "-"
 
+ASKED = ("stature_m", "seed")
+"""What a report says that its runs were asked for, None for each scenario's own."""
+
+_RUN_WITH = ("stature_m", "mass_kg", "seed")
+"""What a run says that it was run with."""
+
 _KEPT: dict[str, tuple[str, ...]] = {
     "centroidal": ("duration_s", "min_margin", "margin_unit", "feasibility_radius", "wall_s"),
-    "wholebody": ("min_clearance_m", "wall_s"),
-    "execution": ("min_margin", "com_rms_error_m", "fell", "wall_s"),
+    "wholebody": ("min_clearance_m", "lowest_com_m", "head_clearance_m", "wall_s"),
+    "execution": ("min_margin", "com_rms_error_m", "lowest_com_m", "head_clearance_m", "fell", "wall_s"),
 }
-"""Keys of a run's summary that the table shows."""
+"""Keys of a run's summary that the tables show."""
 
 
 def result_rows(report: Mapping[str, Any]) -> list[tuple[str, ...]]:
@@ -46,13 +52,19 @@ def text_table(report: Mapping[str, Any]) -> str:
 def markdown_table(report: Mapping[str, Any]) -> str:
     """The table in Markdown."""
     heads = [f"{name} [{unit}]" if unit else name for name, unit in zip(HEADER, UNITS, strict=True)]
+    return markdown_rows(heads, result_rows(report))
+
+
+def markdown_rows(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown of any columns."""
     lines = [_markdown_row(heads), _markdown_row(["---"] * len(heads))]
-    return "\n".join([*lines, *(_markdown_row(row) for row in result_rows(report))]) + "\n"
+    return "\n".join([*lines, *(_markdown_row(row) for row in rows)]) + "\n"
 
 
 def reduced(report: Mapping[str, Any]) -> dict[str, Any]:
     """What the table shows of a report and no more, rounded to four digits."""
     return {
+        **{key: report.get(key) for key in ASKED},
         "runs": [_reduced_run(run) for run in report["runs"]],
         "succeeded": report["succeeded"], "failed": report["failed"], "wall_s": _rounded(report["wall_s"]),
     }  # fmt: skip
@@ -61,11 +73,11 @@ def reduced(report: Mapping[str, Any]) -> dict[str, Any]:
 def _reduced_run(run: Mapping[str, Any]) -> dict[str, Any]:
     names = ("scenario", "variant", "expected", "as_expected", "succeeded")
     failure = run["failure"]
-    kept: dict[str, Any] = {name: run[name] for name in names}
+    kept: dict[str, Any] = {name: run[name] for name in names} | {name: run.get(name) for name in _RUN_WITH}
     kept["failure"] = None if failure is None else {key: failure[key] for key in ("stage", "reason")}
     for stage, keys in _KEPT.items():
         block = run[stage]
-        kept[stage] = None if block is None else {key: _rounded(block[key]) for key in keys}
+        kept[stage] = None if block is None else {key: _rounded(block.get(key)) for key in keys}
     return {**kept, "wall_s": _rounded(run["wall_s"])}
 
 
@@ -75,26 +87,28 @@ def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         str(run["scenario"]).partition("@")[0],
         run["variant"] or NOTHING,
-        _number(com.get("duration_s"), 2),
-        _number(com.get("min_margin"), 1, f" {com.get('margin_unit', '')}"),
-        _number(com.get("feasibility_radius"), 1),
-        _number(body.get("min_clearance_m"), 1, scale=1000.0),
-        _number(executed.get("min_margin"), 1),
-        _number(executed.get("com_rms_error_m"), 2, scale=1000.0),
+        number(com.get("duration_s"), 2),
+        number(com.get("min_margin"), 1, f" {com.get('margin_unit', '')}"),
+        number(com.get("feasibility_radius"), 1),
+        number(body.get("min_clearance_m"), 1, scale=1000.0),
+        number(executed.get("min_margin"), 1),
+        number(executed.get("com_rms_error_m"), 2, scale=1000.0),
         {True: "yes", False: "no", None: NOTHING}[executed.get("fell")],
-        " + ".join(_number(wall, 1) for wall in walls if wall is not None) or NOTHING,
-        _result(run),
+        " + ".join(number(wall, 1) for wall in walls if wall is not None) or NOTHING,
+        result(run),
     )
 
 
-def _result(run: Mapping[str, Any]) -> str:
+def result(run: Mapping[str, Any]) -> str:
+    """How a run ended, in words."""
     if run["failure"] is None:
         return "succeeded" if run["as_expected"] else "succeeded although a failure was expected"
     word = "failed as expected" if run["as_expected"] else "FAILED"
     return f"{word} ({run['failure']['stage']}): {run['failure']['reason']}"
 
 
-def _number(value: float | None, digits: int, unit: str = "", scale: float = 1.0) -> str:
+def number(value: float | None, digits: int, unit: str = "", scale: float = 1.0) -> str:
+    """A value with a number of decimals, or :data:`NOTHING`."""
     return NOTHING if value is None else f"{scale * value:.{digits}f}{unit}"
 
 

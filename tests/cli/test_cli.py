@@ -268,7 +268,15 @@ def test_run_all_prints_one_json_object_and_status_0_when_all_is_as_expected(cap
     assert [run["scenario"] for run in report["runs"]] == ["one", "two@bad"]
     assert (report["succeeded"], report["failed"]) == (2, 0)
     assert report["wall_s"] > 0
+    assert (report["stature_m"], report["seed"]) == (None, None)
     assert "[2/2]" in err
+
+
+def test_run_all_says_which_stature_and_seed_it_was_asked_for(capfd, two_runs):
+    two_runs("failure")
+    assert main(["run", "all", "--json", "--stature", "1.65", "--seed", "3", "--jobs", "2"]) == DONE
+    report = json.loads(capfd.readouterr().out)
+    assert (report["stature_m"], report["seed"]) == (1.65, 3)
 
 
 def test_run_all_is_status_3_and_a_table_when_one_fails(capfd, two_runs, tmp_path):
