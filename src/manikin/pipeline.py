@@ -443,6 +443,7 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
         "max_com_error_m": certificate.max_com_error_m,
         "min_clearance_m": certificate.min_clearance_m,
         "closest_pair": list(certificate.closest_pair),
+        "max_scuff_m": certificate.max_scuff_m,
         "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
         "max_velocity_share": certificate.max_velocity_share,
         "max_torque_share": certificate.max_torque_share,

@@ -18,6 +18,7 @@ from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.motion import Motion
 from manikin.scene import Proximity
 from manikin.spatial import FloatArray
+from manikin.wholebody.scuff import deepest_scuff
 from manikin.wholebody.targets import Ignored
 
 
@@ -56,6 +57,8 @@ class WholeBodyResiduals:
         max_com_error_m: Distance of the centre of mass from its plan [m].
         min_clearance_m: Least counted distance [m].
         closest_pair: Names of the shapes at that distance.
+        max_scuff_m: Depth to which a flying foot or hand goes into what it has left or comes to hold,
+            which does not count as clearance; nothing is required of it [m].
         max_joint_limit_violation_rad: Violation of a joint range [rad].
         max_velocity_share: Largest share of a joint's velocity limit.
         max_missing_wrench: Part of the dynamics that no admissible contact force supplies [N, N.m].
@@ -70,6 +73,7 @@ class WholeBodyResiduals:
     max_com_error_m: float
     min_clearance_m: float
     closest_pair: tuple[str, str]
+    max_scuff_m: float
     max_joint_limit_violation_rad: float
     max_velocity_share: float
     max_missing_wrench: float
@@ -139,12 +143,14 @@ def certify(
         "max_missing_wrench": missing, "max_torque_share": torque,
     }  # fmt: skip
     times = {name: float(motion.time[int(np.argmax(values))]) for name, values in series.items()}
+    scuff, times["max_scuff_m"] = deepest_scuff(body, proximity, trajectory.schedule, motion, ignored)
     closest_sample = clearance.sample if clearance.sample is not None else 0
     times["min_clearance_m"] = float(motion.time[closest_sample])
     return WholeBodyResiduals(
         **{name: float(values.max()) for name, values in series.items()},
         min_clearance_m=float(clearance.distance),
         closest_pair=clearance.pair or ("", ""),
+        max_scuff_m=scuff,
         min_zmp_distance_m=_least_zmp_distance(trajectory.schedule, motion.time, wrench),
         worst_times_s=times,
     )
