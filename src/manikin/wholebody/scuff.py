@@ -42,7 +42,7 @@ def deepest_scuff(
         start, end = schedule.swing_interval(swing)
         rows = np.flatnonzero((motion.time >= start) & (motion.time < end))
         ends = frozenset(end_segments(body, swing.effector))
-        obstacles = _supports(body, ends, [ignored[row] for row in rows])
+        obstacles = _supports(body, ends, [ignored[row] for row in rows.tolist()])
         if not obstacles:
             continue
         others = frozenset(
