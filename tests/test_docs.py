@@ -59,6 +59,10 @@ def generated(generator):
     return generator.files()
 
 
+def test_no_page_has_the_marks_of_a_merge():
+    assert not [name for name, text in PAGES.items() if re.search(r"^(<{7}|>{7}) ", text, re.M)]
+
+
 def test_schemas_and_tables_are_up_to_date(generated):
     """After a change: ``python docs/generate.py``."""
     assert [path.name for path, text in generated.items() if path.read_text(encoding="utf-8") != text] == []
