@@ -191,6 +191,25 @@ def test_walks_succeed_for_every_stature(name, stature, mass):
     assert body["min_zmp_distance_m"] > 0.0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "stature"),
+    [
+        ("car-ingress", 1.65),
+        ("car-ingress", 1.85),
+        ("beam-H2C2", 1.65),
+        ("beam-H2C2", 1.85),
+        ("beam-H3C1", 1.85),
+    ],
+)
+def test_cluttered_tasks_succeed_for_short_and_tall_people(name, stature):
+    """What stands in the scene does not grow with the body; these are the narrowest of them."""
+    result = manikin.run(load_scenario(name).with_body(stature_m=stature))
+    assert result.succeeded, result.summary["failure"]
+    assert not result.execution.fell
+    assert result.execution.min_margin > 0.0
+
+
 def test_the_walk_asks_for_the_published_margin_and_duration():
     """[Qiu2012]_ 5.4.4: 25.86 N.m in 3.54 s, four steps in nine phases from (0, 0) to (0, 1.5)."""
     scenario = load_scenario("walk")
