@@ -10,6 +10,8 @@ from manikin.motion.file import read_motions
 from manikin.pipeline import ExecutionRequirements, run
 from manikin.scenarios import load_scenario
 
+BEAMS = ("H1C1", "H2C1", "H3C1", "H2C2", "H2C3")
+
 KEYS = {
     "centroidal": {
         "method", "duration_s", "phase_durations_s", "min_margin", "margin_unit", "limiting_phase",
@@ -224,11 +226,12 @@ def test_the_walk_asks_for_the_published_margin_and_duration():
     [
         ("walk@slippery", "friction of 0.05 is too low"),
         ("walk@long-step", "step is too long"),
+        *((f"beam-{case}@slippery", "friction of 0.05 is too low") for case in BEAMS),
         ("ramp@slippery", "slope of 15.0 degrees needs a friction of at least 0.27"),
         ("ramp-down@slippery", "slope of 15.0 degrees needs a friction of at least 0.27"),
     ],
 )
-def test_impossible_walks_name_the_cause(name, cause):
+def test_impossible_walks_and_passages_name_the_cause(name, cause):
     """The explanation names what would have to change, not where a solver stopped."""
     result = manikin.run(name)
     assert not result.succeeded
