@@ -121,7 +121,7 @@ class ScenarioValues:
 
     @property
     def max_support_distance(self) -> float | None:
-        """Largest distance from the CoM to every foot in contact, scaled to the body [m], or None."""
+        """Largest distance from the CoM to every contact, scaled to the body [m], or None."""
         constraint = self.constraint("max_support_distance_m")
         if constraint is None or constraint.max_support_distance_m is None:
             return None

@@ -30,7 +30,7 @@ class ComConstraintSection(Section):
 
     height_band: HeightBandSection | None = Field(default=None, description="bounds of the CoM's height")
     max_support_distance_m: Positive | None = Field(
-        default=None, description="largest distance from the CoM to every foot in contact [m]"
+        default=None, description="largest distance from the CoM to every contact, hands included [m]"
     )
     overhead: Annotated[list[Text], Field(min_length=1)] | Literal["automatic"] | None = Field(
         default=None,
