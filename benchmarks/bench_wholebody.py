@@ -4,6 +4,8 @@ Run with ``pytest benchmarks/bench_wholebody.py``. The star to steer by: plannin
 the motion takes no longer than the motion lasts (5.0 s).
 """
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,8 @@ from manikin.scenarios import load_scenario
 from manikin.scene import Proximity
 from manikin.wholebody import plan_whole_body
 from manikin.wholebody.assemble import WholeBodySettings, _Planner
-from manikin.wholebody.banded import SampledBasis
+from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
+from manikin.wholebody.forces import plan_forces
 from manikin.wholebody.objective import MotionObjective
 from manikin.wholebody.targets import ignored_pairs
 
@@ -29,6 +32,17 @@ def platform():
 @pytest.fixture(scope="module")
 def planner(platform):
     return _Planner(*platform, np.random.default_rng(0), WholeBodySettings(), None)
+
+
+@pytest.fixture(scope="module")
+def linearisation(planner, swings):
+    """Objective, basis, control points at rest in the first posture, and no multipliers."""
+    knots = planner._knots()
+    targets = planner._targets(swings, planner._guide(swings), knots)
+    basis = SampledBasis.at(targets.time, knots, 5)
+    objective = MotionObjective(planner.body, planner.proximity, targets, basis)
+    points = np.tile(targets.reference[0], (basis.size, 1))
+    return objective, basis, points, np.zeros((len(targets.time), objective.task_rows))
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +62,12 @@ def test_guide_postures(benchmark, planner, swings):
 
 def test_fit(benchmark, planner, swings):
     guide = planner._guide(swings)
-    scales = WholeBodySettings().fit
-    benchmark.pedantic(planner._fit, args=(swings, guide, scales), rounds=3, iterations=1)
+
+    def fit():
+        problem, start = planner._prepare(swings, guide, planner._knots(), planner._scales())
+        return problem.solve(start)
+
+    benchmark.pedantic(fit, rounds=3, iterations=1)
 
 
 def test_dense_clearance(benchmark, platform):
@@ -61,14 +79,32 @@ def test_dense_clearance(benchmark, platform):
     benchmark.pedantic(proximity.minimum_over, args=(result.motion.q, ignored, 1e-5), rounds=3, iterations=1)
 
 
-def test_linearisation(benchmark, planner, swings):
-    """One evaluation of the objective with all derivatives."""
-    targets, knots = planner._targets(swings, planner._guide(swings))
-    basis = SampledBasis.at(targets.time, knots, 5)
-    objective = MotionObjective(planner.body, planner.proximity, targets, basis)
-    points = np.tile(targets.reference[0], (basis.size, 1))
-    shift = np.zeros((len(targets.time), objective.task_rows))
-    benchmark(objective.linearise, points, WholeBodySettings().fit, shift)
+def test_linearisation(benchmark, linearisation):
+    """One evaluation of the objective with all derivatives, after a step of a centimetre and a degree."""
+    objective, _, points, shift = linearisation
+    moved = itertools.cycle((points + 0.01, points))
+    benchmark(lambda: objective.linearise(next(moved), WholeBodySettings().fit, shift))
+
+
+def test_step(benchmark, linearisation):
+    """Assembly and solution of the normal equations."""
+    objective, basis, points, shift = linearisation
+    state = objective.linearise(points, WholeBodySettings().fit, shift)
+    system = BlockBandedSystem(basis, points.shape[1])
+
+    def step():
+        state.assemble(system)
+        return system.solve(1.0)
+
+    benchmark(step)
+
+
+def test_forces(benchmark, platform):
+    """Contact forces and joint torques at 1 kHz."""
+    body, scene, trajectory = platform
+    motion = plan_whole_body(body, scene, trajectory, rng=np.random.default_rng(0)).motion
+    args = (body, trajectory.schedule, motion.time, motion.q, motion.v, motion.a)
+    benchmark.pedantic(plan_forces, args=args, rounds=3, iterations=1)
 
 
 def test_whole_body(benchmark, platform):
