@@ -23,8 +23,8 @@ def grips(monkeypatch):
     found = []
 
     class Watched(World):
-        def __init__(self, model):
-            super().__init__(model)
+        def __init__(self, *args, **options):
+            super().__init__(*args, **options)
             self.held = {}
 
         def grip(self, grip):
