@@ -74,8 +74,11 @@ class RunOptions:
         return words if self.figures else [*words, "--no-figures"]
 
 
-def built_in_jobs() -> tuple[Job, ...]:
+def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
     """Every built-in scenario followed by its variants, in the order of ``manikin scenarios``.
+
+    Args:
+        statures: Whether to leave out bodies without a stature, such as a point mass.
 
     Raises:
         ScenarioError: If one of the files is not valid.
@@ -84,6 +87,7 @@ def built_in_jobs() -> tuple[Job, ...]:
         Job(name, variant, load_scenario(name, variant).file.expect)
         for name in list_scenarios()
         for variant in (None, *list_variants(name))
+        if not (statures and load_scenario(name, variant).is_point_mass)
     )
 
 

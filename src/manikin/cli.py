@@ -301,7 +301,7 @@ def _run_all(
     from manikin.output import make_directory, to_json
     from manikin.results import text_table
 
-    runs = batch.built_in_jobs()
+    runs = batch.built_in_jobs(statures=asked["stature_m"] is not None)
     if out is not None:
         make_directory(out)
 

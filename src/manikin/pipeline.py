@@ -48,6 +48,9 @@ from manikin.wholebody.configuration_spline import rotation_from_quaternion
 from manikin.wholebody.manner import manner_of
 from manikin.wholebody.point_mass import point_mass_motion
 
+KEY_ROOM = 0.5
+"""Share of the fit's distance from the ends of the joint ranges that key postures keep."""
+
 Progress = Callable[[str, float], None]
 """Told the stage and the share of it that is done, in [0, 1]."""
 
@@ -284,7 +287,7 @@ class _Run:
             return planned, None
         # The fit keeps its distance from the ends of the ranges: the key postures leave room for that,
         # if they can.
-        found = self._eligible(planned, self._settings.fit.joint_buffer)
+        found = self._eligible(planned, KEY_ROOM * self._settings.fit.joint_buffer)
         if found.failure is not None:
             found = self._eligible(planned, 0.0)
         block = centroidal_summary(found.centroidal) | {

@@ -254,7 +254,7 @@ def two_runs(monkeypatch):
 
     def expect(outcome):
         jobs = (batch.Job("one"), batch.Job("two", "bad", outcome))
-        monkeypatch.setattr(batch, "built_in_jobs", lambda: jobs)
+        monkeypatch.setattr(batch, "built_in_jobs", lambda **_: jobs)
 
     monkeypatch.setattr(batch.RunOptions, "command", command)
     return expect

@@ -167,6 +167,8 @@ def test_what_is_broken_weighs_more():
     scales = FitScales()
     changed = reweighed(scales, frozenset({"min_clearance_m", "max_support_error_m"}))
     assert changed.clearance < scales.clearance
+    assert WholeBodyRequirements().clearance < changed.safe_distance < scales.safe_distance
+    assert reweighed(scales, frozenset({"min_clearance_m"}), near=False).safe_distance == scales.safe_distance
     assert changed.multiplier_rounds > 0
     for name in ("joint_limit", "joint_velocity", "force", "moment_share", "position", "com"):
         assert getattr(changed, name) == getattr(scales, name)

@@ -54,7 +54,7 @@ CAUGHT = -0.02
 """Below this clearance a part of the body is caught on the wrong side of another: the fit begins anew,
 with more weight on clearance, because no small step leads out [m]."""
 
-INEXACT = frozenset({"max_support_error_m", "max_com_error_m"})
+INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
 
 Progress = Callable[[float], None]
@@ -236,7 +236,7 @@ class _Planner:
                 break
             broken = last.certificate.broken(self.settings.requirements)
             if last.certificate.min_clearance_m < CAUGHT:
-                scales = reweighed(scales, broken & {"min_clearance_m"})
+                scales = reweighed(scales, broken & {"min_clearance_m"}, near=False)
                 fit, start = self._prepare(swings, guide, self._knots(), scales)
                 found = fit.solve(start)
             elif number == 0 and broken & INEXACT:

@@ -115,7 +115,7 @@ class MotionFit:
             iterations += taken
         moved = True
         for _ in range(final.multiplier_rounds):
-            if state.support_error < scales.tolerance and state.com_error < 3.0 * scales.tolerance:
+            if scales.are_met(state.support_error, state.support_turn, state.com_error):
                 break
             if moved:  # At a point that no step has left, another push says nothing new.
                 self._update_multipliers(state)

@@ -31,6 +31,7 @@ class FitScales:
         multiplier_rounds: Most updates of the multipliers of contacts and centre of mass.
         tolerance: Largest error of the contacts at convergence [m]; three times that for the
             centre of mass.
+        turn_tolerance: Largest angle of a sole from its contact at convergence [rad].
     """
 
     position: float = 1.0e-3
@@ -54,6 +55,21 @@ class FitScales:
     iterations_per_round: int = 3
     multiplier_rounds: int = 12
     tolerance: float = 5.0e-4
+    turn_tolerance: float = 3.5e-3
+
+    def are_met(self, support_error: float, support_turn: float, com_error: float) -> bool:
+        """Whether contacts and centre of mass are exact enough.
+
+        Args:
+            support_error: Of contacts [m].
+            support_turn: Of soles [rad].
+            com_error: Of the centre of mass [m].
+        """
+        return (
+            support_error < self.tolerance
+            and support_turn < self.turn_tolerance
+            and com_error < 3.0 * self.tolerance
+        )
 
     def loosened(self, factor: float) -> "FitScales":
         """Return the same scales with contacts and centre of mass ``factor`` times looser."""

@@ -46,6 +46,7 @@ class Linearised:
         task_jacobian: (n, m, nq) their derivatives by the raw coordinates.
         momentum: Scaled residual (n, 6) of the momentum's rate with its derivatives.
         support_error: Largest error of an effector in contact [m].
+        support_turn: Largest angle of one that must keep its orientation [rad].
         com_error: Largest error of the centre of mass [m].
         clearance: Least distance among the close pairs [m].
         closest: Names of that pair.
@@ -59,6 +60,7 @@ class Linearised:
     task_jacobian: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 0)))
     momentum: MomentumRate | None = None
     support_error: float = 0.0
+    support_turn: float = 0.0
     com_error: float = 0.0
     clearance: float = np.inf
     closest: tuple[str, str] = ("", "")
@@ -177,6 +179,8 @@ class MotionObjective:
             jacobian[:, rows], residual[:, rows] = _effector_rows(target, place, by_joints, scales)
             error = np.linalg.norm(place[:, :3, 3] - target.position, axis=1)
             out.support_error = max(out.support_error, float(error[target.weight >= 1.0].max(initial=0.0)))
+            turn = np.linalg.norm(residual[:, rows][:, 3:], axis=1) * scales.rotation
+            out.support_turn = max(out.support_turn, float(turn[_held_rows(target)[:, 3]].max(initial=0.0)))
         weight = self._targets.com_weight
         error = motion.com - self._targets.com
         jacobian[:, -3:] = (weight / scales.com)[:, None, None] * motion.com_jacobian

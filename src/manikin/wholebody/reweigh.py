@@ -12,10 +12,16 @@ from manikin.wholebody.fit_scales import FitScales
 STRONGER = 0.5
 """Factor of the scales of what was missed."""
 
+NEARER = 0.75
+"""Factor of the wanted clearance where the required one is missed."""
+
+LEAST_SAFE_DISTANCE = 0.014
+"""Wanted clearance that this leaves [m]: more than the required one."""
+
 MORE_ROUNDS = 12
 """Further rounds of the multipliers for contacts and centre of mass."""
 
-CLOSER = 0.02
+CLOSER = 0.005
 """Relative decrease of the objective below which the iteration stops: a near miss asks for patience."""
 
 _SCALES = MappingProxyType(
@@ -30,13 +36,24 @@ _SCALES = MappingProxyType(
 """Scales that decide each field of the certificate.  Contacts and the centre of mass have multipliers."""
 
 
-def reweighed(scales: FitScales, broken: frozenset[str]) -> FitScales:
+def reweighed(scales: FitScales, broken: frozenset[str], *, near: bool = True) -> FitScales:
     """Return scales at which the broken requirements weigh more.
 
     Args:
         scales: Those of the fit before.
         broken: Names of fields of the certificate, see :meth:`WholeBodyResiduals.broken`.
+        near: Whether they are missed by a little only, and the fit goes on from where it is.
     """
+    if near and "min_clearance_m" in broken:
+        scales = replace(scales, **_nearer(scales))
     names = {scale for field in broken for scale in _SCALES.get(field, ())}
     finer = {name: STRONGER * getattr(scales, name) for name in sorted(names)}
     return replace(scales, **finer, multiplier_rounds=MORE_ROUNDS, decrease=CLOSER)
+
+
+def _nearer(scales: FitScales) -> dict[str, float]:
+    """Count on less room where there is little: what is far enough no longer pushes."""
+    return {
+        "safe_distance": max(NEARER * scales.safe_distance, LEAST_SAFE_DISTANCE),
+        "softness": NEARER * scales.softness,
+    }
