@@ -28,7 +28,7 @@ from manikin.wholebody.guide import Guide, guide_times, plan_guide
 from manikin.wholebody.knots import phase_knots, refined, sample_times, touch_downs_at_speed
 from manikin.wholebody.manner import CLOSE, READY, Manner
 from manikin.wholebody.reference import reference_motion
-from manikin.wholebody.reweigh import reweighed
+from manikin.wholebody.reweigh import FIRST_DECREASE, LATER_DECREASE, reweighed
 from manikin.wholebody.swing import SwingLimits
 from manikin.wholebody.targets import FitTargets, Ignored, effector_targets, ignored_pairs, toe_angles
 
@@ -236,7 +236,7 @@ class _Planner:
                 break
             broken = last.certificate.broken(self.settings.requirements)
             if last.certificate.min_clearance_m < CAUGHT:
-                scales = reweighed(scales, broken & {"min_clearance_m"}, near=False)
+                scales = reweighed(scales, broken & {"min_clearance_m"})
                 fit, start = self._prepare(swings, guide, self._knots(), scales)
                 found = fit.solve(start)
             elif number == 0 and broken & INEXACT:
@@ -244,7 +244,8 @@ class _Planner:
                 fit, start = self._prepare(swings, guide, self._knots(fine=True), scales, found.spline)
                 found = fit.improve(start, scales)
             else:
-                scales = reweighed(scales, broken)
+                decrease = FIRST_DECREASE if number == 0 else LATER_DECREASE
+                scales = reweighed(scales, broken, narrow=number > 0, decrease=decrease)
                 found = fit.improve(found.spline, scales)
             last = self._judged(found, swings, guide, began)
             result = _better(result, last)

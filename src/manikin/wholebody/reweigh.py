@@ -21,8 +21,11 @@ LEAST_SAFE_DISTANCE = 0.014
 MORE_ROUNDS = 12
 """Further rounds of the multipliers for contacts and centre of mass."""
 
-CLOSER = 0.005
-"""Relative decrease of the objective below which the iteration stops: a near miss asks for patience."""
+FIRST_DECREASE = 0.02
+"""Relative decrease of the objective below which the first repair stops."""
+
+LATER_DECREASE = 0.005
+"""The same where that did not help, or a fit begins anew: the harder, the more patience."""
 
 _SCALES = MappingProxyType(
     {
@@ -36,19 +39,22 @@ _SCALES = MappingProxyType(
 """Scales that decide each field of the certificate.  Contacts and the centre of mass have multipliers."""
 
 
-def reweighed(scales: FitScales, broken: frozenset[str], *, near: bool = True) -> FitScales:
+def reweighed(
+    scales: FitScales, broken: frozenset[str], *, narrow: bool = False, decrease: float = LATER_DECREASE
+) -> FitScales:
     """Return scales at which the broken requirements weigh more.
 
     Args:
         scales: Those of the fit before.
         broken: Names of fields of the certificate, see :meth:`WholeBodyResiduals.broken`.
-        near: Whether they are missed by a little only, and the fit goes on from where it is.
+        narrow: Whether to count on less room where clearance is missed.
+        decrease: Relative decrease of the objective below which the iteration stops.
     """
-    if near and "min_clearance_m" in broken:
+    if narrow and "min_clearance_m" in broken:
         scales = replace(scales, **_nearer(scales))
     names = {scale for field in broken for scale in _SCALES.get(field, ())}
     finer = {name: STRONGER * getattr(scales, name) for name in sorted(names)}
-    return replace(scales, **finer, multiplier_rounds=MORE_ROUNDS, decrease=CLOSER)
+    return replace(scales, **finer, multiplier_rounds=MORE_ROUNDS, decrease=decrease)
 
 
 def _nearer(scales: FitScales) -> dict[str, float]:
