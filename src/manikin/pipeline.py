@@ -288,7 +288,8 @@ class _Run:
         # The fit keeps its distance from the ends of the ranges: the key postures leave room for that,
         # if they can.
         found = self._eligible(planned, KEY_ROOM * self._settings.fit.joint_buffer)
-        if found.failure is not None:
+        if found.failure is not None or (found.trajectory is None and found.replans > 0):
+            self._summary["failure"] = None  # of a seated part that did not fit another plan
             found = self._eligible(planned, 0.0)
         block = centroidal_summary(found.centroidal) | {
             "replans": found.replans,

@@ -5,7 +5,10 @@ import json
 import numpy as np
 import pytest
 
+from manikin import pipeline
 from manikin.pipeline import run
+from manikin.scenarios import load_scenario
+from manikin.wholebody import Eligibility
 
 STRIDE = """
 name: stride
@@ -107,3 +110,22 @@ def test_constraints_that_forbid_the_postures_are_named(tmp_path):
     assert "no plan of the centre of mass passes there" in failure["reason"]
     assert "1 further plan of the centre of mass tried" in failure["reason"]
     assert result.summary["centroidal"]["replans"] == 1
+
+
+def test_a_seated_part_that_fits_no_replanned_com_is_tried_without_room_in_the_ranges(monkeypatch):
+    """The first search plans again and finds no seated part; the second one counts, and so does its result."""
+    search, calls = pipeline.find_eligible_plan, []
+    job = pipeline._Run(load_scenario("ramp"), None, None, pipeline.ExecutionRequirements(), None)
+
+    def first_fails(first, realise, look, *, replan):
+        calls.append(look)
+        if len(calls) == 1:
+            job._fail("wholebody", "no final sitting posture", 0.0, "phase 6")
+            return Eligibility(first, None, None, 1, None)
+        return search(first, realise, look, replan=replan)
+
+    monkeypatch.setattr(pipeline, "find_eligible_plan", first_fails)
+    _, trajectory = job._test_key_postures(job._plan_com())
+    assert len(calls) == 2
+    assert trajectory is not None
+    assert job._summary["failure"] is None
