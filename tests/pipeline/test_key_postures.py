@@ -113,7 +113,7 @@ def test_constraints_that_forbid_the_postures_are_named(tmp_path):
 
 
 def test_a_seated_part_that_fits_no_replanned_com_is_tried_without_room_in_the_ranges(monkeypatch):
-    """The first search plans again and finds no seated part; the second one counts, and so does its result."""
+    """The first search plans again and finds no seated part; the second one counts, with its result."""
     search, calls = pipeline.find_eligible_plan, []
     job = pipeline._Run(load_scenario("ramp"), None, None, pipeline.ExecutionRequirements(), None)
 
