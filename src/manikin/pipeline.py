@@ -444,6 +444,7 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
     certificate = result.certificate
     return {
         "max_support_error_m": certificate.max_support_error_m,
+        "max_meeting_error_m": certificate.max_meeting_error_m,
         "max_com_error_m": certificate.max_com_error_m,
         "min_clearance_m": certificate.min_clearance_m,
         "closest_pair": list(certificate.closest_pair),

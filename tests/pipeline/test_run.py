@@ -18,7 +18,8 @@ KEYS = {
         "limiting_contact", "feasibility_radius", "wall_s",
     },
     "wholebody": {
-        "max_support_error_m", "max_com_error_m", "min_clearance_m", "max_scuff_m", "closest_pair",
+        "max_support_error_m", "max_meeting_error_m", "max_com_error_m", "min_clearance_m", "max_scuff_m",
+        "closest_pair",
         "max_joint_limit_violation_rad", "seed_matters", "lowest_com_m", "head_clearance_m", "wall_s",
     },
     "execution": {

@@ -46,6 +46,10 @@ from manikin.spatial import GRAVITY, FloatArray, frozen_array
 
 _PELVIS = "pelvis"
 
+RAISED = 0.006
+"""Points this far above the lowest one of a contact that still settles may carry all of its load, twice as
+far none [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class ControlOutput:
@@ -185,10 +189,13 @@ class Controller:
     ) -> list[AccelerationTask]:
         """List the weighted tasks of one step."""
         gains, weights = self.settings.impedances, self.settings.weights
-        pelvis = orientation_task(
-            _PELVIS, state.frames[_PELVIS], reference.effectors[_PELVIS], gains.pelvis, weights.pelvis
-        )
-        tasks = [com_task(state, reference, gains.com, weights.com), pelvis]
+        tasks = [com_task(state, reference, gains.com, weights.com)]
+        if not self._rests(supports):
+            tasks.append(
+                orientation_task(
+                    _PELVIS, state.frames[_PELVIS], reference.effectors[_PELVIS], gains.pelvis, weights.pelvis
+                )
+            )
         tasks += [self._effector_task(support, state, reference) for support in supports.values()]
         posture_weight = self._posture_weight(supports)
         tasks.append(posture_task(state, reference, gains.posture, posture_weight))
@@ -197,6 +204,14 @@ class Controller:
                 angular_momentum_task(state, reference, gains.angular_momentum, weights.angular_momentum)
             )
         return tasks
+
+    def _rests(self, supports: Mapping[str, SupportState]) -> bool:
+        """Whether the pelvis itself is on a support, which then says how it is turned."""
+        segment = self.body.effector(_PELVIS).segment
+        return any(
+            support.mode is SupportMode.STANCE and self.body.effector(name).segment == segment
+            for name, support in supports.items()
+        )
 
     def _effector_task(
         self, support: SupportState, state: DynamicsState, reference: ReferenceSample
@@ -209,6 +224,8 @@ class Controller:
         grasps = support.contact is not None and support.contact.kind is ContactKind.GRASP
         if support.mode is not SupportMode.SWING and (grasps or support.settling):
             # A hand turns in its grasp; what settles is on its way.
+            if support.mode is SupportMode.LANDING and not grasps:
+                planned = landing_reference(support, planned)
             return swing_task(name, frame, planned, gains.swing, weight)
         if support.mode is SupportMode.STANCE:
             return stance_task(name, frame, support, gains.stance, weight)
@@ -235,10 +252,23 @@ class Controller:
         cap *= support.load_share
         if support.unload_share < 1.0:
             cap = min(cap, support.unload_share * self._carried.get(support.effector, cap))
+        if support.settling:
+            limits = cap * self._low_shares(geometry, contact, state)
+            basis = replace(basis, upper=np.minimum(basis.upper, limits))
         if support.fades:
             limits = state.mass * GRAVITY * self._point_shares(support, contact)
             basis = replace(basis, upper=np.minimum(basis.upper, limits))
         return LoadedContact(basis, cap, min(support.load_share, support.unload_share))
+
+    @staticmethod
+    def _low_shares(geometry: ContactGeometry, contact: Contact, state: DynamicsState) -> FloatArray:
+        """(4 k,) share of the load that each point may carry: those that a tilt has raised carry none."""
+        heights = []
+        for patch in geometry.patches:
+            frame = state.frames[segment_key(patch.segment)]
+            heights.append((frame.position + patch.points @ frame.rotation.T) @ contact.normal)
+        height = np.concatenate(heights)
+        return np.repeat(np.clip(2.0 - (height - height.min()) / RAISED, 0.0, 1.0), 4)
 
     def _point_shares(self, support: SupportState, contact: Contact) -> FloatArray:
         """(4 k,) body weights that each point's variables may carry while the touching part changes."""

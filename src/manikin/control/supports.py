@@ -241,7 +241,9 @@ class SupportSwitch:
         """Lift the end of a flight smoothly, in the first part of the time in which it might touch."""
         duration = _LIFTING_SHARE * (interval.start - interval.early)
         share = float(np.clip((time - interval.early) / duration, 0.0, 1.0))
-        up = self._settings.hover * interval.contact.normal
+        # What is made at speed has to press in time, and a seat may press a little early.
+        height = 0.0 if interval.contact.settle > 0.0 else self._settings.hover
+        up = height * interval.contact.normal
         return SupportState(
             name,
             SupportMode.SWING,

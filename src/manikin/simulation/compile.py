@@ -229,12 +229,18 @@ def _add_body(spec: Any, body: BodyModel, options: PhysicsOptions) -> None:
         )
 
 
+SOFT_IMPEDANCE = (0.3, 0.8, 0.005)
+"""Of soft flesh: the engine's impedance at first touch and at a depth [m], as a third value.  Low ones give
+way under load, so that a body slides on a cushion instead of bouncing along it."""
+
+
 def _soft_contact(friction: float, options: PhysicsOptions) -> dict[str, Any]:
     """Contact settings of soft flesh, which count before those of what it touches."""
     return {
         "friction": [friction, 0.005, 0.0001],
         "solref": [options.soft_time_constant, options.contact_damping_ratio],
         "priority": 1,
+        "solimp": [*SOFT_IMPEDANCE, 0.5, 2.0],
     }
 
 

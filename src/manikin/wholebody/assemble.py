@@ -27,6 +27,7 @@ from manikin.wholebody.forces import plan_forces
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
 from manikin.wholebody.knots import phase_knots, refined, sample_times, touch_downs_at_speed
 from manikin.wholebody.manner import CLOSE, READY, Manner
+from manikin.wholebody.meeting import meeting_at
 from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.reweigh import FIRST_DECREASE, LATER_DECREASE, reweighed
 from manikin.wholebody.swing import SwingLimits
@@ -272,7 +273,8 @@ class _Planner:
         ignored = ignored_pairs(self.body, self.scene, self.trajectory.schedule, motion.time)
         if self.leaning:
             ignored = tuple(pairs | self.leaning for pairs in ignored)
-        certificate = certify(self.body, self.proximity, self.trajectory, motion, ignored, wrench)
+        meeting = meeting_at(self.body, self.scene, self.trajectory.schedule, motion.time)
+        certificate = certify(self.body, self.proximity, self.trajectory, motion, ignored, wrench, meeting)
         failure = self._failure(swings, guide, certificate)
         wall = clock.perf_counter() - began
         return WholeBodyResult(motion, fit.spline, certificate, swings, guide, failure, fit.iterations, wall)
@@ -323,6 +325,7 @@ class _Planner:
             reference=_with_joints(guide.at(time), toes),
             reference_scale=scale,
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
+            meeting=meeting_at(self.body, self.scene, schedule, time),
         )
 
     def _sample(self, spline: ConfigurationSpline) -> tuple[Motion, FloatArray]:

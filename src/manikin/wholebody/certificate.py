@@ -18,8 +18,8 @@ from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.motion import Motion
 from manikin.scene import Proximity
 from manikin.spatial import FloatArray
+from manikin.wholebody.meeting import Ignored, Meeting, meeting_errors
 from manikin.wholebody.scuff import deepest_scuff
-from manikin.wholebody.targets import Ignored
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,7 @@ class WholeBodyRequirements:
     Attributes:
         support_error: Largest distance of an effector from its contact [m].
         support_turn: Largest angle of a sole from its contact [rad].
+        meeting_error: Largest depth in its surface, or distance from it, of what is made at speed [m].
         com_error: Largest distance of the centre of mass from its plan [m].
         clearance: Least distance to obstacles and between body parts [m].
         joint_limit: Largest violation of a joint range [rad].
@@ -39,6 +40,7 @@ class WholeBodyRequirements:
 
     support_error: float = 1.0e-3
     support_turn: float = 5.0e-3
+    meeting_error: float = 2.0e-3
     com_error: float = 2.0e-3
     clearance: float = 0.01
     joint_limit: float = 1.0e-9
@@ -54,6 +56,8 @@ class WholeBodyResiduals:
     Attributes:
         max_support_error_m: Distance of an effector from its contact [m].
         max_support_turn_rad: Angle of a sole from its contact [rad].
+        max_meeting_error_m: Depth in its surface, or distance from it, of what is made at speed until
+            it has settled [m].
         max_com_error_m: Distance of the centre of mass from its plan [m].
         min_clearance_m: Least counted distance [m].
         closest_pair: Names of the shapes at that distance.
@@ -70,6 +74,7 @@ class WholeBodyResiduals:
 
     max_support_error_m: float
     max_support_turn_rad: float
+    max_meeting_error_m: float
     max_com_error_m: float
     min_clearance_m: float
     closest_pair: tuple[str, str]
@@ -99,6 +104,8 @@ class WholeBodyResiduals:
         return [
             ("max_support_error_m", self.max_support_error_m, r.support_error, "support error [m]"),
             ("max_support_turn_rad", self.max_support_turn_rad, r.support_turn, "support turn [rad]"),
+            ("max_meeting_error_m", self.max_meeting_error_m, r.meeting_error,
+             "distance of what slides from its surface [m]"),
             ("max_com_error_m", self.max_com_error_m, r.com_error, "centre-of-mass error [m]"),
             ("min_clearance_m", -self.min_clearance_m, -r.clearance, f"clearance [m] of {pair}, negated,"),
             ("max_joint_limit_violation_rad", self.max_joint_limit_violation_rad, r.joint_limit,
@@ -116,6 +123,7 @@ def certify(
     motion: Motion,
     ignored: tuple[Ignored, ...],
     wrench: FloatArray,
+    meeting: Meeting | None = None,
 ) -> WholeBodyResiduals:
     """Measure a motion against its contacts, centre of mass, limits and obstacles.
 
@@ -126,6 +134,7 @@ def certify(
         motion: The planned motion, densely sampled.
         ignored: Pairs that may touch, per sample.
         wrench: (n, 6) pseudo-wrench of the whole body about the world origin, per sample.
+        meeting: What is met at speed, at the motion's samples.
     """
     support, turn = _support_errors(body, trajectory, motion)
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
@@ -139,6 +148,7 @@ def certify(
     clearance = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
     series = {
         "max_support_error_m": support, "max_support_turn_rad": turn, "max_com_error_m": com,
+        "max_meeting_error_m": meeting_errors(proximity, meeting, motion),
         "max_joint_limit_violation_rad": np.maximum(limit, 0.0), "max_velocity_share": speed,
         "max_missing_wrench": missing, "max_torque_share": torque,
     }  # fmt: skip

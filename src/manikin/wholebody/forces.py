@@ -42,6 +42,9 @@ _NEWTON_STEPS = 40
 _ARM = 0.1
 """Length that makes moments comparable with forces [m]."""
 
+_RAISED = 0.005
+"""Height above the lowest point of a contact that still settles at which a force costs twice as much [m]."""
+
 _HANGING_COST = 3.0
 """Cost of a force on a hanging segment (toes) relative to one on the effector's own."""
 
@@ -97,9 +100,24 @@ class _Generators:
         moment = np.cross(self.point - centre, self.direction) / _ARM
         return centre, np.vstack([self.direction.T, moment.T])
 
-    def shifted(self, contact: int, offset: FloatArray) -> "_Generators":
-        """The same forces with those of one contact acting elsewhere by an offset (3,) [m]."""
-        return replace(self, point=self.point + np.outer(self.contact == contact, offset))
+    def settling(
+        self, number: int, contact: Contact, position: FloatArray, rotation: FloatArray
+    ) -> "_Generators":
+        """The same forces with those of one contact where its effector is now, most of them where it is low.
+
+        Args:
+            number: Index of the contact's effector among the contact names.
+            contact: The contact that is still settling.
+            position: (3,) of its effector [m].
+            rotation: (3, 3) effector-to-world.
+        """
+        own = self.contact == number
+        point, cost = self.point.copy(), self.cost.copy()
+        local = (self.point[own] - contact.position) @ contact.rotation_contact_to_world
+        point[own] = position + local @ rotation.T
+        height = point[own] @ contact.normal
+        cost[own] *= 1.0 + ((height - height.min()) / _RAISED) ** 2
+        return replace(self, point=point, cost=cost)
 
     @cached_property
     def by_carrier(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
@@ -205,19 +223,13 @@ def _alike(
         if np.any(rows & ~sliding):
             yield np.flatnonzero(rows & ~sliding), generators, phase.stance
         for k in np.flatnonzero(sliding):
-            shifted = generators
+            moved = generators
             for index, name in enumerate(names):
                 if settling[name][k]:
-                    here = effector_position(body, data, q[k], name)
-                    shifted = shifted.shifted(index, here - phase.stance[name].position)
-            yield np.array([k]), shifted, phase.stance
-
-
-def effector_position(body: BodyModel, data: pin.Data, q: FloatArray, effector: str) -> FloatArray:
-    """(3,) place of an effector in the world [m]."""
-    pin.forwardKinematics(body.pinocchio, data, q)
-    place = pin.updateFramePlacement(body.pinocchio, data, body.effector_frame(effector))
-    return np.array(place.translation)
+                    pin.forwardKinematics(body.pinocchio, data, q[k])
+                    place = pin.updateFramePlacement(body.pinocchio, data, body.effector_frame(name))
+                    moved = moved.settling(index, phase.stance[name], place.translation, place.rotation)
+            yield np.array([k]), moved, phase.stance
 
 
 def load_shares(schedule: ContactSchedule, time: FloatArray, names: tuple[str, ...]) -> FloatArray:

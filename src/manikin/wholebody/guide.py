@@ -176,9 +176,7 @@ def _settling(
         if schedule.settling(time, contact.effector)[0]:
             if contact.effector not in touched:
                 _, here = Configuration(body, q).effector_placement(contact.effector)
-                touched[contact.effector] = here - contact.normal * (
-                    contact.normal @ (here - contact.position)
-                )
+                touched[contact.effector] = here
             start = touched[contact.effector]
             share = float(settled_share(schedule, phase, contact, np.array([time]))[0])
             placements[contact.effector] = Placement(

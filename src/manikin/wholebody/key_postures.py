@@ -26,7 +26,7 @@ from manikin.wholebody.manner import READY, Manner
 from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.targets import Ignored, ignored_pairs
 
-SETTINGS = SolverSettings(tolerance=1e-3, clearance_tolerance=2e-3, settled=2e-2, explain=False)
+SETTINGS = SolverSettings(tolerance=2e-4, clearance_tolerance=2e-3, settled=2e-2, explain=False)
 """A posture counts when it is as exact as the finished motion has to be."""
 
 NEARNESS = (200.0, 1000.0)

@@ -131,6 +131,8 @@ class MotionObjective:
         self._body, self._proximity, self._targets = body, proximity, targets
         self._sampler = MotionSampler(body, tuple(targets.effectors), basis)
         self._known = KnownDistances()
+        meeting = targets.meeting
+        self._ignored = targets.ignored if meeting is None else meeting.without(targets.ignored)
         self._last: tuple[FloatArray, MotionSamples] | None = None
         with np.errstate(divide="ignore"):
             self._reference_weight = 1.0 / targets.reference_scale
@@ -193,15 +195,22 @@ class MotionObjective:
         if self._proximity is None:
             return
         reach = scales.safe_distance + 4.0 * scales.softness
-        found = self._proximity.evaluate_placed(motion.shapes, reach, self._targets.ignored, self._known)
+        found = self._proximity.evaluate_placed(motion.shapes, reach, self._ignored, self._known)
         if len(found.distance) == 0:
             return
-        worst = int(np.argmin(found.distance))
-        out.clearance, out.closest = float(found.distance[worst]), found.pairs[worst]
+        meeting = self._targets.meeting
+        met = np.zeros(len(found.distance), dtype=np.bool_) if meeting is None else meeting.rows(found)
+        apart = np.where(met, np.inf, found.distance)
+        worst = int(np.argmin(apart))
+        out.clearance, out.closest = float(apart[worst]), found.pairs[worst]
         # A softened hinge: it also holds back what is about to come too close.
         missing = (scales.safe_distance - found.distance) / scales.softness
         value = scales.softness * np.logaddexp(0.0, missing) / scales.clearance
         rows = -expit(missing)[:, None] * found.gradient / scales.clearance
+        if meeting is not None and np.any(met):
+            weight = meeting.wanted(found, met) / scales.position
+            value = np.where(met, weight * found.distance, value)
+            rows = np.where(met[:, None], weight[:, None] * found.gradient, rows)
         jacobian, residual = _padded(found.sample, rows, value, len(motion.com))
         out.add(0, _to_raw(jacobian, motion.tangent), residual)
 

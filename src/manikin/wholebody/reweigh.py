@@ -29,6 +29,9 @@ LATER_DECREASE = 0.005
 
 _SCALES = MappingProxyType(
     {
+        "max_support_error_m": ("tolerance",),
+        "max_com_error_m": ("tolerance",),
+        "max_meeting_error_m": ("position",),
         "min_clearance_m": ("clearance",),
         "max_joint_limit_violation_rad": ("joint_limit",),
         "max_velocity_share": ("joint_velocity",),
@@ -36,7 +39,8 @@ _SCALES = MappingProxyType(
         "max_torque_share": ("force", "moment_share"),
     }
 )
-"""Scales that decide each field of the certificate.  Contacts and the centre of mass have multipliers."""
+"""Scales that decide each field of the certificate.  Contacts and the centre of mass have multipliers, which
+are only updated until the tolerance is kept."""
 
 
 def reweighed(

@@ -11,9 +11,7 @@ from manikin.contact import Contact, ContactKind, ContactSchedule
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.flights import PlannedSwing, hangs, touch_pairs
-
-Ignored = frozenset[tuple[str, str]]
-"""Pairs of segment and obstacle (or segment) whose distance does not count."""
+from manikin.wholebody.meeting import SITTING_DOWN, Ignored, Meeting
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +50,7 @@ class FitTargets:
         reference_scale: (nv,) deviation of the tangent [m, rad] that costs as much as one
             unit of every other residual; infinite entries are free.
         ignored: Pairs whose distance does not count, per sample.
+        meeting: What is met at speed, per sample, or None without.
     """
 
     time: FloatArray
@@ -63,6 +62,7 @@ class FitTargets:
     reference: FloatArray
     reference_scale: FloatArray
     ignored: tuple[Ignored, ...]
+    meeting: Meeting | None = None
 
 
 def effector_targets(
@@ -241,7 +241,3 @@ def ignored_pairs(
             known[key] = frozenset(per_phase[index].union(*extra))
         found.append(known[key])
     return tuple(found)
-
-
-SITTING_DOWN = 0.15
-"""Time before a seat is touched in which the trunk may come close to it [s]."""

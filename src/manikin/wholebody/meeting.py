@@ -1,0 +1,119 @@
+"""A contact that is made at speed and slides to its place: its shapes on the surface meanwhile.
+
+Buttocks reach a seat with one side first and slide and roll to their place.  Until they are there the
+contact's own frame is above the surface, and only the distance of the shapes says whether they touch.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule
+from manikin.motion import Motion
+from manikin.scene import Proximity, Scene
+from manikin.scene.distance import ProximitySamples, considered
+from manikin.spatial import FloatArray
+from manikin.wholebody.flights import touch_pairs
+
+Ignored = frozenset[tuple[str, str]]
+"""Pairs of segment and obstacle (or segment) whose distance does not count."""
+
+SITTING_DOWN = 0.15
+"""Time before a seat is touched in which the trunk may come close to it [s]."""
+
+_REACH = 0.1
+"""Distances beyond this are not measured [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """Which shapes meet which obstacles at speed.
+
+    Attributes:
+        pairs: Pairs of segment and obstacle that may touch but not go into each other.
+        near: (n,) whether they are about to touch, or do and have not settled yet, at each sample.
+        sliding: (n,) whether one of their shapes has to touch.
+    """
+
+    pairs: Ignored
+    near: NDArray[np.bool_]
+    sliding: NDArray[np.bool_]
+
+    def without(self, ignored: Sequence[Ignored]) -> tuple[Ignored, ...]:
+        """The pairs that are ignored at each sample, but for those that meet there."""
+        return tuple(
+            found - self.pairs if near else found for found, near in zip(ignored, self.near, strict=True)
+        )
+
+    def rows(self, found: ProximitySamples) -> NDArray[np.bool_]:
+        """(k,) whether a close pair is one that meets."""
+        known: dict[tuple[str, str], bool] = {}
+        for pair in found.pairs:
+            if pair not in known:
+                known[pair] = not considered([pair], self.pairs)[0]
+        named = np.array([known[pair] for pair in found.pairs], dtype=np.bool_)
+        return named & self.near[found.sample]
+
+    def wanted(self, found: ProximitySamples, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(k,) the rows whose distance should be zero: the closest where one must touch, and what is inside.
+
+        Args:
+            found: Close pairs.
+            rows: (k,) those that meet.
+        """
+        least = np.full(len(self.near), np.inf)
+        np.minimum.at(least, found.sample[rows], found.distance[rows])
+        closest = self.sliding[found.sample] & (found.distance <= least[found.sample])
+        return rows & (closest | (found.distance < 0.0))
+
+
+def meeting_at(body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray) -> Meeting | None:
+    """What is met at speed, from shortly before the touch until it has settled.
+
+    Args:
+        body: The body.
+        scene: The obstacles.
+        schedule: Contacts in time.
+        time: (n,) [s].
+
+    Returns:
+        None where every contact is made at rest.
+    """
+    pairs: Ignored = frozenset()
+    near, sliding = np.zeros(len(time), dtype=np.bool_), np.zeros(len(time), dtype=np.bool_)
+    for index, phase in enumerate(schedule.sequence):
+        for contact in phase.stance:
+            new = index > 0 and contact.effector not in schedule.sequence[index - 1].stance
+            if contact.settle > 0.0 and new:
+                start = float(schedule.instants[index])
+                pairs |= touch_pairs(body, scene, contact)
+                near |= (time >= start - SITTING_DOWN) & (time < start + contact.settle)
+                sliding |= schedule.settling(time, contact.effector)
+    return Meeting(pairs, near, sliding) if pairs else None
+
+
+def meeting_errors(proximity: Proximity, meeting: Meeting | None, motion: Motion) -> FloatArray:
+    """(n,) depth of what meets at speed in its surface, or its distance where it should touch [m].
+
+    Args:
+        proximity: Distances to the scene.
+        meeting: What is met, at the samples of the motion.
+        motion: The planned motion, with n samples.
+    """
+    errors = np.zeros(len(motion.time))
+    if meeting is None:
+        return errors
+    samples = np.flatnonzero(meeting.near)
+    others = frozenset(
+        pair
+        for pair, apart in zip(proximity.pairs, considered(proximity.pairs, meeting.pairs), strict=True)
+        if apart
+    )
+    found = proximity.evaluate_over(motion.q[samples], _REACH, others)
+    least = np.full(len(samples), _REACH)
+    np.minimum.at(least, found.sample, found.distance)
+    errors[samples] = np.where(meeting.sliding[samples], np.abs(least), np.maximum(-least, 0.0))
+    return errors
