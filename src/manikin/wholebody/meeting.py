@@ -24,6 +24,9 @@ Ignored = frozenset[tuple[str, str]]
 SITTING_DOWN = 0.15
 """Time before a seat is touched in which the trunk may come close to it [s]."""
 
+_BLEND = 3.0e-3
+"""Difference of two distances at which the farther shape matters little [m]."""
+
 _REACH = 0.1
 """Distances beyond this are not measured [m]."""
 
@@ -57,17 +60,25 @@ class Meeting:
         named = np.array([known[pair] for pair in found.pairs], dtype=np.bool_)
         return named & self.near[found.sample]
 
-    def wanted(self, found: ProximitySamples, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(k,) the rows whose distance should be zero: the closest where one must touch, and what is inside.
+    def importance(self, found: ProximitySamples, rows: NDArray[np.bool_]) -> FloatArray:
+        """(k,) how much it matters that each distance is zero: of what is inside, and of the closest.
+
+        Where a contact rolls from one shape to the other, the importance passes gradually between them.
 
         Args:
             found: Close pairs.
             rows: (k,) those that meet.
         """
+        sample, distance = found.sample[rows], found.distance[rows]
         least = np.full(len(self.near), np.inf)
-        np.minimum.at(least, found.sample[rows], found.distance[rows])
-        closest = self.sliding[found.sample] & (found.distance <= least[found.sample])
-        return rows & (closest | (found.distance < 0.0))
+        np.minimum.at(least, sample, distance)
+        share = np.exp((least[sample] - distance) / _BLEND)
+        total = np.zeros(len(self.near))
+        np.add.at(total, sample, share)
+        touching = np.where(self.sliding[sample], np.sqrt(share / total[sample]), 0.0)
+        importance = np.zeros(len(found.distance))
+        importance[rows] = np.where(distance < 0.0, 1.0, touching)
+        return importance
 
 
 def meeting_at(body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray) -> Meeting | None:

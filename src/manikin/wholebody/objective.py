@@ -208,7 +208,7 @@ class MotionObjective:
         value = scales.softness * np.logaddexp(0.0, missing) / scales.clearance
         rows = -expit(missing)[:, None] * found.gradient / scales.clearance
         if meeting is not None and np.any(met):
-            weight = meeting.wanted(found, met) / scales.position
+            weight = meeting.importance(found, met) / scales.position
             value = np.where(met, weight * found.distance, value)
             rows = np.where(met[:, None], weight[:, None] * found.gradient, rows)
         jacobian, residual = _padded(found.sample, rows, value, len(motion.com))
