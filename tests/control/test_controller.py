@@ -4,7 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.control import Controller, ControlSettings, SupportMode, TaskWeights
+from manikin.control.controller import RAISED
 from manikin.control.solver import QPSolution
 from manikin.errors import InputError
 
@@ -171,3 +173,26 @@ def test_bad_input_is_refused(body, still, schedule):
         ControlSettings(solver="magic")
     with pytest.raises(InputError, match="task weight 'com'"):
         TaskWeights(com=-1.0)
+
+
+def test_a_tilted_seat_carries_on_its_low_side_and_turns_the_pelvis(body, contacts, still):
+    """Points raised by more than 2 x RAISED get no force while it slides; the pelvis' own task gives way."""
+    seat = sole("buttocks", (0.0, 0.0, 0.7), length=0.14, width=0.24, friction=0.4, settle=0.5)
+    phases = [Phase(Stance(contacts)), Phase(Stance([*contacts, seat]))]
+    controller = Controller(body, still, ContactSchedule(StanceSequence(phases), [0.0, 0.5, 1.0]))
+    q = body.standing_posture()
+    q[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(0.2, 0.0, 0.0)).coeffs()
+    before = controller.step(0.4, q, np.zeros(body.nv), {})
+    assert "pelvis" in {task.name for task in before.problem.tasks}
+    output, x = solve(controller, q, np.zeros(body.nv), 0.6)
+    assert "pelvis" not in {task.name for task in output.problem.tasks}
+    forces = [
+        (point[2], np.linalg.norm(force))
+        for _, point, force, contact in force_per_point(output.problem, x, controller)
+        if contact.effector == "buttocks"
+    ]
+    lowest = min(height for height, _ in forces)
+    raised = [force for height, force in forces if height > lowest + 2.0 * RAISED]
+    assert len(raised) == 2
+    assert max(raised) < 1e-9
+    assert max(force for _, force in forces) > 1.0

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -153,3 +155,13 @@ def test_load_moves_gradually_to_the_part_that_stays(rolling):
     after = right(switch, 1.7 + 0.5 * settings.rolling_load_time)
     assert after.fades == ((SolePart.HEEL, pytest.approx(0.25)),)
     assert right(switch, 2.5).fades == ()
+
+
+def test_a_support_made_at_speed_is_not_waited_for_above_it(stepping, contacts):
+    """It has to press at its time: no hovering before it, and the way down begins at the plan."""
+    seat = replace(contacts[1], settle=0.3)
+    phases = [Phase(Stance(contacts)), Phase(Stance(contacts[:1])), Phase(Stance([contacts[0], seat]))]
+    switch = SupportSwitch(ContactSchedule(StanceSequence(phases), stepping.instants), SupportSettings())
+    assert np.all(right(switch, LAND - 0.005, False).lift == 0.0)
+    landing = right(switch, LAND, False)
+    assert (landing.mode, landing.press, landing.settling) == (SupportMode.LANDING, 0.0, True)

@@ -229,7 +229,7 @@ class SupportSwitch:
         if not planned:
             return self._hovering(name, interval, time)
         late = time - max(interval.start, memory.touched)
-        height = self._settings.hover if memory.touched < interval.start else 0.0
+        height = self._hover(interval) if memory.touched < interval.start else 0.0
         contact = interval.contact_at(time)
         way, rate = self._settings.descent(contact, late)
         press = min(self._settings.press_depth, way - height)
@@ -241,9 +241,7 @@ class SupportSwitch:
         """Lift the end of a flight smoothly, in the first part of the time in which it might touch."""
         duration = _LIFTING_SHARE * (interval.start - interval.early)
         share = float(np.clip((time - interval.early) / duration, 0.0, 1.0))
-        # What is made at speed has to press in time, and a seat may press a little early.
-        height = 0.0 if interval.contact.settle > 0.0 else self._settings.hover
-        up = height * interval.contact.normal
+        up = self._hover(interval) * interval.contact.normal
         return SupportState(
             name,
             SupportMode.SWING,
@@ -251,6 +249,10 @@ class SupportSwitch:
             lift=share**2 * (3.0 - 2.0 * share) * up,
             lift_rate=6.0 * share * (1.0 - share) / duration * up,
         )
+
+    def _hover(self, interval: SupportInterval) -> float:
+        """Height at which a support is waited for [m]; one made at speed has to press in time."""
+        return 0.0 if interval.contact.settle > 0.0 else self._settings.hover
 
     def _fades(self, interval: SupportInterval, time: float) -> tuple[tuple[SolePart, float], ...]:
         """Load moves gradually to points that begin to touch, and off those that cease to."""
