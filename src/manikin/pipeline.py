@@ -77,24 +77,36 @@ class ExecutionRequirements:
     penetration: float = 0.005
     padding_compression: float = 0.01
 
-    def violation(self, execution: Execution, seated: bool = False) -> str | None:
-        """Explain the first requirement that is not kept, or None.
+    def violation(self, execution: Execution, seated: bool = False) -> tuple[str, float] | None:
+        """Explain the first requirement that is not kept, with a time [s], or None.
+
+        Where what was measured does not say when, the time is that of the least margin.
 
         Args:
             execution: What happened.
             seated: Whether the motion ends on a seat.
         """
         penetration = self.padding_compression if seated else self.penetration
+        thinnest = float(execution.motion.time[int(np.argmin(execution.motion.margin))])
         if execution.min_margin <= self.margin:
-            return f"executed margin falls to {execution.min_margin:.2f} N.m; allowed > {self.margin:g}"
-        for value, limit, what in (
-            (execution.com_rms_error_m, self.com_rms_error, "RMS error of the centre of mass"),
-            (execution.max_foot_error_m, self.foot_error, "effector error"),
-            (execution.max_penetration_m, penetration, "penetration"),
-            (execution.max_padding_compression_m, self.padding_compression, "compression of padding"),
+            return (
+                f"executed margin falls to {execution.min_margin:.2f} N.m; allowed > {self.margin:g}",
+                thinnest,
+            )
+        effector = f"error of {execution.worst_effector}"
+        for value, limit, what, time in (
+            (execution.com_rms_error_m, self.com_rms_error, "RMS error of the centre of mass", thinnest),
+            (execution.max_foot_error_m, self.foot_error, effector, execution.worst_effector_time_s),
+            (execution.max_penetration_m, penetration, "penetration", thinnest),
+            (
+                execution.max_padding_compression_m,
+                self.padding_compression,
+                "compression of padding",
+                thinnest,
+            ),
         ):
             if value > limit:
-                return f"{what} is {value:.4f} m; allowed {limit:g} m"
+                return f"{what} is {value:.4f} m; allowed {limit:g} m", time
         return None
 
 
@@ -362,10 +374,11 @@ class _Run:
         )  # fmt: skip
         self._finish("execution", result.summary() | self._passage(trajectory, result.motion))
         seated = self._scenario.seated_from is not None
-        reason = result.failure or self._requirements.violation(result, seated)
-        if reason:
-            worst = float(result.motion.time[int(np.argmin(result.motion.margin))])
-            time = worst if result.failure_time_s is None else result.failure_time_s
+        broken = self._requirements.violation(result, seated)
+        if result.failure:
+            broken = result.failure, float(result.failure_time_s or 0.0)
+        if broken is not None:
+            reason, time = broken
             phase = int(trajectory.schedule.phase_at(time))
             held = ", ".join(trajectory.schedule.sequence[phase].stance.effectors)
             self._fail("execution", reason, time, _place(phase, held))

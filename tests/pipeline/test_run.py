@@ -176,7 +176,12 @@ def test_a_run_that_draws_no_numbers_has_the_same_bits_for_every_seed(platform):
 @pytest.mark.slow
 def test_an_execution_that_misses_its_requirement_is_a_failure(platform):
     requirements = ExecutionRequirements(margin=1e6)
-    assert "executed margin" in requirements.violation(platform.execution)
+    reason, time = requirements.violation(platform.execution)
+    assert "executed margin" in reason
+    assert time == platform.execution.motion.time[np.argmin(platform.execution.motion.margin)]
+    reason, time = ExecutionRequirements(foot_error=1e-9).violation(platform.execution)
+    assert f"error of {platform.execution.worst_effector} is" in reason
+    assert time == platform.execution.worst_effector_time_s
 
 
 @pytest.mark.slow

@@ -225,6 +225,7 @@ class _Run:
         bound = com[: max(recorder.bound_samples(), 1)]
         peak = np.abs(executed.tau[:, 6:]).max(axis=0)
         simulated = len(recorder.samples) * self.period
+        effector_error, effector, effector_time = recorder.worst_effector()
         return Execution(
             motion=executed,
             fell=fell,
@@ -232,7 +233,9 @@ class _Run:
             failure_time_s=self.failure_time,
             com_rms_error_m=float(np.sqrt(np.mean(bound**2))),
             com_max_error_m=float(bound.max()),
-            max_foot_error_m=float(recorder.effector_errors().max(initial=0.0)),
+            max_foot_error_m=effector_error,
+            worst_effector=effector,
+            worst_effector_time_s=effector_time,
             final_com_error_m=float(com[-1]),
             min_margin=float(executed.margin.min()),
             max_penetration_m=world.penetration,

@@ -26,6 +26,8 @@ class Execution:
         com_max_error_m: Largest such distance [m].
         max_foot_error_m: Largest distance of an effector of the schedule from its plan, but not of one
             that slides to its place on a seat [m].
+        worst_effector: Which effector that is; empty without one.
+        worst_effector_time_s: When [s].
         final_com_error_m: Distance of the CoM from its plan at the end of the hold [m].
         min_margin: Least wrench margin [N.m].
         max_penetration_m: Deepest penetration of any hard contact, at every engine step [m].
@@ -47,6 +49,8 @@ class Execution:
     com_rms_error_m: float
     com_max_error_m: float
     max_foot_error_m: float
+    worst_effector: str
+    worst_effector_time_s: float
     final_com_error_m: float
     min_margin: float
     max_penetration_m: float

@@ -119,16 +119,27 @@ class Recorder:
         ]
         return int(np.sum(times < min(seated, default=np.inf)))
 
-    def effector_errors(self) -> FloatArray:
-        """(n * effectors,) distance of each effector's origin from its plan, where it does not slide [m]."""
-        return _lengths(
+    def worst_effector(self) -> tuple[float, str, float]:
+        """Largest distance of an effector's origin from its plan [m], its name and the time [s].
+
+        What slides to its place on a seat does not count.
+        """
+        firm = [
+            name
+            for name in self.effectors
+            if all(item.contact.settle == 0.0 for item in self._intervals[name])
+        ]
+        errors = _lengths(
             [
                 s.output.state.frames[name].position - s.output.reference.effectors[name].position
                 for s in self.samples
-                for name in self.effectors
-                if all(item.contact.settle == 0.0 for item in self._intervals[name])
+                for name in firm
             ]
         )
+        if not len(errors):
+            return 0.0, "", 0.0
+        row, column = divmod(int(np.argmax(errors)), len(firm))
+        return float(errors.max()), firm[column], self.samples[row].sensed.time
 
     def margins(self, mass: float) -> FloatArray:
         """(n,) wrench margin of the mean measured wrenches [N.m].
