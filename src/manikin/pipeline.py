@@ -51,6 +51,10 @@ from manikin.wholebody.point_mass import point_mass_motion
 KEY_ROOM = 0.5
 """Share of the fit's distance from the ends of the joint ranges that key postures keep."""
 
+KEY_TOLERANCES = (1.0e-3, 2.0e-4)
+"""How exact key postures are [m]: as exact as the finished motion has to be; and more, where no motion is
+found although each posture was just within reach."""
+
 Progress = Callable[[str, float], None]
 """Told the stage and the share of it that is done, in [0, 1]."""
 
@@ -245,8 +249,14 @@ class _Run:
         centroidal = self._plan_com()
         if self._scenario.is_point_mass:
             return self._result(centroidal, self._move_point_mass(centroidal), None, None)
-        centroidal, trajectory = self._test_key_postures(centroidal)
+        planned, found = centroidal, self._test_key_postures(centroidal, KEY_TOLERANCES[0])
+        centroidal, trajectory = self._take(planned, found)
         wholebody = None if trajectory is None else self._plan_whole_body(trajectory)
+        if wholebody is not None and not wholebody.succeeded:
+            other = self._stricter_plan(planned, found)
+            if other is not None:
+                centroidal, trajectory = self._take(planned, other)
+                wholebody = None if trajectory is None else self._plan_whole_body(trajectory)
         execution = None
         if trajectory is not None and wholebody is not None and wholebody.succeeded:
             execution = self._execute(trajectory, wholebody)
@@ -291,18 +301,35 @@ class _Run:
         if self._directory is not None and result.trajectory is not None:
             self._directory.write_stage("com_trajectory", result.trajectory.to_dict())
 
-    def _test_key_postures(
-        self, planned: CentroidalResult
-    ) -> tuple[CentroidalResult, CentroidalTrajectory | None]:
-        """The plan, or another one where a key posture fails, with its trajectory if it can be done."""
+    def _test_key_postures(self, planned: CentroidalResult, tolerance: float) -> Eligibility | None:
+        """The plan, or another one where a key posture fails; None where there is no plan."""
         if planned.trajectory is None:
-            return planned, None
+            return None
         # The fit keeps its distance from the ends of the ranges: the key postures leave room for that,
         # if they can.
-        found = self._eligible(planned, KEY_ROOM * self._settings.fit.joint_buffer)
+        found = self._eligible(planned, KEY_ROOM * self._settings.fit.joint_buffer, tolerance)
         if found.failure is not None or (found.trajectory is None and found.replans > 0):
             self._summary["failure"] = None  # of a seated part that did not fit another plan
-            found = self._eligible(planned, 0.0)
+            found = self._eligible(planned, 0.0, tolerance)
+        return found
+
+    def _stricter_plan(self, planned: CentroidalResult, before: Eligibility | None) -> Eligibility | None:
+        """Another plan where no motion was found and a key posture is only just within reach, or None."""
+        failure = self._summary["failure"]
+        found = self._test_key_postures(planned, KEY_TOLERANCES[1])
+        replans = 0 if before is None else before.replans
+        if found is None or found.failure is not None or found.trajectory is None or found.replans <= replans:
+            self._summary["failure"] = failure
+            return None
+        self._summary["failure"] = None
+        return found
+
+    def _take(
+        self, planned: CentroidalResult, found: Eligibility | None
+    ) -> tuple[CentroidalResult, CentroidalTrajectory | None]:
+        """Report a plan that was tested, and return it with its trajectory if it can be done."""
+        if found is None:
+            return planned, None
         block = centroidal_summary(found.centroidal) | {
             "replans": found.replans,
             "key_postures": None if found.postures is None else found.postures.summary(),
@@ -318,13 +345,14 @@ class _Run:
         self._fail(found.failure.stage, found.failure.reason, posture.time, place)
         return found.centroidal, None
 
-    def _eligible(self, planned: CentroidalResult, range_margin: float) -> Eligibility:
+    def _eligible(self, planned: CentroidalResult, range_margin: float, tolerance: float) -> Eligibility:
         """Test the key postures of a plan, and plan again where they fail."""
 
         def look(trajectory: CentroidalTrajectory) -> KeyPostures:
             return find_key_postures(
                 self._body, self._scene, trajectory, manner=self._settings.manner,
                 requirements=self._settings.requirements, range_margin=range_margin,
+                tolerance=tolerance,
             )  # fmt: skip
 
         return find_eligible_plan(planned, self._on_real_supports, look, replan=self._keyframes is None)

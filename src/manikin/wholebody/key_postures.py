@@ -26,8 +26,8 @@ from manikin.wholebody.manner import READY, Manner
 from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.targets import Ignored, ignored_pairs
 
-SETTINGS = SolverSettings(tolerance=2e-4, clearance_tolerance=2e-3, settled=2e-2, explain=False)
-"""A posture counts when it is as exact as the finished motion has to be."""
+SETTINGS = SolverSettings(tolerance=1e-3, clearance_tolerance=2e-3, settled=2e-2, explain=False)
+"""A posture counts when it is as exact as the finished motion has to be, unless told otherwise."""
 
 NEARNESS = (200.0, 1000.0)
 """Weights of the planned centre of mass where it is only wished, one search after the other [1/m^2]: far
@@ -118,6 +118,7 @@ def find_key_postures(
     manner: Manner = READY,
     requirements: WholeBodyRequirements | None = None,
     range_margin: float = 0.0,
+    tolerance: float = SETTINGS.tolerance,
 ) -> KeyPostures:
     """Look for a posture at every key instant until which the trajectory binds.
 
@@ -128,11 +129,12 @@ def find_key_postures(
         manner: How the body carries itself where the task leaves freedom.
         requirements: What the finished motion must keep; the clearance is asked of the postures.
         range_margin: Angle that the postures keep from the ends of the hinge ranges [rad].
+        tolerance: How exact contacts and centre of mass have to be [m].
     """
     instants = trajectory.schedule.instants
     time = instants[trajectory.binds(instants)]
     search = _Search(body, scene, trajectory, time, manner, requirements or WholeBodyRequirements())
-    search.range_margin = range_margin
+    search.range_margin, search.settings = range_margin, replace(SETTINGS, tolerance=tolerance)
     return KeyPostures(search.run())
 
 
@@ -155,7 +157,7 @@ class _Search:
         self._rolls = rolls_of(body, trajectory.schedule)
         self._reference = reference_motion(body, trajectory, time, manner)
         _extend_toes(body, self._rolls, time, self._reference)
-        self.range_margin = 0.0
+        self.range_margin, self.settings = 0.0, SETTINGS
         self._explained_one = False  # An examination takes seconds; the first is the one that is reported.
         self._ignored = _ignored(body, scene, trajectory.schedule, time)
 
@@ -163,7 +165,7 @@ class _Search:
         q, found = self._reference[0], []
         for key in range(len(self._time)):
             problem = self._problem(key)
-            result = generate_posture(problem, q, settings=SETTINGS)
+            result = generate_posture(problem, q, settings=self.settings)
             found.append(self._posture(key, problem, result))
             q = found[-1].q
         return tuple(found)
@@ -189,11 +191,11 @@ class _Search:
         """
         near = self._nearest(problem, result.q)
         if near is None:
-            explain = replace(SETTINGS, explain=not self._explained_one)
+            explain = replace(self.settings, explain=not self._explained_one)
             self._explained_one = True
             result = generate_posture(problem, result.q, settings=explain)
             return replace(posture, reason=result.failure or "posture not found")
-        again = generate_posture(problem, near.q, settings=SETTINGS)
+        again = generate_posture(problem, near.q, settings=self.settings)
         if again.succeeded:
             return replace(posture, q=again.q)
         com = np.array(Configuration(self._body, near.q).com)
@@ -206,13 +208,13 @@ class _Search:
 
     def _nearest(self, problem: PostureProblem, start: FloatArray) -> PostureResult | None:
         """The posture with the nearest centre of mass; None when there is none with any."""
-        free = generate_posture(replace(problem, com=None), start, settings=SETTINGS)
+        free = generate_posture(replace(problem, com=None), start, settings=self.settings)
         if not free.succeeded:
             return None
         nearest = free
         for weight in NEARNESS:
             wished = replace(problem, com_weight=weight)
-            found = generate_posture(wished, nearest.q, settings=replace(SETTINGS, restarts=False))
+            found = generate_posture(wished, nearest.q, settings=replace(self.settings, restarts=False))
             nearest = found if found.succeeded else nearest
         return nearest
 
