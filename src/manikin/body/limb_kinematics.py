@@ -2,11 +2,8 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body.limbs import limb_hinges, limb_slots
@@ -15,7 +12,7 @@ from manikin.body.segments import Limb
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, frozen_array, skew
 
-_BLOCK = 4096  # samples whose temporary arrays fit in the cache
+_BLOCK = 1024  # samples whose temporary arrays fit in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +23,13 @@ class EffectorPlacements:
         positions: (n, 3) [m].
         rotations: (n, 3, 3) from the effector's axes to the limb frame's.
         jacobians: (n, 3, k) velocity of the effector per joint speed [m/rad].
+        axes: (n, 3, k) unit axes of the joints: its angular velocity per joint speed.
     """
 
     positions: FloatArray
     rotations: FloatArray
     jacobians: FloatArray
+    axes: FloatArray
 
 
 class LimbKinematics:
@@ -54,7 +53,9 @@ class LimbKinematics:
         self._axes = np.array([hinge.axis for hinge in hinges])
         self._offsets, self._tip = _offsets(body, limb)
         self._tip_rotation = np.array(body.effector(limb.effector).rotation)
-        self._turns = [(skew(axis), skew(axis) @ skew(axis)) for axis in self._axes]
+        self._moved = self._offsets.any(axis=1).tolist()
+        self._crosses = skew(self._axes)
+        self._squares = self._crosses @ self._crosses
 
     def __len__(self) -> int:
         """Number of hinges."""
@@ -67,9 +68,6 @@ class LimbKinematics:
     def place(self, angles: ArrayLike) -> EffectorPlacements:
         """Place the effector at many joint angles.
 
-        A turn by the angle ``a`` about the unit axis ``k`` is ``I + sin a [k] + (1 - cos a) [k]^2``;
-        as the axes are fixed, each hinge costs two products with one constant matrix for all samples.
-
         Args:
             angles: (n, k) [rad].
 
@@ -79,48 +77,33 @@ class LimbKinematics:
         q = np.asarray(angles, dtype=np.float64)
         if q.ndim != 2 or q.shape[1] != len(self):
             raise BodyError(f"limb {self.limb.name!r} angles have shape {q.shape}; valid: (n, {len(self)})")
+        count = len(q)
+        shape = (count, 3, len(self))
         found = EffectorPlacements(
-            np.empty((len(q), 3)), np.empty((len(q), 3, 3)), np.empty((len(q), 3, len(self)))
+            np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(shape), np.empty(shape)
         )
-        for rows in _blocks(len(q)):
+        for rows in _blocks(count):
             self._place_block(q[rows], found, rows)
         return found
 
     def _place_block(self, q: FloatArray, out: EffectorPlacements, rows: slice) -> None:
-        turn = np.broadcast_to(np.eye(3), (len(q), 3, 3)).copy()
+        """Turn by turn: ``I + sin a [k] + (1 - cos a) [k]^2`` about each unit axis ``k``."""
+        turns = np.eye(3) + np.sin(q)[..., None, None] * self._crosses
+        turns += (1.0 - np.cos(q))[..., None, None] * self._squares
+        turn = np.broadcast_to(np.eye(3), (len(q), 3, 3))
         point = np.zeros((len(q), 3))
-        places, axes = [], []
-        sine, rest = np.sin(q), 1.0 - np.cos(q)
-        for hinge, (cross, square) in enumerate(self._turns):
-            if self._offsets[hinge].any():
+        places, axes = np.empty((len(q), len(self), 3)), np.empty((len(q), len(self), 3))
+        for hinge, moved in enumerate(self._moved):
+            if moved:
                 point = point + turn @ self._offsets[hinge]
-            places.append(point)
-            axes.append(turn @ self._axes[hinge])
-            flat = turn.reshape(-1, 3)
-            turn = (
-                turn
-                + sine[:, hinge, None, None] * (flat @ cross).reshape(-1, 3, 3)
-                + rest[:, hinge, None, None] * (flat @ square).reshape(-1, 3, 3)
-            )
+            places[:, hinge] = point
+            axes[:, hinge] = turn @ self._axes[hinge]
+            turn = turn @ turns[:, hinge]
         point = point + turn @ self._tip
         out.positions[rows] = point
-        out.rotations[rows] = (turn.reshape(-1, 3) @ self._tip_rotation).reshape(-1, 3, 3)
-        for hinge, (place, axis) in enumerate(zip(places, axes, strict=True)):
-            out.jacobians[rows, :, hinge] = _cross(axis, point - place)
-
-    @cached_property
-    def pinocchio(self) -> Any:
-        """The limb alone as a ``pin.Model`` whose last frame is the effector; never change it."""
-        model = pin.Model()
-        joint = 0
-        for axis, offset in zip(self._axes, self._offsets, strict=True):
-            placement = pin.SE3(np.eye(3), offset)
-            joint = model.addJoint(
-                joint, pin.JointModelRevoluteUnaligned(axis), placement, f"hinge_{model.njoints}"
-            )
-        tip = pin.SE3(self._tip_rotation, self._tip)
-        model.addFrame(pin.Frame("effector", joint, 0, tip, pin.FrameType.OP_FRAME))
-        return model
+        out.rotations[rows] = turn @ self._tip_rotation
+        out.axes[rows] = axes.transpose(0, 2, 1)
+        out.jacobians[rows] = _cross(axes, point[:, None] - places).transpose(0, 2, 1)
 
 
 def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:
@@ -138,9 +121,11 @@ def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products of (n, 3) by (n, 3), without the overhead of ``np.cross``."""
-    (ax, ay, az), (bx, by, bz) = a.T, b.T
-    return np.column_stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+    """Cross products of (..., 3) by (..., 3), without the overhead of ``np.cross``."""
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return out
 
 
 def _blocks(count: int) -> Iterator[slice]:
