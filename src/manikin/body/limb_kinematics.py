@@ -12,6 +12,7 @@ from manikin.body.segments import Limb
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, frozen_array, skew
 
+_IDENTITY = np.eye(3)
 _BLOCK = 1024  # samples whose temporary arrays fit in the cache
 
 
@@ -88,13 +89,15 @@ class LimbKinematics:
 
     def _place_block(self, q: FloatArray, out: EffectorPlacements, rows: slice) -> None:
         """Turn by turn: ``I + sin a [k] + (1 - cos a) [k]^2`` about each unit axis ``k``."""
-        turns = np.eye(3) + np.sin(q)[..., None, None] * self._crosses
+        turns = np.sin(q)[..., None, None] * self._crosses
         turns += (1.0 - np.cos(q))[..., None, None] * self._squares
-        turn = np.broadcast_to(np.eye(3), (len(q), 3, 3))
-        point = np.zeros((len(q), 3))
+        turns += _IDENTITY
         places, axes = np.empty((len(q), len(self), 3)), np.empty((len(q), len(self), 3))
-        for hinge, moved in enumerate(self._moved):
-            if moved:
+        point: FloatArray = self._offsets[0]
+        places[:, 0], axes[:, 0] = point, self._axes[0]
+        turn = turns[:, 0]
+        for hinge in range(1, len(self)):
+            if self._moved[hinge]:
                 point = point + turn @ self._offsets[hinge]
             places[:, hinge] = point
             axes[:, hinge] = turn @ self._axes[hinge]

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from manikin.body import EffectorPlacements, LimbKinematics
 from manikin.spatial import FloatArray
@@ -12,8 +11,8 @@ POSITION_TOLERANCE = 1e-5
 """How far the effector may be from the surface point [m]."""
 TILT_TOLERANCE = 1e-4
 """Angle between the effector's z axis and the normal that counts as aligned [rad]."""
-STEPS = 8
-"""Steps for position and normal, and at most as many again for the position alone."""
+STEPS = 6
+"""Steps for position and normal, after which come at most half as many for the position alone."""
 _DAMPING = 1e-3
 _LARGEST_STEP = 0.4  # [rad]
 _LEVER = 0.3  # [m], what one radian of tilt weighs beside one metre
@@ -36,78 +35,79 @@ class Alignment:
     tilt: FloatArray
 
 
-def align(chain: LimbKinematics, angles: FloatArray, points: FloatArray, normals: FloatArray) -> Alignment:
+def align(
+    chain: LimbKinematics,
+    angles: FloatArray,
+    points: FloatArray,
+    normals: FloatArray,
+    max_tilt: float = TILT_TOLERANCE,
+) -> Alignment:
     """Move effectors to points, their z axes along normals, by damped least squares within the joint ranges.
 
-    All rows are moved at once. The position comes first, the normal second: where both cannot be had, the
-    last steps are those of the position alone. Joints at the end of their range that would leave
-    it are held there.
+    All rows are moved at once. Where a tilt is allowed, the position comes first: rows that are not
+    upright after some steps make the last ones for the position alone. Joints at the end of their
+    range that would leave it are held there.
 
     Args:
         chain: The limb.
         angles: (n, k) to begin with [rad].
         points: (n, 3) in the limb's frame [m].
         normals: (n, 3) unit vectors in the limb's frame.
+        max_tilt: Angle between z axis and normal that the caller will accept [rad].
     """
     q = np.array(angles)
-    for step in range(2 * STEPS):
+    steps = STEPS if max_tilt <= TILT_TOLERANCE else STEPS + STEPS // 2
+    for step in range(steps + 1):
         placed = chain.place(q)
         missing = _missing(placed, points, normals)
-        error, tilt = (np.linalg.norm(part, axis=1) for part in (missing[:, :3], missing[:, 3:]))
-        level = (tilt <= TILT_TOLERANCE) | (step >= STEPS)
-        if ((error <= POSITION_TOLERANCE) & level).all():
-            break
-        moving = np.flatnonzero((error > POSITION_TOLERANCE) | ~level)
-        if step >= STEPS:
-            missing[:, 3:] = 0.0
-        q[moving] = _step(chain, q[moving], placed, moving, missing[moving], step < STEPS)
-    placed = chain.place(q)
-    missing = _missing(placed, points, normals)
-    error, tilt = (np.linalg.norm(part, axis=1) for part in (missing[:, :3], missing[:, 3:]))
-    return Alignment(q, placed.rotations, error, tilt)
+        error, tilt = _length(missing[:, :3]), _length(missing[:, 3:])
+        done = (error <= POSITION_TOLERANCE) & ((tilt <= TILT_TOLERANCE) | (step >= STEPS))
+        if step == steps or done.all():
+            return Alignment(q, placed.rotations, error, tilt)
+        jacobian = placed.jacobians
+        if step < STEPS:
+            jacobian = np.concatenate([jacobian, _LEVER * _across(placed)], axis=1)
+            missing[:, 3:] *= _LEVER
+        missing[done] = 0.0
+        q = _moved(chain, q, jacobian, missing[:, : jacobian.shape[1]])
+    raise AssertionError("the last step returns")
 
 
 def _missing(placed: EffectorPlacements, points: FloatArray, normals: FloatArray) -> FloatArray:
     """(n, 6) what is missing in position [m] and, as a rotation vector, in tilt [rad]."""
     z = placed.rotations[:, :, 2]
-    turn = np.empty_like(z)
+    out = np.empty((len(z), 6))
+    out[:, :3] = points - placed.positions
+    turn = out[:, 3:]
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         turn[:, i] = z[:, j] * normals[:, k] - z[:, k] * normals[:, j]
-    sine = np.linalg.norm(turn, axis=1)
+    sine = _length(turn)
     angle = np.arctan2(sine, np.einsum("ni,ni->n", z, normals))
     # At half a turn every axis across does, and the effector's x axis is one.
     opposite = (sine < 1e-9) & (angle > 1.0)
-    turn[opposite], sine[opposite] = placed.rotations[opposite, :, 0], 1.0
+    if opposite.any():
+        turn[opposite], sine[opposite] = placed.rotations[opposite, :, 0], 1.0
     turn *= (angle / np.maximum(sine, 1e-12))[:, None]
-    return np.hstack([points - placed.positions, turn])
+    return out
 
 
-def _step(
-    chain: LimbKinematics,
-    q: FloatArray,
-    placed: EffectorPlacements,
-    rows: NDArray[np.int64],
-    missing: FloatArray,
-    level: bool,
-) -> FloatArray:
-    """Angles after one damped step; a turn about the normal itself is free."""
-    jacobian = placed.jacobians[rows]
-    if level:
-        axes, z = placed.axes[rows], placed.rotations[rows, :, 2]
-        across = axes - z[:, :, None] * np.einsum("ni,nik->nk", z, axes)[:, None]
-        jacobian = np.concatenate([jacobian, _LEVER * across], axis=1)
-        missing = missing * np.array([1.0, 1.0, 1.0, _LEVER, _LEVER, _LEVER])
-    else:
-        missing = missing[:, :3]
-    move = _damped(jacobian, missing)
-    held = ((q <= chain.lower) & (move < 0.0)) | ((q >= chain.upper) & (move > 0.0))
-    if held.any():
-        jacobian = jacobian * ~held[:, None]
-        move = _damped(jacobian, missing)
+def _across(placed: EffectorPlacements) -> FloatArray:
+    """(n, 3, k) angular velocity of the effector without its part about its own z axis."""
+    z = placed.rotations[:, :, 2]
+    return placed.axes - z[:, :, None] * (z[:, None] @ placed.axes)
+
+
+def _moved(chain: LimbKinematics, q: FloatArray, jacobian: FloatArray, missing: FloatArray) -> FloatArray:
+    """Angles after one damped step."""
+    pull = (missing[:, None] @ jacobian)[:, 0]
+    held = ((q <= chain.lower) & (pull < 0.0)) | ((q >= chain.upper) & (pull > 0.0))
+    free = jacobian * ~held[:, None]
+    turned = free.transpose(0, 2, 1)
+    square = free @ turned + _DAMPING**2 * np.eye(free.shape[1])
+    move = (turned @ np.linalg.solve(square, missing[..., None]))[..., 0]
     return np.clip(q + np.clip(move, -_LARGEST_STEP, _LARGEST_STEP), chain.lower, chain.upper)
 
 
-def _damped(jacobian: FloatArray, missing: FloatArray) -> FloatArray:
-    turned = jacobian.transpose(0, 2, 1)
-    square = jacobian @ turned + _DAMPING**2 * np.eye(jacobian.shape[1])
-    return (turned @ np.linalg.solve(square, missing[..., None]))[..., 0]
+def _length(vectors: FloatArray) -> FloatArray:
+    """(n,) lengths of (n, 3), quicker than ``np.linalg.norm`` for few."""
+    return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))

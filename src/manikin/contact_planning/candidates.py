@@ -135,7 +135,7 @@ class SurfaceTable:
         """
         corners = points[:, None] + footprint @ turns.transpose(0, 2, 1)
         each = self.over(corners.reshape(-1, 3), np.repeat(numbers, len(footprint)))
-        return each.reshape(len(points), -1).all(axis=1)
+        return each.reshape(len(points), len(footprint)).all(axis=1)
 
     def height_of(self, point: FloatArray, numbers: IntArray) -> FloatArray:
         """(m,) signed distance of one world point to the planes of some surfaces [m]."""
@@ -173,11 +173,11 @@ def find_candidates(
     near = table.over(situation.to_world(grid.centres)[cells], numbers[owners], ball)
     rows, of_cell = grid.points_of(cells[near])
     owner = owners[near][of_cell]
-    upright = _along(samples.rotations[rows, :, 2], normals[owner]) >= np.cos(max_tilt)
-    rows, owner = rows[upright], owner[upright]
     gap = _along(samples.positions[rows], normals[owner]) + heights[owner]
     close = np.abs(gap) <= tolerance
     rows, owner, gap = rows[close], owner[close], gap[close]
+    upright = _along(samples.upward[rows], normals[owner]) >= np.cos(max_tilt)
+    rows, owner, gap = rows[upright], owner[upright], gap[upright]
     points = situation.to_world(samples.positions[rows] - gap[:, None] * normals[owner])
     inside = table.over(points, numbers[owner])
     rows, owner, points = rows[inside], owner[inside], points[inside]

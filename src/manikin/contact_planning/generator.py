@@ -22,9 +22,9 @@ from manikin.errors import BodyError
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 
-_BATCHES = (6, 24)
+_BATCHES = (12, 48)
 """Numbers of candidates after which the aligned ones are tested before more are aligned."""
-_TILTED = "the effector cannot lie flat on the surface"
+_TILTED = "tilted"
 
 
 class Hindrance(StrEnum):
@@ -185,19 +185,21 @@ class ContactGenerator:
         faults: Counter[str] = Counter()
         order = _tried(scores, self.settings.tries)
         q = np.array(situation.state.q)
+        allowed = TILT_TOLERANCE if kind is ContactKind.SOLE else self.settings.point_tilt
         for start, end in pairwise((0, *(size for size in _BATCHES if size < len(order)), len(order))):
             rows = order[start:end]
-            aligned = tools.align(situation, candidates, rows)
+            aligned = tools.align(situation, candidates, rows, allowed)
             turns = situation.rotation @ aligned.rotations
-            lies = self._lies(aligned, candidates, rows, turns, kind)
+            lies = self._lies(aligned, candidates, rows, turns, kind, allowed)
             faults[_TILTED] += int((~lies).sum())
             for number in np.flatnonzero(lies).tolist():
                 q[tools.chain.slots] = aligned.angles[number]
-                hit = tools.collisions.first(q)
+                row, tried = int(rows[number]), start + number + 1
+                touched = self._table.surfaces[int(candidates.surfaces[row])].obstacle
+                hit = tools.collisions.first(q, touched)
                 if hit is None:
-                    row, tried = int(rows[number]), start + number + 1
                     return self._found(tools.limb, kind, candidates, row, turns[number], q, scores, tried)
-                faults[f"collision of {hit[0]} with {hit[1]}"] += 1
+                faults[f"{hit[0]} in {hit[1]}"] += 1
         return _none_fits(tools.limb.name, faults, len(candidates), len(order))
 
     def _lies(
@@ -207,10 +209,10 @@ class ContactGenerator:
         rows: NDArray[np.int64],
         turns: FloatArray,
         kind: ContactKind,
+        max_tilt: float,
     ) -> NDArray[np.bool_]:
         """(n,) whether aligned effectors touch as they should, with all of their footprint."""
-        allowed = TILT_TOLERANCE if kind is ContactKind.SOLE else self.settings.point_tilt
-        lies = (aligned.error <= POSITION_TOLERANCE) & (aligned.tilt <= allowed)
+        lies = (aligned.error <= POSITION_TOLERANCE) & (aligned.tilt <= max_tilt)
         if kind is ContactKind.SOLE:
             corners = footprint(self.body, kind)
             lies &= self._table.carries(candidates.points[rows], turns, candidates.surfaces[rows], corners)
@@ -242,15 +244,23 @@ class _LimbTools:
         self.samples = samples
         self.chain = LimbKinematics(body, limb)
         self.collisions = LimbCollisions(body, limb, scene)
-        _ = samples.grid, samples.manipulability, samples.reach  # made now, not during a request
+        _ = (
+            samples.grid,
+            samples.upward,
+            samples.manipulability,
+            samples.reach,
+        )  # made now, not during a request
 
-    def align(self, situation: Situation, candidates: Candidates, rows: NDArray[np.int64]) -> Alignment:
+    def align(
+        self, situation: Situation, candidates: Candidates, rows: NDArray[np.int64], max_tilt: float
+    ) -> Alignment:
         """Put the effectors of some candidates onto their surfaces."""
         return align(
             self.chain,
             self.samples.angles[candidates.samples[rows]],
             (candidates.points[rows] - situation.origin) @ situation.rotation,
             candidates.normals[rows] @ situation.rotation,
+            max_tilt,
         )
 
 
@@ -274,9 +284,12 @@ def _failure(
 
 
 def _none_fits(limb: str, faults: Counter[str], candidates: int, tried: int) -> GeneratedContact:
-    reason, count = faults.most_common(1)[0]
-    kind = Hindrance.ALIGNMENT if reason == _TILTED else Hindrance.COLLISION
-    message = (
-        f"none of the {tried} best of {candidates} contacts of {limb} is possible; mostly ({count}): {reason}"
-    )
+    tilted = faults.pop(_TILTED, 0)
+    collided = sum(faults.values())
+    kind = Hindrance.COLLISION if collided > tilted else Hindrance.ALIGNMENT
+    what = [f"{tilted} cannot lie flat on the surface"] if tilted else []
+    if collided:
+        reason, count = faults.most_common(1)[0]
+        what.append(f"{collided} collide, {count} by {reason}")
+    message = f"none of {tried} contacts of {limb} out of {candidates} is possible: {', '.join(what)}"
     return _failure(limb, kind, message, candidates, tried)

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from manikin.spatial import FloatArray
 
-CELLS_ACROSS = 24
-"""Cells along the longest side of the points' box."""
+POINTS_PER_CELL = 30
+"""Points of a cell on average: fewer make more cells to test, more make more points to test."""
 
 IntArray = NDArray[np.int64]
 
@@ -26,9 +26,11 @@ class SampleGrid:
 
     def __init__(self, points: FloatArray) -> None:
         low = points.min(axis=0)
-        side = max(float(np.ptp(points, axis=0).max()) / CELLS_ACROSS, 1e-9)
-        cells = np.minimum(((points - low) / side).astype(np.int64), CELLS_ACROSS)
-        keys = (cells[:, 0] * (CELLS_ACROSS + 1) + cells[:, 1]) * (CELLS_ACROSS + 1) + cells[:, 2]
+        # A reach fills about half of the cube around it.
+        across = max(int(np.cbrt(2.0 * len(points) / POINTS_PER_CELL)), 1)
+        side = max(float(np.ptp(points, axis=0).max()) / across, 1e-9)
+        cells = np.minimum(((points - low) / side).astype(np.int64), across - 1)
+        keys = (cells[:, 0] * across + cells[:, 1]) * across + cells[:, 2]
         self.order: IntArray = np.argsort(keys, kind="stable")
         sorted_keys = keys[self.order]
         firsts = np.flatnonzero(np.diff(sorted_keys, prepend=-1))

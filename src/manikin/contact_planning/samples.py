@@ -55,6 +55,11 @@ class LimbSamples:
         return manipulability(self.products)
 
     @cached_property
+    def upward(self) -> FloatArray:
+        """(n, 3) z axes of the effector, the normals it would fit, in the limb's frame."""
+        return np.ascontiguousarray(self.rotations[:, :, 2])
+
+    @cached_property
     def grid(self) -> SampleGrid:
         """Spatial index of the positions."""
         return SampleGrid(self.positions)
