@@ -184,8 +184,8 @@ def test_collisions_are_said_with_the_names_of_both(person, person_samples):
         Obstacle(f"bar{n}", Capsule(0.02, 3.0), translation=(0.4, -0.8 + 0.08 * n, 1.5)) for n in range(24)
     ]
     scene = Scene([*wall_scene(0.55).obstacles[1:], *bars], None)
-    upright = GeneratorSettings(max_tilt=0.35)
-    generator = ContactGenerator(person, scene, person_samples, upright)
+    loose = GeneratorSettings(point_tilt=1.0)
+    generator = ContactGenerator(person, scene, person_samples, loose)
     answer = generator.request(person.standing_posture(), "left_arm", PUSH)
     assert answer.failure is Hindrance.COLLISION
     assert " in bar" in answer.message

@@ -135,7 +135,7 @@ class SurfaceTable:
         """
         corners = points[:, None] + footprint @ turns.transpose(0, 2, 1)
         each = self.over(corners.reshape(-1, 3), np.repeat(numbers, len(footprint)))
-        return each.reshape(len(points), len(footprint)).all(axis=1)
+        return np.logical_and.reduce(each.reshape(len(points), len(footprint)), axis=1)
 
     def height_of(self, point: FloatArray, numbers: IntArray) -> FloatArray:
         """(m,) signed distance of one world point to the planes of some surfaces [m]."""
@@ -167,7 +167,7 @@ def find_candidates(
     normals = table.normals[numbers] @ situation.rotation
     heights = table.height_of(situation.origin, numbers)
     grid = samples.grid
-    at_cells = np.abs(grid.centres @ normals.T + heights) <= tolerance + grid.radii[:, None]
+    at_cells = np.abs(grid.centres @ normals.T + heights) <= tolerance + grid.halves @ np.abs(normals.T)
     cells, owners = np.nonzero(at_cells)
     ball = grid.radii[cells] + tolerance
     near = table.over(situation.to_world(grid.centres)[cells], numbers[owners], ball)
@@ -199,8 +199,11 @@ def find_candidates(
 
 
 def _along(vectors: FloatArray, normals: FloatArray) -> FloatArray:
-    """(n,) dot products of rows."""
-    return np.einsum("ni,ni->n", vectors, normals)
+    """(n,) dot products of rows; column by column, which is the quickest for many short ones."""
+    found = vectors[:, 0] * normals[:, 0]
+    found += vectors[:, 1] * normals[:, 1]
+    found += vectors[:, 2] * normals[:, 2]
+    return found
 
 
 def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:

@@ -5,14 +5,14 @@ from numpy.typing import NDArray
 
 from manikin.spatial import FloatArray
 
-POINTS_PER_CELL = 30
+POINTS_PER_CELL = 12
 """Points of a cell on average: fewer make more cells to test, more make more points to test."""
 
 IntArray = NDArray[np.int64]
 
 
 class SampleGrid:
-    """Points sorted into cubic cells, of which each non-empty one keeps a tight ball.
+    """Points sorted into cubic cells, of which each non-empty one keeps a tight box and ball.
 
     A slab around a surface crosses few cells, and the points of a cell lie next to each other in
     memory; an octree would find the same points.
@@ -20,7 +20,8 @@ class SampleGrid:
     Attributes:
         order: (n,) indices of the points, cell by cell.
         starts: (c + 1,) where each cell begins in :attr:`order`.
-        centres: (c, 3) middles of the balls [m].
+        centres: (c, 3) middles of both [m].
+        halves: (c, 3) half sides of the tight boxes around them [m].
         radii: (c,) [m].
     """
 
@@ -39,7 +40,8 @@ class SampleGrid:
         lowest = np.minimum.reduceat(ordered, firsts, axis=0)
         highest = np.maximum.reduceat(ordered, firsts, axis=0)
         self.centres: FloatArray = 0.5 * (lowest + highest)
-        self.radii: FloatArray = 0.5 * np.linalg.norm(highest - lowest, axis=1)
+        self.halves: FloatArray = 0.5 * (highest - lowest)
+        self.radii: FloatArray = np.linalg.norm(self.halves, axis=1)
 
     def points_of(self, cells: IntArray) -> tuple[IntArray, IntArray]:
         """Points of cells that may occur repeatedly.
