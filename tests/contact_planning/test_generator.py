@@ -181,9 +181,9 @@ def test_no_sample_on_a_surface_is_said(person, person_samples):
 def test_collisions_are_said_with_the_names_of_both(person, person_samples):
     """A wall behind a lattice of bars too narrow for an arm."""
     bars = [
-        Obstacle(f"bar{n}", Capsule(0.02, 3.0), translation=(0.4, -0.8 + 0.08 * n, 1.5)) for n in range(24)
+        Obstacle(f"bar{n}", Capsule(0.02, 3.0), translation=(0.3, -0.8 + 0.08 * n, 1.5)) for n in range(24)
     ]
-    scene = Scene([*wall_scene(0.55).obstacles[1:], *bars], None)
+    scene = Scene([*wall_scene(0.45).obstacles[1:], *bars], None)
     loose = GeneratorSettings(point_tilt=1.0)
     generator = ContactGenerator(person, scene, person_samples, loose)
     answer = generator.request(person.standing_posture(), "left_arm", PUSH)

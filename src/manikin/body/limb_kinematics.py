@@ -54,7 +54,7 @@ class LimbKinematics:
         self._axes = np.array([hinge.axis for hinge in hinges])
         self._offsets, self._tip = _offsets(body, limb)
         self._tip_rotation = np.array(body.effector(limb.effector).rotation)
-        self._moved = self._offsets.any(axis=1).tolist()
+        self._moved = [bool(offset.any()) for offset in self._offsets]
         self._crosses = skew(self._axes)
         self._squares = self._crosses @ self._crosses
 

@@ -11,8 +11,9 @@ POSITION_TOLERANCE = 1e-5
 """How far the effector may be from the surface point [m]."""
 TILT_TOLERANCE = 1e-4
 """Angle between the effector's z axis and the normal that counts as aligned [rad]."""
-STEPS = 6
-"""Steps for position and normal, after which come at most half as many for the position alone."""
+STEPS = 7
+"""Steps for position and normal, and again for the position alone."""
+_STALLED = 0.9  # a row that comes no nearer than this share of its distance is left alone
 _DAMPING = 1e-3
 _LARGEST_STEP = 0.4  # [rad]
 _LEVER = 0.3  # [m], what one radian of tilt weighs beside one metre
@@ -55,22 +56,45 @@ def align(
         normals: (n, 3) unit vectors in the limb's frame.
         max_tilt: Angle between z axis and normal that the caller will accept [rad].
     """
-    q = np.array(angles)
-    steps = STEPS if max_tilt <= TILT_TOLERANCE else STEPS + STEPS // 2
-    for step in range(steps + 1):
+    q = _descend(chain, np.array(angles), points, normals, level=True)
+    found = _measured(chain, q, points, normals)
+    rest = np.flatnonzero(found.error > POSITION_TOLERANCE)
+    if max_tilt <= TILT_TOLERANCE or not len(rest):
+        return found
+    q[rest] = _descend(chain, q[rest], points[rest], normals[rest], level=False)
+    return _measured(chain, q, points, normals)
+
+
+def _descend(
+    chain: LimbKinematics, q: FloatArray, points: FloatArray, normals: FloatArray, *, level: bool
+) -> FloatArray:
+    """Angles after several steps, until every row has arrived or gets no nearer."""
+    last = np.full(len(q), np.inf)
+    resting = np.zeros(len(q), dtype=bool)
+    for _ in range(STEPS):
         placed = chain.place(q)
         missing = _missing(placed, points, normals)
         error, tilt = _length(missing[:, :3]), _length(missing[:, 3:])
-        done = (error <= POSITION_TOLERANCE) & ((tilt <= TILT_TOLERANCE) | (step >= STEPS))
-        if step == steps or done.all():
-            return Alignment(q, placed.rotations, error, tilt)
+        left = error + _LEVER * tilt if level else error
+        resting |= (left > _STALLED * last) | (
+            (error <= POSITION_TOLERANCE) & ((tilt <= TILT_TOLERANCE) | (not level))
+        )
+        if resting.all():
+            break
+        last = left
         jacobian = placed.jacobians
-        if step < STEPS:
+        if level:
             jacobian = np.concatenate([jacobian, _LEVER * _across(placed)], axis=1)
             missing[:, 3:] *= _LEVER
-        missing[done] = 0.0
+        missing[resting] = 0.0
         q = _moved(chain, q, jacobian, missing[:, : jacobian.shape[1]])
-    raise AssertionError("the last step returns")
+    return q
+
+
+def _measured(chain: LimbKinematics, q: FloatArray, points: FloatArray, normals: FloatArray) -> Alignment:
+    placed = chain.place(q)
+    missing = _missing(placed, points, normals)
+    return Alignment(q, placed.rotations, _length(missing[:, :3]), _length(missing[:, 3:]))
 
 
 def _missing(placed: EffectorPlacements, points: FloatArray, normals: FloatArray) -> FloatArray:

@@ -173,11 +173,11 @@ def find_candidates(
     near = table.over(situation.to_world(grid.centres)[cells], numbers[owners], ball)
     rows, of_cell = grid.points_of(cells[near])
     owner = owners[near][of_cell]
+    upright = _upright(samples, normals, rows, owner, float(np.cos(max_tilt)))
+    rows, owner = rows[upright], owner[upright]
     gap = _along(samples.positions[rows], normals[owner]) + heights[owner]
     close = np.abs(gap) <= tolerance
     rows, owner, gap = rows[close], owner[close], gap[close]
-    upright = _along(samples.upward[rows], normals[owner]) >= np.cos(max_tilt)
-    rows, owner, gap = rows[upright], owner[upright], gap[upright]
     points = situation.to_world(samples.positions[rows] - gap[:, None] * normals[owner])
     inside = table.over(points, numbers[owner])
     rows, owner, points = rows[inside], owner[inside], points[inside]
@@ -196,6 +196,20 @@ def find_candidates(
         samples.manipulability[rows],
         samples.rotations[rows],
     )
+
+
+def _upright(
+    samples: LimbSamples, normals: FloatArray, rows: IntArray, owner: IntArray, least: float
+) -> NDArray[np.bool_]:
+    """(n,) whether the cosine of the effector's z axis and the surface's normal is at least ``least``.
+
+    Many surfaces share few normals, as the faces of boxes do: then a table of all samples is quicker.
+    """
+    distinct, which = np.unique(np.round(normals, 9), axis=0, return_inverse=True)
+    if len(distinct) * len(samples) <= 2 * len(rows):
+        table = samples.upward @ distinct.T >= least
+        return table[rows, which.ravel()[owner]]
+    return _along(samples.upward[rows], normals[owner]) >= least
 
 
 def _along(vectors: FloatArray, normals: FloatArray) -> FloatArray:
