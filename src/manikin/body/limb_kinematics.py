@@ -54,7 +54,6 @@ class LimbKinematics:
         self._axes = np.array([hinge.axis for hinge in hinges])
         self._offsets, self._tip = _offsets(body, limb)
         self._tip_rotation = np.array(body.effector(limb.effector).rotation)
-        self._moved = [bool(offset.any()) for offset in self._offsets]
         self._crosses = skew(self._axes)
         self._squares = self._crosses @ self._crosses
 
@@ -92,17 +91,15 @@ class LimbKinematics:
         turns = np.sin(q)[..., None, None] * self._crosses
         turns += (1.0 - np.cos(q))[..., None, None] * self._squares
         turns += _IDENTITY
-        places, axes = np.empty((len(q), len(self), 3)), np.empty((len(q), len(self), 3))
-        point: FloatArray = self._offsets[0]
-        places[:, 0], axes[:, 0] = point, self._axes[0]
-        turn = turns[:, 0]
-        for hinge in range(1, len(self)):
-            if self._moved[hinge]:
-                point = point + turn @ self._offsets[hinge]
-            places[:, hinge] = point
-            axes[:, hinge] = turn @ self._axes[hinge]
-            turn = turn @ turns[:, hinge]
-        point = point + turn @ self._tip
+        # Before each hinge, and after the last.
+        frames = np.empty((len(q), len(self) + 1, 3, 3))
+        frames[:, 0] = _IDENTITY
+        for hinge in range(len(self)):
+            np.matmul(frames[:, hinge], turns[:, hinge], out=frames[:, hinge + 1])
+        turn, before = frames[:, -1], frames[:, :-1]
+        axes = (before @ self._axes[..., None])[..., 0]
+        places = np.cumsum((before @ self._offsets[..., None])[..., 0], axis=1)
+        point = places[:, -1] + turn @ self._tip
         out.positions[rows] = point
         out.rotations[rows] = turn @ self._tip_rotation
         out.axes[rows] = axes.transpose(0, 2, 1)

@@ -22,7 +22,7 @@ from manikin.errors import BodyError
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 
-_BATCHES = (12, 48)
+_BATCHES = (32,)
 """Numbers of candidates after which the aligned ones are tested before more are aligned."""
 _TILTED = "tilted"
 
