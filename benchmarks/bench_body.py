@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from manikin.body import Configuration, human, random_configuration
+from manikin.body import Configuration, human, insect, limbs_of, random_configuration, reach_volume
 from manikin.scene import Scene
 from manikin.simulation import compile_model
 
@@ -61,3 +61,11 @@ def test_hundred_physics_steps_standing(benchmark):
             mujoco.mj_step(model.mujoco, data)
 
     benchmark(steps)
+
+
+@pytest.mark.parametrize("count", [10_000, 100_000])
+@pytest.mark.parametrize("make", [human, insect])
+def test_reach_of_a_limb(benchmark, make, count):
+    """Sampling and hull."""
+    body = make()
+    benchmark(lambda: reach_volume(body, limbs_of(body)[0], np.random.default_rng(0), count))

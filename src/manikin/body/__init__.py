@@ -8,26 +8,42 @@ from manikin.body.configuration import (
     interpolate,
     random_configuration,
 )
+from manikin.body.further_contacts import with_knees_and_elbows
 from manikin.body.human import body_from_signature, human
+from manikin.body.insect import insect
+from manikin.body.limb_kinematics import EffectorPlacements, LimbKinematics
+from manikin.body.limbs import are_mirrored, limb_named, limb_placement, limbs_of
 from manikin.body.model import BodyModel
 from manikin.body.point_mass import point_mass
-from manikin.body.segments import Effector, Hinge, Segment, Shape, ShapeKind
+from manikin.body.reach_volume import ReachVolume, reach_volume
+from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKind
 
 __all__ = [
     "Anthropometry",
     "BodyModel",
     "Configuration",
     "Effector",
+    "EffectorPlacements",
     "Hinge",
+    "Limb",
+    "LimbKinematics",
+    "ReachVolume",
     "Segment",
     "Sex",
     "Shape",
     "ShapeKind",
+    "are_mirrored",
     "body_from_signature",
     "difference",
     "human",
+    "insect",
     "integrate",
     "interpolate",
+    "limb_named",
+    "limb_placement",
+    "limbs_of",
     "point_mass",
     "random_configuration",
+    "reach_volume",
+    "with_knees_and_elbows",
 ]

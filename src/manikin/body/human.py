@@ -19,7 +19,8 @@ from manikin.body.anthropometry import (
 )
 from manikin.body.model import BodyModel
 from manikin.body.range_of_motion import HUMAN_HINGES, human_hinges
-from manikin.body.segments import Effector, Segment, Shape, ShapeKind
+from manikin.body.segments import Effector, Limb, Segment, Shape, ShapeKind
+from manikin.contact import ContactKind
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, skew
 
@@ -78,6 +79,9 @@ def human(
     ``head`` (vertex), ``pelvis`` (its segment frame) and ``buttocks`` (middle of what presses on
     a seat, axes as the pelvis).
 
+    Limbs: ``left_arm``, ``right_arm``, ``left_leg``, ``right_leg``; knees and elbows too with
+    :func:`manikin.body.further_contacts.with_knees_and_elbows`.
+
     Collision shapes are the flesh made slim: the breadth over the hips is Winter's 0.191 H, all
     other breadths and girths are our choice. They scale with stature and (within 12 %) with the
     square root of the body mass index, so that limbs standing side by side stay 2 cm apart.
@@ -105,6 +109,7 @@ def human(
         sole_length=size.sole_length,
         sole_width=size.sole_width,
         nominal_mass=size.mass,
+        limbs=_limbs(),
     )
 
 
@@ -134,6 +139,22 @@ def _standing_angles() -> dict[str, float]:
     angles["shoulder_flexion"] = float(np.arctan2(arm @ spread, -arm[2]))
     angles["shoulder_abduction"] = float(np.arcsin(arm @ -lift))
     return {f"{side}_{name}": angle for side in ("left", "right") for name, angle in angles.items()}
+
+
+def _limbs() -> tuple[Limb, ...]:
+    """Arms and legs; a hand presses with its palm, unless a grasp is asked for."""
+    chains = (
+        ("arm", "hand", ("upper_arm", "forearm", "hand"), ContactKind.POINT),
+        ("leg", "foot", ("thigh", "leg", "foot"), ContactKind.SOLE),
+    )
+    return tuple(
+        Limb(
+            f"{side}_{name}", f"{side}_{effector}", tuple(f"{side}_{part}" for part in parts), kind,
+            f"{other}_{name}",
+        )
+        for name, effector, parts, kind in chains
+        for side, other in (("left", "right"), ("right", "left"))
+    )  # fmt: skip
 
 
 def _soft_pairs() -> frozenset[frozenset[str]]:

@@ -12,7 +12,17 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from manikin.body.segments import Effector, Hinge, Segment, Shape, ShapeKind, hinges_of, segments_by_name
+from manikin.body.segments import (
+    Effector,
+    Hinge,
+    Limb,
+    Segment,
+    Shape,
+    ShapeKind,
+    check_limbs,
+    hinges_of,
+    segments_by_name,
+)
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, frozen_array
 
@@ -38,6 +48,7 @@ class BodyModel:
         sole_length: Length of the sole rectangles [m], or None.
         sole_width: Width of the sole rectangles [m], or None.
         nominal_mass: The mass that was asked for [kg]; the segments must add up to it.
+        limbs: The limbs with which it makes contacts, see :mod:`manikin.body.limbs`.
     """
 
     name: str
@@ -50,6 +61,7 @@ class BodyModel:
     sole_length: float | None = None
     sole_width: float | None = None
     nominal_mass: float | None = None
+    limbs: tuple[Limb, ...] = ()
 
     def __post_init__(self) -> None:
         index = segments_by_name(self.segments)
@@ -58,6 +70,7 @@ class BodyModel:
                 raise BodyError(
                     f"effector {effector.name!r} is on {effector.segment!r}; valid: one of {list(index)}"
                 )
+        check_limbs(self.limbs, index, self.effectors)
         unknown = set(self.standing_angles) - set(self.joint_names)
         if unknown:
             raise BodyError(f"standing angle of {min(unknown)!r}; valid: one of {list(self.joint_names)}")
@@ -241,9 +254,13 @@ class BodyModel:
         return q
 
     def standing_posture(self) -> FloatArray:
-        """(nq,) standing upright: soles flat on z = 0, root at x = y = 0, heading along x."""
+        """(nq,) standing upright: soles flat on z = 0, root at x = y = 0, heading along x.
+
+        A creature without soles has the ends of its limbs at that height on average.
+        """
         q = self.posture(self.standing_angles)
         soles = [name for name in ("left_foot", "right_foot") if name in self.effectors]
+        soles = soles or [limb.effector for limb in self.limbs]
         if soles:
             data = self.pinocchio.createData()
             pin.framesForwardKinematics(self.pinocchio, data, q)

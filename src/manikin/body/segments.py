@@ -1,4 +1,4 @@
-"""Neutral description of a body: segments, hinges, shapes and effectors.
+"""Neutral description of a body: segments, hinges, shapes, effectors and limbs.
 
 Every engine model (Pinocchio, Coal, MuJoCo) is built from these values and from
 nothing else, so that the engines cannot disagree about what the body is.
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from manikin.contact import ContactKind
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, check_rotation, finite_number, frozen_array
 
@@ -180,6 +181,66 @@ class Effector:
         place = frozen_array(self.translation, f"{where} translation", (3,), BodyError)
         object.__setattr__(self, "translation", place)
         object.__setattr__(self, "rotation", check_rotation(self.rotation, f"{where} rotation", BodyError))
+
+
+@dataclass(frozen=True)
+class Limb:
+    """A chain of segments that ends in an effector made for contact ([Tonneau2015]_ 4.3.1).
+
+    Its joints are those of its segments, in order; its frame has the origin of its first segment
+    and the axes of that segment's parent. The effector's z axis is the normal of the contact, from
+    the scene into the body.
+
+    Attributes:
+        name: Unique among the limbs.
+        effector: Name of the effector.
+        segments: Names from the limb's root segment to the effector's own, each the parent of the next.
+        kind: How the effector touches when nothing else is said.
+        mirror: Name of the limb that is its reflection in the sagittal plane, or None.
+    """
+
+    name: str
+    effector: str
+    segments: tuple[str, ...]
+    kind: ContactKind
+    mirror: str | None = None
+
+
+def check_limbs(
+    limbs: tuple[Limb, ...], segments: Mapping[str, Segment], effectors: Mapping[str, Effector]
+) -> None:
+    """Refuse limbs that are no chains, lack hinges, or name what does not exist.
+
+    Raises:
+        BodyError: Naming the limb and what would be valid.
+    """
+    names = [limb.name for limb in limbs]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise BodyError(f"limb {twice[0]!r} occurs twice; valid: unique names")
+    for limb in limbs:
+        _check_chain(limb, segments)
+        if limb.effector not in effectors or effectors[limb.effector].segment != limb.segments[-1]:
+            valid = [name for name, item in effectors.items() if item.segment == limb.segments[-1]]
+            raise BodyError(f"limb {limb.name!r} effector is {limb.effector!r}; valid: one of {valid}")
+        if limb.mirror is not None and limb.mirror not in names:
+            raise BodyError(f"limb {limb.name!r} mirror is {limb.mirror!r}; valid: one of {names}")
+
+
+def _check_chain(limb: Limb, segments: Mapping[str, Segment]) -> None:
+    unknown = [name for name in limb.segments if name not in segments]
+    if not limb.segments or unknown:
+        wrong = repr(unknown[0]) if unknown else "none"
+        raise BodyError(f"limb {limb.name!r} has segment {wrong}; valid: one of {list(segments)}")
+    for parent, child in zip((None, *limb.segments), limb.segments, strict=False):
+        actual = segments[child].parent
+        if actual is None or parent not in (None, actual):
+            raise BodyError(
+                f"limb {limb.name!r} goes from {parent!r} to {child!r}, whose parent is {actual!r}; "
+                "valid: segments that follow each other, the root not among them"
+            )
+    if not any(segments[name].hinges for name in limb.segments):
+        raise BodyError(f"limb {limb.name!r} has no hinge; valid: at least one")
 
 
 def hinges_of(segments: tuple[Segment, ...]) -> tuple[Hinge, ...]:

@@ -1,0 +1,98 @@
+"""Samples of limbs and requests for contacts: `pytest benchmarks/bench_contact_planning.py`.
+
+Four scenes like those of Tonneau (2015), Table 8.1. A round asks for every limb at 20 places of the root.
+"""
+
+import time
+
+import numpy as np
+import pytest
+
+from manikin.body import human, insect, integrate, limbs_of
+from manikin.contact import ContactKind
+from manikin.contact_planning import ContactGenerator, Task, sample_limb, sample_limbs
+from manikin.scene import Box, Obstacle, Scene
+
+PLACES = 20
+
+
+def box(name, size, place):
+    return Obstacle(name, Box(size), translation=place)
+
+
+def pushing():
+    body = human()
+    task = Task((1.0, 0.0, 0.0), {"left_arm", "right_arm"})
+    return body, Scene([box("cupboard", (0.6, 1.2, 1.9), (0.9, 0.0, 0.95))]), body.standing_posture(), task
+
+
+def rising():
+    body = human()
+    bent = {"hip_flexion": 1.4, "knee_flexion": 1.5, "elbow_flexion": 0.5}
+    q = body.posture({f"{side}_{name}": bent[name] for side in ("left", "right") for name in bent})
+    q[2] = 0.58
+    chair = [
+        box("seat", (0.45, 0.5, 0.05), (-0.05, 0.0, 0.42)),
+        box("back", (0.05, 0.5, 0.5), (-0.3, 0.0, 0.7)),
+        box("left_rest", (0.4, 0.06, 0.04), (0.0, 0.32, 0.66)),
+        box("right_rest", (0.4, 0.06, 0.04), (0.0, -0.32, 0.66)),
+        box("table", (0.7, 1.2, 0.04), (0.65, 0.0, 0.74)),
+    ]
+    return body, Scene(chair), q, Task((0.0, 0.0, 1.0))
+
+
+def climbing():
+    body, rng = human(), np.random.default_rng(1)
+    holds = [
+        box(f"hold{n}", (0.14, 0.16, 0.06), (0.44, rng.uniform(-1.2, 1.2), rng.uniform(0.3, 2.6)))
+        for n in range(16)
+    ]
+    q = body.standing_posture()
+    q[2] += 0.4
+    return body, Scene([box("wall", (0.2, 6.0, 6.0), (0.6, 0.0, 3.0)), *holds]), q, Task((0.0, 0.0, 1.0))
+
+
+def crawling():
+    body, rng = insect(), np.random.default_rng(2)
+    books = [
+        box(f"book{n}", (0.06, 0.25, 0.04 + 0.1 * rng.random()), (-0.6 + 0.062 * n, 0.15 * (n % 3 - 1), 0.05))
+        for n in range(20)
+    ]
+    q = body.standing_posture()
+    q[2] += 0.08
+    return body, Scene(books), q, Task((1.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("count", [10_000, 100_000])
+def test_samples_of_a_limb(benchmark, count):
+    body = human()
+    benchmark(lambda: sample_limb(body, limbs_of(body)[0], np.random.default_rng(0), count))
+
+
+@pytest.mark.parametrize("count", [1_000, 10_000, 100_000])
+@pytest.mark.parametrize("make", [climbing, rising, crawling, pushing])
+def test_requests(benchmark, make, count):
+    """CPU time of single requests, their average and worst, is in ``extra_info`` [ms]."""
+    body, scene, q, task = make()
+    generator = ContactGenerator(body, scene, sample_limbs(body, np.random.default_rng(0), count))
+    rng = np.random.default_rng(3)
+    moves = np.zeros((PLACES, body.nv))
+    moves[:, :2], moves[:, 5] = rng.uniform(-0.12, 0.12, (PLACES, 2)), rng.uniform(-0.2, 0.2, PLACES)
+    places = [integrate(body, q, move) for move in moves]
+    kind = ContactKind.POINT if make is climbing else None
+    took, found, candidates = [], [], []
+
+    def requests():
+        for place in places:
+            for limb in limbs_of(body):
+                start = time.process_time()
+                answer = generator.request(place, limb.name, task, kind=kind)
+                took.append(time.process_time() - start)
+                found.append(answer.found)
+                candidates.append(answer.candidates)
+
+    benchmark.pedantic(requests, rounds=3, warmup_rounds=1)
+    benchmark.extra_info["average_ms"] = 1e3 * float(np.mean(took))
+    benchmark.extra_info["worst_ms"] = 1e3 * float(np.max(took))
+    benchmark.extra_info["found"] = float(np.mean(found))
+    benchmark.extra_info["candidates"] = float(np.mean(candidates))

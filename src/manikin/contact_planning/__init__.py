@@ -1,0 +1,70 @@
+"""Contacts found on their own: samples of limbs, EFORT, and the request for one contact."""
+
+from manikin.contact_planning.alignment import Alignment, align
+from manikin.contact_planning.candidates import Candidates, Situation, SurfaceTable, find_candidates
+from manikin.contact_planning.collisions import LimbCollisions
+from manikin.contact_planning.efort import (
+    Ellipsoid,
+    Task,
+    efort,
+    force_ellipsoid,
+    force_transmission_ratio,
+    pulling_efort,
+    velocity_ellipsoid,
+)
+from manikin.contact_planning.generator import (
+    ContactGenerator,
+    GeneratedContact,
+    GeneratorSettings,
+    Hindrance,
+)
+from manikin.contact_planning.heuristics import (
+    Balance,
+    ClosestDistance,
+    Duration,
+    Efort,
+    Heuristic,
+    Manipulability,
+    Random,
+    WeightedSum,
+    duration,
+)
+from manikin.contact_planning.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
+from manikin.contact_planning.touch import ContactRules, make_contact
+
+__all__ = [
+    "Alignment",
+    "Balance",
+    "Candidates",
+    "ClosestDistance",
+    "ContactGenerator",
+    "ContactRules",
+    "Duration",
+    "Efort",
+    "Ellipsoid",
+    "GeneratedContact",
+    "GeneratorSettings",
+    "Heuristic",
+    "Hindrance",
+    "LimbCollisions",
+    "LimbSamples",
+    "Manipulability",
+    "Random",
+    "Situation",
+    "SurfaceTable",
+    "Task",
+    "WeightedSum",
+    "align",
+    "duration",
+    "efort",
+    "find_candidates",
+    "force_ellipsoid",
+    "force_transmission_ratio",
+    "make_contact",
+    "manipulability",
+    "mirrored",
+    "pulling_efort",
+    "sample_limb",
+    "sample_limbs",
+    "velocity_ellipsoid",
+]

@@ -1,0 +1,241 @@
+"""Samples of a limb whose effector is near a surface of the scene: steps 1 and 2 of a request."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.body import Configuration, Limb, limb_placement
+from manikin.contact_planning.samples import LimbSamples
+from manikin.scene import Surface
+from manikin.spatial import FloatArray
+
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """Where a limb is and what it is asked for.
+
+    Attributes:
+        state: The body as it is.
+        limb: The limb that shall make a contact.
+        rotation: (3, 3) from the limb's frame to the world's.
+        origin: (3,) of the limb's frame in the world [m].
+        reaction: (3,) unit direction in the world in which the scene shall push the limb.
+    """
+
+    state: Configuration
+    limb: Limb
+    rotation: FloatArray
+    origin: FloatArray
+    reaction: FloatArray
+
+    @staticmethod
+    def of(state: Configuration, limb: Limb, reaction: FloatArray) -> "Situation":
+        """Situation of a limb of a placed body."""
+        return Situation(state, limb, *limb_placement(state, limb), reaction)
+
+    def to_world(self, points: FloatArray) -> FloatArray:
+        """Map (n, 3) points of the limb's frame to the world [m]."""
+        return points @ self.rotation.T + self.origin
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Samples near surfaces, one row per sample and surface.
+
+    Attributes:
+        samples: (n,) rows of the limb's samples.
+        surfaces: (n,) indices of the surfaces.
+        points: (n, 3) effector positions projected on their surface, in the world [m].
+        normals: (n, 3) unit normals of the surfaces in the world.
+        products: (n, 3, 3) ``J J^T`` in the limb's frame [m^2].
+        manipulability: (n,) [m^3].
+        rotations: (n, 3, 3) from the effector's axes to the limb frame's.
+    """
+
+    samples: IntArray
+    surfaces: IntArray
+    points: FloatArray
+    normals: FloatArray
+    products: FloatArray
+    manipulability: FloatArray
+    rotations: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+
+class SurfaceTable:
+    """The surfaces of a scene as arrays, so that all are tested at once.
+
+    Attributes:
+        surfaces: The surfaces.
+    """
+
+    def __init__(self, surfaces: Sequence[Surface]) -> None:
+        self.surfaces = tuple(surfaces)
+        self.normals = np.array([item.normal for item in surfaces]).reshape(-1, 3)
+        self.offsets = np.array([item.polygon[0] @ item.normal for item in surfaces])
+        self._low = np.array([item.polygon.min(axis=0) for item in surfaces]).reshape(-1, 3)
+        self._high = np.array([item.polygon.max(axis=0) for item in surfaces]).reshape(-1, 3)
+        walls = [_walls(item) for item in surfaces]
+        self._convex = np.array([item is not None for item in walls], dtype=bool)
+        self._walls, self._wall_offsets = _padded(walls)
+
+    def within_reach(self, situation: Situation, samples: LimbSamples, tolerance: float) -> IntArray:
+        """Surfaces that may meet the reach of a limb (step 1): no reachable one is left out.
+
+        The box of the polygon must meet the ball of the reach, and its plane the hull.
+
+        Args:
+            situation: Where the limb is.
+            samples: Samples of the limb.
+            tolerance: How far beyond the hull a surface may be [m].
+        """
+        hull = samples.reach.vertices - samples.origin
+        radius = float(np.linalg.norm(hull, axis=1).max()) + tolerance
+        nearest = np.clip(situation.origin, self._low, self._high)
+        near = np.flatnonzero(((nearest - situation.origin) ** 2).sum(axis=1) <= radius**2)
+        heights = hull @ (self.normals[near] @ situation.rotation).T + self.height_of(situation.origin, near)
+        meets = (heights.min(axis=0) <= tolerance) & (heights.max(axis=0) >= -tolerance)
+        return near[meets]
+
+    def over(
+        self, points: FloatArray, numbers: IntArray, margin: FloatArray | float = 0.0
+    ) -> NDArray[np.bool_]:
+        """(n,) whether points project into the polygon of their surface.
+
+        Args:
+            points: (n, 3) in the world [m].
+            numbers: (n,) indices of the surfaces.
+            margin: (n,) or one distance that points may lie outside [m].
+        """
+        beyond = np.einsum("nei,ni->ne", self._walls[numbers], points) - self._wall_offsets[numbers]
+        inside = (beyond <= np.asarray(margin)[..., None]).all(axis=1)
+        loose = np.flatnonzero(~self._convex[numbers])
+        for number in np.unique(numbers[loose]):
+            mine = loose[numbers[loose] == number]
+            allowed = np.broadcast_to(margin, len(points))[mine]
+            inside[mine] = self.surfaces[number].outside(points[mine]) <= allowed
+        return inside
+
+    def carries(
+        self, points: FloatArray, turns: FloatArray, numbers: IntArray, footprint: FloatArray
+    ) -> NDArray[np.bool_]:
+        """(n,) whether the whole footprint of placed effectors projects into their polygons.
+
+        Args:
+            points: (n, 3) places of the effectors in the world [m].
+            turns: (n, 3, 3) from their axes to the world's.
+            numbers: (n,) indices of the surfaces.
+            footprint: (c, 3) points of the effector's frame [m].
+        """
+        corners = points[:, None] + footprint @ turns.transpose(0, 2, 1)
+        each = self.over(corners.reshape(-1, 3), np.repeat(numbers, len(footprint)))
+        return np.logical_and.reduce(each.reshape(len(points), len(footprint)), axis=1)
+
+    def height_of(self, point: FloatArray, numbers: IntArray) -> FloatArray:
+        """(m,) signed distance of one world point to the planes of some surfaces [m]."""
+        return self.normals[numbers] @ point - self.offsets[numbers]
+
+
+def find_candidates(
+    table: SurfaceTable,
+    numbers: IntArray,
+    situation: Situation,
+    samples: LimbSamples,
+    *,
+    tolerance: float,
+    max_tilt: float,
+    footprint: FloatArray,
+) -> Candidates:
+    """Select the samples in contact (step 2, [Tonneau2015]_ 4.3): near the plane and over the polygon.
+
+    Args:
+        table: Surfaces of the scene.
+        numbers: Those within reach.
+        situation: Where the limb is.
+        samples: Samples of the limb.
+        tolerance: Largest distance of an effector to the plane, on either side [m].
+        max_tilt: Largest angle between the effector's z axis and the normal [rad]; what is
+            tilted more cannot be aligned by small moves of the joints.
+        footprint: (c, 3) points of the effector's frame that must lie over the polygon [m].
+    """
+    normals = table.normals[numbers] @ situation.rotation
+    heights = table.height_of(situation.origin, numbers)
+    grid = samples.grid
+    at_cells = np.abs(grid.centres @ normals.T + heights) <= tolerance + grid.halves @ np.abs(normals.T)
+    cells, owners = np.nonzero(at_cells)
+    ball = grid.radii[cells] + tolerance
+    near = table.over(situation.to_world(grid.centres)[cells], numbers[owners], ball)
+    rows, of_cell = grid.points_of(cells[near])
+    owner = owners[near][of_cell]
+    upright = _upright(samples, normals, rows, owner, float(np.cos(max_tilt)))
+    rows, owner = rows[upright], owner[upright]
+    gap = _along(samples.positions[rows], normals[owner]) + heights[owner]
+    close = np.abs(gap) <= tolerance
+    rows, owner, gap = rows[close], owner[close], gap[close]
+    points = situation.to_world(samples.positions[rows] - gap[:, None] * normals[owner])
+    inside = table.over(points, numbers[owner])
+    rows, owner, points = rows[inside], owner[inside], points[inside]
+    if len(footprint) > 1:
+        turns = situation.rotation @ samples.rotations[rows]
+        inside = table.carries(points, turns, numbers[owner], footprint)
+        rows, owner, points = rows[inside], owner[inside], points[inside]
+    order = np.lexsort((owner, rows))
+    rows, owner = rows[order], owner[order]
+    return Candidates(
+        rows,
+        numbers[owner],
+        points[order],
+        table.normals[numbers[owner]],
+        samples.products[rows],
+        samples.manipulability[rows],
+        samples.rotations[rows],
+    )
+
+
+def _upright(
+    samples: LimbSamples, normals: FloatArray, rows: IntArray, owner: IntArray, least: float
+) -> NDArray[np.bool_]:
+    """(n,) whether the cosine of the effector's z axis and the surface's normal is at least ``least``.
+
+    Many surfaces share few normals, as the faces of boxes do: then a table of all samples is quicker.
+    """
+    distinct, which = np.unique(np.round(normals, 9), axis=0, return_inverse=True)
+    if len(distinct) * len(samples) <= 2 * len(rows):
+        table = samples.upward @ distinct.T >= least
+        return table[rows, which.ravel()[owner]]
+    return _along(samples.upward[rows], normals[owner]) >= least
+
+
+def _along(vectors: FloatArray, normals: FloatArray) -> FloatArray:
+    """(n,) dot products of rows; column by column, which is the quickest for many short ones."""
+    found = vectors[:, 0] * normals[:, 0]
+    found += vectors[:, 1] * normals[:, 1]
+    found += vectors[:, 2] * normals[:, 2]
+    return found
+
+
+def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:
+    """Outward normals (e, 3) and offsets (e,) of a convex polygon's edges, or None if it is not convex."""
+    corners = surface.polygon
+    edges = np.roll(corners, -1, axis=0) - corners
+    out = np.cross(edges, surface.normal)
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    offsets = np.einsum("ei,ei->e", out, corners)
+    convex = bool((corners @ out.T <= offsets + 1e-9 * max(1.0, float(np.abs(corners).max()))).all())
+    return (out, offsets) if convex else None
+
+
+def _padded(walls: Sequence[tuple[FloatArray, FloatArray] | None]) -> tuple[FloatArray, FloatArray]:
+    """Walls of all surfaces in one array (m, e, 3), (m, e); missing ones hold everything inside."""
+    most = max((len(item[1]) for item in walls if item is not None), default=1)
+    normals, offsets = np.zeros((len(walls), most, 3)), np.full((len(walls), most), np.inf)
+    for number, item in enumerate(walls):
+        if item is not None:
+            normals[number, : len(item[1])], offsets[number, : len(item[1])] = item
+    return normals, offsets

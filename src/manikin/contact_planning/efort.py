@@ -1,0 +1,119 @@
+"""How well a limb can press along a direction: EFORT ([Tonneau2015]_ 5.2) and its ellipsoids.
+
+All functions take the translation's ``J J^T`` (3, 3) of each limb configuration, as the Jacobian of
+one limb is 3 by the number of its joints (the thesis prints l by n in 5.2), and directions of unit
+length, which 5.11 needs and does not say.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.errors import InputError
+from manikin.spatial import FloatArray, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoid:
+    """``{x : x^T A^-1 x <= 1}`` by its half axes.
+
+    Attributes:
+        axes: (3, 3) unit directions in columns, the longest first.
+        lengths: (3,) half lengths; infinite along what a singular limb carries without torque.
+    """
+
+    axes: FloatArray
+    lengths: FloatArray
+
+
+def velocity_ellipsoid(product: ArrayLike) -> Ellipsoid:
+    """Velocities of the effector at joint speeds with a norm of at most 1 rad/s (5.4) [m/s]."""
+    values, vectors = np.linalg.eigh(np.asarray(product, dtype=np.float64))
+    return Ellipsoid(vectors[:, ::-1], np.sqrt(np.maximum(values[::-1], 0.0)))
+
+
+def force_ellipsoid(product: ArrayLike) -> Ellipsoid:
+    """Forces of the effector at joint torques with a norm of at most 1 N.m (5.10) [N].
+
+    Its axes are those of the velocity ellipsoid, its lengths the inverse.
+    """
+    speed = velocity_ellipsoid(product)
+    with np.errstate(divide="ignore"):
+        return Ellipsoid(speed.axes[:, ::-1], 1.0 / speed.lengths[::-1])
+
+
+def unit_direction(direction: ArrayLike, name: str = "task direction") -> FloatArray:
+    """(3,) direction of length 1.
+
+    Raises:
+        InputError: If it is zero or not finite.
+    """
+    vector = frozen_array(direction, name, (3,))
+    length = float(np.linalg.norm(vector))
+    if length < 1e-12:
+        raise InputError(f"{name} is {vector.tolist()}; valid: a direction that is not zero")
+    return frozen_array(vector / length, name)
+
+
+def force_transmission_ratio(products: FloatArray, direction: ArrayLike) -> FloatArray:
+    """``f_T = (v^T J J^T v)^(-1/2)``, the force along ``v`` of unit torque (5.11) [N per N.m].
+
+    Args:
+        products: (n, 3, 3) ``J J^T`` [m^2].
+        direction: (3,) ``v`` in the same frame; only its direction counts.
+
+    Returns:
+        (n,); infinite where the limb carries the direction without torque.
+    """
+    v = unit_direction(direction)
+    squares = np.maximum((products.reshape(-1, 9) @ np.outer(v, v).ravel()), 0.0)
+    with np.errstate(divide="ignore"):
+        return 1.0 / np.sqrt(squares)
+
+
+def efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> FloatArray:
+    """EFORT: ``alpha = f_T (v . n)`` (5.12).
+
+    Args:
+        products: (n, 3, 3) ``J J^T`` [m^2].
+        direction: (3,) ``v``: where the scene shall push this limb, see :class:`Task`.
+        normals: (n, 3) unit normals of the surfaces, out of the scene, in the same frame.
+
+    Returns:
+        (n,) negative where the surface would have to pull.
+    """
+    return force_transmission_ratio(products, direction) * (normals @ unit_direction(direction))
+
+
+def pulling_efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> FloatArray:
+    """EFORT of what holds on to a surface and pulls at it: ``-alpha`` (5.13), (n,)."""
+    return -efort(products, direction, normals)
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is to be done, and with which limbs.
+
+    The thesis has one direction for all limbs, which makes every contact of hands that push a cupboard
+    score negative: its side faces the hands and thus against the push. EFORT asks where the scene
+    pushes the *limb*, so each limb has its own direction: along the task for those that move the
+    body or brace it, against it for those that act on an object.
+
+    Attributes:
+        direction: (3,) unit direction in the world: of the body's motion, or of the force on an object.
+        acting: Names of the limbs that act on an object.
+    """
+
+    direction: FloatArray
+    acting: frozenset[str] = frozenset()
+
+    def __init__(
+        self, direction: ArrayLike, acting: frozenset[str] | set[str] | tuple[str, ...] = ()
+    ) -> None:
+        object.__setattr__(self, "direction", unit_direction(direction))
+        object.__setattr__(self, "acting", frozenset(acting))
+
+    def reaction_on(self, limb: str) -> FloatArray:
+        """(3,) unit direction in which the scene shall push a limb; EFORT's ``v``."""
+        return -self.direction if limb in self.acting else self.direction

@@ -1,0 +1,295 @@
+"""The request for one contact: reach, samples in contact, order, choice ([Tonneau2015]_ 5.3.2)."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.body import BodyModel, Configuration, Limb, LimbKinematics, limb_named
+from manikin.contact import Contact, ContactKind
+from manikin.contact_planning.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Alignment, align
+from manikin.contact_planning.candidates import Candidates, Situation, SurfaceTable, find_candidates
+from manikin.contact_planning.collisions import LimbCollisions
+from manikin.contact_planning.efort import Task
+from manikin.contact_planning.heuristics import Efort, Heuristic
+from manikin.contact_planning.samples import LimbSamples
+from manikin.contact_planning.touch import ContactRules, footprint, make_contact, onto_normal
+from manikin.errors import BodyError
+from manikin.scene import Scene
+from manikin.spatial import FloatArray
+
+_BATCHES = (32,)
+"""Numbers of candidates after which the aligned ones are tested before more are aligned."""
+_TILTED = "tilted"
+
+
+class Hindrance(StrEnum):
+    """What kept a limb from making a contact."""
+
+    REACH = "reach"
+    """No surface is within reach of the limb."""
+    SURFACE = "surface"
+    """Surfaces are within reach, but no sample of the limb lies on one."""
+    COLLISION = "collision"
+    """Every contact that was tried collides."""
+    ALIGNMENT = "alignment"
+    """No effector that was tried can be put flat onto its surface."""
+
+
+@dataclass(frozen=True)
+class GeneratorSettings:
+    """How a request searches.
+
+    Attributes:
+        tolerance: Largest distance of a sample's effector to a surface, closed by inverse kinematics [m].
+        max_tilt: Largest angle between the effector's z axis and the normal before the alignment [rad].
+        point_tilt: The same after it, for points and grasps; soles lie flat [rad].
+        tries: Candidates that are aligned and tested before giving up: the best third of them in
+            order, the others spread over the rest of the order.
+    """
+
+    tolerance: float = 0.03
+    max_tilt: float = float(np.deg2rad(45.0))
+    point_tilt: float = float(np.deg2rad(15.0))
+    tries: int = 120
+
+
+@dataclass(frozen=True, eq=False)
+class GeneratedContact:
+    """Answer to a request: a contact and the posture that makes it, or why there is none.
+
+    Attributes:
+        limb: Name of the limb.
+        contact: The contact, or None.
+        q: (nq,) the body with this limb in contact and all else as asked, or None.
+        obstacle: Name of the obstacle touched, or None.
+        score: Score of the candidate; minus infinity without one.
+        candidates: Number of samples in contact (Table 8.2).
+        tried: How many of them were tried.
+        failure: What kept the limb from a contact, or None.
+        message: The failure in words, or an empty text.
+    """
+
+    limb: str
+    contact: Contact | None
+    q: FloatArray | None
+    obstacle: str | None
+    score: float
+    candidates: int
+    tried: int
+    failure: Hindrance | None = None
+    message: str = ""
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a contact."""
+        return self.contact is not None
+
+
+class ContactGenerator:
+    """Makes contacts of a body in a scene, one request at a time.
+
+    What depends on the scene alone is prepared once; each request is a lookup in the samples, an order
+    and a few tests. The same request has the same answer. One instance works on buffers of its own:
+    use one per thread.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        samples: Mapping[str, LimbSamples],
+        settings: GeneratorSettings | None = None,
+        rules: ContactRules | None = None,
+    ) -> None:
+        """Prepare a scene.
+
+        Args:
+            body: A body with limbs.
+            scene: Its surroundings.
+            samples: Samples by name of the limb, see :func:`manikin.contact_planning.sample_limbs`.
+            settings: How to search.
+            rules: What contacts can carry.
+
+        Raises:
+            BodyError: If samples belong to no limb of the body.
+        """
+        self.body = body
+        self.settings = settings or GeneratorSettings()
+        self.rules = rules or ContactRules()
+        self._state = Configuration(body)
+        self._table = SurfaceTable(scene.surfaces)
+        self._tools = {
+            name: _LimbTools(body, limb_named(body, name), scene, item) for name, item in samples.items()
+        }
+
+    def request(
+        self,
+        q: ArrayLike,
+        limb: str,
+        task: Task,
+        heuristic: Heuristic | None = None,
+        *,
+        kind: ContactKind | None = None,
+    ) -> GeneratedContact:
+        """Find the best contact of one limb ([Tonneau2015]_ algorithm 2).
+
+        Each candidate, best first, is aligned with its surface and then tested for collision: the print
+        tests before the alignment, after which the posture is another one.
+
+        Args:
+            q: (nq,) the body; all but the limb stays as it is.
+            limb: Name of the limb.
+            task: What is to be done.
+            heuristic: What to prefer; EFORT when omitted.
+            kind: How the effector touches; the limb's own way when omitted.
+
+        Raises:
+            BodyError: If there are no samples of such a limb or ``q`` does not fit.
+            ContactError: If a sole is asked for of a body without soles.
+        """
+        if limb not in self._tools:
+            raise BodyError(f"no samples of limb {limb!r}; valid: {', '.join(self._tools) or 'none'}")
+        tools = self._tools[limb]
+        touch = kind or tools.limb.kind
+        situation = Situation.of(self._state.update(q), tools.limb, task.reaction_on(limb))
+        near = self._table.within_reach(situation, tools.samples, self.settings.tolerance)
+        if not len(near):
+            return _failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")
+        candidates = find_candidates(
+            self._table, near, situation, tools.samples, tolerance=self.settings.tolerance,
+            max_tilt=self.settings.max_tilt, footprint=footprint(self.body, touch),
+        )  # fmt: skip
+        if not len(candidates):
+            names = sorted({self._table.surfaces[number].obstacle for number in near})
+            return _failure(
+                limb, Hindrance.SURFACE,
+                f"no sample of {limb} lies flat on a surface of {', '.join(names)}, though these are near",
+            )  # fmt: skip
+        scores = (heuristic or Efort()).score(situation, candidates)
+        return self._choose(tools, situation, candidates, scores, touch)
+
+    def _choose(
+        self,
+        tools: "_LimbTools",
+        situation: Situation,
+        candidates: Candidates,
+        scores: FloatArray,
+        kind: ContactKind,
+    ) -> GeneratedContact:
+        """Steps 3 and 4: best first, the first that can be aligned and is free."""
+        faults: Counter[str] = Counter()
+        order = _tried(scores, self.settings.tries)
+        q = np.array(situation.state.q)
+        allowed = TILT_TOLERANCE if kind is ContactKind.SOLE else self.settings.point_tilt
+        for start, end in pairwise((0, *(size for size in _BATCHES if size < len(order)), len(order))):
+            rows = order[start:end]
+            aligned = tools.align(situation, candidates, rows, allowed)
+            turns = situation.rotation @ aligned.rotations
+            lies = self._lies(aligned, candidates, rows, turns, kind, allowed)
+            faults[_TILTED] += int((~lies).sum())
+            for number in np.flatnonzero(lies).tolist():
+                q[tools.chain.slots] = aligned.angles[number]
+                row, tried = int(rows[number]), start + number + 1
+                touched = self._table.surfaces[int(candidates.surfaces[row])].obstacle
+                hit = tools.collisions.first(q, touched)
+                if hit is None:
+                    return self._found(tools.limb, kind, candidates, row, turns[number], q, scores, tried)
+                faults[f"{hit[0]} in {hit[1]}"] += 1
+        return _none_fits(tools.limb.name, faults, len(candidates), len(order))
+
+    def _lies(
+        self,
+        aligned: Alignment,
+        candidates: Candidates,
+        rows: NDArray[np.int64],
+        turns: FloatArray,
+        kind: ContactKind,
+        max_tilt: float,
+    ) -> NDArray[np.bool_]:
+        """(n,) whether aligned effectors touch as they should, with all of their footprint."""
+        lies = (aligned.error <= POSITION_TOLERANCE) & (aligned.tilt <= max_tilt)
+        if kind is ContactKind.SOLE:
+            corners = footprint(self.body, kind)
+            lies &= self._table.carries(candidates.points[rows], turns, candidates.surfaces[rows], corners)
+        return lies
+
+    def _found(
+        self,
+        limb: Limb,
+        kind: ContactKind,
+        candidates: Candidates,
+        row: int,
+        turn: FloatArray,
+        q: FloatArray,
+        scores: FloatArray,
+        tried: int,
+    ) -> GeneratedContact:
+        surface = self._table.surfaces[int(candidates.surfaces[row])]
+        rotation = onto_normal(turn, surface.normal)
+        contact = make_contact(self.body, limb, kind, candidates.points[row], rotation, self.rules)
+        score = float(scores[row])
+        return GeneratedContact(limb.name, contact, q, surface.obstacle, score, len(candidates), tried)
+
+
+class _LimbTools:
+    """What one limb needs for its requests."""
+
+    def __init__(self, body: BodyModel, limb: Limb, scene: Scene, samples: LimbSamples) -> None:
+        self.limb = limb
+        self.samples = samples
+        self.chain = LimbKinematics(body, limb)
+        self.collisions = LimbCollisions(body, limb, scene)
+        _ = (
+            samples.grid,
+            samples.upward,
+            samples.manipulability,
+            samples.reach,
+        )  # made now, not during a request
+
+    def align(
+        self, situation: Situation, candidates: Candidates, rows: NDArray[np.int64], max_tilt: float
+    ) -> Alignment:
+        """Put the effectors of some candidates onto their surfaces."""
+        return align(
+            self.chain,
+            self.samples.angles[candidates.samples[rows]],
+            (candidates.points[rows] - situation.origin) @ situation.rotation,
+            candidates.normals[rows] @ situation.rotation,
+            max_tilt,
+        )
+
+
+def _tried(scores: FloatArray, tries: int) -> NDArray[np.int64]:
+    """Candidates to try, best first; after the best few, ever longer steps down the order.
+
+    Neighbours in the order are often neighbours in space and collide with the same thing.
+    """
+    order = np.argsort(-scores, kind="stable")
+    if len(order) <= tries:
+        return order
+    best = tries // 3
+    steps = np.geomspace(best + 1, len(order), tries - best).astype(np.int64) - 1
+    return order[np.unique(np.concatenate([np.arange(best), steps]))]
+
+
+def _failure(
+    limb: str, kind: Hindrance, message: str, candidates: int = 0, tried: int = 0
+) -> GeneratedContact:
+    return GeneratedContact(limb, None, None, None, -np.inf, candidates, tried, kind, message)
+
+
+def _none_fits(limb: str, faults: Counter[str], candidates: int, tried: int) -> GeneratedContact:
+    tilted = faults.pop(_TILTED, 0)
+    collided = sum(faults.values())
+    kind = Hindrance.COLLISION if collided > tilted else Hindrance.ALIGNMENT
+    what = [f"{tilted} cannot lie flat on the surface"] if tilted else []
+    if collided:
+        reason, count = faults.most_common(1)[0]
+        what.append(f"{collided} collide, {count} by {reason}")
+    message = f"none of {tried} contacts of {limb} out of {candidates} is possible: {', '.join(what)}"
+    return _failure(limb, kind, message, candidates, tried)

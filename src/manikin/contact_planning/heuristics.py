@@ -1,0 +1,174 @@
+"""What makes one contact better than another: interchangeable scores of candidates."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.balance import pseudo_wrench, stability_margins, wrench_polytope
+from manikin.body import ReachVolume
+from manikin.contact import Contact, ContactKind, Stance
+from manikin.contact_planning.candidates import Candidates, Situation
+from manikin.contact_planning.efort import efort
+from manikin.contact_planning.touch import ContactRules, make_contact, onto_normal
+from manikin.spatial import FloatArray
+
+
+class Heuristic(Protocol):
+    """A score of candidate contacts; the largest is tried first."""
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """(n,) scores of the candidates, without NaN; larger is better."""
+        ...
+
+
+@dataclass(frozen=True)
+class Efort:
+    """Extended force transmission ratio ([Tonneau2015]_ 5.12), with the limb's own direction.
+
+    Attributes:
+        pulling: Whether the limb holds on and pulls at the surface (5.13).
+    """
+
+    pulling: bool = False
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """See :class:`Heuristic`."""
+        direction = situation.reaction @ situation.rotation
+        alpha = efort(candidates.products, direction, candidates.normals @ situation.rotation)
+        return -alpha if self.pulling else alpha
+
+
+@dataclass(frozen=True)
+class ClosestDistance:
+    """Little movement: minus the distance of the contact to where the effector is [m] (8.1.3)."""
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """See :class:`Heuristic`."""
+        _, place = situation.state.effector_placement(situation.limb.effector)
+        return -np.linalg.norm(candidates.points - place, axis=1)
+
+
+@dataclass(frozen=True)
+class Manipulability:
+    """Freedom to move on: ``sqrt(det(J J^T))`` (5.6), whatever the task."""
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:  # noqa: ARG002
+        """See :class:`Heuristic`."""
+        return candidates.manipulability
+
+
+@dataclass(frozen=True)
+class Random:
+    """No preference; the same for a seed and the same candidates."""
+
+    seed: int = 0
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:  # noqa: ARG002
+        """See :class:`Heuristic`."""
+        return np.random.default_rng(self.seed).random(len(candidates))
+
+
+@dataclass(frozen=True, eq=False)
+class Duration:
+    """How long a contact can be kept on the way ahead ([Tonneau2015]_ 7.1-7.4).
+
+    The range of motion is the largest sphere inside the reach (7.1.1).
+
+    Attributes:
+        reach: Reach of the limb.
+        ahead: (rotation (3, 3) segment-to-world, position (3,) [m]) of the segment that carries the
+            limb at the next configurations ``q_2 ... q_w``.
+    """
+
+    reach: ReachVolume
+    ahead: Sequence[tuple[FloatArray, FloatArray]]
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:  # noqa: ARG002
+        """See :class:`Heuristic`."""
+        centre, radius = self.reach.inscribed_sphere
+        centres = [place + rotation @ centre for rotation, place in self.ahead]
+        inside = [np.linalg.norm(candidates.points - each, axis=1) <= radius for each in centres]
+        return duration(np.array(inside).reshape(len(self.ahead), len(candidates)).T)
+
+
+def duration(within: ArrayLike) -> FloatArray:
+    """Share of the next configurations up to the first that cannot reach ([Tonneau2015]_ 7.4).
+
+    The product of 7.3 stops at the first configuration out of reach, so later ones do not count.
+
+    Args:
+        within: (..., w - 1) whether the contact is within reach at ``q_2 ... q_w``.
+
+    Returns:
+        (...) in [0, 1]; 1 when nothing lies ahead.
+    """
+    reached = np.asarray(within, dtype=bool)
+    if reached.shape[-1] == 0:
+        return np.ones(reached.shape[:-1])
+    return np.logical_and.accumulate(reached, axis=-1).mean(axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Balance with the contact added to those that are held ([Tonneau2015]_ 7.5-7.6).
+
+    Ours is the true margin of the wrench polytope (:mod:`manikin.balance`), moments about the CoM, the
+    centre of mass being where the body now has it. It depends on the place of a contact, not on the
+    limb, so candidates of one surface within ``spacing`` share one margin. A polytope takes
+    milliseconds: this is for planning, not for the real time request.
+
+    Attributes:
+        held: The other contacts, with what caps their forces.
+        acceleration: (3,) of the CoM [m/s^2].
+        binary: 1 where balanced and else 0, as printed (7.6), instead of the margin [N.m].
+        spacing: [m].
+        kind: How the new contact touches; the limb's own way when None.
+        rules: Friction and strengths.
+    """
+
+    held: Stance
+    acceleration: ArrayLike = (0.0, 0.0, 0.0)
+    binary: bool = False
+    spacing: float = 0.1
+    kind: ContactKind | None = None
+    rules: ContactRules = field(default_factory=ContactRules)
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """See :class:`Heuristic`."""
+        keys = np.column_stack([candidates.surfaces, np.round(candidates.points / self.spacing)])
+        _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        margins = np.array([self._margin(situation, candidates, int(row)) for row in first])
+        values = margins[group.ravel()] if len(margins) else margins
+        return (values >= 0.0).astype(np.float64) if self.binary else values
+
+    def _margin(self, situation: Situation, candidates: Candidates, row: int) -> float:
+        body, limb = situation.state.body, situation.limb
+        turn = onto_normal(situation.rotation @ candidates.rotations[row], candidates.normals[row])
+        kind = self.kind or limb.kind
+        contact: Contact = make_contact(body, limb, kind, candidates.points[row], turn, self.rules)
+        others = [item for item in self.held if item.effector != limb.effector]
+        W = wrench_polytope(Stance([*others, contact], self.held.normal_force_cap))
+        com = situation.state.com
+        wrench = pseudo_wrench(body.mass, com, self.acceleration, np.zeros(3), W.reference)
+        return float(stability_margins(W, wrench, com).wrench_about_com)
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedSum:
+    """Sum of weighted scores ([Tonneau2015]_ 7.7); the weights carry the units.
+
+    Attributes:
+        terms: (weight, heuristic) pairs.
+    """
+
+    terms: Sequence[tuple[float, Heuristic]]
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """See :class:`Heuristic`."""
+        total: NDArray[np.float64] = np.zeros(len(candidates))
+        for weight, heuristic in self.terms:
+            total = total + weight * heuristic.score(situation, candidates)
+        return total

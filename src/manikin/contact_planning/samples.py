@@ -1,0 +1,191 @@
+"""Sampled configurations of a limb, made once and asked often ([Tonneau2015]_ 5.1.4, 5.3.1)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel, Limb, LimbKinematics, ReachVolume, are_mirrored
+from manikin.body.limbs import REFLECTION, parent_segment
+from manikin.body.reach_volume import hull_of
+from manikin.contact_planning.grid import SampleGrid
+from manikin.errors import BodyError
+from manikin.spatial import FloatArray, finite_number
+
+THRESHOLD = 0.05
+"""Smallest manipulability, as a share of the largest one seen; our choice, the thesis leaves it open."""
+_FEWEST_KEPT = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class LimbSamples:
+    """Random configurations of one limb, in the limb's frame.
+
+    Attributes:
+        limb: The limb.
+        segment: Name of the segment that carries it.
+        origin: (3,) origin of the limb's frame in that segment [m].
+        angles: (n, k) joint angles [rad].
+        positions: (n, 3) effector positions [m].
+        rotations: (n, 3, 3) from the effector's axes to the limb frame's.
+        products: (n, 3, 3) ``J J^T`` of the effector's translation [m^2].
+        threshold: Manipulability [m^3] that every sample has at least.
+    """
+
+    limb: Limb
+    segment: str
+    origin: FloatArray
+    angles: FloatArray
+    positions: FloatArray
+    rotations: FloatArray
+    products: FloatArray
+    threshold: float
+
+    def __post_init__(self) -> None:
+        for name in ("origin", "angles", "positions", "rotations", "products"):
+            getattr(self, name).setflags(write=False)
+
+    def __len__(self) -> int:
+        return len(self.angles)
+
+    @cached_property
+    def manipulability(self) -> FloatArray:
+        """(n,) ``sqrt(det(J J^T))`` [m^3] (5.6, where the print lacks the determinant)."""
+        return manipulability(self.products)
+
+    @cached_property
+    def upward(self) -> FloatArray:
+        """(n, 3) z axes of the effector, the normals it would fit, in the limb's frame."""
+        return np.ascontiguousarray(self.rotations[:, :, 2])
+
+    @cached_property
+    def grid(self) -> SampleGrid:
+        """Spatial index of the positions."""
+        return SampleGrid(self.positions)
+
+    @cached_property
+    def reach(self) -> ReachVolume:
+        """Convex hull of the positions, in the frame of the carrying segment."""
+        return hull_of(self.limb, self.segment, self.positions + self.origin)
+
+
+def manipulability(products: FloatArray) -> FloatArray:
+    """(n,) ``w = sqrt(det(J J^T))`` of (n, 3, 3) products ([Tonneau2015]_ 5.6)."""
+    a, b, c = products[:, :, 0], products[:, :, 1], products[:, :, 2]
+    determinant = (
+        a[:, 0] * (b[:, 1] * c[:, 2] - b[:, 2] * c[:, 1])
+        - b[:, 0] * (a[:, 1] * c[:, 2] - a[:, 2] * c[:, 1])
+        + c[:, 0] * (a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1])
+    )
+    return np.sqrt(np.maximum(determinant, 0.0))
+
+
+def sample_limb(
+    body: BodyModel,
+    limb: Limb,
+    rng: np.random.Generator,
+    count: int = 10_000,
+    threshold: float = THRESHOLD,
+) -> LimbSamples:
+    """Draw configurations of a limb within its joint ranges and keep those far from singular.
+
+    The ratio that EFORT builds on grows without bound towards singular configurations, so those with
+    little manipulability are dropped (5.4.1).
+
+    Args:
+        body: The body.
+        limb: One of its limbs.
+        rng: Source of randomness.
+        count: Number of samples that are kept, > 0.
+        threshold: Smallest manipulability kept, as a share of the largest among the first
+            ``count`` samples, in [0, 1).
+
+    Raises:
+        BodyError: If a value is out of its range, or fewer than one sample in fifty passes.
+    """
+    if count < 4:
+        raise BodyError(f"limb samples count is {count}; valid: at least 4")
+    share = finite_number(threshold, "limb samples threshold", at_least=0.0, error=BodyError)
+    chain = LimbKinematics(body, limb)
+    parts: list[tuple[FloatArray, ...]] = []
+    kept, drawn, least = 0, 0, None
+    while kept < count:
+        part, values = _draw(chain, rng, count)
+        least = share * float(values.max()) if least is None else least
+        good = values >= least
+        parts.append(tuple(values[good] for values in part))
+        kept, drawn = kept + int(good.sum()), drawn + count
+        if kept < _FEWEST_KEPT * drawn:
+            raise BodyError(
+                f"limb {limb.name!r}: {kept} of {drawn} samples have a manipulability of {share:g} of the "
+                "largest; valid: a smaller threshold"
+            )
+    joined = [np.concatenate(arrays)[:count] for arrays in zip(*parts, strict=True)]
+    origin = np.array(body.segment(limb.segments[0]).origin)
+    return LimbSamples(limb, parent_segment(body, limb), origin, *joined, threshold=float(least or 0.0))
+
+
+def _draw(
+    chain: LimbKinematics, rng: np.random.Generator, count: int
+) -> tuple[tuple[FloatArray, ...], FloatArray]:
+    """Angles, positions, rotations, products; and the manipulabilities."""
+    angles = chain.random_angles(rng, count)
+    placed = chain.place(angles)
+    products = placed.jacobians @ placed.jacobians.transpose(0, 2, 1)
+    return (angles, placed.positions, placed.rotations, products), manipulability(products)
+
+
+def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
+    """Samples of the limb on the other side, by reflection in the sagittal plane (5.3.1).
+
+    Equal angles give ``M p``, ``M R M`` and ``M J J^T M`` with ``M = diag(1, -1, 1)``.
+
+    Args:
+        body: The body.
+        samples: Samples of a limb.
+        limb: The limb that is its mirror image.
+
+    Raises:
+        BodyError: If it is not.
+    """
+    if not are_mirrored(body, samples.limb, limb):
+        raise BodyError(
+            f"limb {limb.name!r} is no reflection of {samples.limb.name!r}; "
+            f"valid: {samples.limb.mirror or 'none'}"
+        )
+    flip: NDArray[np.float64] = np.outer(REFLECTION, REFLECTION)
+    return LimbSamples(
+        limb,
+        samples.segment,
+        samples.origin * REFLECTION,
+        samples.angles,
+        samples.positions * REFLECTION,
+        samples.rotations * flip,
+        samples.products * flip,
+        samples.threshold,
+    )
+
+
+def sample_limbs(
+    body: BodyModel,
+    rng: np.random.Generator,
+    count: int = 10_000,
+    threshold: float = THRESHOLD,
+) -> dict[str, LimbSamples]:
+    """Samples of every limb by its name; mirrored limbs share one set, reflected.
+
+    Args:
+        body: A body with limbs.
+        rng: Source of randomness.
+        count: Samples per limb.
+        threshold: See :func:`sample_limb`.
+    """
+    found: dict[str, LimbSamples] = {}
+    for limb in body.limbs:
+        twin = found.get(limb.mirror or "")
+        if twin is not None and are_mirrored(body, twin.limb, limb):
+            found[limb.name] = mirrored(body, twin, limb)
+        else:
+            found[limb.name] = sample_limb(body, limb, rng, count, threshold)
+    return found

@@ -1,0 +1,83 @@
+"""The contact that an effector makes where it has been put."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.body import BodyModel, Limb
+from manikin.contact import Contact, ContactKind, grasp, point, sole
+from manikin.errors import ContactError
+from manikin.spatial import FloatArray
+
+
+@dataclass(frozen=True)
+class ContactRules:
+    """What contacts can carry.
+
+    Attributes:
+        friction: Coulomb coefficient of soles and points.
+        grasp_force: Largest force of a grasp along each world axis [N].
+        grasp_moment: Largest moment of a grasp along each world axis [N.m].
+    """
+
+    friction: float = 0.7
+    grasp_force: float = 400.0
+    grasp_moment: float = 10.0
+
+
+def footprint(body: BodyModel, kind: ContactKind) -> FloatArray:
+    """(c, 3) points of the effector's frame that must lie on the surface [m].
+
+    Raises:
+        ContactError: If a sole is asked for of a body without soles.
+    """
+    if kind is not ContactKind.SOLE:
+        return np.zeros((1, 3))
+    if body.sole_length is None or body.sole_width is None:
+        raise ContactError(f"body {body.name!r} has no soles; valid: a contact of kind point or grasp")
+    half = 0.5 * np.array([body.sole_length, body.sole_width, 0.0])
+    return np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]]) * half
+
+
+def make_contact(
+    body: BodyModel,
+    limb: Limb,
+    kind: ContactKind,
+    position: FloatArray,
+    rotation: FloatArray,
+    rules: ContactRules,
+) -> Contact:
+    """Contact of a limb's effector.
+
+    Args:
+        body: The body.
+        limb: The limb.
+        kind: How it touches.
+        position: (3,) in the world [m].
+        rotation: (3, 3) effector-to-world; its z column is the normal.
+        rules: Friction and strengths.
+
+    Raises:
+        ContactError: If a value is out of its range, or a sole is asked for of a body without.
+    """
+    if kind is ContactKind.GRASP:
+        return grasp(
+            limb.effector, position, max_force=rules.grasp_force, max_moment=rules.grasp_moment,
+            rotation=rotation,
+        )  # fmt: skip
+    if kind is ContactKind.POINT:
+        return point(limb.effector, position, friction=rules.friction, rotation=rotation)
+    length, width = 2.0 * footprint(body, kind)[0, :2]
+    return sole(
+        limb.effector, position, length=length, width=width, friction=rules.friction, rotation=rotation
+    )
+
+
+def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
+    """(3, 3) the rotation turned by the shortest way so that its z axis is the unit normal exactly."""
+    across = np.cross(normal, rotation[:, 0])
+    length = float(np.linalg.norm(across))
+    if length < 1e-9:
+        across, length = np.array(rotation[:, 1]), 1.0
+    y = across / length
+    return np.column_stack([np.cross(y, normal), y, normal])

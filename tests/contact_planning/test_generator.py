@@ -1,0 +1,317 @@
+"""Requests for a contact: what is found is true, best first, and failures say why."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from manikin.body import Configuration, LimbKinematics, human, insect, integrate, limb_named, limbs_of
+from manikin.body.limbs import limb_slots
+from manikin.contact import ContactKind
+from manikin.contact_planning import (
+    ClosestDistance,
+    ContactGenerator,
+    ContactRules,
+    Efort,
+    GeneratorSettings,
+    Hindrance,
+    LimbCollisions,
+    Random,
+    Situation,
+    SurfaceTable,
+    Task,
+    align,
+    find_candidates,
+)
+from manikin.contact_planning.collisions import TOUCH, yielding
+from manikin.errors import BodyError, ContactError
+from manikin.scene import Box, Capsule, Mesh, Obstacle, Proximity, Scene, Surface
+from manikin.spatial import rotation_from_rpy
+
+UP = Task((0.0, 0.0, 1.0))
+PUSH = Task((1.0, 0.0, 0.0), {"left_arm", "right_arm"})
+
+
+def wall_scene(distance=0.5):
+    return Scene([Obstacle("wall", Box((0.2, 3.0, 3.0)), translation=(distance + 0.1, 0.0, 1.5))])
+
+
+@pytest.fixture(scope="module")
+def at_wall(person, person_samples):
+    return ContactGenerator(person, wall_scene(), person_samples)
+
+
+def check(body, scene, answer, q, limb):
+    """A contact is exact, on its surface, free of collision and within the joint ranges."""
+    state = Configuration(body, answer.q)
+    turn, place = state.effector_placement(limb.effector)
+    contact = answer.contact
+    assert np.abs(place - contact.position).max() < 2e-5
+    tilt = np.arccos(min(turn[:, 2] @ contact.normal, 1.0))
+    assert tilt < (2e-4 if contact.kind is ContactKind.SOLE else np.deg2rad(15.0) + 1e-6)
+    if contact.kind is not ContactKind.GRASP:
+        assert scene.supporting_surface(contact).obstacle == answer.obstacle
+    slots = limb_slots(body, limb)
+    others = np.setdiff1d(np.arange(body.nq), slots)
+    assert np.array_equal(answer.q[others], np.asarray(q)[others])
+    angles = answer.q[slots]
+    assert ((angles >= body.lower[slots - 7]) & (angles <= body.upper[slots - 7])).all()
+    moving = {*limb.segments, *(s.name for s in body.segments if s.parent in limb.segments)}
+    near = Proximity(body, scene).evaluate(answer.q, 0.0)
+    soft, depth = yielding(body, limb)
+    for (first, second), distance in zip(near.pairs, near.distance, strict=True):
+        inner = "/" in second
+        pair = {first.split("/")[0], second.split("/")[0]}
+        if moving & pair:
+            gives = first.split("/")[0] in soft and second == answer.obstacle
+            allowed = 0.0 if inner else max(depth, TOUCH) if gives else TOUCH
+            assert distance > -allowed - 1e-6, (first, second)
+
+
+@pytest.mark.parametrize("name", ["left_arm", "right_arm", "left_leg", "right_leg"])
+def test_contacts_at_a_wall_are_true(person, at_wall, name):
+    q = person.standing_posture()
+    answer = at_wall.request(q, name, PUSH)
+    assert answer.found, answer.message
+    check(person, wall_scene(), answer, q, limb_named(person, name))
+
+
+@given(st.floats(-0.15, 0.1), st.floats(-0.2, 0.2), st.floats(-0.4, 0.4), st.integers(0, 5))
+@settings(max_examples=25, deadline=None)
+def test_whatever_is_found_is_true(person, at_wall, x, y, yaw, number):
+    limb = limbs_of(person)[number]
+    move = np.zeros(person.nv)
+    move[:2], move[5] = (x, y), yaw
+    q = integrate(person, person.standing_posture(), move)
+    answer = at_wall.request(q, limb.name, PUSH)
+    assert answer.found == (answer.failure is None) == (answer.message == "")
+    if answer.found:
+        check(person, wall_scene(), answer, q, limb)
+
+
+def test_hands_that_push_go_to_the_wall_and_not_to_the_table(person, person_samples):
+    """EFORT against the closest surface: a table under the hands, a wall before them."""
+    table = Obstacle("table", Box((0.4, 3.0, 0.05)), translation=(0.3, 0.0, 0.85))
+    scene = Scene([*wall_scene().obstacles[1:], table])
+    generator = ContactGenerator(person, scene, person_samples)
+    q = person.standing_posture()
+    pushing = generator.request(q, "right_arm", PUSH)
+    closest = generator.request(q, "right_arm", PUSH, ClosestDistance())
+    assert (pushing.obstacle, closest.obstacle) == ("wall", "table")
+    rising = generator.request(q, "right_arm", UP)
+    assert rising.obstacle == "table"
+
+
+def test_without_its_own_direction_a_pushing_hand_would_score_negative(person, at_wall):
+    q = person.standing_posture()
+    assert at_wall.request(q, "left_arm", PUSH).score > 0.0
+    assert at_wall.request(q, "left_arm", Task((1.0, 0.0, 0.0))).score < 0.0
+
+
+def test_a_hand_can_grasp_and_pull(person, at_wall):
+    q = person.standing_posture()
+    task = Task((-1.0, 0.0, 0.0), {"left_arm"})
+    answer = at_wall.request(q, "left_arm", task, Efort(pulling=True), kind=ContactKind.GRASP)
+    assert answer.found
+    assert answer.score > 0.0
+    assert answer.contact.kind is ContactKind.GRASP
+    assert answer.contact.max_force == ContactRules().grasp_force
+
+
+def test_the_same_request_has_the_same_answer(person, person_samples, at_wall):
+    q = person.standing_posture()
+    for heuristic in (Efort(), Random(1)):
+        first = at_wall.request(q, "left_leg", PUSH, heuristic)
+        at_wall.request(q, "left_arm", PUSH)
+        second = ContactGenerator(person, wall_scene(), person_samples).request(
+            q, "left_leg", PUSH, heuristic
+        )
+        assert np.array_equal(first.q, second.q)
+        assert first.score == second.score
+
+
+def test_an_insect_stands_on_books(creature, creature_samples):
+    books = [
+        Obstacle(f"book{n}", Box((0.06, 0.5, 0.03 + 0.02 * (n % 3))), translation=(-0.6 + 0.065 * n, 0, 0.02))
+        for n in range(19)
+    ]
+    scene = Scene(books)
+    generator = ContactGenerator(creature, scene, creature_samples)
+    q = creature.standing_posture()
+    q[2] += 0.06
+    for limb in limbs_of(creature):
+        answer = generator.request(q, limb.name, Task((1.0, 0.0, 0.5)))
+        assert answer.found, answer.message
+        check(creature, scene, answer, q, limb)
+
+
+def test_a_knee_is_put_on_a_step(person, person_samples):
+    step = Obstacle("step", Box((0.5, 1.0, 0.45)), translation=(0.35, 0.0, 0.225))
+    scene = Scene([step])
+    generator = ContactGenerator(person, scene, person_samples)
+    q = person.standing_posture()
+    q[2] -= 0.02
+    answer = generator.request(q, "left_knee", UP)
+    assert answer.found, answer.message
+    assert answer.obstacle == "step"
+    check(person, scene, answer, q, limb_named(person, "left_knee"))
+
+
+def test_nothing_in_reach_is_said(person, person_samples):
+    answer = ContactGenerator(person, wall_scene(5.0), person_samples).request(
+        person.standing_posture(), "left_arm", PUSH
+    )
+    assert answer.failure is Hindrance.REACH
+    assert answer.message == "no surface is within reach of left_arm"
+    empty = ContactGenerator(person, Scene([], None), person_samples)
+    assert empty.request(person.standing_posture(), "left_leg", UP).failure is Hindrance.REACH
+
+
+def test_no_sample_on_a_surface_is_said(person, person_samples):
+    """A ledge narrower than a sole."""
+    ledge = Obstacle("ledge", Box((0.05, 0.05, 0.05)), translation=(0.2, 0.1, 0.2))
+    generator = ContactGenerator(person, Scene([ledge], None), person_samples)
+    answer = generator.request(person.standing_posture(), "left_leg", UP)
+    assert answer.failure is Hindrance.SURFACE
+    assert "a surface of ledge" in answer.message
+
+
+def test_collisions_are_said_with_the_names_of_both(person, person_samples):
+    """A wall behind a lattice of bars too narrow for an arm."""
+    bars = [
+        Obstacle(f"bar{n}", Capsule(0.02, 3.0), translation=(0.3, -0.8 + 0.08 * n, 1.5)) for n in range(24)
+    ]
+    scene = Scene([*wall_scene(0.45).obstacles[1:], *bars], None)
+    loose = GeneratorSettings(point_tilt=1.0)
+    generator = ContactGenerator(person, scene, person_samples, loose)
+    answer = generator.request(person.standing_posture(), "left_arm", PUSH)
+    assert answer.failure is Hindrance.COLLISION
+    assert " in bar" in answer.message
+    assert answer.q is None
+    assert answer.tried > 0
+
+
+def test_effectors_that_cannot_lie_flat_are_said(person, person_samples):
+    """Steps of a ceiling's slope that no ankle can follow, allowed in only by a wide filter."""
+    tilt = rotation_from_rpy(0.0, np.deg2rad(-80.0), 0.0)
+    slope = Obstacle("slope", Box((1.0, 3.0, 0.05)), tilt, (0.55, 0.0, 0.2))
+    settings_ = GeneratorSettings(max_tilt=1.5, tries=10)
+    generator = ContactGenerator(person, Scene([slope], None), person_samples, settings_)
+    answer = generator.request(person.standing_posture(), "left_leg", Task((0.0, 0.0, -1.0)))
+    assert not answer.found
+    assert answer.failure in (Hindrance.ALIGNMENT, Hindrance.COLLISION)
+    assert answer.message.startswith("none of ")
+
+
+def test_misuse_is_refused(person, person_samples, creature, creature_samples):
+    arm = {"left_arm": person_samples["left_arm"]}
+    generator = ContactGenerator(person, wall_scene(), arm)
+    with pytest.raises(BodyError, match="no samples of limb 'right_arm'; valid: left_arm"):
+        generator.request(person.standing_posture(), "right_arm", PUSH)
+    with pytest.raises(BodyError, match="shape"):
+        generator.request(np.zeros(3), "left_arm", PUSH)
+    insects = ContactGenerator(creature, wall_scene(), creature_samples)
+    q = creature.standing_posture()
+    with pytest.raises(ContactError, match="has no soles"):
+        insects.request(q, "left_front_leg", UP, kind=ContactKind.SOLE)
+
+
+# --- parts ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("make", [human, insect])
+def test_alignment_reaches_what_can_be_reached(make):
+    """Targets taken from other samples nearby: position and normal to the tolerance, ranges kept."""
+    body = make()
+    chain = LimbKinematics(body, limbs_of(body)[0])
+    rng = np.random.default_rng(5)
+    angles = chain.lower + (0.3 + 0.4 * rng.random((60, len(chain)))) * (chain.upper - chain.lower)
+    goal = chain.place(np.clip(angles + rng.uniform(-0.15, 0.15, angles.shape), chain.lower, chain.upper))
+    found = align(chain, angles, goal.positions, goal.rotations[:, :, 2])
+    good = (found.error < 1e-5) & (found.tilt < 1e-4)
+    assert good.mean() > 0.9
+    assert ((found.angles >= chain.lower) & (found.angles <= chain.upper)).all()
+    placed = chain.place(found.angles)
+    assert np.allclose(np.linalg.norm(placed.positions - goal.positions, axis=1), found.error)
+    cosine = np.einsum("ni,ni->n", placed.rotations[:, :, 2], goal.rotations[:, :, 2])
+    assert np.allclose(np.cos(found.tilt), cosine, atol=1e-12)
+
+
+def test_alignment_turns_an_effector_that_looks_the_wrong_way():
+    """Half a turn, where the axis of the turn is not unique, gives finite steps."""
+    body = human()
+    chain = LimbKinematics(body, limbs_of(body)[0])
+    angles = 0.5 * (chain.lower + chain.upper)[None]
+    placed = chain.place(angles)
+    found = align(chain, angles, placed.positions, -placed.rotations[:, :, 2])
+    assert np.isfinite(found.angles).all()
+    assert found.tilt[0] < np.pi
+
+
+def test_candidates_are_all_samples_near_a_surface(person, person_samples):
+    """The index and the filters together, against a test of every sample on every surface."""
+    ramp = Obstacle("ramp", Box((0.6, 0.8, 0.1)), rotation_from_rpy(0.1, -0.4, 0.2), (0.4, 0.1, 0.9))
+    corner = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0.5, 0.2, 0], [0, 1, 0]]) * 0.5 + [0.2, -0.2, 1.1]
+    bent = Surface("bent", corner, np.array([0.0, 0.0, 1.0]))
+    surfaces = (*Scene([ramp]).surfaces, bent)
+    samples = person_samples["left_arm"]
+    state = Configuration(person, person.standing_posture())
+    situation = Situation.of(state, samples.limb, np.array([0.0, 0.0, 1.0]))
+    table = SurfaceTable(surfaces)
+    near = table.within_reach(situation, samples, 0.03)
+    found = find_candidates(
+        table, near, situation, samples, tolerance=0.03, max_tilt=0.7, footprint=np.zeros((1, 3))
+    )
+    places = situation.to_world(samples.positions)
+    up = samples.rotations[:, :, 2] @ situation.rotation.T
+    wanted = {
+        (row, number)
+        for number, surface in enumerate(surfaces)
+        for row in np.flatnonzero(
+            (np.abs(surface.height(places)) <= 0.03)
+            & (up @ surface.normal >= np.cos(0.7))
+            & (surface.outside(places) == 0.0)
+        ).tolist()
+    }
+    assert set(zip(found.samples.tolist(), found.surfaces.tolist(), strict=True)) == wanted
+    assert len(surfaces) - 1 in found.surfaces
+    heights = [surfaces[n].height(p[None])[0] for n, p in zip(found.surfaces, found.points, strict=True)]
+    assert np.abs(heights).max() < 1e-9
+
+
+def test_the_collision_test_agrees_with_distances(person):
+    """Random arms in a small room with a mesh, against the distances of all pairs."""
+    pyramid = Mesh(
+        np.array([[0, 0, 0], [0.4, 0, 0], [0, 0.4, 0], [0, 0, 0.4]], dtype=float),
+        np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+    )
+    scene = Scene([*wall_scene(0.35).obstacles[1:], Obstacle("rock", pyramid, translation=(0.1, 0.3, 0.9))])
+    limb = limb_named(person, "left_arm")
+    test, near = LimbCollisions(person, limb, scene), Proximity(person, scene)
+    chain = LimbKinematics(person, limb)
+    free = 0
+    for angles in chain.random_angles(np.random.default_rng(6), 150):
+        q = person.standing_posture()
+        q[chain.slots] = angles
+        result = near.evaluate(q, 0.1)
+        depths = [
+            distance if "/" in other else distance + TOUCH
+            for (name, other), distance in zip(result.pairs, result.distance, strict=True)
+            if {name.split("/")[0], other.split("/")[0]} & set(limb.segments)
+        ]
+        least = min(depths, default=1.0)
+        if abs(least) > 1e-4:
+            assert (test.first(q) is not None) == (least < 0.0), (test.first(q), least)
+        free += test.first(q) is None
+    assert 10 < free < 140
+
+
+def test_tries_are_the_best_first_and_then_spread(person, person_samples, at_wall):
+    few = ContactGenerator(person, wall_scene(), person_samples, replace(GeneratorSettings(), tries=9))
+    q = person.standing_posture()
+    best, spread = at_wall.request(q, "left_arm", PUSH), few.request(q, "left_arm", PUSH)
+    assert spread.tried <= 9
+    if spread.found and best.tried <= 3:
+        assert spread.score == best.score
