@@ -76,7 +76,12 @@ class Roadmap:
     def copy(self) -> "Roadmap":
         """A copy that can grow without changing this one."""
         return Roadmap(
-            self.settings, self.graph.copy(), self.samples, self.rejected, self._poses.copy(), list(self._part)
+            self.settings,
+            self.graph.copy(),
+            self.samples,
+            self.rejected,
+            self._poses.copy(),
+            list(self._part),
         )
 
     def joined(self, first: int, second: int) -> bool:

@@ -5,6 +5,7 @@ margins that planning keeps elsewhere (a standing person's legs are nearly at th
 reach), so near them the plain condition counts, checked at closer poses.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -141,7 +142,7 @@ class LocalPlanner:
         points = self.waypoints(first, second, turn_at)
         if not (self.holds(points[1]) and self.holds(points[2])):
             return False
-        return all(self.straight(a, b) for a, b in zip(points[:-1], points[1:], strict=True))
+        return all(self.straight(a, b) for a, b in itertools.pairwise(points))
 
     def connect(self, first: FloatArray, second: FloatArray, turn_at: float) -> "Way | None":
         """SIMPLEPATH: try the straight way, then rotate-at-s.

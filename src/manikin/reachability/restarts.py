@@ -1,0 +1,125 @@
+"""Searches from several seeds at once, in processes.
+
+The result is that of the lowest restart that succeeds, whichever finishes first, so that it depends
+on the seed and not on the machine.  A restart gives up when a lower one has succeeded.
+"""
+
+import multiprocessing
+from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from multiprocessing.sharedctypes import Synchronized
+from typing import Any
+
+import numpy as np
+
+from manikin.errors import InputError
+from manikin.reachability.guide import GuideResult, GuideTask, KeepGoing, World, plan_guide
+from manikin.reachability.roadmap import Roadmap
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """One restart, as it is sent to a process."""
+
+    world: World
+    task: GuideTask
+    roadmap: Roadmap | None
+    seed: int
+    number: int
+
+
+def plan_guide_with_restarts(
+    world: World,
+    task: GuideTask,
+    seed: int,
+    *,
+    restarts: int = 4,
+    workers: int = 2,
+    roadmap: Roadmap | None = None,
+) -> GuideResult:
+    """Plan a path with several independent searches.
+
+    Args:
+        world: Scene, creature and condition.
+        task: Start, goal and speed limits.
+        seed: Each restart draws from its own stream of this seed.
+        restarts: Searches at most.
+        workers: Processes; with 1 everything runs in this one, one search after the other, with
+            the same result.
+        roadmap: A roadmap of this world to begin with.
+
+    Returns:
+        The result of the lowest restart that succeeds, or of the last one when none does.
+
+    Raises:
+        InputError: If a count is less than 1.
+    """
+    for name, value in (("restarts", restarts), ("workers", workers)):
+        if value < 1:
+            raise InputError(f"{name} is {value}; valid: at least 1")
+    jobs = [_Job(world, task, roadmap, seed, number) for number in range(restarts)]
+    first = _run(jobs[0], None) if workers == 1 or restarts == 1 else None
+    if first is None:
+        return _in_processes(jobs, workers)
+    results = [first]
+    while not _final(results[-1]) and len(results) < restarts:
+        results.append(_run(jobs[len(results)], None))
+    return results[-1]
+
+
+def _final(result: GuideResult) -> bool:
+    """Whether further restarts could not change the answer: a success, or an unfit end."""
+    return result.succeeded or result.where in ("start", "goal")
+
+
+def _in_processes(jobs: list[_Job], workers: int) -> GuideResult:
+    # Fresh processes: copies of this one would share the threads and locks of its libraries.
+    context = multiprocessing.get_context("spawn")
+    lowest: Any = context.Value("i", len(jobs))
+    with ProcessPoolExecutor(workers, context, _share, (lowest,)) as pool:
+        futures: list[Future[GuideResult]] = [pool.submit(_run_shared, job) for job in jobs]
+        result = futures[0].result()
+        for future in futures[1:]:
+            if _final(result):
+                break
+            result = future.result()
+        pool.shutdown(wait=False, cancel_futures=True)
+    return result
+
+
+_lowest: "Synchronized[int] | None" = None
+
+
+def _share(lowest: "Synchronized[int]") -> None:
+    """Give a process the number of the lowest restart that has its answer."""
+    global _lowest
+    _lowest = lowest
+
+
+class _StillWanted(KeepGoing):
+    """Whether no lower restart has its answer."""
+
+    def __init__(self, number: int, lowest: "Synchronized[int]") -> None:
+        self._number, self._lowest = number, lowest
+
+    def __call__(self) -> bool:
+        return self._lowest.value > self._number
+
+
+def _run_shared(job: _Job) -> GuideResult:
+    lowest = _lowest
+    if lowest is None:
+        return _run(job, None)
+    result = _run(job, _StillWanted(job.number, lowest))
+    if _final(result):
+        with lowest.get_lock():
+            lowest.value = min(lowest.value, job.number)
+    return result
+
+
+def _run(job: _Job, keep_going: KeepGoing | None) -> GuideResult:
+    stream = np.random.SeedSequence(job.seed, spawn_key=(job.number,))
+    result = plan_guide(
+        job.world, job.task, np.random.default_rng(stream), job.roadmap, keep_going=keep_going
+    )
+    return replace(result, statistics=replace(result.statistics, restart=job.number))
