@@ -37,7 +37,7 @@ def human_reaches():
     for side, sign in (("left", 1.0), ("right", -1.0)):
         leg = ball_points((0.1, 0.09 * sign, -0.15), 0.8, 200)
         leg = leg[leg[:, 2] < 0.1]
-        names = tuple(f"{side}_{part}" for part in ("thigh", "leg", "foot", "toes"))
+        names = tuple(f"{side}_{part}" for part in ("thigh", "leg", "foot"))
         found.append(FakeReach(FakeLimb(f"{side}_leg", names), "pelvis", leg))
         arm = ball_points((0.1, 0.22 * sign, 0.2), 0.6, 150)
         names = tuple(f"{side}_{part}" for part in ("upper_arm", "forearm", "hand"))

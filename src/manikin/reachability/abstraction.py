@@ -18,7 +18,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, QhullError
 
 from manikin.body.model import BodyModel
-from manikin.body.segments import ShapeKind
+from manikin.body.segments import Shape, ShapeKind
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, check_rotation, finite_number, frozen_array
 
@@ -235,15 +235,13 @@ def abstraction_of(
         volumes: Reach of each limb to be used.
         angles: Hinge angles of the trunk by name [rad]; the standing posture's where left out.
         trunk_scale: Factor on the radii and sides of the trunk's shapes, > 0.
-        trunk_segments: Segments that make up the trunk; those of no limb when omitted.
+        trunk_segments: Segments that make up the trunk; those of no limb, and hanging on none, when omitted.
 
     Raises:
         BodyError: If a name is unknown, or there is no volume or no shape.
     """
     factor = finite_number(trunk_scale, "trunk_scale", above=0.0, error=BodyError)
-    in_limbs = {name for volume in volumes for name in volume.limb.segments}
-    names = [segment.name for segment in body.segments if segment.name not in in_limbs]
-    wanted = names if trunk_segments is None else list(trunk_segments)
+    wanted = _outside_limbs(body, volumes) if trunk_segments is None else list(trunk_segments)
     frames = _segment_frames(body, angles)
     shapes = [
         _in_root(frames[name], f"{name}/{shape.name}", shape).enlarged(factor)
@@ -282,7 +280,16 @@ def _segment_frames(body: BodyModel, angles: Mapping[str, float] | None) -> dict
     return {name: _Frame(frame.rotation.copy(), frame.translation.copy()) for name, frame in placed.items()}
 
 
-def _in_root(frame: _Frame, name: str, shape: TrunkShape) -> TrunkShape:
+def _outside_limbs(body: BodyModel, volumes: Sequence[LimbVolume]) -> list[str]:
+    """Names of the segments that belong to no limb and hang on none, as toes do."""
+    in_limbs = {name for volume in volumes for name in volume.limb.segments}
+    for segment in body.segments:
+        if segment.parent in in_limbs:
+            in_limbs.add(segment.name)
+    return [segment.name for segment in body.segments if segment.name not in in_limbs]
+
+
+def _in_root(frame: _Frame, name: str, shape: Shape) -> TrunkShape:
     place = frame.act_points(shape.translation)
     return TrunkShape(name, shape.kind, shape.size, place, frame.rotation @ shape.rotation)
 
