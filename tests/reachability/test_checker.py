@@ -101,6 +101,21 @@ def test_more_limbs_are_harder(stricter, at):
     assert held[0] >= held[2] >= held[1]
 
 
+def test_many_obstacles_are_asked_as_few_are(bug):
+    """120 boxes, which go through a tree of bounding boxes, against closed forms."""
+    rng = np.random.default_rng(0)
+    boxes = [
+        Obstacle(f"box{i}", Box(rng.uniform(0.1, 0.4, 3)), Rotation.random(random_state=i).as_matrix(), place)
+        for i, place in enumerate(rng.uniform(-1.5, 1.5, (120, 3)))
+    ]
+    checker = ReachabilityChecker(bug, Scene(boxes, floor_height=None), margins=NO_MARGINS)
+    answers = []
+    for place in rng.uniform(-1.5, 1.5, (150, 3)):
+        answers.append(min(ball_to_box(place, item) for item in boxes) > 0.1)
+        assert checker.trunk_is_free(root_pose(place)) == answers[-1]
+    assert 20 < sum(answers) < 130
+
+
 def test_a_limb_counts_only_surfaces_with_a_usable_normal(bug):
     """Beside a wall a limb reaches it, but no surface that carries a foot."""
     wall = Scene([Obstacle("wall", Box((4.0, 0.1, 4.0)), translation=(0.0, 0.4, 0.0))], floor_height=None)
@@ -196,6 +211,9 @@ def test_shrunk_volume_keeps_its_margin(radius, margin):
     limb = LimbReach("leg", points)
     room = limb.offsets - (limb.shrunk(margin) @ limb.normals.T).max(axis=0)
     assert room.min() >= limb.kept_margin(margin) - 1e-12
+    few = limb.coarse(20)
+    assert len(few) <= 20
+    assert {tuple(corner) for corner in few} <= {tuple(corner) for corner in limb.vertices}
 
 
 @given(first=pose, second=pose, third=pose)

@@ -168,14 +168,26 @@ class LimbReach:
         """Whether each of (k, 3) points of the root's frame lies inside."""
         return np.all(points @ self.normals.T <= self.offsets, axis=1)
 
-    def shrunk(self, margin: float) -> FloatArray:
+    def coarse(self, directions: int) -> FloatArray:
+        """(k, 3) vertices that are outermost in evenly spread directions, k <= ``directions``.
+
+        Their hull lies inside the volume and is quicker to test.
+        """
+        height = (np.arange(directions) + 0.5) / directions * 2.0 - 1.0
+        angle = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(directions)
+        ring = np.sqrt(1.0 - height**2)
+        spread = np.column_stack([ring * np.cos(angle), ring * np.sin(angle), height])
+        return self.vertices[np.unique(np.argmax(self.vertices @ spread.T, axis=0))]
+
+    def shrunk(self, margin: float, vertices: FloatArray | None = None) -> FloatArray:
         """(n, 3) vertices drawn towards the centre so that each has ``margin`` [m] to every face.
 
         With the ball's radius r the factor is ``1 - margin / r``, at least 1/2: a volume less than
         ``2 margin`` deep loses less.
         """
         factor = max(0.5, 1.0 - margin / self.radius)
-        return self.centre + factor * (self.vertices - self.centre)
+        drawn = self.vertices if vertices is None else vertices
+        return self.centre + factor * (drawn - self.centre)
 
     def kept_margin(self, margin: float) -> float:
         """Margin [m] that :meth:`shrunk` really keeps."""

@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.body.segments import ShapeKind
-from manikin.reachability.abstraction import Abstraction, TrunkShape
+from manikin.reachability.abstraction import Abstraction, LimbReach, TrunkShape
 from manikin.reachability.condition import Condition
 from manikin.reachability.pose import angles_between, tilt
 from manikin.reachability.surfaces import SceneTriangles, UsableSurface, endless
@@ -28,6 +28,9 @@ TRUNK_MARGIN = 0.02
 
 REACH_MARGIN = 0.03
 """By how much a limb's volume is drawn in while planning [m]; our choice."""
+
+DIRECTIONS = 128
+"""Directions whose outermost corners stand for a limb's volume while planning; a human's lose 3 %."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,7 @@ class ReachabilityChecker:
 
     def limbs_reach(self, pose: FloatArray) -> bool:
         """Whether every rule about the limbs holds."""
-        lean = float(tilt(pose))
+        lean = tilt(pose)
         self._limbs.place(pose)
         known: dict[int, bool] = {}
         return all(
@@ -172,7 +175,7 @@ class ReachabilityChecker:
         solid = self.inside_solid(pose)
         if solid is not None:
             return f"the trunk is inside {solid!r}"
-        lean, found = float(tilt(pose)), self.reaching(pose)
+        lean, found = tilt(pose), self.reaching(pose)
         have = f"within reach: {', '.join(found) or 'none'}"
         for rule in self.condition.rules:
             if not rule.holds_at(lean, self._tilt_slack):
@@ -248,6 +251,7 @@ class ReachabilityChecker:
 _Target = tuple[coal.CollisionGeometry, pin.SE3]
 _HERE = coal.Transform3s.Identity()
 _REQUEST = coal.CollisionRequest()
+_FEW_PAIRS = 100  # up to this many, asking all is quicker than a tree of bounding boxes
 
 
 class _Queries:
@@ -275,12 +279,18 @@ class _Queries:
                 self._shapes.addCollisionPair(pin.CollisionPair(row, index))
         self._data = self._model.createData()
         self._found = pin.GeometryData(self._shapes)
+        self._tree = None
+        if len(self._pairs) > _FEW_PAIRS:
+            tree = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager
+            self._tree = tree(self._model, self._shapes, self._found)
 
     def any(self, pose: FloatArray) -> bool:
         """Whether any pair meets at a pose (7,)."""
-        return bool(self._pairs) and pin.computeCollisions(
-            self._model, self._data, self._shapes, self._found, pose, True
-        )
+        if not self._pairs:
+            return False
+        if self._tree is not None:
+            return pin.computeCollisions(self._model, self._data, self._tree, pose, True)
+        return pin.computeCollisions(self._model, self._data, self._shapes, self._found, pose, True)
 
     def first(self, pose: FloatArray) -> tuple[int, int] | None:
         """First pair (row, number of the target) that meets, or None."""
@@ -309,7 +319,9 @@ def _trunk_object(shape: TrunkShape) -> _Target:
     return geometry, pin.SE3(np.array(shape.rotation), np.array(shape.translation))
 
 
-def _volume_object(vertices: FloatArray) -> _Target:
+def _volume_object(limb: LimbReach, margin: float) -> _Target:
+    """A limb's volume; drawn in for planning, and then with fewer corners, which lie inside it."""
+    vertices = limb.shrunk(margin, limb.coarse(DIRECTIONS)) if margin > 0.0 else limb.vertices
     return convex_geometry(vertices), pin.SE3.Identity()
 
 

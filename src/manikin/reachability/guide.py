@@ -22,6 +22,9 @@ from manikin.spatial import FloatArray
 CHUNK = 10
 """Poses drawn between two looks at whether start and goal are joined."""
 
+PATIENCE = 5
+"""Times as many rejections in a row end a search for one task as end an offline roadmap."""
+
 
 @dataclass(frozen=True)
 class GuideSettings:
@@ -222,7 +225,7 @@ def _search(
         if roadmap.joined(start, goal) or (keep_going is not None and not keep_going()):
             break
         before = roadmap.samples
-        grow(roadmap, sampler, planner, rng, CHUNK)
+        grow(roadmap, sampler, planner, rng, CHUNK, PATIENCE * world.settings.roadmap.failures)
         if roadmap.samples == before:
             break
     return find_route(roadmap, planner, start, goal)

@@ -5,6 +5,8 @@ configuration. [Tonneau2015]_ uses three Euler angles instead; they are singular
 lies horizontally, so angles here are those of the shortest turn between two poses.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
@@ -95,7 +97,7 @@ def between(first: FloatArray, second: FloatArray, shares: FloatArray) -> FloatA
     return out
 
 
-def tilt(poses: FloatArray) -> FloatArray:
-    """Angle between the root's z axis and the vertical, of poses (..., 7) [rad]."""
-    x, y = poses[..., 3], poses[..., 4]
-    return np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0))
+def tilt(pose: FloatArray) -> float:
+    """Angle between the root's z axis and the vertical, of a pose (7,) [rad]."""
+    x, y = float(pose[3]), float(pose[4])
+    return math.acos(min(1.0, max(-1.0, 1.0 - 2.0 * (x * x + y * y))))

@@ -29,7 +29,7 @@ class RoadmapSettings:
         farthest: Guards farther than this are not asked.
     """
 
-    failures: int = 150
+    failures: int = 80
     samples: int = 2000
     position_share: float = 0.5
     nearest: int = 15
@@ -155,14 +155,17 @@ def grow(
     planner: LocalPlanner,
     rng: np.random.Generator,
     samples: int,
+    failures: int | None = None,
 ) -> None:
     """Draw poses and let the roadmap consider them, at most ``samples``.
 
-    It ends earlier when the settings' number of poses was rejected in a row or drawn in all.
+    It ends earlier when so many poses were rejected in a row (``failures``, the settings' when
+    omitted), or as many drawn in all as the settings allow.
     """
     limits = roadmap.settings
+    most = limits.failures if failures is None else failures
     for _ in range(samples):
-        if roadmap.rejected >= limits.failures or roadmap.samples >= limits.samples:
+        if roadmap.rejected >= most or roadmap.samples >= limits.samples:
             return
         roadmap.samples += 1
         pose = sampler.draw(rng)
