@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from manikin.errors import InputError
 from manikin.reachability import NO_MARGINS, Condition, ReachabilityChecker, root_pose
 from manikin.reachability.pose import between
 from manikin.reachability.steering import LocalPlanner, Way
@@ -85,6 +86,11 @@ def test_margins_are_waived_near_the_ends_of_the_task_only(bug):
     assert near.holds(barely)
     assert near.straight(barely, lower)
     assert not LocalPlanner(checker, (root_pose((-1.0, -1.0, 0.3)),)).holds(barely)
+
+
+def test_a_planner_needs_margins(planner):
+    with pytest.raises(InputError, match="margins > 0"):
+        LocalPlanner(planner.plain)
 
 
 def test_a_way_seen_from_the_other_end_is_itself_again():

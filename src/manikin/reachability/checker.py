@@ -197,8 +197,7 @@ class ReachabilityChecker:
             way: Length of the path of the root's origin [m].
             angle: Angle turned [rad].
 
-        Raises:
-            ZeroDivisionError: If a margin is zero.
+        The margins must not be zero.
         """
         trunk = (way + self._trunk_radius * angle) / (2.0 * self.margins.trunk)
         reach = (way + self._reach_radius * angle) / (2.0 * self._reach_margin)

@@ -1,6 +1,7 @@
 """A guide for the root from start to goal: roadmap, request, spline ([Tonneau2015]_ chapter 6)."""
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,6 +19,9 @@ from manikin.reachability.shortcut import ShortcutSettings, approximate, prune, 
 from manikin.reachability.steering import LocalPlanner
 from manikin.scene.scene import Scene
 from manikin.spatial import FloatArray
+
+KeepGoing = Callable[[], bool]
+"""Asked by a search now and then: whether its result is still wanted."""
 
 CHUNK = 10
 """Poses drawn between two looks at whether start and goal are joined."""
@@ -162,7 +166,7 @@ def plan_guide(
     rng: np.random.Generator,
     roadmap: Roadmap | None = None,
     *,
-    keep_going: "KeepGoing | None" = None,
+    keep_going: KeepGoing | None = None,
 ) -> GuideResult:
     """Plan a path of the root.
 
@@ -198,14 +202,6 @@ def plan_guide(
         control_poses=len(path.control_points),
     )
     return GuideResult(path, pruned, counted)
-
-
-class KeepGoing:
-    """Tells a search whether its result is still wanted; the default always says yes."""
-
-    def __call__(self) -> bool:
-        """Whether to go on."""
-        return True
 
 
 def _search(

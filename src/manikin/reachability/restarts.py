@@ -15,6 +15,7 @@ import numpy as np
 from manikin.errors import InputError
 from manikin.reachability.guide import GuideResult, GuideTask, KeepGoing, World, plan_guide
 from manikin.reachability.roadmap import Roadmap
+from manikin.scene.scene import FLOOR, Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +45,10 @@ def plan_guide_with_restarts(
         task: Start, goal and speed limits.
         seed: Each restart draws from its own stream of this seed.
         restarts: Searches at most.
-        workers: Processes; with 1 everything runs in this one, one search after the other, with
-            the same result.
+        workers: Processes; with 1 everything runs in this one, one search after the other, with the
+            same result. More than one pays for searches of several seconds, because a new process
+            takes one or two to begin; a script must then keep its own work under
+            ``if __name__ == "__main__":``.
         roadmap: A roadmap of this world to begin with.
 
     Returns:
@@ -57,14 +60,21 @@ def plan_guide_with_restarts(
     for name, value in (("restarts", restarts), ("workers", workers)):
         if value < 1:
             raise InputError(f"{name} is {value}; valid: at least 1")
-    jobs = [_Job(world, task, roadmap, seed, number) for number in range(restarts)]
-    first = _run(jobs[0], None) if workers == 1 or restarts == 1 else None
-    if first is None:
+    jobs = [_Job(_portable(world), task, roadmap, seed, number) for number in range(restarts)]
+    if workers > 1 and restarts > 1:
         return _in_processes(jobs, workers)
-    results = [first]
-    while not _final(results[-1]) and len(results) < restarts:
-        results.append(_run(jobs[len(results)], None))
-    return results[-1]
+    result = _run(jobs[0], None)
+    for job in jobs[1:]:
+        if _final(result):
+            break
+        result = _run(job, None)
+    return result
+
+
+def _portable(world: World) -> World:
+    """The same world with a fresh scene: what a scene has computed may not pass between processes."""
+    items = [item for item in world.scene if item.name != FLOOR]
+    return replace(world, scene=Scene(items, world.scene.floor_height))
 
 
 def _final(result: GuideResult) -> bool:
@@ -96,7 +106,7 @@ def _share(lowest: "Synchronized[int]") -> None:
     _lowest = lowest
 
 
-class _StillWanted(KeepGoing):
+class _StillWanted:
     """Whether no lower restart has its answer."""
 
     def __init__(self, number: int, lowest: "Synchronized[int]") -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from manikin.errors import InputError
 from manikin.reachability.checker import NO_MARGINS, ReachabilityChecker
 from manikin.reachability.pose import angles_between, between
 from manikin.spatial import FloatArray
@@ -50,6 +51,13 @@ class LocalPlanner:
     """
 
     def __init__(self, checker: ReachabilityChecker, ends: Sequence[FloatArray] = ()) -> None:
+        """Take a checker whose margins say how densely a way is checked.
+
+        Raises:
+            InputError: If a margin is zero.
+        """
+        if min(checker.margins.trunk, checker.margins.reach) <= 0.0:
+            raise InputError(f"local planner has {checker.margins}; valid: margins > 0")
         self.checker = checker
         self.ends = tuple(ends)
         self.asked = 0
