@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from manikin.errors import InputError
-from manikin.reachability.guide import GuideResult, GuideTask, KeepGoing, World, plan_guide
+from manikin.reachability.guide import GuideResult, GuideStatistics, GuideTask, KeepGoing, World, plan_guide
 from manikin.reachability.roadmap import Roadmap
 from manikin.scene.scene import FLOOR, Scene
 
@@ -120,7 +120,10 @@ def _run_shared(job: _Job) -> GuideResult:
     lowest = _lowest
     if lowest is None:
         return _run(job, None)
-    result = _run(job, _StillWanted(job.number, lowest))
+    wanted = _StillWanted(job.number, lowest)
+    if not wanted():
+        return GuideResult(None, None, GuideStatistics(restart=job.number), "given up", "roadmap")
+    result = _run(job, wanted)
     if _final(result):
         with lowest.get_lock():
             lowest.value = min(lowest.value, job.number)

@@ -30,7 +30,7 @@ class RoadmapSettings:
     """
 
     failures: int = 80
-    samples: int = 2000
+    samples: int = 1500
     position_share: float = 0.5
     nearest: int = 15
     farthest: float = 2.5
