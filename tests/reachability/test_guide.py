@@ -129,6 +129,21 @@ def test_restarts_give_the_same_result_on_one_and_two_processes(open_world):
     assert one.statistics == two.statistics
 
 
+def test_a_later_restart_may_win_from_another_process(bug):
+    """With so few samples that the first restart fails, the next success is found all the same."""
+    scarce = world_of(bug, 0.5, settings=GuideSettings(roadmap=RoadmapSettings(samples=10)))
+    task = GuideTask(START, GOAL)
+    seed, one = next(
+        (seed, result)
+        for seed in range(30)
+        if (result := plan_guide_with_restarts(scarce, task, seed, restarts=3, workers=1)).succeeded
+        and result.statistics.restart > 0
+    )
+    two = plan_guide_with_restarts(scarce, task, seed, restarts=3, workers=2)
+    assert np.array_equal(one.path.control_points, two.path.control_points)
+    assert one.statistics == two.statistics
+
+
 def test_restarts_that_all_fail_tell_why(bug):
     tight = world_of(bug, settings=GuideSettings(roadmap=RoadmapSettings(samples=10, failures=10)))
     result = plan_guide_with_restarts(tight, GuideTask(START, GOAL), 0, restarts=2, workers=1)

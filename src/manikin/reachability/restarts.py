@@ -1,4 +1,4 @@
-"""Searches from several seeds at once, in processes.
+"""Searches from several seeds at once, the first here and the others in processes beside it.
 
 The result is that of the lowest restart that succeeds, whichever finishes first, so that it depends
 on the seed and not on the machine.  A restart gives up when a lower one has succeeded.
@@ -45,9 +45,9 @@ def plan_guide_with_restarts(
         task: Start, goal and speed limits.
         seed: Each restart draws from its own stream of this seed.
         restarts: Searches at most.
-        workers: Processes; with 1 everything runs in this one, one search after the other, with the
-            same result. More than one pays for searches of several seconds, because a new process
-            takes one or two to begin; a script must then keep its own work under
+        workers: Processes, this one included; with 1 the searches run one after the other, with
+            the same result. More than one pays for searches of several seconds, because a new
+            process takes a second or more to begin; a script must then keep its own work under
             ``if __name__ == "__main__":``.
         roadmap: A roadmap of this world to begin with.
 
@@ -83,16 +83,21 @@ def _final(result: GuideResult) -> bool:
 
 
 def _in_processes(jobs: list[_Job], workers: int) -> GuideResult:
+    """The lowest restart runs here, the others in processes beside it."""
     # Fresh processes: copies of this one would share the threads and locks of its libraries.
     context = multiprocessing.get_context("spawn")
     lowest: Any = context.Value("i", len(jobs))
-    with ProcessPoolExecutor(workers, context, _share, (lowest,)) as pool:
-        futures: list[Future[GuideResult]] = [pool.submit(_run_shared, job) for job in jobs]
-        result = futures[0].result()
-        for future in futures[1:]:
+    pool = ProcessPoolExecutor(min(workers, len(jobs)) - 1, context, _share, (lowest,))
+    try:
+        futures: list[Future[GuideResult]] = [pool.submit(_run_shared, job) for job in jobs[1:]]
+        result = _run(jobs[0], None)
+        for future in futures:
             if _final(result):
                 break
             result = future.result()
+    finally:
+        with lowest.get_lock():
+            lowest.value = -1  # nobody's result is wanted any more
         pool.shutdown(wait=False, cancel_futures=True)
     return result
 
