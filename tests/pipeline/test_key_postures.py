@@ -125,7 +125,28 @@ def test_a_seated_part_that_fits_no_replanned_com_is_tried_without_room_in_the_r
         return search(first, realise, look, replan=replan)
 
     monkeypatch.setattr(pipeline, "find_eligible_plan", first_fails)
-    _, trajectory = job._test_key_postures(job._plan_com())
+    planned = job._plan_com()
+    found = job._test_key_postures(planned, pipeline.KEY_TOLERANCES[0])
     assert len(calls) == 2
+    _, trajectory = job._take(planned, found)
     assert trajectory is not None
+    assert job._summary["failure"] is None
+
+
+def test_a_stricter_search_counts_only_where_it_leads_to_another_plan(monkeypatch):
+    """With the same plan as before nothing changes, the failure of the whole body included."""
+    job = pipeline._Run(load_scenario("ramp"), None, None, pipeline.ExecutionRequirements(), None)
+    planned = job._plan_com()
+    found = job._test_key_postures(planned, pipeline.KEY_TOLERANCES[0])
+    job._fail("wholebody", "nothing found", 1.0, "phase 2")
+    assert job._stricter_plan(planned, found) is None
+    assert job._summary["failure"]["reason"] == "nothing found"
+
+    def another(first, realise, look, *, replan):
+        return Eligibility(first, realise(first.trajectory), None, found.replans + 1, None)
+
+    monkeypatch.setattr(pipeline, "find_eligible_plan", another)
+    other = job._stricter_plan(planned, found)
+    assert other is not None
+    assert other.replans == found.replans + 1
     assert job._summary["failure"] is None
