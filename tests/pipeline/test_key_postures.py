@@ -142,7 +142,7 @@ def test_a_stricter_search_counts_only_where_it_leads_to_another_plan(monkeypatc
     assert job._stricter_plan(planned, found) is None
     assert job._summary["failure"]["reason"] == "nothing found"
 
-    def another(first, realise, look, *, replan):
+    def another(first, realise, *_, **__):
         return Eligibility(first, realise(first.trajectory), None, found.replans + 1, None)
 
     monkeypatch.setattr(pipeline, "find_eligible_plan", another)
