@@ -20,7 +20,7 @@ from scipy.spatial import ConvexHull, QhullError
 from manikin.body.model import BodyModel
 from manikin.body.segments import Shape, ShapeKind
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray, check_rotation, finite_number, frozen_array
+from manikin.spatial import FloatArray, finite_number, frozen_array
 
 TRUNK_SCALE = 1.1
 """Factor on the radii and sides of the trunk's shapes; our choice, the thesis gives none."""
@@ -59,40 +59,8 @@ class LimbVolume(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
-class TrunkShape:
-    """A shape of the trunk in the frame of the root.
-
-    Attributes:
-        name: ``"segment/shape"``.
-        kind: Sphere, capsule or box.
-        size: Dimensions as in :class:`manikin.body.ShapeKind` [m].
-        translation: (3,) its centre in the root's frame [m].
-        rotation: (3, 3) rotation from the shape's axes to the root's.
-    """
-
-    name: str
-    kind: ShapeKind
-    size: FloatArray
-    translation: FloatArray
-    rotation: FloatArray
-
-    def __init__(
-        self,
-        name: str,
-        kind: ShapeKind | str,
-        size: ArrayLike,
-        translation: ArrayLike = (0.0, 0.0, 0.0),
-        rotation: ArrayLike | None = None,
-    ) -> None:
-        where = f"trunk shape {name!r}"
-        turn = np.eye(3) if rotation is None else rotation
-        object.__setattr__(self, "name", name)
-        object.__setattr__(self, "kind", ShapeKind(kind))
-        object.__setattr__(self, "size", frozen_array(size, f"{where} size [m]", (None,), BodyError))
-        place = frozen_array(translation, f"{where} translation", (3,), BodyError)
-        object.__setattr__(self, "translation", place)
-        object.__setattr__(self, "rotation", check_rotation(turn, f"{where} rotation", BodyError))
+class TrunkShape(Shape):
+    """A shape of the trunk in the frame of the root instead of its segment's, named ``"segment/shape"``."""
 
     @property
     def radius_about_root(self) -> float:
