@@ -185,15 +185,16 @@ def test_folder_that_does_not_exist_gives_one_line(content, tmp_path):
 
 
 WRITER = """
-import signal
 import sys
-# A background shell starts its children with SIGINT ignored.
-signal.signal(signal.SIGINT, signal.default_int_handler)
+from manikin.interruption import Interruption
 from manikin.motion.file import MotionFile, read_motions, write_motions
 content = read_motions(sys.argv[1])
-print("ready", flush=True)
-while True:
-    write_motions(sys.argv[2], MotionFile(content.planned, None, content.body))
+with Interruption() as interruption:
+    print("ready", flush=True)
+    while True:
+        write_motions(sys.argv[2], MotionFile(content.planned, None, content.body))
+        # Python drops an exception that is raised in the callback of a weak reference, and h5py has many.
+        interruption.check()
 """
 
 
