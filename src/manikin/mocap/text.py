@@ -1,0 +1,99 @@
+"""Reading the text files of motion capture: decoding, numbers and rotations of three angles."""
+
+from pathlib import Path
+
+import numpy as np
+
+from manikin.errors import InputError
+from manikin.spatial import FloatArray
+
+
+def read_text(path: str | Path, kind: str) -> str:
+    """Text of a file.
+
+    Args:
+        path: The file.
+        kind: What it should be, for the message (``"BVH"``).
+
+    Raises:
+        InputError: If it is missing, unreadable, empty or no text.
+    """
+    file = Path(path)
+    try:
+        text = file.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror or error}; valid: a {kind} file") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: is no text; valid: a {kind} file") from None
+    if not text.strip():
+        raise InputError(f"{file}: is empty; valid: a {kind} file")
+    if "\0" in text:
+        raise InputError(f"{file}: is no text; valid: a {kind} file")
+    return text
+
+
+def numbers(words: list[str], where: str) -> FloatArray:
+    """(n,) finite numbers.
+
+    Args:
+        words: Their texts.
+        where: File and line or key, for the message.
+
+    Raises:
+        InputError: If a word is no finite number.
+    """
+    try:
+        values = np.array(words, dtype=np.float64)
+    except ValueError:
+        wrong = next(word for word in words if not _is_number(word))
+        raise InputError(f"{where}: {wrong[:40]!r} is no number; valid: finite numbers") from None
+    if not np.all(np.isfinite(values)):
+        wrong = words[int(np.argmin(np.isfinite(values)))]
+        raise InputError(f"{where}: is {wrong[:40]!r}; valid: finite numbers")
+    return values
+
+
+def whole_number(word: str, where: str) -> int:
+    """A whole number of at least 0.
+
+    Raises:
+        InputError: If the word is none.
+    """
+    if not (word.isascii() and word.isdigit()) or len(word) > 12:
+        raise InputError(f"{where}: {word[:40]!r} is no frame count or number; valid: a whole number >= 0")
+    return int(word)
+
+
+def rotations_of(angles: FloatArray, axes: str) -> FloatArray:
+    """Product of turns about coordinate axes, the first leftmost.
+
+    Args:
+        angles: (n, k) [rad], one column per turn.
+        axes: k letters of ``XYZ``.
+
+    Returns:
+        (n, 3, 3).
+    """
+    total = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+    for column, axis in enumerate(axes):
+        total = total @ _turns(angles[:, column], "XYZ".index(axis))
+    return np.array(total)
+
+
+def _turns(angle: FloatArray, axis: int) -> FloatArray:
+    """(n, 3, 3) turns about one coordinate axis."""
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turn = np.zeros((len(angle), 3, 3))
+    turn[:, axis, axis] = 1.0
+    turn[:, first, first] = turn[:, second, second] = np.cos(angle)
+    turn[:, second, first] = np.sin(angle)
+    turn[:, first, second] = -turn[:, second, first]
+    return turn
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
