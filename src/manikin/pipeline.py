@@ -24,6 +24,7 @@ from manikin.centroidal import (
     plan_com_through_key_frames,
 )
 from manikin.contact import ContactSchedule, StanceSequence
+from manikin.contact_search import find_supports
 from manikin.control import ControlSettings, SupportSettings
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
@@ -119,7 +120,7 @@ class Failure:
     """Why a run ended without success.
 
     Attributes:
-        stage: ``"centroidal"``, ``"wholebody"`` or ``"execution"``.
+        stage: ``"contacts"``, ``"centroidal"``, ``"wholebody"`` or ``"execution"``.
         reason: In one line.
         time_s: When in the motion [s].
         where: Phase, contact, limb or pair.
@@ -143,7 +144,7 @@ class RunResult:
         summary: As printed by ``manikin run --json``.
         planned: Planned whole-body motion, or that of a point mass; None when there is none.
         executed: Executed motion, or None.
-        centroidal: Result of the centre-of-mass stage.
+        centroidal: Result of the centre-of-mass stage, or None where no contacts were found.
         wholebody: Result of the whole-body stage, or None.
         execution: Result of the execution, or None.
         directory: Where the files are, or None.
@@ -152,7 +153,7 @@ class RunResult:
     summary: dict[str, Any]
     planned: Motion | None
     executed: Motion | None
-    centroidal: CentroidalResult
+    centroidal: CentroidalResult | None
     wholebody: WholeBodyResult | None
     execution: Execution | None
     directory: Path | None
@@ -232,9 +233,8 @@ class _Run:
         self._progress = progress or _silent
         self._body: BodyModel = scenario.build_body()
         self._scene: Scene = scenario.build_scene()
-        scenario.check_contacts(self._scene)
-        self._problem = scenario.build_centroidal_problem()
-        self._keyframes = scenario.build_keyframe_problem()
+        if scenario.file.supports is not None:
+            self._take_scenario(scenario)
         self._directory = None if out is None else RunDirectory(out)
         if self._directory is not None:
             self._directory.write_scenario(scenario.to_yaml())
@@ -242,10 +242,12 @@ class _Run:
         self._summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "succeeded": False, "failure": None,
-            "centroidal": None, "wholebody": None, "execution": None, "wall_s": 0.0,
+            "contacts": None, "centroidal": None, "wholebody": None, "execution": None, "wall_s": 0.0,
         }  # fmt: skip
 
     def run(self) -> RunResult:
+        if self._scenario.file.supports is None and not self._find_contacts():
+            return self._result(None, None, None, None)
         centroidal = self._plan_com()
         if self._scenario.is_point_mass:
             return self._result(centroidal, self._move_point_mass(centroidal), None, None)
@@ -262,9 +264,33 @@ class _Run:
             execution = self._execute(trajectory, wholebody)
         return self._result(centroidal, None if wholebody is None else wholebody.motion, wholebody, execution)
 
+    def _take_scenario(self, scenario: Scenario) -> None:
+        """Pose the problem of a scenario with supports."""
+        scenario.check_contacts(self._scene)
+        self._scenario = scenario
+        self._problem = scenario.build_centroidal_problem()
+        self._keyframes = scenario.build_keyframe_problem()
+
+    def _find_contacts(self) -> bool:
+        """Plan the supports of a scenario that lists none, and go on with them; False without any."""
+        self._progress("contacts", 0.0)
+        rng = np.random.default_rng(self._scenario.seed)
+        found = find_supports(self._scenario, self._body, self._scene, rng)
+        self._summary["contacts"] = dict(found.summary)
+        if self._directory is not None:
+            self._directory.write_stage("contacts", found.to_dict())
+        if found.scenario is None:
+            self._fail("contacts", found.failure or "", 0.0, found.where)
+            return False
+        self._take_scenario(found.scenario)
+        if self._directory is not None:
+            self._directory.write_scenario(found.scenario.to_yaml())
+        self._progress("contacts", 1.0)
+        return True
+
     def _result(
         self,
-        centroidal: CentroidalResult,
+        centroidal: CentroidalResult | None,
         planned: Motion | None,
         wholebody: WholeBodyResult | None,
         execution: Execution | None,

@@ -12,12 +12,16 @@ from manikin.contact_planning.efort import (
     pulling_efort,
     velocity_ellipsoid,
 )
+from manikin.contact_planning.endpoint import Endpoint, Endpoints, Habit
+from manikin.contact_planning.extend import Extension, ExtendSettings, extend
+from manikin.contact_planning.footholds import Foothold, Footholds, FootholdSettings
 from manikin.contact_planning.generator import (
     ContactGenerator,
     GeneratedContact,
     GeneratorSettings,
     Hindrance,
 )
+from manikin.contact_planning.guide_line import GuideLine
 from manikin.contact_planning.heuristics import (
     Balance,
     ClosestDistance,
@@ -29,7 +33,10 @@ from manikin.contact_planning.heuristics import (
     WeightedSum,
     duration,
 )
+from manikin.contact_planning.poser import Posed, Poser, PoserSettings
 from manikin.contact_planning.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
+from manikin.contact_planning.stage import ContactPlan, Stage
+from manikin.contact_planning.static_region import StaticRegion
 from manikin.contact_planning.touch import ContactRules, make_contact
 
 __all__ = [
@@ -38,25 +45,41 @@ __all__ = [
     "Candidates",
     "ClosestDistance",
     "ContactGenerator",
+    "ContactPlan",
     "ContactRules",
     "Duration",
     "Efort",
     "Ellipsoid",
+    "Endpoint",
+    "Endpoints",
+    "ExtendSettings",
+    "Extension",
+    "Foothold",
+    "FootholdSettings",
+    "Footholds",
     "GeneratedContact",
     "GeneratorSettings",
+    "GuideLine",
+    "Habit",
     "Heuristic",
     "Hindrance",
     "LimbCollisions",
     "LimbSamples",
     "Manipulability",
+    "Posed",
+    "Poser",
+    "PoserSettings",
     "Random",
     "Situation",
+    "Stage",
+    "StaticRegion",
     "SurfaceTable",
     "Task",
     "WeightedSum",
     "align",
     "duration",
     "efort",
+    "extend",
     "find_candidates",
     "force_ellipsoid",
     "force_transmission_ratio",

@@ -1,6 +1,15 @@
 """The problems of the centre-of-mass planners that a scenario states."""
 
-from manikin.centroidal import CentroidalProblem, GeometricConstraint, KeyframeProblem, Weights, height_band
+import numpy as np
+
+from manikin.centroidal import (
+    CentroidalProblem,
+    GeometricConstraint,
+    KeyframeProblem,
+    KeyPlane,
+    Weights,
+    height_band,
+)
 from manikin.contact import StanceSequence
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios.overhead import overhead_constraints
@@ -35,7 +44,7 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
             required_margin=values.required_margin,
             support_distance=values.max_support_distance,
             geometric=_height_constraints(values),
-            key_planes=(),
+            key_planes=_key_planes(values),
             max_duration=options.max_duration_s,
             weights=Weights(**options.weights.model_dump(exclude_none=True)),
             friction_model=options.friction_model,
@@ -70,6 +79,17 @@ def _standing(values: ScenarioValues, *, planning: bool = False) -> StanceSequen
     """The stances before the body sits: all, where it does not."""
     sequence = stance_sequence(values, planning=planning)
     return StanceSequence(sequence.phases[: values.seated_from])
+
+
+def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
+    """Faces of the boxes in which phases want the centre of mass to be when they begin."""
+    planes: list[KeyPlane] = []
+    for key, phase in enumerate(values.explicit_supports().phases[: values.seated_from]):
+        if phase.com_near is None:
+            continue
+        for axis, (middle, room) in enumerate(zip(phase.com_near, phase.com_within_m, strict=True)):
+            planes += [KeyPlane(key, sign * np.eye(3)[axis], sign * middle + room) for sign in (1.0, -1.0)]
+    return tuple(planes)
 
 
 def _height_constraints(values: ScenarioValues) -> tuple[GeometricConstraint, ...]:

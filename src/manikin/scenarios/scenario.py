@@ -59,6 +59,17 @@ class Scenario(ScenarioValues):
         file = validate(ScenarioFile, changed.data, self.source, changed.lines)
         return Scenario(file, self.source, self.folder, changed.lines)
 
+    def replaced(self, **sections: Any) -> Scenario:
+        """Return the same scenario with whole sections replaced; None takes one out.
+
+        Raises:
+            ScenarioError: If the sections do not fit each other.
+        """
+        data = {key: value for key, value in {**self._data(), **sections}.items() if value is not None}
+        if self.file.floor_height_m is None:
+            data["floor_height_m"] = None
+        return Scenario(validate(ScenarioFile, data, self.source), self.source, self.folder, {})
+
     def build_body(self) -> BodyModel:
         """Build the body; its soles have the size that the supports give.
 

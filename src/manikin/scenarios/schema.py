@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from manikin.scenarios.sections.body import BodySection
 from manikin.scenarios.sections.com_constraint import ComConstraintSection
+from manikin.scenarios.sections.contacts import ContactsSection
 from manikin.scenarios.sections.obstacle import ObstacleSection
 from manikin.scenarios.sections.phase import EFFECTORS, MASSLESS_FEET
 from manikin.scenarios.sections.planning import PlanningSection
@@ -44,7 +45,12 @@ class ScenarioFile(Section):
     )
     floor_height_m: Number | None = Field(default=0.0, description="height of the floor [m], null for none")
     scene: list[ObstacleSection] = Field(default_factory=list, description="obstacles")
-    supports: SupportsSection | None = Field(default=None, description="explicit sequence of supports")
+    supports: SupportsSection | None = Field(
+        default=None, description="explicit sequence of supports; left out, contacts are planned"
+    )
+    contacts: ContactsSection | None = Field(
+        default=None, description="how contacts are planned where no supports are given"
+    )
     task: TaskSection = Field(description="start and goal")
     com_constraints: list[ComConstraintSection] = Field(
         default_factory=list, description="constraints on the centre of mass"
@@ -85,6 +91,10 @@ class ScenarioFile(Section):
                         f"({', '.join(names) or 'it has none'})",
                     )
         self._check_body()
+        if self.supports is None:
+            self._check_planned()
+        elif self.contacts is not None:
+            raise refuse("contacts", "is given beside supports; valid: one of them")
         for key in type(self.com_constraints[0])._keys() if self.com_constraints else ():
             if sum(getattr(c, key) is not None for c in self.com_constraints) > 1:
                 raise refuse("com_constraints", f"holds {key} twice; valid: at most once")
@@ -94,13 +104,28 @@ class ScenarioFile(Section):
                 raise refuse(
                     f"task.{end}.com", "is missing; valid: [x, y, z] in metres when supports are given"
                 )
-            for key in ("at", "heading_deg", "posture"):
+            for key in ("at", "heading_deg", "height_m", "posture"):
                 if getattr(state, key) is not None:
                     raise refuse(
                         f"task.{end}.{key}",
                         "has no meaning beside explicit supports; valid: only com, [x, y, z]",
                     )
         return self
+
+    def _check_planned(self) -> None:
+        """Refuse what contacts cannot be planned for."""
+        if self.body.model != "human":
+            raise refuse("supports", f"is missing; valid: explicit supports for a {self.body.model}")
+        for end in ("start", "goal"):
+            state = getattr(self.task, end)
+            for key in ("com", "velocity_m_s"):
+                if getattr(state, key) is not None:
+                    raise refuse(
+                        f"task.{end}.{key}",
+                        "has no meaning without explicit supports; valid: at, heading_deg, height_m, posture",
+                    )
+        if self.task.goal.posture == "seated":
+            raise refuse("task.goal.posture", "is seated; valid: standing or crouched, or explicit supports")
 
     def _check_body(self) -> None:
         if self.body.model == "human":

@@ -16,8 +16,10 @@ from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.sections import (
     ComConstraintSection,
     ContactSection,
+    ContactsSection,
     PlanningSection,
     PushSection,
+    SoleSection,
     SupportsSection,
 )
 from manikin.scenarios.validation import Path as KeyPath
@@ -134,6 +136,18 @@ class ScenarioValues:
         mass_scale = 1.0 if reference is None else self.mass / reference
         length_scale = self.stature_scale if self.planning.margin_space == "wrench" else 1.0
         return self.planning.min_margin * mass_scale * length_scale
+
+    @property
+    def contacts(self) -> ContactsSection:
+        """How contacts are planned where no supports are given."""
+        return self.file.contacts or ContactsSection()
+
+    @property
+    def sole(self) -> SoleSection | None:
+        """Size of the soles; None leaves it to the body."""
+        if self.file.supports is not None:
+            return self.file.supports.sole
+        return None if self.file.contacts is None else self.file.contacts.sole
 
     @property
     def friction_share(self) -> float:

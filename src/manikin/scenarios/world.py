@@ -16,8 +16,8 @@ def build_body(values: ScenarioValues) -> BodyModel:
     """
     if values.is_point_mass:
         return point_mass(values.mass)
-    data, supports = values.file.body, values.file.supports
-    soles = {"sole_length": supports.sole.length_m, "sole_width": supports.sole.width_m} if supports else {}
+    data, sole = values.file.body, values.sole
+    soles = {} if sole is None else {"sole_length": sole.length_m, "sole_width": sole.width_m}
     try:
         return human(data.stature_m, data.mass_kg, data.sex, **soles)
     except InputError as error:

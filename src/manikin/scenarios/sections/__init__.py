@@ -3,6 +3,7 @@
 from manikin.scenarios.sections.body import BodySection
 from manikin.scenarios.sections.com_constraint import ComConstraintSection, HeightBandSection
 from manikin.scenarios.sections.contact import ContactSection, SoleSection
+from manikin.scenarios.sections.contacts import ContactsSection
 from manikin.scenarios.sections.obstacle import ObstacleSection, RoundSection, SphereSection
 from manikin.scenarios.sections.phase import PhaseSection
 from manikin.scenarios.sections.planning import PlanningSection, WeightsSection
@@ -14,6 +15,7 @@ __all__ = [
     "BodySection",
     "ComConstraintSection",
     "ContactSection",
+    "ContactsSection",
     "HeightBandSection",
     "ObstacleSection",
     "PhaseSection",

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from manikin.scenarios.sections.contact import ContactSection
-from manikin.scenarios.validation import Duration, Section, refuse
+from manikin.scenarios.validation import Duration, Section, Vector3, refuse
 
 EFFECTORS = ("left_foot", "right_foot", "left_hand", "right_hand", "buttocks")
 """Effectors of a human that a phase may put in contact, in the order of the contact tables."""
@@ -47,6 +47,12 @@ class PhaseSection(Section):
     buttocks: ContactEntry | None = Field(default=None, description="contact with a seat, or 'same'")
     min_duration_s: Duration = Field(default=0.1, description="shortest duration [s]")
     max_duration_s: Duration | None = Field(default=None, description="longest duration [s]")
+    com_near: Vector3 | None = Field(
+        default=None, description="where the centre of mass should be when the phase begins [m]"
+    )
+    com_within_m: Vector3 = Field(
+        default=(0.05, 0.05, 0.05), description="how far it may be from there along x, y and z [m]"
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -55,6 +61,8 @@ class PhaseSection(Section):
                 "max_duration_s", f"is {self.max_duration_s:g}; valid: at least min_duration_s = "
                 f"{self.min_duration_s:g}"
             )  # fmt: skip
+        if min(self.com_within_m) <= 0.0:
+            raise refuse("com_within_m", f"is {list(self.com_within_m)}; valid: three numbers > 0 [m]")
         if not self.entries():
             raise refuse("", f"has no contact; valid: at least one of {', '.join(EFFECTORS)}")
         for effector, entry in self.entries().items():

@@ -53,6 +53,10 @@ class SupportsSection(Section):
             ours, limit = getattr(self, key), getattr(self, real)
             if ours is not None and limit is not None and ours > limit:
                 raise refuse(key, f"is {ours:g}; valid: at most {real} = {limit:g}")
+        if self.phases[0].com_near is not None:
+            raise refuse("phases[0].com_near", "is given; valid: task.start.com says where the motion begins")
+        if self.foot == "rolling" and any(phase.com_near is not None for phase in self.phases):
+            raise refuse("foot", "is rolling beside a phase with com_near; valid: flat, or no com_near")
         for number, phase in enumerate(self.phases):
             before = self.phases[number - 1].entries() if number else {}
             for effector, entry in phase.entries().items():

@@ -1,10 +1,10 @@
 """Sections of a scenario file: from where to where."""
 
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from manikin.scenarios.validation import Number, Section, Text, Vector2, Vector3, refuse
+from manikin.scenarios.validation import Number, Section, Vector2, Vector3, refuse
 
 
 class StateSection(Section):
@@ -16,8 +16,13 @@ class StateSection(Section):
     )
     at: Vector2 | None = Field(default=None, description="where to stand, x and y [m]")
     heading_deg: Number | None = Field(default=None, description="where to face [deg]")
-    posture: Text | None = Field(
-        default=None, description="standing, seated, crouched, lying or a posture file"
+    height_m: Number | None = Field(
+        default=None,
+        description="height of the surface to stand or sit on there [m] (default: the lowest one on which the "
+        "posture exists)",
+    )
+    posture: Literal["standing", "seated", "crouched"] | None = Field(
+        default=None, description="how the body is at rest there (default: standing)"
     )
 
     @model_validator(mode="after")

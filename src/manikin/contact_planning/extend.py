@@ -1,0 +1,252 @@
+"""From a guide of the root to a sequence of contacts: the road of [Tonneau2015]_ 7.2, algorithm 7.
+
+The guide is followed limb by limb.  The limb that is farthest behind is put to a new place, its
+contact broken and made; all others are maintained.  A change counts only when two postures exist,
+free of collision and at rest on the contacts that stay: one that still holds the old contact and
+one that already holds the new one.  Where there is none, a shorter step, another place or another
+limb is tried, and then the change before is taken back.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.body import BodyModel, Configuration
+from manikin.contact import Contact
+from manikin.contact_planning.footholds import Footholds
+from manikin.contact_planning.guide_line import GuideLine, heading_of
+from manikin.contact_planning.poser import Poser
+from manikin.contact_planning.stage import ContactPlan, Stage
+from manikin.scene import Scene
+from manikin.spatial import FloatArray, rotation_from_yaw
+
+
+@dataclass(frozen=True)
+class ExtendSettings:
+    """How contacts follow a guide; the values are our choice.
+
+    Attributes:
+        stride: Way from a foot to the next one [m], for a body of 1.75 m.
+        shares: Shares of the stride that are tried, in order.
+        searches: Most postures that are looked for.
+        swing_duration: Shortest flight of a foot [s].
+        swing_speed: Its mean speed on longer ways [m/s].
+        shift_duration: Shortest time between two flights [s].
+        friction: Coulomb coefficient of the soles.
+    """
+
+    stride: float = 0.36
+    shares: tuple[float, ...] = (1.0, 0.75, 0.5, 0.3)
+    searches: int = 600
+    swing_duration: float = 0.7
+    swing_speed: float = 0.7
+    shift_duration: float = 0.35
+    friction: float = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Extension:
+    """A contact plan, or why there is none.
+
+    Attributes:
+        plan: The plan, or None.
+        searches: Postures looked for.
+        backtracks: Changes taken back.
+        failure: None, or the reason in one line.
+        reached: Share of the guide that the farthest attempt got to.
+    """
+
+    plan: ContactPlan | None
+    searches: int
+    backtracks: int
+    failure: str | None = None
+    reached: float = 1.0
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether there is a plan."""
+        return self.plan is not None
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Where the search is: stages so far and how far along the guide each foot is."""
+
+    stages: tuple[Stage, ...]
+    along: Mapping[str, float]
+
+    @property
+    def last(self) -> Stage:
+        return self.stages[-1]
+
+
+def extend(
+    body: BodyModel,
+    scene: Scene,
+    guide: GuideLine,
+    start: Stage,
+    goal: Stage,
+    settings: ExtendSettings | None = None,
+) -> Extension:
+    """Find the contacts with which a body on feet follows a guide.
+
+    Contacts of the start that are no feet, such as a seat, are left first.
+
+    Args:
+        body: A body with soles.
+        scene: Its surroundings.
+        guide: Way of the root, from where it is at the start.
+        start: Contacts and posture at the start.
+        goal: Contacts and posture at the goal, on feet.
+        settings: How to search.
+    """
+    return _Search(body, scene, guide, goal, settings or ExtendSettings()).run(start)
+
+
+class _Search:
+    """Depth-first search over changes of contact."""
+
+    def __init__(
+        self, body: BodyModel, scene: Scene, guide: GuideLine, goal: Stage, settings: ExtendSettings
+    ) -> None:
+        self._body, self._guide, self._goal, self._settings = body, guide, goal, settings
+        self._poser = Poser(body, scene)
+        self._footholds = Footholds(body, scene)
+        self._feet = _standing_feet(body)
+        self._stride = settings.stride * body.stature / 1.75
+        self._reasons: Counter[str] = Counter()
+        self._backtracks = 0
+        self._farthest = 0.0
+
+    def run(self, start: Stage) -> Extension:
+        first = self._without_others(start)
+        if first is None:
+            return self._failed(f"cannot leave {', '.join(set(start.contacts) - set(self._feet))}")
+        states, options = [first], [self._options(first)]
+        while states:
+            ended = self._ended(states[-1])
+            if ended is not None:
+                return Extension(ended, self._poser.searches, self._backtracks)
+            following = None if self._spent else next(options[-1], None)
+            if following is not None:
+                states.append(following)
+                options.append(self._options(following))
+                continue
+            if self._spent:
+                return self._failed(f"no contacts after {self._poser.searches} postures")
+            states.pop()
+            options.pop()
+            self._backtracks += 1
+        return self._failed("no contacts follow the guide")
+
+    @property
+    def _spent(self) -> bool:
+        return self._poser.searches >= self._settings.searches
+
+    def _without_others(self, start: Stage) -> _State | None:
+        """The state after contacts that are no feet have been left, all at once."""
+        feet = {name: contact for name, contact in start.contacts.items() if name in self._feet}
+        along = dict.fromkeys(feet, 0.0)
+        if len(feet) == len(start.contacts):
+            return _State((start,), along)
+        posed = self._poser.pose(start.contacts, feet, start.q, restarts=True)
+        if posed.q is None:
+            self._reasons[posed.reason] += 1
+            return None
+        leaving = Stage.of(self._body, feet, posed.q, 2.0 * self._settings.swing_duration)
+        return _State((start, leaving), along)
+
+    def _ended(self, state: _State) -> ContactPlan | None:
+        """The plan, when every foot is where it is at the goal."""
+        self._farthest = max(self._farthest, float(np.mean(list(state.along.values()))))
+        if not all(self._is_at_goal(state, foot) for foot in self._feet):
+            return None
+        return ContactPlan.of(self._body, state.stages, self._goal.q)
+
+    def _is_at_goal(self, state: _State, foot: str) -> bool:
+        held = state.last.contacts.get(foot)
+        return held is not None and held.same_place(self._goal.contacts[foot], 1e-6)
+
+    def _options(self, state: _State) -> Iterator[_State]:
+        """States one step further, the longest step of the foot that is farthest behind first."""
+        for name in sorted(state.along, key=lambda foot: state.along[foot]):
+            if self._is_at_goal(state, name):
+                continue
+            tried: list[FloatArray] = []
+            for along, contact in self._wanted(state, name):
+                if any(np.linalg.norm(contact.position - other) < 0.03 for other in tried):
+                    continue
+                tried.append(contact.position)
+                following = self._step(state, name, contact, along)
+                if following is not None:
+                    yield following
+                if self._spent:
+                    return
+
+    def _wanted(self, state: _State, foot: str) -> Iterator[tuple[float, Contact]]:
+        """Contacts to which a foot may go, each with how far along the guide it is."""
+        ahead = max(value for name, value in state.along.items() if name != foot)
+        for share in self._settings.shares:
+            along = ahead + share * self._stride
+            if along >= self._guide.length:
+                yield self._guide.length, self._goal.contacts[foot]
+            elif along > state.along[foot]:
+                for contact in self._places(foot, along):
+                    yield along, contact
+
+    def _places(self, foot: str, along: float) -> list[Contact]:
+        """Contacts of a foot near where it would be if the body stood below the guide's pose."""
+        pose = self._guide.at(along)
+        yaw = heading_of(pose)
+        wanted = pose[:3] + rotation_from_yaw(yaw) @ self._feet[foot]
+        holds = self._footholds.near(wanted, yaw)
+        if not holds:
+            self._reasons[f"no foothold for {foot} near {np.round(wanted, 2).tolist()} m"] += 1
+        return [
+            hold.contact(foot, self._footholds.length, self._footholds.width, self._settings.friction)
+            for hold in holds
+        ]
+
+    def _step(self, state: _State, foot: str, contact: Contact, along: float) -> _State | None:
+        """One foot put to another place, or None where a posture is missing."""
+        held = state.last.contacts
+        standing = {name: other for name, other in held.items() if name != foot}
+        landed = {**standing, foot: contact}
+        here = float(np.mean(list(state.along.values())))
+        there = float(np.mean([along, *(value for name, value in state.along.items() if name != foot)]))
+        lifting = self._poser.pose(held, standing, state.last.q, self._guide.at(here))
+        if lifting.q is None:
+            self._reasons[f"{foot} cannot be lifted: {lifting.reason}"] += 1
+            return None
+        landing = self._poser.pose(landed, standing, lifting.q, self._guide.at(there))
+        if landing.q is None:
+            self._reasons[f"{foot} cannot be put down: {landing.reason}"] += 1
+            return None
+        way = 0.0 if foot not in held else float(np.linalg.norm(contact.position - held[foot].position))
+        flight = max(self._settings.swing_duration, way / self._settings.swing_speed)
+        stages = (
+            *state.stages,
+            Stage.of(self._body, standing, lifting.q, flight),
+            Stage.of(self._body, landed, landing.q, self._settings.shift_duration),
+        )
+        return _State(stages, {**state.along, foot: along})
+
+    def _failed(self, what: str) -> Extension:
+        reached = self._farthest / self._guide.length if self._guide.length > 0.0 else 0.0
+        most = self._reasons.most_common(1)
+        why = f"; most often: {most[0][0]}" if most else ""
+        text = f"{what} beyond {100.0 * reached:.0f} % of it ({self._farthest:.2f} m){why}"
+        return Extension(None, self._poser.searches, self._backtracks, text, reached)
+
+
+def _standing_feet(body: BodyModel) -> dict[str, FloatArray]:
+    """(3,) place of each foot's sole relative to the root in the standing posture, root level [m]."""
+    q = np.array(body.standing_posture())
+    state = Configuration(body, q)
+    return {
+        limb.effector: state.effector_placement(limb.effector)[1] - q[:3]
+        for limb in body.limbs
+        if limb.effector.endswith("foot")
+    }

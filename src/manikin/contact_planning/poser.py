@@ -1,0 +1,131 @@
+"""Balanced, free postures on given contacts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.body import BodyModel, Configuration
+from manikin.contact import Contact
+from manikin.contact_planning.static_region import StaticRegion
+from manikin.posture import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
+from manikin.scene import Proximity, Scene
+from manikin.spatial import FloatArray
+
+ROOT = "pelvis"
+"""Effector of a human's root, that the guide leads."""
+
+
+@dataclass(frozen=True)
+class PoserSettings:
+    """What the postures of a contact plan keep to; the values are our choice.
+
+    Attributes:
+        clearance: Distance to obstacles and between body parts [m].
+        range_margin: Angle to the ends of the joint ranges [rad].
+        inset: Distance of the centre of mass to the edges of the region where it may rest [m].
+        root_weight: Of the distance between the root and the guide [1/m^2].
+        turn_weight: Of the angle between the root and the guide [1/rad^2].
+        tolerance: Largest residual of a contact [m, rad].
+        iterations: Of each search.
+    """
+
+    clearance: float = 0.014
+    range_margin: float = 0.05
+    inset: float = 0.03
+    root_weight: float = 1.0
+    turn_weight: float = 0.3
+    tolerance: float = 2e-4
+    iterations: int = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A posture, or why there is none.
+
+    Attributes:
+        q: (nq,) or None.
+        reason: In one line, where there is none.
+    """
+
+    q: FloatArray | None
+    reason: str = ""
+
+
+class Poser:
+    """Finds postures of a body in a scene, and counts them.
+
+    Attributes:
+        searches: Postures looked for so far.
+    """
+
+    def __init__(self, body: BodyModel, scene: Scene, settings: PoserSettings | None = None) -> None:
+        self.body, self.scene = body, scene
+        self.settings = settings or PoserSettings()
+        self.searches = 0
+        self._proximity = Proximity(body, scene)
+
+    def pose(
+        self,
+        held: Mapping[str, Contact],
+        carrying: Mapping[str, Contact],
+        start: FloatArray,
+        guide: FloatArray | None = None,
+        reference: FloatArray | None = None,
+        *,
+        restarts: bool = False,
+    ) -> Posed:
+        """Find a posture that holds contacts and rests on some of them alone.
+
+        Args:
+            held: Contacts that are held.
+            carrying: Those that carry the body.
+            start: (nq,) where to begin.
+            guide: (7,) pose of the root to be near; none when omitted.
+            reference: (nq,) posture to be like; standing when omitted.
+            restarts: Whether to try again from crouched postures.
+        """
+        region = StaticRegion.of(carrying.values(), self.body.mass)
+        near = Configuration(self.body, start).com[:2] if guide is None else guide[:2]
+        place = region.nearest(np.asarray(near), self.settings.inset)
+        if place is None:
+            return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
+        self.searches += 1
+        problem = PostureProblem(
+            self.body,
+            tuple(held.values()),
+            self._wish(guide),
+            com=np.array([*place, np.nan]),
+            proximity=self._proximity,
+            clearance=self.settings.clearance,
+            self_clearance=self.settings.clearance,
+            ignore=self._touching(held),
+            range_margin=self.settings.range_margin,
+            reference=reference,
+        )
+        found = generate_posture(
+            problem,
+            start,
+            settings=SolverSettings(
+                tolerance=self.settings.tolerance,
+                iterations=self.settings.iterations,
+                restarts=restarts,
+                explain=False,
+            ),
+        )
+        return Posed(found.q) if found.succeeded else Posed(None, found.failure or "no posture")
+
+    def _wish(self, guide: FloatArray | None) -> dict[str, Placement]:
+        if guide is None or ROOT not in self.body.effectors:
+            return {}
+        pose = pin.XYZQUATToSE3(guide)
+        return {
+            ROOT: Placement(
+                pose.translation, pose.rotation, self.settings.turn_weight, self.settings.root_weight
+            )
+        }
+
+    def _touching(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
+        pairs = [(name, self.scene.touched_obstacle(contact)) for name, contact in held.items()]
+        return touching_pairs(self.body, pairs)

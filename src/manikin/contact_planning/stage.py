@@ -1,0 +1,80 @@
+"""A sequence of contacts with a posture for every change, as the contact planner finds it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from manikin.body import BodyModel, Configuration
+from manikin.contact import Contact, Phase, Stance, StanceSequence
+from manikin.spatial import FloatArray, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The contacts of one phase and the posture with which it begins.
+
+    Attributes:
+        contacts: By effector.
+        q: (nq,) posture that holds the contacts of this phase and of the one before.
+        com: (3,) its centre of mass [m].
+        min_duration: Shortest time that the phase should last [s].
+    """
+
+    contacts: Mapping[str, Contact]
+    q: FloatArray
+    com: FloatArray
+    min_duration: float
+
+    @classmethod
+    def of(
+        cls, body: BodyModel, contacts: Mapping[str, Contact], q: FloatArray, min_duration: float
+    ) -> "Stage":
+        """Stage with the centre of mass of its posture."""
+        com = frozen_array(Configuration(body, q).com, "com [m]", (3,))
+        kept = MappingProxyType(dict(contacts))
+        return cls(kept, frozen_array(q, "posture", (body.nq,)), com, min_duration)
+
+    @property
+    def stance(self) -> Stance:
+        """The contacts as a stance."""
+        return Stance(list(self.contacts.values()))
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPlan:
+    """Stages from the start to the goal.
+
+    Attributes:
+        stages: At least one; one contact is made or broken from each to the next.
+        goal: (nq,) posture with which the last one ends.
+        goal_com: (3,) its centre of mass [m].
+    """
+
+    stages: tuple[Stage, ...]
+    goal: FloatArray
+    goal_com: FloatArray
+
+    @classmethod
+    def of(cls, body: BodyModel, stages: Sequence[Stage], goal: FloatArray) -> "ContactPlan":
+        """Plan with the centre of mass of its last posture."""
+        com = frozen_array(Configuration(body, goal).com, "goal com [m]", (3,))
+        return cls(tuple(stages), frozen_array(goal, "goal posture", (body.nq,)), com)
+
+    def sequence(self) -> StanceSequence:
+        """The stances in order, as the stages that follow take them."""
+        return StanceSequence([Phase(stage.stance, stage.min_duration) for stage in self.stages])
+
+    @property
+    def postures(self) -> FloatArray:
+        """(n + 1, nq) the posture at every change and at the goal."""
+        return np.array([*(stage.q for stage in self.stages), self.goal])
+
+    @property
+    def steps(self) -> int:
+        """Number of contacts made."""
+        before = [{}, *(stage.contacts for stage in self.stages)]
+        return sum(
+            len(set(stage.contacts) - set(old)) for old, stage in zip(before[1:], self.stages[1:], strict=False)
+        )

@@ -1,0 +1,184 @@
+"""From start and goal to supports: guide, contacts, and the scenario with what was found.
+
+The first stage of the pipeline for a scenario that lists no supports ([Tonneau2015]_ chapters 6 and 7).
+"""
+
+import time as clock
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from manikin.body import BodyModel, limbs_of, reach_volume
+from manikin.contact_planning import (
+    ContactPlan,
+    Endpoints,
+    ExtendSettings,
+    GuideLine,
+    Habit,
+    Stage,
+    extend,
+)
+from manikin.reachability import (
+    Abstraction,
+    Condition,
+    GuideTask,
+    LimbRule,
+    SamplingRegion,
+    UsableSurface,
+    World,
+    abstraction_of,
+    plan_guide,
+)
+from manikin.scenarios import Scenario
+from manikin.scenarios.planned import with_supports
+from manikin.scene import Scene
+from manikin.spatial import FloatArray
+
+LEGS = ("left_leg", "right_leg")
+
+AROUND = 1.2
+"""Room around start and goal in which the root is led [m]."""
+
+PITCH = (-0.2, 1.0)
+ROLL = (-0.1, 0.1)
+"""How the root may lean [rad]; our choice for a body on its feet."""
+
+GUIDE_POSES = 200
+"""Poses by which the contact planner knows a guide."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSearch:
+    """Supports for a scenario, or why there are none.
+
+    Attributes:
+        scenario: The scenario with supports, or None.
+        plan: The contacts with their postures, or None.
+        guide: The root's way, or None.
+        summary: The ``contacts`` block of the run's summary.
+        failure: None, or the reason in one line.
+        where: Stage of the search that failed.
+    """
+
+    scenario: Scenario | None
+    plan: ContactPlan | None
+    guide: GuideLine | None
+    summary: Mapping[str, Any]
+    failure: str | None = None
+    where: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Guide and postures in plain values."""
+        plan = self.plan
+        return {
+            **self.summary,
+            "guide": None if self.guide is None else self.guide.poses.tolist(),
+            "postures": None if plan is None else plan.postures.tolist(),
+        }
+
+
+def find_supports(
+    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
+) -> ContactSearch:
+    """Plan the contacts of a scenario that gives start and goal alone.
+
+    Args:
+        scenario: Without supports.
+        body: Its body.
+        scene: Its scene.
+        rng: Source of all randomness.
+    """
+    return _Search(scenario, body, scene, rng).run()
+
+
+class _Search:
+    def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
+        self._began = clock.perf_counter()
+        self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
+        self._endpoints = Endpoints(body, scene, scenario.contacts.friction)
+        self._summary: dict[str, Any] = {
+            "attempts": 0, "steps": None, "phases": None, "guide_length_m": None, "guide_samples": 0,
+            "postures": 0, "backtracks": 0, "guide_wall_s": 0.0, "wall_s": 0.0,
+        }  # fmt: skip
+
+    def run(self) -> ContactSearch:
+        start, goal = self._end("start"), self._end("goal")
+        for end, found in (("start", start), ("goal", goal)):
+            if isinstance(found, str):
+                return self._failed(found, end)
+        assert isinstance(start, Stage) and isinstance(goal, Stage)  # no text, as just seen
+        standing = self._endpoints.risen(start) if "buttocks" in start.contacts else None
+        if standing is not None and standing.stage is None:
+            return self._failed(standing.failure or "", "start")
+        first = start if standing is None or standing.stage is None else standing.stage
+        for _ in range(self._scenario.contacts.attempts):
+            self._summary["attempts"] += 1
+            line, reason = self._guide(first, goal)
+            if line is None:
+                return self._failed(reason, "guide")
+            extension = extend(self._body, self._scene, line, start, goal, self._settings())
+            self._summary["postures"] += extension.searches
+            self._summary["backtracks"] += extension.backtracks
+            if extension.plan is not None:
+                return self._found(extension.plan, line)
+            reason = extension.failure or ""
+        return self._failed(reason, "contacts")
+
+    def _settings(self) -> ExtendSettings:
+        options = self._scenario.contacts
+        return ExtendSettings(stride=options.stride_m, friction=options.friction)
+
+    def _end(self, end: str) -> Stage | str:
+        """Start or goal, or why there is none."""
+        state = getattr(self._scenario.file.task, end)
+        found = self._endpoints.find(
+            np.array(state.at), np.deg2rad(state.heading_deg or 0.0), Habit(state.posture or "standing"),
+            state.height_m,
+        )  # fmt: skip
+        return found.stage or f"the {end}: {found.failure}"
+
+    def _guide(self, start: Stage, goal: Stage) -> tuple[GuideLine | None, str]:
+        began = clock.perf_counter()
+        ends = np.array([start.q[:7], goal.q[:7]])
+        world = World(self._scene, self._abstraction(), _region(ends), _condition())
+        result = plan_guide(world, GuideTask(*ends), self._rng)
+        self._summary["guide_wall_s"] += clock.perf_counter() - began
+        self._summary["guide_samples"] += result.statistics.samples
+        if result.path is None:
+            return None, result.failure or "no guide"
+        line = GuideLine.through(result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES)))
+        self._summary["guide_length_m"] = line.length
+        return line, ""
+
+    def _abstraction(self) -> Abstraction:
+        volumes = [
+            reach_volume(self._body, limb, np.random.default_rng(0))
+            for limb in limbs_of(self._body)
+            if limb.name in LEGS
+        ]
+        return abstraction_of(self._body, volumes)
+
+    def _found(self, plan: ContactPlan, line: GuideLine) -> ContactSearch:
+        self._summary.update(steps=plan.steps, phases=len(plan.stages))
+        return ContactSearch(with_supports(self._scenario, plan), plan, line, self._done())
+
+    def _failed(self, reason: str, where: str) -> ContactSearch:
+        return ContactSearch(None, None, None, self._done(), reason, where)
+
+    def _done(self) -> dict[str, Any]:
+        return self._summary | {"wall_s": clock.perf_counter() - self._began}
+
+
+def _region(ends: FloatArray) -> SamplingRegion:
+    """Box around start and goal; headings between theirs, and a little beyond."""
+    low, high = ends[:, :3].min(axis=0) - AROUND, ends[:, :3].max(axis=0) + AROUND
+    low[2], high[2] = ends[:, 2].min() - 0.7, ends[:, 2].max() + 0.1
+    return SamplingRegion(low, high, pitch=PITCH, roll=ROLL)
+
+
+def _condition() -> Condition:
+    """Both legs reach something to stand on."""
+    ground = UsableSurface((0.0, 0.0, 1.0), float(np.deg2rad(35.0)))
+    return Condition((LimbRule(LEGS, len(LEGS)),), dict.fromkeys(LEGS, ground))

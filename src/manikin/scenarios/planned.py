@@ -1,0 +1,77 @@
+"""A scenario with supports that were planned for it."""
+
+import math
+from typing import Any
+
+from manikin.contact import Contact
+from manikin.contact_planning import ContactPlan
+from manikin.scenarios.scenario import Scenario
+from manikin.scenarios.values import ScenarioValues
+
+COM_ROOM = (0.06, 0.06, 0.06)
+"""How far from that of its posture the centre of mass may be when a phase begins [m]; our choice."""
+
+MAX_SUPPORT_DISTANCE = 1.08
+"""Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
+
+
+def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
+    """Return the scenario with the supports of a contact plan, which can be kept and run again.
+
+    The centre of mass starts and ends where it is in the plan's first and last posture, and is near that of
+    each posture in between when its phase begins. Constraints that the file gives are kept.
+
+    Args:
+        scenario: Without supports.
+        plan: For its body and scene.
+    """
+    friction = scenario.contacts.friction
+    before: dict[str, Contact] = {}
+    phases: list[dict[str, Any]] = []
+    for number, stage in enumerate(plan.stages):
+        phase: dict[str, Any] = {
+            name: "same" if before.get(name) is contact else _entry(contact, friction)
+            for name, contact in stage.contacts.items()
+        }
+        phase["min_duration_s"] = stage.min_duration
+        if number:
+            phase["com_near"] = [float(x) for x in stage.com]
+            phase["com_within_m"] = list(COM_ROOM)
+        before = dict(stage.contacts)
+        phases.append(phase)
+    feet = next(c for stage in plan.stages for name, c in stage.contacts.items() if name.endswith("foot"))
+    supports = {
+        "friction": friction,
+        "sole": {"length_m": feet.length, "width_m": feet.width},
+        "phases": phases,
+    }
+    task = {
+        "start": {"com": [float(x) for x in plan.stages[0].com]},
+        "goal": {"com": [float(x) for x in plan.goal_com]},
+    }
+    return scenario.replaced(
+        supports=supports, contacts=None, task=task, com_constraints=_constraints(scenario)
+    )
+
+
+def _entry(contact: Contact, friction: float) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "position": [float(x) for x in contact.position],
+        "yaw_deg": math.degrees(contact.yaw),
+    }
+    if abs(contact.normal[2] - 1.0) > 1e-12:
+        entry["normal"] = [float(x) for x in contact.normal]
+    if contact.friction != friction:
+        entry["friction"] = contact.friction
+    return entry
+
+
+def _constraints(values: ScenarioValues) -> list[dict[str, Any]]:
+    """The file's constraints, and those that a body on its feet keeps to."""
+    given = [item.model_dump(mode="json", exclude_none=True) for item in values.file.com_constraints]
+    keys = {key for item in given for key in item}
+    if "max_support_distance_m" not in keys:
+        given.append({"max_support_distance_m": MAX_SUPPORT_DISTANCE * values.file.body.stature_m / 1.75})
+    if "overhead" not in keys:
+        given.append({"overhead": "automatic"})
+    return given
