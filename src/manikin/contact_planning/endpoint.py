@@ -71,7 +71,7 @@ class Endpoints:
         for contacts, guess in tried(np.asarray(at), heading, habit, height):
             posed = self._poser.pose(contacts, contacts, guess, guess[:7], restarts=True)
             if posed.q is not None:
-                return Endpoint(Stage.of(self._body, contacts, posed.q, 0.3))
+                return Endpoint(Stage.of(self._body, contacts, posed.q, 0.35))
             reasons.append(posed.reason)
         where = f"{habit} at {np.round(at, 3).tolist()} m"
         why = reasons[0] if reasons else "there is no surface to be on"

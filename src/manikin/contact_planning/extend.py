@@ -23,6 +23,23 @@ from manikin.scene import Scene
 from manikin.spatial import FloatArray, rotation_from_yaw
 
 
+LEANING = (0.25, 0.5, 0.75)
+"""Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
+
+LEANING_TIME = 0.4
+"""Shortest time between two of them [s]."""
+
+SEATED_ROOM = (0.01, 0.01, 0.006)
+"""How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
+
+
+AT_GOAL = 0.06
+"""Distance of a foot from its place at the goal that is not worth a step [m]."""
+
+AT_GOAL_TURN = float(np.deg2rad(15.0))
+"""The same for its heading [rad]."""
+
+
 @dataclass(frozen=True)
 class ExtendSettings:
     """How contacts follow a guide; the values are our choice.
@@ -151,23 +168,44 @@ class _Search:
         along = dict.fromkeys(feet, 0.0)
         if len(feet) == len(start.contacts):
             return _State((start,), along)
-        posed = self._poser.pose(start.contacts, feet, start.q, restarts=True)
-        if posed.q is None:
-            self._reasons[posed.reason] += 1
+        leaving = self._poser.pose(start.contacts, feet, start.q, restarts=True)
+        if leaving.q is None:
+            self._reasons[leaving.reason] += 1
             return None
-        leaving = Stage.of(self._body, feet, posed.q, 2.0 * self._settings.swing_duration)
-        return _State((start, leaving), along)
+        over_feet = Configuration(self._body, leaving.q).com[:2]
+        stages = [start]
+        for share in LEANING:
+            place = (1.0 - share) * start.com[:2] + share * over_feet
+            posed = self._poser.pose(start.contacts, start.contacts, stages[-1].q, place=place)
+            if posed.q is not None:
+                stages.append(Stage.of(self._body, start.contacts, posed.q, LEANING_TIME, SEATED_ROOM))
+        rising = 2.0 * self._settings.swing_duration
+        stages.append(Stage.of(self._body, feet, leaving.q, rising, SEATED_ROOM))
+        risen = self._poser.pose(feet, feet, leaving.q, self._guide.at(0.0), restarts=True)
+        if risen.q is None:
+            self._reasons[risen.reason] += 1
+            return None
+        stages.append(Stage.of(self._body, feet, risen.q, self._settings.shift_duration))
+        return _State(tuple(stages), along)
 
     def _ended(self, state: _State) -> ContactPlan | None:
         """The plan, when every foot is where it is at the goal."""
         self._farthest = max(self._farthest, float(np.mean(list(state.along.values()))))
         if not all(self._is_at_goal(state, foot) for foot in self._feet):
             return None
-        return ContactPlan.of(self._body, state.stages, self._goal.q)
+        contacts = state.last.contacts
+        posed = self._poser.pose(contacts, contacts, self._goal.q, self._goal.q[:7], restarts=True)
+        if posed.q is None:
+            self._reasons[f"at the goal: {posed.reason}"] += 1
+            return None
+        return ContactPlan.of(self._body, state.stages, posed.q)
 
     def _is_at_goal(self, state: _State, foot: str) -> bool:
-        held = state.last.contacts.get(foot)
-        return held is not None and held.same_place(self._goal.contacts[foot], 1e-6)
+        held, wanted = state.last.contacts.get(foot), self._goal.contacts[foot]
+        if held is None:
+            return False
+        away = float(np.linalg.norm(held.position - wanted.position))
+        return away <= AT_GOAL and float(np.cos(held.yaw - wanted.yaw)) >= np.cos(AT_GOAL_TURN)
 
     def _options(self, state: _State) -> Iterator[_State]:
         """States one step further, the longest step of the foot that is farthest behind first."""

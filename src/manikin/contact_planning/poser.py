@@ -74,6 +74,7 @@ class Poser:
         guide: FloatArray | None = None,
         reference: FloatArray | None = None,
         *,
+        place: FloatArray | None = None,
         restarts: bool = False,
     ) -> Posed:
         """Find a posture that holds contacts and rests on some of them alone.
@@ -84,11 +85,13 @@ class Poser:
             start: (nq,) where to begin.
             guide: (7,) pose of the root to be near; none when omitted.
             reference: (nq,) posture to be like; standing when omitted.
+            place: (2,) where the centre of mass has to be [m]; near the guide, or where it is, when omitted.
             restarts: Whether to try again from crouched postures.
         """
-        region = StaticRegion.of(carrying.values(), self.body.mass)
-        near = Configuration(self.body, start).com[:2] if guide is None else guide[:2]
-        place = region.nearest(np.asarray(near), self.settings.inset)
+        if place is None:
+            near = Configuration(self.body, start).com[:2] if guide is None else guide[:2]
+            region = StaticRegion.of(carrying.values(), self.body.mass)
+            place = region.nearest(np.asarray(near), self.settings.inset)
         if place is None:
             return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
         self.searches += 1

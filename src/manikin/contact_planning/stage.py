@@ -11,6 +11,10 @@ from manikin.contact import Contact, Phase, Stance, StanceSequence
 from manikin.spatial import FloatArray, frozen_array
 
 
+COM_ROOM = (0.06, 0.06, 0.06)
+"""How far from that of its posture the centre of mass may be when a phase begins [m]; our choice."""
+
+
 @dataclass(frozen=True, eq=False)
 class Stage:
     """The contacts of one phase and the posture with which it begins.
@@ -20,21 +24,28 @@ class Stage:
         q: (nq,) posture that holds the contacts of this phase and of the one before.
         com: (3,) its centre of mass [m].
         min_duration: Shortest time that the phase should last [s].
+        com_room: How far from there the centre of mass of a motion may be, along x, y and z [m].
     """
 
     contacts: Mapping[str, Contact]
     q: FloatArray
     com: FloatArray
     min_duration: float
+    com_room: tuple[float, float, float] = COM_ROOM
 
     @classmethod
     def of(
-        cls, body: BodyModel, contacts: Mapping[str, Contact], q: FloatArray, min_duration: float
+        cls,
+        body: BodyModel,
+        contacts: Mapping[str, Contact],
+        q: FloatArray,
+        min_duration: float,
+        com_room: tuple[float, float, float] = COM_ROOM,
     ) -> "Stage":
         """Stage with the centre of mass of its posture."""
         com = frozen_array(Configuration(body, q).com, "com [m]", (3,))
         kept = MappingProxyType(dict(contacts))
-        return cls(kept, frozen_array(q, "posture", (body.nq,)), com, min_duration)
+        return cls(kept, frozen_array(q, "posture", (body.nq,)), com, min_duration, com_room)
 
     @property
     def stance(self) -> Stance:

@@ -8,9 +8,6 @@ from manikin.contact_planning import ContactPlan
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.values import ScenarioValues
 
-COM_ROOM = (0.06, 0.06, 0.06)
-"""How far from that of its posture the centre of mass may be when a phase begins [m]; our choice."""
-
 MAX_SUPPORT_DISTANCE = 1.08
 """Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
 
@@ -36,7 +33,7 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         phase["min_duration_s"] = stage.min_duration
         if number:
             phase["com_near"] = [float(x) for x in stage.com]
-            phase["com_within_m"] = list(COM_ROOM)
+            phase["com_within_m"] = list(stage.com_room)
         before = dict(stage.contacts)
         phases.append(phase)
     feet = next(c for stage in plan.stages for name, c in stage.contacts.items() if name.endswith("foot"))
