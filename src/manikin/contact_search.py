@@ -19,17 +19,20 @@ from manikin.contact_planning import (
     Habit,
     Stage,
     extend,
+    heading_of,
 )
 from manikin.reachability import (
     Abstraction,
     Condition,
     GuideTask,
     LimbRule,
+    LocalPlanner,
     SamplingRegion,
     UsableSurface,
     World,
     abstraction_of,
     plan_guide,
+    relax,
 )
 from manikin.scenarios import Scenario
 from manikin.scenarios.planned import with_supports
@@ -44,6 +47,9 @@ AROUND = 1.2
 PITCH = (-0.2, 1.0)
 ROLL = (-0.1, 0.1)
 """How the root may lean [rad]; our choice for a body on its feet."""
+
+TURN = float(np.deg2rad(75.0))
+"""How far the root may turn from the headings of start and goal, where these are as near to each other [rad]."""
 
 GUIDE_POSES = 200
 """Poses by which the contact planner knows a guide."""
@@ -144,12 +150,14 @@ class _Search:
         ends = np.array([start.q[:7], goal.q[:7]])
         world = World(self._scene, self._abstraction(), _region(ends), _condition())
         result = plan_guide(world, GuideTask(*ends), self._rng)
-        self._summary["guide_wall_s"] += clock.perf_counter() - began
         self._summary["guide_samples"] += result.statistics.samples
         if result.path is None:
             return None, result.failure or "no guide"
-        line = GuideLine.through(result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES)))
+        planner = LocalPlanner(world.checker(), tuple(ends))
+        poses = relax(result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES)), planner, self._rng)
+        line = GuideLine.through(poses)
         self._summary["guide_length_m"] = line.length
+        self._summary["guide_wall_s"] += clock.perf_counter() - began
         return line, ""
 
     def _abstraction(self) -> Abstraction:
@@ -175,7 +183,9 @@ def _region(ends: FloatArray) -> SamplingRegion:
     """Box around start and goal; headings between theirs, and a little beyond."""
     low, high = ends[:, :3].min(axis=0) - AROUND, ends[:, :3].max(axis=0) + AROUND
     low[2], high[2] = ends[:, 2].min() - 0.7, ends[:, 2].max() + 0.1
-    return SamplingRegion(low, high, pitch=PITCH, roll=ROLL)
+    headings = np.unwrap([heading_of(pose) for pose in ends])
+    yaw = (headings.min() - TURN, headings.max() + TURN) if np.ptp(headings) <= TURN else None
+    return SamplingRegion(low, high, yaw=yaw, pitch=PITCH, roll=ROLL)
 
 
 def _condition() -> Condition:

@@ -21,7 +21,7 @@ from manikin.contact_planning.generator import (
     GeneratorSettings,
     Hindrance,
 )
-from manikin.contact_planning.guide_line import GuideLine
+from manikin.contact_planning.guide_line import GuideLine, heading_of
 from manikin.contact_planning.heuristics import (
     Balance,
     ClosestDistance,
@@ -84,6 +84,7 @@ __all__ = [
     "force_ellipsoid",
     "force_transmission_ratio",
     "make_contact",
+    "heading_of",
     "manipulability",
     "mirrored",
     "pulling_efort",

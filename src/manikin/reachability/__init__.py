@@ -2,6 +2,7 @@
 
 from manikin.reachability.abstraction import Abstraction, LimbReach, TrunkShape, abstraction_of
 from manikin.reachability.checker import NO_MARGINS, Margins, ReachabilityChecker
+from manikin.reachability.comfort import ComfortSettings, relax
 from manikin.reachability.condition import Condition, LimbRule
 from manikin.reachability.guide import (
     GuideResult,
@@ -25,6 +26,7 @@ from manikin.reachability.surfaces import UsableSurface
 __all__ = [
     "NO_MARGINS",
     "Abstraction",
+    "ComfortSettings",
     "Condition",
     "GuideResult",
     "GuideSettings",
@@ -51,6 +53,7 @@ __all__ = [
     "offline_roadmap",
     "plan_guide",
     "plan_guide_with_restarts",
+    "relax",
     "request",
     "roadmap_for",
     "root_pose",
