@@ -38,6 +38,7 @@ from manikin.scenarios import Scenario
 from manikin.scenarios.planned import with_supports
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
+from manikin.wholebody.manner import manner_of
 
 LEGS = ("left_leg", "right_leg")
 
@@ -103,7 +104,8 @@ class _Search:
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
         self._began = clock.perf_counter()
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
-        self._endpoints = Endpoints(body, scene, scenario.contacts.friction)
+        self._reference = manner_of(scenario.manner).posture(body)
+        self._endpoints = Endpoints(body, scene, scenario.contacts.friction, self._reference)
         self._summary: dict[str, Any] = {
             "attempts": 0, "steps": None, "phases": None, "guide_length_m": None, "guide_samples": 0,
             "postures": 0, "backtracks": 0, "guide_wall_s": 0.0, "wall_s": 0.0,
@@ -124,7 +126,9 @@ class _Search:
             line, reason = self._guide(first, goal)
             if line is None:
                 return self._failed(reason, "guide")
-            extension = extend(self._body, self._scene, line, start, goal, self._settings())
+            extension = extend(
+                self._body, self._scene, line, start, goal, self._settings(), self._reference
+            )
             self._summary["postures"] += extension.searches
             self._summary["backtracks"] += extension.backtracks
             if extension.plan is not None:

@@ -33,7 +33,7 @@ from manikin.output import MOTION, RunDirectory
 from manikin.scenarios import Scenario, load_scenario
 from manikin.scene import Scene
 from manikin.simulation import Execution, Push, execute
-from manikin.spatial import rotation_from_yaw
+from manikin.spatial import FloatArray, rotation_from_yaw
 from manikin.wholebody import (
     Eligibility,
     KeyPostures,
@@ -231,6 +231,7 @@ class _Run:
         self._scenario, self._requirements = scenario, requirements
         self._settings = settings or WholeBodySettings(manner=manner_of(scenario.manner))
         self._progress = progress or _silent
+        self._known_postures: FloatArray | None = None
         self._body: BodyModel = scenario.build_body()
         self._scene: Scene = scenario.build_scene()
         if scenario.file.supports is not None:
@@ -283,6 +284,7 @@ class _Run:
             self._fail("contacts", found.failure or "", 0.0, found.where)
             return False
         self._take_scenario(found.scenario)
+        self._known_postures = None if found.plan is None else found.plan.postures
         if self._directory is not None:
             self._directory.write_scenario(found.scenario.to_yaml())
         self._progress("contacts", 1.0)
@@ -410,7 +412,8 @@ class _Run:
         unused = rng.bit_generator.state
         result = plan_whole_body(
             self._body, self._scene, trajectory, rng=rng, settings=self._settings,
-            padded=self._scenario.padded, progress=lambda share: self._progress("wholebody", share),
+            padded=self._scenario.padded, key_postures=self._known_postures,
+            progress=lambda share: self._progress("wholebody", share),
         )  # fmt: skip
         drawn = rng.bit_generator.state != unused
         block = wholebody_summary(result) | self._passage(trajectory, result.motion)

@@ -52,9 +52,19 @@ class Endpoint:
 class Endpoints:
     """Finds starts and goals in one scene."""
 
-    def __init__(self, body: BodyModel, scene: Scene, friction: float) -> None:
+    def __init__(
+        self, body: BodyModel, scene: Scene, friction: float, reference: FloatArray | None = None
+    ) -> None:
+        """Prepare a scene.
+
+        Args:
+            body: A body with soles.
+            scene: Its surroundings.
+            friction: Coulomb coefficient of the soles.
+            reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
+        """
         self._body, self._scene, self._friction = body, scene, friction
-        self._poser = Poser(body, scene)
+        self._poser = Poser(body, scene, reference)
         self._footholds = Footholds(body, scene)
 
     def find(self, at: FloatArray, heading: float, habit: Habit, height: float | None = None) -> Endpoint:

@@ -106,6 +106,7 @@ def extend(
     start: Stage,
     goal: Stage,
     settings: ExtendSettings | None = None,
+    reference: FloatArray | None = None,
 ) -> Extension:
     """Find the contacts with which a body on feet follows a guide.
 
@@ -118,19 +119,19 @@ def extend(
         start: Contacts and posture at the start.
         goal: Contacts and posture at the goal, on feet.
         settings: How to search.
+        reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
     """
-    return _Search(body, scene, guide, goal, settings or ExtendSettings()).run(start)
+    poser = Poser(body, scene, reference)
+    return _Search(poser, guide, goal, settings or ExtendSettings()).run(start)
 
 
 class _Search:
     """Depth-first search over changes of contact."""
 
-    def __init__(
-        self, body: BodyModel, scene: Scene, guide: GuideLine, goal: Stage, settings: ExtendSettings
-    ) -> None:
-        self._body, self._guide, self._goal, self._settings = body, guide, goal, settings
-        self._poser = Poser(body, scene)
-        self._footholds = Footholds(body, scene)
+    def __init__(self, poser: Poser, guide: GuideLine, goal: Stage, settings: ExtendSettings) -> None:
+        self._poser, self._guide, self._goal, self._settings = poser, guide, goal, settings
+        self._body = body = poser.body
+        self._footholds = Footholds(body, poser.scene)
         self._feet = _standing_feet(body)
         self._stride = settings.stride * body.stature / 1.75
         self._reasons: Counter[str] = Counter()

@@ -60,8 +60,22 @@ class Poser:
         searches: Postures looked for so far.
     """
 
-    def __init__(self, body: BodyModel, scene: Scene, settings: PoserSettings | None = None) -> None:
-        self.body, self.scene = body, scene
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        reference: FloatArray | None = None,
+        settings: PoserSettings | None = None,
+    ) -> None:
+        """Prepare a scene.
+
+        Args:
+            body: The body.
+            scene: Its surroundings.
+            reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
+            settings: What to keep to.
+        """
+        self.body, self.scene, self._reference = body, scene, reference
         self.settings = settings or PoserSettings()
         self.searches = 0
         self._proximity = Proximity(body, scene)
@@ -72,7 +86,6 @@ class Poser:
         carrying: Mapping[str, Contact],
         start: FloatArray,
         guide: FloatArray | None = None,
-        reference: FloatArray | None = None,
         *,
         place: FloatArray | None = None,
         restarts: bool = False,
@@ -84,7 +97,6 @@ class Poser:
             carrying: Those that carry the body.
             start: (nq,) where to begin.
             guide: (7,) pose of the root to be near; none when omitted.
-            reference: (nq,) posture to be like; standing when omitted.
             place: (2,) where the centre of mass has to be [m]; near the guide, or where it is, when omitted.
             restarts: Whether to try again from crouched postures.
         """
@@ -105,7 +117,7 @@ class Poser:
             self_clearance=self.settings.clearance,
             ignore=self._touching(held),
             range_margin=self.settings.range_margin,
-            reference=reference,
+            reference=self._reference,
         )
         found = generate_posture(
             problem,

@@ -64,11 +64,9 @@ def _entry(contact: Contact, friction: float) -> dict[str, Any]:
 
 
 def _constraints(values: ScenarioValues) -> list[dict[str, Any]]:
-    """The file's constraints, and those that a body on its feet keeps to."""
+    """The file's constraints, and one that a body on its feet keeps to."""
     given = [item.model_dump(mode="json", exclude_none=True) for item in values.file.com_constraints]
     keys = {key for item in given for key in item}
     if "max_support_distance_m" not in keys:
         given.append({"max_support_distance_m": MAX_SUPPORT_DISTANCE * values.file.body.stature_m / 1.75})
-    if "overhead" not in keys:
-        given.append({"overhead": "automatic"})
     return given

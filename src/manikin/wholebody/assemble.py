@@ -24,6 +24,7 @@ from manikin.wholebody.fit import FitResult, MotionFit
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
 from manikin.wholebody.forces import plan_forces
+from manikin.wholebody.configuration_spline import align_quaternions
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
 from manikin.wholebody.knots import phase_knots, refined, sample_times, touch_downs_at_speed
 from manikin.wholebody.manner import CLOSE, READY, Manner
@@ -140,6 +141,7 @@ def plan_whole_body(
     rng: np.random.Generator,
     settings: WholeBodySettings | None = None,
     padded: Sequence[str] = (),
+    key_postures: FloatArray | None = None,
     progress: Progress | None = None,
 ) -> WholeBodyResult:
     """Find a whole-body motion that keeps contacts, centre of mass and distances.
@@ -153,6 +155,8 @@ def plan_whole_body(
         settings: Options.
         padded: Obstacles that any part of the body may lean on: it is kept off them where that is
             possible, but the certificate does not ask for it.
+        key_postures: (phases + 1, nq) postures known for the key instants, which the motion stays near;
+            the manner's when omitted.
         progress: Called now and then with the share done.
 
     Returns:
@@ -163,6 +167,8 @@ def plan_whole_body(
     """
     began = clock.perf_counter()
     planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), progress)
+    if key_postures is not None:
+        planner.known = Guide(trajectory.schedule.instants, align_quaternions(np.array(key_postures)), ())
     planner.leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
     return planner.run(began)
 
@@ -183,9 +189,10 @@ class _Planner:
         self.proximity = Proximity(body, scene)
         self.flights = FlightPlanner(
             body, scene, trajectory, settings.swing, rng,
-            lambda time: reference_motion(body, trajectory, np.array([time]), settings.manner)[0],
+            lambda time: self._reference(np.array([time]))[0],
         )  # fmt: skip
         self.leaning: Ignored = frozenset()
+        self.known: Guide | None = None
         self._progress = progress
 
     def run(self, began: float) -> WholeBodyResult:
@@ -287,13 +294,19 @@ class _Planner:
         schedule = self.trajectory.schedule
         time = guide_times(schedule.instants, self.settings.guide_spacing)
         toes = toe_angles(self.body, swings, time)
-        reference = reference_motion(self.body, self.trajectory, time, self.settings.manner)
+        reference = self._reference(time)
         return plan_guide(
             self.body, self.proximity, schedule, time, effector_targets(schedule, swings, time),
             self._guide_com(time), ignored_pairs(self.body, self.scene, schedule, time),
             _with_joints(reference, toes), self.settings.fit.safe_distance,
             self.settings.manner.preferences, tuple(toes),
         )  # fmt: skip
+
+    def _reference(self, time: FloatArray) -> FloatArray:
+        """(n, nq) preferred postures: between those that are known, or the manner's."""
+        if self.known is not None:
+            return self.known.at(time)
+        return reference_motion(self.body, self.trajectory, time, self.settings.manner)
 
     def _guide_com(self, time: FloatArray) -> FloatArray:
         """(k, 3) centre of mass of the guide postures; NaN where the body is safe without one."""
