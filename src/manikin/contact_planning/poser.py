@@ -1,7 +1,7 @@
 """Balanced, free postures on given contacts."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -34,8 +34,8 @@ class PoserSettings:
     clearance: float = 0.014
     range_margin: float = 0.05
     inset: float = 0.03
-    root_weight: float = 1.0
-    turn_weight: float = 0.3
+    root_weight: float = 2.0
+    turn_weight: float = 2.0
     tolerance: float = 2e-4
     iterations: int = 40
 
@@ -119,16 +119,16 @@ class Poser:
             range_margin=self.settings.range_margin,
             reference=self._reference,
         )
-        found = generate_posture(
-            problem,
-            start,
-            settings=SolverSettings(
-                tolerance=self.settings.tolerance,
-                iterations=self.settings.iterations,
-                restarts=restarts,
-                explain=False,
-            ),
+        once = SolverSettings(
+            tolerance=self.settings.tolerance, iterations=self.settings.iterations, restarts=False, explain=False
         )
+        if guide is not None:
+            # The guide's trunk is free, so that from there no obstacle is passed on its wrong side.
+            led = np.concatenate([guide, start[7:]])
+            found = generate_posture(problem, led, settings=once)
+            if found.succeeded:
+                return Posed(found.q)
+        found = generate_posture(problem, start, settings=replace(once, restarts=restarts))
         return Posed(found.q) if found.succeeded else Posed(None, found.failure or "no posture")
 
     def _wish(self, guide: FloatArray | None) -> dict[str, Placement]:

@@ -1,7 +1,7 @@
 """A sequence of contacts with a posture for every change, as the contact planner finds it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -13,6 +13,13 @@ from manikin.spatial import FloatArray, frozen_array
 
 COM_ROOM = (0.06, 0.06, 0.06)
 """How far from that of its posture the centre of mass may be when a phase begins [m]; our choice."""
+
+
+HINGE_PACE = 1.3
+"""Mean speed of the hinge that turns most between two postures [rad/s]; our choice."""
+
+COM_PACE = 0.4
+"""Mean speed of the centre of mass between two postures [m/s]; our choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +78,12 @@ class ContactPlan:
     def of(cls, body: BodyModel, stages: Sequence[Stage], goal: FloatArray) -> "ContactPlan":
         """Plan with the centre of mass of its last posture."""
         com = frozen_array(Configuration(body, goal).com, "goal com [m]", (3,))
-        return cls(tuple(stages), frozen_array(goal, "goal posture", (body.nq,)), com)
+        ends = [(stage.q, stage.com) for stage in stages[1:]] + [(goal, com)]
+        timed = [
+            replace(stage, min_duration=max(stage.min_duration, _least_time(stage, q, there)))
+            for stage, (q, there) in zip(stages, ends, strict=True)
+        ]
+        return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
 
     def sequence(self) -> StanceSequence:
         """The stances in order, as the stages that follow take them."""
@@ -89,3 +101,9 @@ class ContactPlan:
         return sum(
             len(set(stage.contacts) - set(old)) for old, stage in zip(before[1:], self.stages[1:], strict=False)
         )
+
+
+def _least_time(stage: Stage, q: FloatArray, com: FloatArray) -> float:
+    """Time that the change to the next posture takes at an unhurried pace [s]."""
+    turn = float(np.abs(q[7:] - stage.q[7:]).max(initial=0.0))
+    return max(turn / HINGE_PACE, float(np.linalg.norm(com - stage.com)) / COM_PACE)
