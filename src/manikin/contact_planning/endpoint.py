@@ -84,7 +84,7 @@ class Endpoints:
                 return Endpoint(Stage.of(self._body, contacts, posed.q, 0.35))
             reasons.append(posed.reason)
         where = f"{habit} at {np.round(at, 3).tolist()} m"
-        why = reasons[0] if reasons else "there is no surface to be on"
+        why = reasons[0] if reasons else _NOWHERE[habit]
         return Endpoint(None, f"no posture {where}: {why}")
 
     def risen(self, stage: Stage) -> Endpoint:
@@ -162,6 +162,12 @@ class Endpoints:
                 found.add(round(level, 6))
         return sorted(found)
 
+
+_NOWHERE = {
+    Habit.STANDING: "there is no surface with room for both feet",
+    Habit.SEATED: "there is no surface at the height of a seat with room for both feet before it",
+    Habit.CROUCHED: "there is no surface with room for both feet",
+}
 
 _SITTING = {
     f"{side}_{joint}": angle

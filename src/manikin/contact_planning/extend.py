@@ -56,7 +56,7 @@ class ExtendSettings:
 
     stride: float = 0.36
     shares: tuple[float, ...] = (1.0, 0.75, 0.5, 0.3)
-    searches: int = 600
+    searches: int = 250
     swing_duration: float = 0.7
     swing_speed: float = 0.7
     shift_duration: float = 0.35
