@@ -19,6 +19,7 @@ from manikin.contact_planning.generator import (
     Hindrance,
 )
 from manikin.contact_planning.heuristics import (
+    HEURISTICS,
     Balance,
     ClosestDistance,
     Duration,
@@ -28,11 +29,13 @@ from manikin.contact_planning.heuristics import (
     Random,
     WeightedSum,
     duration,
+    heuristic_named,
 )
 from manikin.contact_planning.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
 from manikin.contact_planning.touch import ContactRules, make_contact
 
 __all__ = [
+    "HEURISTICS",
     "Alignment",
     "Balance",
     "Candidates",
@@ -60,6 +63,7 @@ __all__ = [
     "find_candidates",
     "force_ellipsoid",
     "force_transmission_ratio",
+    "heuristic_named",
     "make_contact",
     "manipulability",
     "mirrored",

@@ -13,6 +13,7 @@ from manikin.contact import Contact, ContactKind, Stance
 from manikin.contact_planning.candidates import Candidates, Situation
 from manikin.contact_planning.efort import efort
 from manikin.contact_planning.touch import ContactRules, make_contact, onto_normal
+from manikin.errors import InputError
 from manikin.spatial import FloatArray
 
 
@@ -69,6 +70,30 @@ class Random:
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:  # noqa: ARG002
         """See :class:`Heuristic`."""
         return np.random.default_rng(self.seed).random(len(candidates))
+
+
+HEURISTICS = ("efort", "distance", "manipulability", "random")
+"""Names of the heuristics that need nothing but the request."""
+
+
+def heuristic_named(name: str, seed: int = 0, *, pulling: bool = False) -> Heuristic:
+    """Heuristic by its name.
+
+    Args:
+        name: One of :data:`HEURISTICS`.
+        seed: Of the random one.
+        pulling: Whether EFORT is that of a limb which holds on and pulls.
+
+    Raises:
+        InputError: If there is none of that name.
+    """
+    found: dict[str, Heuristic] = {
+        "efort": Efort(pulling), "distance": ClosestDistance(), "manipulability": Manipulability(),
+        "random": Random(seed),
+    }  # fmt: skip
+    if name not in found:
+        raise InputError(f"heuristic is {name!r}; valid: {', '.join(HEURISTICS)}")
+    return found[name]
 
 
 @dataclass(frozen=True, eq=False)
