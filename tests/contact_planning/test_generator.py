@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from manikin.body import Configuration, LimbKinematics, human, insect, integrate, limb_named, limbs_of
 from manikin.body.limbs import limb_slots
+from manikin.body.natural_range import NaturalRange
 from manikin.contact import ContactKind
 from manikin.contact_planning import (
     ClosestDistance,
@@ -24,8 +25,10 @@ from manikin.contact_planning import (
     Task,
     align,
     find_candidates,
+    sample_limbs,
 )
 from manikin.contact_planning.collisions import TOUCH, yielding
+from manikin.contact_planning.generator import NATURAL_SLACK
 from manikin.errors import BodyError, ContactError
 from manikin.scene import Box, Capsule, Mesh, Obstacle, Proximity, Scene, Surface
 from manikin.spatial import rotation_from_rpy
@@ -315,3 +318,21 @@ def test_tries_are_the_best_first_and_then_spread(person, person_samples, at_wal
     assert spread.tried <= 9
     if spread.found and best.tried <= 3:
         assert spread.score == best.score
+
+
+def test_contacts_of_natural_samples_are_natural(person):
+    """Hands and feet on a wall are within learnt ranges, but for the slack of the alignment."""
+    samples = sample_limbs(person, np.random.default_rng(0), 5000, natural=True)
+    generator = ContactGenerator(person, wall_scene(0.45), samples)
+    found = 0
+    for number in range(12):
+        q = person.standing_posture()
+        q[0] -= 0.02 * number
+        for name in ("left_arm", "right_leg"):
+            answer = generator.request(q, name, PUSH)
+            if answer.found:
+                limb = limb_named(person, name)
+                angles = answer.q[limb_slots(person, limb)]
+                assert NaturalRange(person, limb).volume_distance(angles[None])[0] >= -NATURAL_SLACK
+                found += 1
+    assert found >= 8

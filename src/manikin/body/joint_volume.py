@@ -100,9 +100,10 @@ class JointVolume:
 
     def _on_grid(self, angles: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Places on the grid in steps, and the distance [rad] from the angles to there."""
-        wanted = (np.asarray(angles, dtype=np.float64) - self.origin) / self.step
-        if wanted.shape[-1:] != (3,):
-            raise BodyError(f"angles of a ball joint have shape {np.shape(angles)}; valid: (..., 3)")
+        q = np.asarray(angles, dtype=np.float64)
+        if q.shape[-1:] != (3,):
+            raise BodyError(f"angles of a ball joint have shape {q.shape}; valid: (..., 3)")
+        wanted = (q - self.origin) / self.step
         x = np.clip(wanted, 0.0, np.array(self.distances.shape) - 1.0)
         return x, self.step * np.linalg.norm(wanted - x, axis=-1)
 

@@ -6,6 +6,7 @@ hinge has its interval.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,10 +15,10 @@ from manikin.body.human_volumes import human_volumes
 from manikin.body.joint_volume import JointVolume
 from manikin.body.limbs import limb_hinges
 from manikin.body.model import BodyModel
-from manikin.body.range_of_motion import HUMAN_HINGES, human_hinges
+from manikin.body.range_of_motion import human_hinges
 from manikin.body.segments import Hinge, Limb, Segment
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, frozen_array
 
 _SIDES = ("left", "right")
 
@@ -95,6 +96,16 @@ class NaturalRange:
         """(n,) whether (n, k) angles are within the range of motion."""
         return self.normalised(angles) >= 0.0
 
+    def random_angles(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """(count, k) angles, uniform within the range of motion [rad]."""
+        parts: list[FloatArray] = []
+        kept = 0
+        while kept < count:
+            drawn = rng.uniform(self.lower, self.upper, (2 * count, len(self.lower)))
+            parts.append(drawn[self.volume_distance(drawn) >= 0.0])
+            kept += len(parts[-1])
+        return np.concatenate(parts)[:count]
+
     def _least(self, q: FloatArray, others: Callable[[FloatArray], FloatArray]) -> FloatArray:
         found = others(q)
         for columns, ball in self.balls:
@@ -122,36 +133,53 @@ def _balls(body: BodyModel, limb: Limb) -> list[tuple[slice, BallRange]]:
     found, start = [], 0
     for name in limb.segments:
         segment = body.segment(name)
-        volume = _volume(segment)
-        if volume is not None:
-            found.append((slice(start, start + 3), ball_range(volume, segment.hinges)))
+        part = _learnt_part(segment)
+        if part is not None:
+            ends = tuple((hinge.lower, hinge.upper) for hinge in segment.hinges)
+            found.append((slice(start, start + 3), _learnt_range(part, ends)))
         start += len(segment.hinges)
     return found
 
 
-def ball_range(volume: JointVolume, hinges: tuple[Hinge, ...]) -> BallRange:
+def ball_range(volume: JointVolume, lower: ArrayLike, upper: ArrayLike) -> BallRange:
     """Volume within the intervals of three hinges.
+
+    Args:
+        volume: The volume.
+        lower: (3,) smallest angles [rad].
+        upper: (3,) largest angles [rad].
 
     Raises:
         BodyError: If nothing of the volume is within them.
     """
-    lower, upper = (np.array([getattr(hinge, end) for hinge in hinges]) for end in ("lower", "upper"))
-    ball = BallRange(volume, lower, upper, 1.0)
+    low, high = (frozen_array(end, "range of a ball joint", (3,), BodyError) for end in (lower, upper))
+    ball = BallRange(volume, low, high, 1.0)
     radius = float(ball.normalised(volume.points).max())
     if not radius > 0.0:
-        raise BodyError(f"no posture of {hinges[0].name!r} is in its volume; valid: ranges that overlap it")
-    return BallRange(volume, lower, upper, radius)
+        raise BodyError(
+            f"nothing from {low.tolist()} to {high.tolist()} is in the volume; valid: ranges that overlap it"
+        )
+    return BallRange(volume, low, high, radius)
 
 
-def _volume(segment: Segment) -> JointVolume | None:
-    """Learnt volume of a segment whose hinges are those of the human."""
+@cache
+def _learnt_range(part: str, ends: tuple[tuple[float, float], ...]) -> BallRange:
+    """Range of a learnt part for hinges with these ends; the largest ball takes a while to find."""
+    lower, upper = zip(*ends, strict=True)
+    return ball_range(human_volumes()[part], lower, upper)
+
+
+def _learnt_part(segment: Segment) -> str | None:
+    """Name of the volume of a segment whose hinges are those of the human."""
     for side in _SIDES:
         part = segment.name.removeprefix(f"{side}_")
-        if part in human_volumes() and part in HUMAN_HINGES and part != segment.name:
+        if part != segment.name and part in human_volumes():
             human = human_hinges(part, side, 1.0)
-            same = [
-                a.name == b.name and np.allclose(a.axis, b.axis)
-                for a, b in zip(segment.hinges, human, strict=False)
-            ]
-            return human_volumes()[part] if len(same) == len(human) and all(same) else None
+            own = segment.hinges
+            same = len(own) == len(human) and all(map(_same_hinge, own, human))
+            return part if same else None
     return None
+
+
+def _same_hinge(first: Hinge, second: Hinge) -> bool:
+    return first.name == second.name and bool(np.allclose(first.axis, second.axis))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.body import BodyModel, Configuration, Limb, LimbKinematics, limb_named
+from manikin.body.natural_range import NaturalRange
 from manikin.contact import Contact, ContactKind
 from manikin.contact_planning.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Alignment, align
 from manikin.contact_planning.candidates import Candidates, Situation, SurfaceTable, find_candidates
@@ -25,6 +26,9 @@ from manikin.spatial import FloatArray
 _BATCHES = (32,)
 """Numbers of candidates after which the aligned ones are tested before more are aligned."""
 _TILTED = "tilted"
+_UNNATURAL = "unnatural"
+NATURAL_SLACK = 0.1
+"""Normalised distance by which the alignment may take a limb of natural samples out of its learnt range."""
 
 
 class Hindrance(StrEnum):
@@ -192,6 +196,9 @@ class ContactGenerator:
             turns = situation.rotation @ aligned.rotations
             lies = self._lies(aligned, candidates, rows, turns, kind, allowed)
             faults[_TILTED] += int((~lies).sum())
+            natural = tools.natural(aligned)
+            faults[_UNNATURAL] += int((lies & ~natural).sum())
+            lies &= natural
             for number in np.flatnonzero(lies).tolist():
                 q[tools.chain.slots] = aligned.angles[number]
                 row, tried = int(rows[number]), start + number + 1
@@ -244,12 +251,19 @@ class _LimbTools:
         self.samples = samples
         self.chain = LimbKinematics(body, limb)
         self.collisions = LimbCollisions(body, limb, scene)
+        self._range = NaturalRange(body, limb) if samples.natural else None
         _ = (
             samples.grid,
             samples.upward,
             samples.manipulability,
             samples.reach,
         )  # made now, not during a request
+
+    def natural(self, aligned: Alignment) -> NDArray[np.bool_]:
+        """(n,) whether aligned limbs are hardly beyond learnt ranges of motion; all, where none count."""
+        if self._range is None:
+            return np.ones(len(aligned.angles), dtype=bool)
+        return self._range.volume_distance(aligned.angles) >= -NATURAL_SLACK
 
     def align(
         self, situation: Situation, candidates: Candidates, rows: NDArray[np.int64], max_tilt: float
@@ -284,10 +298,12 @@ def _failure(
 
 
 def _none_fits(limb: str, faults: Counter[str], candidates: int, tried: int) -> GeneratedContact:
-    tilted = faults.pop(_TILTED, 0)
+    tilted, unnatural = faults.pop(_TILTED, 0), faults.pop(_UNNATURAL, 0)
     collided = sum(faults.values())
     kind = Hindrance.COLLISION if collided > tilted else Hindrance.ALIGNMENT
     what = [f"{tilted} cannot lie flat on the surface"] if tilted else []
+    if unnatural:
+        what.append(f"{unnatural} are beyond the range of motion")
     if collided:
         reason, count = faults.most_common(1)[0]
         what.append(f"{collided} collide, {count} by {reason}")

@@ -25,23 +25,23 @@ from manikin.spatial import FloatArray
 SIDES = ("left", "right")
 
 JOINTS: Mapping[str, tuple[str, ...]] = {
-    # Ours: names on skeletons of CMU (ASF, then the BVH made of them) and of ACCAD.
-    "pelvis": ("root", "Hips"),
+    # Names on skeletons of CMU (ASF, then the BVH made of them) and of ACCAD.
+    "pelvis": ("pelvis", "root", "Hips"),
     "thorax": ("thorax", "Chest2", "Spine1"),
-    "left_thigh": ("lfemur", "LeftHip", "LeftUpLeg"),
-    "left_leg": ("ltibia", "LeftKnee", "LeftLeg"),
-    "left_foot": ("lfoot", "LeftAnkle", "LeftFoot"),
-    "right_thigh": ("rfemur", "RightHip", "RightUpLeg"),
-    "right_leg": ("rtibia", "RightKnee", "RightLeg"),
-    "right_foot": ("rfoot", "RightAnkle", "RightFoot"),
-    "left_upper_arm": ("lhumerus", "LeftArm", "LeftShoulder"),
-    "left_forearm": ("lradius", "LeftForeArm", "LeftElbow"),
-    "left_hand": ("lwrist", "LeftHand", "LeftWrist"),
-    "right_upper_arm": ("rhumerus", "RightArm", "RightShoulder"),
-    "right_forearm": ("rradius", "RightForeArm", "RightElbow"),
-    "right_hand": ("rwrist", "RightHand", "RightWrist"),
+    "left_thigh": ("left_thigh", "lfemur", "LeftHip", "LeftUpLeg"),
+    "left_leg": ("left_leg", "ltibia", "LeftKnee", "LeftLeg"),
+    "left_foot": ("left_foot", "lfoot", "LeftAnkle", "LeftFoot"),
+    "right_thigh": ("right_thigh", "rfemur", "RightHip", "RightUpLeg"),
+    "right_leg": ("right_leg", "rtibia", "RightKnee", "RightLeg"),
+    "right_foot": ("right_foot", "rfoot", "RightAnkle", "RightFoot"),
+    "left_upper_arm": ("left_upper_arm", "lhumerus", "LeftArm", "LeftShoulder"),
+    "left_forearm": ("left_forearm", "lradius", "LeftForeArm", "LeftElbow"),
+    "left_hand": ("left_hand", "lwrist", "LeftHand", "LeftWrist"),
+    "right_upper_arm": ("right_upper_arm", "rhumerus", "RightArm", "RightShoulder"),
+    "right_forearm": ("right_forearm", "rradius", "RightForeArm", "RightElbow"),
+    "right_hand": ("right_hand", "rwrist", "RightHand", "RightWrist"),
 }
-"""Joints at which our segments begin, by the names that occur; the first that a skeleton has is taken."""
+"""Joints at which our segments begin, by the names that occur, our own among them; the first one is taken."""
 
 BENT = np.deg2rad(30.0)
 """A knee or elbow that is bent by more than this shows the axis about which it bends."""
