@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def save_volumes(path: str | Path, volumes: Mapping[str, JointVolume], acknowled
     Raises:
         OSError: If the folder cannot be written to.
     """
-    arrays: dict[str, np.ndarray] = {}
+    arrays: dict[str, Any] = {}
     for name, volume in volumes.items():
         arrays[f"{name}/origin"], arrays[f"{name}/step"] = volume.origin, np.array(volume.step)
         arrays[f"{name}/distances"] = np.rint(volume.distances / _DIGIT).astype(np.int16)
