@@ -8,6 +8,7 @@ from manikin.body.configuration import (
     interpolate,
     random_configuration,
 )
+from manikin.body.creature import LimbSpec, creature_from_urdf
 from manikin.body.further_contacts import with_knees_and_elbows
 from manikin.body.human import body_from_signature, human
 from manikin.body.human_volumes import human_volumes
@@ -31,6 +32,7 @@ __all__ = [
     "JointVolume",
     "Limb",
     "LimbKinematics",
+    "LimbSpec",
     "NaturalRange",
     "ReachVolume",
     "Segment",
@@ -39,6 +41,7 @@ __all__ = [
     "ShapeKind",
     "are_mirrored",
     "body_from_signature",
+    "creature_from_urdf",
     "difference",
     "human",
     "human_volumes",
