@@ -33,6 +33,7 @@ from manikin.contact_planning.heuristics import (
     heuristic_named,
 )
 from manikin.contact_planning.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
+from manikin.contact_planning.storage import load_samples, samples_for, save_samples
 from manikin.contact_planning.touch import ContactRules, make_contact
 
 __all__ = [
@@ -66,11 +67,14 @@ __all__ = [
     "force_ellipsoid",
     "force_transmission_ratio",
     "heuristic_named",
+    "load_samples",
     "make_contact",
     "manipulability",
     "mirrored",
     "pulling_efort",
     "sample_limb",
     "sample_limbs",
+    "samples_for",
+    "save_samples",
     "velocity_ellipsoid",
 ]
