@@ -6,7 +6,6 @@ import pytest
 from manikin.body import Configuration, NaturalRange, limb_named, limb_placement
 from manikin.body.limbs import limb_slots
 from manikin.contact_planning import manipulability, mirrored, sample_limb, sample_limbs
-from manikin.contact_planning.grid import SampleGrid
 from manikin.errors import BodyError
 
 
@@ -87,17 +86,6 @@ def test_manipulability_is_the_root_of_the_determinant():
     jacobians = np.random.default_rng(1).standard_normal((50, 3, 6))
     products = jacobians @ jacobians.transpose(0, 2, 1)
     assert np.allclose(manipulability(products) ** 2, np.linalg.det(products))
-
-
-def test_cells_hold_every_point_once_within_their_ball():
-    points = np.random.default_rng(2).standard_normal((2000, 3))
-    grid = SampleGrid(points)
-    rows, owner = grid.points_of(np.arange(len(grid.radii)))
-    assert np.array_equal(np.sort(rows), np.arange(2000))
-    away = np.linalg.norm(points[rows] - grid.centres[owner], axis=1)
-    assert (away <= grid.radii[owner] + 1e-12).all()
-    twice, which = grid.points_of(np.array([3, 3]))
-    assert np.array_equal(twice[which == 0], twice[which == 1])
 
 
 def test_natural_samples_keep_to_the_learnt_ranges(person, creature):

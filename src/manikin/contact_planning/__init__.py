@@ -1,6 +1,6 @@
 """Contacts found on their own: samples of limbs, EFORT, and the request for one contact."""
 
-from manikin.contact_planning.alignment import Alignment, align
+from manikin.contact_planning.alignment import Aligner, Alignment
 from manikin.contact_planning.candidates import Candidates, Situation, SurfaceTable, find_candidates
 from manikin.contact_planning.collisions import LimbCollisions
 from manikin.contact_planning.efort import (
@@ -38,6 +38,7 @@ from manikin.contact_planning.touch import ContactRules, make_contact
 
 __all__ = [
     "HEURISTICS",
+    "Aligner",
     "Alignment",
     "Balance",
     "Candidates",
@@ -60,7 +61,6 @@ __all__ = [
     "SurfaceTable",
     "Task",
     "WeightedSum",
-    "align",
     "duration",
     "efort",
     "find_candidates",

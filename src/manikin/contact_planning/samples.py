@@ -11,7 +11,6 @@ from manikin.body import BodyModel, Limb, LimbKinematics, ReachVolume, are_mirro
 from manikin.body.limbs import REFLECTION, parent_segment
 from manikin.body.natural_range import NaturalRange
 from manikin.body.reach_volume import hull_of
-from manikin.contact_planning.grid import SampleGrid
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, finite_number
 
@@ -64,9 +63,10 @@ class LimbSamples:
         return np.ascontiguousarray(self.rotations[:, :, 2])
 
     @cached_property
-    def grid(self) -> SampleGrid:
-        """Spatial index of the positions."""
-        return SampleGrid(self.positions)
+    def hull(self) -> tuple[FloatArray, float]:
+        """Corners (h, 3) of the reach in the limb's frame, and the largest distance of one [m]."""
+        corners = self.reach.vertices - self.origin
+        return corners, float(np.linalg.norm(corners, axis=1).max())
 
     @cached_property
     def reach(self) -> ReachVolume:
