@@ -1,4 +1,4 @@
-"""The command line: ``manikin scenarios | run | compare | view | balance | export``.
+"""The command line: ``manikin scenarios | run | compare | view | balance | contact | export``.
 
 Exit status: 0 done, 2 bad input (one line on standard error), 3 a run that ended in an
 explained failure, 130 interrupted.  With ``--json`` standard output holds exactly one
@@ -226,6 +226,66 @@ def balance(
         _print_json(report)
     else:
         _print_table(_flat(report))
+
+
+@app.command()
+def contact(
+    scenario: Annotated[
+        str, typer.Argument(metavar="NAME|FILE.yaml", help="Scenario: its body, scene and start.")
+    ],
+    limb: Annotated[str, typer.Option(metavar="L", help="Limb that shall make a contact.")],
+    task: Annotated[
+        tuple[float, float, float], typer.Option(metavar="X Y Z", help="Direction of the task in the world.")
+    ],
+    role: Annotated[
+        str,
+        typer.Option(
+            metavar="auto|body|object", help="Whether the limb moves the body along the task or an object."
+        ),
+    ] = "auto",
+    pull: Annotated[bool, typer.Option("--pull", help="Hold on and pull instead of pressing.")] = False,
+    kind: Annotated[
+        str | None,
+        typer.Option(metavar="sole|point|grasp", help="How it touches; default: the limb's own way."),
+    ] = None,
+    heuristic: Annotated[
+        str, typer.Option(metavar="H", help="efort, distance, manipulability or random.")
+    ] = "efort",
+    samples: Annotated[
+        int, typer.Option(metavar="N", min=100, max=1_000_000, help="Samples of the limb.")
+    ] = 10_000,
+    seed: Annotated[int | None, typer.Option(metavar="N", min=0, help="Default: the scenario's.")] = None,
+    at: Annotated[tuple[float, float] | None, typer.Option(metavar="X Y", help="Where to stand [m].")] = None,
+    heading: Annotated[float | None, typer.Option(metavar="DEG", help="Where to face.")] = None,
+    posture: Annotated[str | None, typer.Option(metavar="P", help="Posture; default: the start's.")] = None,
+    figure: Annotated[Path | None, typer.Option(metavar="FILE.png", help="Draw the answer.")] = None,
+    json: JsonOption = False,
+) -> int:
+    """Find the contact of one limb that serves a task best."""
+    from manikin.scenarios import load_scenario
+    from manikin.scenarios.start import start_posture
+    from manikin.single_contact import ContactQuestion, find_contact
+
+    job = load_scenario(scenario)
+    with _stdout_kept_clean():
+        body, scene = job.build_body(), job.build_scene()
+        q = start_posture(job, body, at=at, heading_deg=heading, posture=posture)
+        question = ContactQuestion.of(
+            limb, task, role, pull, heuristic, kind, samples, job.seed if seed is None else seed
+        )
+        answer = find_contact(body, scene, q, question)
+        if figure is not None:
+            from manikin.products import write_contact_figure
+
+            write_contact_figure(body, scene, answer, figure)
+    report = answer.as_dict()
+    if json:
+        _print_json(report)
+    else:
+        _print_table({key: value for key, value in report.items() if key != "q"})
+        if not report["found"]:
+            typer.echo(f"no contact: {report['failure']}", err=True)
+    return DONE if report["found"] else FAILED
 
 
 @app.command()

@@ -50,7 +50,7 @@ ROLL = (-0.1, 0.1)
 """How the root may lean [rad]; our choice for a body on its feet."""
 
 TURN = float(np.deg2rad(75.0))
-"""How far the root may turn from the headings of start and goal, where these are as near to each other [rad]."""
+"""How far the root may turn from the headings of start and goal, where these are that close [rad]."""
 
 GUIDE_POSES = 200
 """Poses by which the contact planner knows a guide."""
@@ -113,10 +113,10 @@ class _Search:
 
     def run(self) -> ContactSearch:
         start, goal = self._end("start"), self._end("goal")
-        for end, found in (("start", start), ("goal", goal)):
-            if isinstance(found, str):
-                return self._failed(found, end)
-        assert isinstance(start, Stage) and isinstance(goal, Stage)  # no text, as just seen
+        if isinstance(start, str):
+            return self._failed(start, "start")
+        if isinstance(goal, str):
+            return self._failed(goal, "goal")
         standing = self._endpoints.risen(start) if "buttocks" in start.contacts else None
         if standing is not None and standing.stage is None:
             return self._failed(standing.failure or "", "start")
@@ -126,9 +126,7 @@ class _Search:
             line, reason = self._guide(first, goal)
             if line is None:
                 return self._failed(reason, "guide")
-            extension = extend(
-                self._body, self._scene, line, start, goal, self._settings(), self._reference
-            )
+            extension = extend(self._body, self._scene, line, start, goal, self._settings(), self._reference)
             self._summary["postures"] += extension.searches
             self._summary["backtracks"] += extension.backtracks
             if extension.plan is not None:

@@ -1,15 +1,22 @@
-"""What is drawn from finished runs: figures and the BVH file of one, the comparison of two."""
+"""What is drawn: figures and the BVH file of a run, the comparison of two, a contact that was found."""
 
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from manikin.atomic import write_text
+from manikin.body import BodyModel
 from manikin.comparison import RunComparison
 from manikin.errors import MotionFileError
 from manikin.export import export_motion
-from manikin.figures import write_comparison, write_figures
+from manikin.figures import ChoicePanel, contact_choice_figure, write_comparison, write_figures
+from manikin.figures.style import readable
+from manikin.figures.write import save_figure
 from manikin.output import FIGURES, to_json
 from manikin.record import read_run
+from manikin.scene import Scene
+from manikin.single_contact import ContactAnswer
 
 COMPARISON = "comparison.json"
 
@@ -67,6 +74,29 @@ def write_comparison_products(
         ) from None
     report = progress or _silent
     return [file, *write_comparison(comparison, folder, lambda share: report("figures", share))]
+
+
+def write_contact_figure(body: BodyModel, scene: Scene, answer: ContactAnswer, path: str | Path) -> Path:
+    """Draw the body before and after it made the contact that was asked for.
+
+    Args:
+        body: The body.
+        scene: Its surroundings.
+        answer: What was found, or not.
+        path: PNG file.
+
+    Raises:
+        MotionFileError: If the file cannot be written.
+    """
+    result, file = answer.result, Path(path)
+    task = np.array(answer.question.task) / np.linalg.norm(answer.question.task)
+    panels = [ChoicePanel("before", answer.q, task=task)]
+    if result.q is not None and result.contact is not None:
+        title = f"{answer.question.heuristic}: {result.obstacle}, EFORT {answer.efort:.2f}"
+        panels.append(ChoicePanel(title, result.q, (result.contact,), (result.limb,), task))
+    figure = contact_choice_figure(body, scene, panels, f"Contact of {readable(result.limb)}")
+    save_figure(figure, file)
+    return file
 
 
 def _silent(_stage: str, _share: float) -> None:

@@ -434,3 +434,95 @@ def test_closed_pipe_is_no_traceback():
     finished = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
     assert "Traceback" not in finished.stderr
     assert "Exception" not in finished.stderr
+
+
+CUPBOARD = """
+name: cupboard
+scene:
+  - {name: cupboard, box: [0.6, 1.2, 1.9], position: [0.8, 0.0, 0.95]}
+task: {start: {at: [0, 0], heading_deg: 0}, goal: {at: [0, 0]}}
+"""
+PUSHING = ["--limb", "right_arm", "--task", "1", "0", "0"]
+
+
+@pytest.fixture
+def cupboard(tmp_path):
+    (tmp_path / "cupboard.yaml").write_text(CUPBOARD)
+    return str(tmp_path / "cupboard.yaml")
+
+
+def test_a_pushing_hand_is_put_on_the_cupboard_and_against_the_push(capfd, cupboard, tmp_path):
+    picture = tmp_path / "answer.png"
+    assert main(["contact", cupboard, *PUSHING, "--json", "--figure", str(picture)]) == DONE
+    out, err = capfd.readouterr()
+    answer = json.loads(out)
+    assert err == ""
+    assert answer["found"]
+    assert answer["failure"] is None
+    assert answer["obstacle"] == "cupboard"
+    assert answer["role"] == "object"
+    assert answer["normal"] == pytest.approx([-1.0, 0.0, 0.0])
+    assert answer["position"][0] == pytest.approx(0.5)
+    assert answer["efort"] > 0.0
+    assert answer["candidates"] > 0
+    assert answer["wall_ms"] > 0.0
+    assert picture.stat().st_size > 1000
+
+
+def test_a_person_is_asked_where_they_are_told_to_stand(capfd, cupboard):
+    """Turned by a quarter and beside the cupboard, the other arm touches its side."""
+    place = ["--at", "0.8", "-1.0", "--heading", "90"]
+    asked = ["--limb", "left_arm", "--task", "0", "1", "0", *place, "--role", "object"]
+    assert main(["contact", cupboard, *asked, "--json"]) == DONE
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["normal"] == pytest.approx([0.0, -1.0, 0.0], abs=1e-12)
+    assert answer["q"][:2] == [0.8, -1.0]
+
+
+def test_no_contact_is_an_explained_failure(capfd, cupboard):
+    far = ["--at", "-3", "0"]
+    assert main(["contact", cupboard, *PUSHING, *far, "--json"]) == FAILED
+    answer = json.loads(capfd.readouterr().out)
+    assert not answer["found"]
+    assert answer["failure"] == "no surface is within reach of right_arm"
+    assert answer["hindrance"] == "reach"
+    assert answer["position"] is None
+    assert main(["contact", cupboard, *PUSHING, *far]) == FAILED
+    out, err = capfd.readouterr()
+    assert "no contact: no surface is within reach" in err
+    assert "found" in out
+
+
+def test_built_in_scenarios_are_asked_at_the_place_of_their_feet(capfd):
+    assert main(["contact", "platform", "--limb", "left_leg", "--task", "0", "0", "1", "--json"]) == DONE
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["obstacle"] == "floor"
+    assert answer["role"] == "body"
+    assert answer["kind"] == "sole"
+
+
+@pytest.mark.parametrize(
+    ("changed", "says"),
+    [
+        (["--limb", "arm", "--task", "1", "0", "0"], "no limb 'arm'; valid: left_arm, right_arm"),
+        (["--limb", "left_arm", "--task", "0", "0", "0"], "task is [0.0, 0.0, 0.0]; valid: a direction"),
+        (["--limb", "left_arm", "--task", "nan", "0", "0"], "task"),
+        (["--limb", "left_arm", "--task", "1", "0"], "--task"),
+        (["--limb", "left_arm"], "--task"),
+        (["--task", "1", "0", "0"], "--limb"),
+        ([*PUSHING, "--role", "hero"], "role is 'hero'; valid: auto, body, object"),
+        ([*PUSHING, "--kind", "glue"], "kind is 'glue'; valid: sole, point, grasp"),
+        ([*PUSHING, "--heuristic", "hope"], "heuristic is 'hope'; valid: efort, distance"),
+        ([*PUSHING, "--posture", "flying"], "posture is 'flying'; valid: standing"),
+        ([*PUSHING, "--samples", "3"], "--samples"),
+        ([*PUSHING, "--at", "nan", "0"], "at x [m]"),
+        ([*PUSHING, "--heading", "inf"], "heading [deg]"),
+        ([*PUSHING, "--figure", "/nowhere/x.png"], "/nowhere/x.png"),
+    ],
+)
+def test_wrong_questions_about_a_contact_are_refused_in_one_line(capfd, cupboard, changed, says):
+    assert_refused(capfd, ["contact", cupboard, *changed], says)
+
+
+def test_a_body_without_limbs_is_refused(capfd):
+    assert_refused(capfd, ["contact", "walls", *PUSHING], "has no limbs; valid: ")

@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manikin.body import Configuration, limb_named
+from manikin.body import Configuration, NaturalRange, limb_named
 from manikin.contact import Stance, sole
 from manikin.contact_planning import (
     Balance,
     Candidates,
     ClosestDistance,
+    Comfort,
     Duration,
     Efort,
     Manipulability,
@@ -111,3 +112,8 @@ def test_balance_prefers_a_contact_on_the_side_to_which_the_body_falls(situation
     assert before == same
     assert before > 0.0 > behind
     assert Balance(held, (-3.0, 0.0, 0.0), binary=True).score(situation, given).tolist() == [1.0, 1.0, 0.0]
+
+
+def test_comfort_is_the_normalised_distance_of_the_samples(person, person_samples, situation, candidates):
+    wanted = NaturalRange(person, situation.limb).normalised(person_samples["left_arm"].angles[:3])
+    np.testing.assert_array_equal(Comfort(person_samples).score(situation, candidates), wanted)

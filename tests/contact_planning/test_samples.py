@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from manikin.body import Configuration, limb_named, limb_placement
+from manikin.body import Configuration, NaturalRange, limb_named, limb_placement
 from manikin.body.limbs import limb_slots
-from manikin.contact_planning import manipulability, mirrored, sample_limb
-from manikin.contact_planning.grid import SampleGrid
+from manikin.contact_planning import manipulability, mirrored, sample_limb, sample_limbs
 from manikin.errors import BodyError
 
 
@@ -89,12 +88,29 @@ def test_manipulability_is_the_root_of_the_determinant():
     assert np.allclose(manipulability(products) ** 2, np.linalg.det(products))
 
 
-def test_cells_hold_every_point_once_within_their_ball():
-    points = np.random.default_rng(2).standard_normal((2000, 3))
-    grid = SampleGrid(points)
-    rows, owner = grid.points_of(np.arange(len(grid.radii)))
-    assert np.array_equal(np.sort(rows), np.arange(2000))
-    away = np.linalg.norm(points[rows] - grid.centres[owner], axis=1)
-    assert (away <= grid.radii[owner] + 1e-12).all()
-    twice, which = grid.points_of(np.array([3, 3]))
-    assert np.array_equal(twice[which == 0], twice[which == 1])
+def test_natural_samples_keep_to_the_learnt_ranges(person, creature):
+    """About a quarter of the box of an arm's intervals is left; limbs without volumes are as before."""
+    arm, leg = limb_named(person, "left_arm"), limb_named(creature, "left_front_leg")
+    reach = NaturalRange(person, arm)
+    plain, natural = (
+        sample_limb(person, arm, np.random.default_rng(1), 3000, natural=flag) for flag in (False, True)
+    )
+    assert natural.natural
+    assert not plain.natural
+    assert reach.contains(natural.angles).all()
+    assert 0.15 < reach.contains(plain.angles).mean() < 0.45
+    for name in ("left_knee", "left_leg"):
+        limb = limb_named(person, name)
+        samples = sample_limb(person, limb, np.random.default_rng(1), 500, natural=True)
+        assert NaturalRange(person, limb).contains(samples.angles).all()
+    same = [
+        sample_limb(creature, leg, np.random.default_rng(1), 300, natural=f).angles for f in (False, True)
+    ]
+    np.testing.assert_array_equal(*same)
+
+
+def test_mirrored_natural_samples_are_natural(person):
+    samples = sample_limbs(person, np.random.default_rng(0), 500, natural=True)
+    right = samples["right_leg"]
+    assert right.natural
+    assert NaturalRange(person, right.limb).contains(right.angles).all()

@@ -42,6 +42,10 @@ class LimbKinematics:
         lower: (k,) smallest angles [rad].
         upper: (k,) largest angles [rad].
         torque_limit: (k,) largest torques [N.m].
+        axes: (k, 3) unit axes of the hinges, each in the axes of the one before it.
+        offsets: (k, 3) translations before each hinge [m].
+        tip: (3,) translation from the last hinge to the effector [m].
+        tip_rotation: (3, 3) from the effector's axes to those of the last hinge.
     """
 
     def __init__(self, body: BodyModel, limb: Limb) -> None:
@@ -51,15 +55,16 @@ class LimbKinematics:
         self.lower = frozen_array([hinge.lower for hinge in hinges], "lower")
         self.upper = frozen_array([hinge.upper for hinge in hinges], "upper")
         self.torque_limit = frozen_array([hinge.torque_limit for hinge in hinges], "torque_limit")
-        self._axes = np.array([hinge.axis for hinge in hinges])
-        self._offsets, self._tip = _offsets(body, limb)
-        self._tip_rotation = np.array(body.effector(limb.effector).rotation)
-        self._crosses = skew(self._axes)
+        self.axes = frozen_array([hinge.axis for hinge in hinges], "axes")
+        offsets, tip = _offsets(body, limb)
+        self.offsets, self.tip = frozen_array(offsets, "offsets"), frozen_array(tip, "tip")
+        self.tip_rotation = frozen_array(body.effector(limb.effector).rotation, "tip_rotation")
+        self._crosses = skew(self.axes)
         self._squares = self._crosses @ self._crosses
 
     def __len__(self) -> int:
         """Number of hinges."""
-        return len(self._axes)
+        return len(self.axes)
 
     def random_angles(self, rng: np.random.Generator, count: int) -> FloatArray:
         """(count, k) angles, uniform within the joint ranges [rad]."""
@@ -86,22 +91,27 @@ class LimbKinematics:
             self._place_block(q[rows], found, rows)
         return found
 
-    def _place_block(self, q: FloatArray, out: EffectorPlacements, rows: slice) -> None:
-        """Turn by turn: ``I + sin a [k] + (1 - cos a) [k]^2`` about each unit axis ``k``."""
+    def _frames(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Axes before each hinge and after the last (n, k + 1, 3, 3), and places of the hinges (n, k, 3).
+
+        Turn by turn: ``I + sin a [k] + (1 - cos a) [k]^2`` about each unit axis ``k``.
+        """
         turns = np.sin(q)[..., None, None] * self._crosses
         turns += (1.0 - np.cos(q))[..., None, None] * self._squares
         turns += _IDENTITY
-        # Before each hinge, and after the last.
         frames = np.empty((len(q), len(self) + 1, 3, 3))
         frames[:, 0] = _IDENTITY
         for hinge in range(len(self)):
             np.matmul(frames[:, hinge], turns[:, hinge], out=frames[:, hinge + 1])
+        return frames, np.cumsum((frames[:, :-1] @ self.offsets[..., None])[..., 0], axis=1)
+
+    def _place_block(self, q: FloatArray, out: EffectorPlacements, rows: slice) -> None:
+        frames, places = self._frames(q)
         turn, before = frames[:, -1], frames[:, :-1]
-        axes = (before @ self._axes[..., None])[..., 0]
-        places = np.cumsum((before @ self._offsets[..., None])[..., 0], axis=1)
-        point = places[:, -1] + turn @ self._tip
+        axes = (before @ self.axes[..., None])[..., 0]
+        point = places[:, -1] + turn @ self.tip
         out.positions[rows] = point
-        out.rotations[rows] = turn @ self._tip_rotation
+        out.rotations[rows] = turn @ self.tip_rotation
         out.axes[rows] = axes.transpose(0, 2, 1)
         out.jacobians[rows] = _cross(axes, point[:, None] - places).transpose(0, 2, 1)
 

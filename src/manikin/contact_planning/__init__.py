@@ -1,6 +1,6 @@
 """Contacts found on their own: samples of limbs, EFORT, and the request for one contact."""
 
-from manikin.contact_planning.alignment import Alignment, align
+from manikin.contact_planning.alignment import Aligner, Alignment
 from manikin.contact_planning.candidates import Candidates, Situation, SurfaceTable, find_candidates
 from manikin.contact_planning.collisions import LimbCollisions
 from manikin.contact_planning.efort import (
@@ -13,7 +13,7 @@ from manikin.contact_planning.efort import (
     velocity_ellipsoid,
 )
 from manikin.contact_planning.endpoint import Endpoint, Endpoints, Habit
-from manikin.contact_planning.extend import Extension, ExtendSettings, extend
+from manikin.contact_planning.extend import ExtendSettings, Extension, extend
 from manikin.contact_planning.footholds import Foothold, Footholds, FootholdSettings
 from manikin.contact_planning.generator import (
     ContactGenerator,
@@ -23,8 +23,10 @@ from manikin.contact_planning.generator import (
 )
 from manikin.contact_planning.guide_line import GuideLine, heading_of
 from manikin.contact_planning.heuristics import (
+    HEURISTICS,
     Balance,
     ClosestDistance,
+    Comfort,
     Duration,
     Efort,
     Heuristic,
@@ -32,18 +34,23 @@ from manikin.contact_planning.heuristics import (
     Random,
     WeightedSum,
     duration,
+    heuristic_named,
 )
 from manikin.contact_planning.poser import Posed, Poser, PoserSettings
 from manikin.contact_planning.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
 from manikin.contact_planning.stage import ContactPlan, Stage
 from manikin.contact_planning.static_region import StaticRegion
+from manikin.contact_planning.storage import load_samples, samples_for, save_samples
 from manikin.contact_planning.touch import ContactRules, make_contact
 
 __all__ = [
+    "HEURISTICS",
+    "Aligner",
     "Alignment",
     "Balance",
     "Candidates",
     "ClosestDistance",
+    "Comfort",
     "ContactGenerator",
     "ContactPlan",
     "ContactRules",
@@ -76,19 +83,22 @@ __all__ = [
     "SurfaceTable",
     "Task",
     "WeightedSum",
-    "align",
     "duration",
     "efort",
     "extend",
     "find_candidates",
     "force_ellipsoid",
     "force_transmission_ratio",
-    "make_contact",
     "heading_of",
+    "heuristic_named",
+    "load_samples",
+    "make_contact",
     "manipulability",
     "mirrored",
     "pulling_efort",
     "sample_limb",
     "sample_limbs",
+    "samples_for",
+    "save_samples",
     "velocity_ellipsoid",
 ]

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manikin.body import EffectorPlacements, LimbKinematics
+from manikin.body import LimbKinematics
+from manikin.contact_planning.alignment_step import LEVER, AlignmentStep
 from manikin.spatial import FloatArray
 
 POSITION_TOLERANCE = 1e-5
@@ -13,125 +14,71 @@ TILT_TOLERANCE = 1e-4
 """Angle between the effector's z axis and the normal that counts as aligned [rad]."""
 STEPS = 7
 """Steps for position and normal, and again for the position alone."""
-_STALLED = 0.9  # a row that comes no nearer than this share of its distance is left alone
-_DAMPING = 1e-3
-_LARGEST_STEP = 0.4  # [rad]
-_LEVER = 0.3  # [m], what one radian of tilt weighs beside one metre
+_STALLED = 0.9  # what comes no nearer than this share of its distance is left alone
 
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Limbs put onto points, one row each.
+    """A limb put onto a point.
 
     Attributes:
-        angles: (n, k) [rad], within the joint ranges.
-        rotations: (n, 3, 3) from the effector's axes to the limb frame's.
-        error: (n,) distance of the effector to its point [m].
-        tilt: (n,) angle between the effector's z axis and the normal [rad].
+        angles: (k,) [rad], within the joint ranges.
+        rotation: (3, 3) from the effector's axes to the limb frame's.
+        error: Distance of the effector to its point [m].
+        tilt: Angle between the effector's z axis and the normal [rad].
     """
 
     angles: FloatArray
-    rotations: FloatArray
-    error: FloatArray
-    tilt: FloatArray
+    rotation: FloatArray
+    error: float
+    tilt: float
+
+    def lies(self, max_tilt: float) -> bool:
+        """Whether the effector is at its point and tilted by at most ``max_tilt`` [rad]."""
+        return self.error <= POSITION_TOLERANCE and self.tilt <= max_tilt
 
 
-def align(
-    chain: LimbKinematics,
-    angles: FloatArray,
-    points: FloatArray,
-    normals: FloatArray,
-    max_tilt: float = TILT_TOLERANCE,
-) -> Alignment:
-    """Move effectors to points, their z axes along normals, by damped least squares within the joint ranges.
+class Aligner:
+    """Puts the effector of one limb onto points; works on buffers of its own."""
 
-    All rows are moved at once. Where a tilt is allowed, the position comes first: rows that are not
-    upright after some steps make the last ones for the position alone. Joints at the end of their
-    range that would leave it are held there.
+    def __init__(self, chain: LimbKinematics) -> None:
+        """Prepare the steps of a limb."""
+        self._level = AlignmentStep(chain, level=True)
+        self._shift = AlignmentStep(chain, level=False)
 
-    Args:
-        chain: The limb.
-        angles: (n, k) to begin with [rad].
-        points: (n, 3) in the limb's frame [m].
-        normals: (n, 3) unit vectors in the limb's frame.
-        max_tilt: Angle between z axis and normal that the caller will accept [rad].
-    """
-    q = _descend(chain, np.array(angles), points, normals, level=True)
-    found = _measured(chain, q, points, normals)
-    rest = np.flatnonzero(found.error > POSITION_TOLERANCE)
-    if max_tilt <= TILT_TOLERANCE or not len(rest):
-        return found
-    q[rest] = _descend(chain, q[rest], points[rest], normals[rest], level=False)
-    return _measured(chain, q, points, normals)
+    def align(
+        self, angles: FloatArray, point: FloatArray, normal: FloatArray, max_tilt: float = TILT_TOLERANCE
+    ) -> Alignment:
+        """Move the effector to a point, its z axis along a normal, by damped least squares.
+
+        The joint ranges are kept. Where a tilt is allowed, the position comes first: what is not
+        there, upright, after some steps makes the last ones for the position alone.
+
+        Args:
+            angles: (k,) to begin with [rad].
+            point: (3,) in the limb's frame [m].
+            normal: (3,) unit vector in the limb's frame.
+            max_tilt: Angle between z axis and normal that the caller will accept [rad].
+        """
+        found = _descend(self._level, angles, point, normal, LEVER)
+        if max_tilt <= TILT_TOLERANCE or found.error <= POSITION_TOLERANCE:
+            return found
+        return _descend(self._shift, found.angles, point, normal, 0.0)
 
 
 def _descend(
-    chain: LimbKinematics, q: FloatArray, points: FloatArray, normals: FloatArray, *, level: bool
-) -> FloatArray:
-    """Angles after several steps, until every row has arrived or gets no nearer."""
-    last = np.full(len(q), np.inf)
-    resting = np.zeros(len(q), dtype=bool)
+    step: AlignmentStep, angles: FloatArray, point: FloatArray, normal: FloatArray, lever: float
+) -> Alignment:
+    """Take steps until the effector has arrived or gets no nearer."""
+    step.q[:], step.point[:], step.normal[:] = angles, point, normal
+    last = np.inf
+    error, tilt = step()
     for _ in range(STEPS):
-        placed = chain.place(q)
-        missing = _missing(placed, points, normals)
-        error, tilt = _length(missing[:, :3]), _length(missing[:, 3:])
-        left = error + _LEVER * tilt if level else error
-        resting |= (left > _STALLED * last) | (
-            (error <= POSITION_TOLERANCE) & ((tilt <= TILT_TOLERANCE) | (not level))
-        )
-        if resting.all():
+        left = error + lever * tilt
+        arrived = error <= POSITION_TOLERANCE and (tilt <= TILT_TOLERANCE or lever == 0.0)
+        if arrived or left > _STALLED * last:
             break
         last = left
-        jacobian = placed.jacobians
-        if level:
-            jacobian = np.concatenate([jacobian, _LEVER * _across(placed)], axis=1)
-            missing[:, 3:] *= _LEVER
-        missing[resting] = 0.0
-        q = _moved(chain, q, jacobian, missing[:, : jacobian.shape[1]])
-    return q
-
-
-def _measured(chain: LimbKinematics, q: FloatArray, points: FloatArray, normals: FloatArray) -> Alignment:
-    placed = chain.place(q)
-    missing = _missing(placed, points, normals)
-    return Alignment(q, placed.rotations, _length(missing[:, :3]), _length(missing[:, 3:]))
-
-
-def _missing(placed: EffectorPlacements, points: FloatArray, normals: FloatArray) -> FloatArray:
-    """(n, 6) what is missing in position [m] and, as a rotation vector, in tilt [rad]."""
-    z = placed.rotations[:, :, 2]
-    out = np.empty((len(z), 6))
-    out[:, :3] = points - placed.positions
-    turn = out[:, 3:]
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        turn[:, i] = z[:, j] * normals[:, k] - z[:, k] * normals[:, j]
-    sine = _length(turn)
-    angle = np.arctan2(sine, np.einsum("ni,ni->n", z, normals))
-    # At half a turn every axis across does, and the effector's x axis is one.
-    opposite = (sine < 1e-9) & (angle > 1.0)
-    if opposite.any():
-        turn[opposite], sine[opposite] = placed.rotations[opposite, :, 0], 1.0
-    turn *= (angle / np.maximum(sine, 1e-12))[:, None]
-    return out
-
-
-def _across(placed: EffectorPlacements) -> FloatArray:
-    """(n, 3, k) angular velocity of the effector without its part about its own z axis."""
-    z = placed.rotations[:, :, 2]
-    return placed.axes - z[:, :, None] * (z[:, None] @ placed.axes)
-
-
-def _moved(chain: LimbKinematics, q: FloatArray, jacobian: FloatArray, missing: FloatArray) -> FloatArray:
-    """Angles after one damped step."""
-    pull = (missing[:, None] @ jacobian)[:, 0]
-    held = ((q <= chain.lower) & (pull < 0.0)) | ((q >= chain.upper) & (pull > 0.0))
-    free = jacobian * ~held[:, None]
-    turned = free.transpose(0, 2, 1)
-    square = free @ turned + _DAMPING**2 * np.eye(free.shape[1])
-    move = (turned @ np.linalg.solve(square, missing[..., None]))[..., 0]
-    return np.clip(q + np.clip(move, -_LARGEST_STEP, _LARGEST_STEP), chain.lower, chain.upper)
-
-
-def _length(vectors: FloatArray) -> FloatArray:
-    """(n,) lengths of (n, 3), quicker than ``np.linalg.norm`` for few."""
-    return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
+        step.q[:] = step.moved
+        error, tilt = step()
+    return Alignment(step.q.copy(), step.rotation.reshape(3, 3).T.copy(), error, tilt)

@@ -73,6 +73,13 @@ class SurfaceTable:
 
     Attributes:
         surfaces: The surfaces.
+        normals: (m, 3) their unit normals.
+        offsets: (m,) of their planes along the normals [m].
+        group: (m,) number of the direction that a surface has for its normal.
+        frames: (g, 3, 3) of each direction the normal and two axes in its planes.
+        side_low: (m, 2) smallest coordinates of the polygons along these axes [m].
+        side_high: (m, 2) largest ones.
+        filled: (m,) whether a polygon is all of the rectangle between them, as the faces of boxes are.
     """
 
     def __init__(self, surfaces: Sequence[Surface]) -> None:
@@ -81,26 +88,50 @@ class SurfaceTable:
         self.offsets = np.array([item.polygon[0] @ item.normal for item in surfaces])
         self._low = np.array([item.polygon.min(axis=0) for item in surfaces]).reshape(-1, 3)
         self._high = np.array([item.polygon.max(axis=0) for item in surfaces]).reshape(-1, 3)
+        self._group_surfaces()
         walls = [_walls(item) for item in surfaces]
         self._convex = np.array([item is not None for item in walls], dtype=bool)
         self._walls, self._wall_offsets = _padded(walls)
 
+    def _group_surfaces(self) -> None:
+        """Sort surfaces by their normals, of which the faces of boxes have few, and bound them sideways."""
+        rounded = np.round(self.normals, 9)
+        _, first, group = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        self.group: IntArray = group.ravel()
+        sides = np.array([self.surfaces[number].rotation[:, :2].T for number in first]).reshape(-1, 2, 3)
+        self.frames = np.concatenate([self.normals[first][:, None], sides], axis=1)
+        shadows = [
+            item.polygon @ sides[number].T for item, number in zip(self.surfaces, self.group, strict=True)
+        ]
+        self.side_low = np.array([item.min(axis=0) for item in shadows]).reshape(-1, 2)
+        self.side_high = np.array([item.max(axis=0) for item in shadows]).reshape(-1, 2)
+        areas = np.array([item.area for item in self.surfaces])
+        self.filled: NDArray[np.bool_] = areas >= np.prod(self.side_high - self.side_low, axis=1) * (1 - 1e-9)
+
     def within_reach(self, situation: Situation, samples: LimbSamples, tolerance: float) -> IntArray:
         """Surfaces that may meet the reach of a limb (step 1): no reachable one is left out.
 
-        The box of the polygon must meet the ball of the reach, and its plane the hull.
+        The box of the polygon must meet the ball of the reach, and, along the normal and the sides of
+        the polygon, the extents of the hull.
 
         Args:
             situation: Where the limb is.
             samples: Samples of the limb.
             tolerance: How far beyond the hull a surface may be [m].
         """
-        hull = samples.reach.vertices - samples.origin
-        radius = float(np.linalg.norm(hull, axis=1).max()) + tolerance
-        nearest = np.clip(situation.origin, self._low, self._high)
-        near = np.flatnonzero(((nearest - situation.origin) ** 2).sum(axis=1) <= radius**2)
-        heights = hull @ (self.normals[near] @ situation.rotation).T + self.height_of(situation.origin, near)
-        meets = (heights.min(axis=0) <= tolerance) & (heights.max(axis=0) >= -tolerance)
+        hull, radius = samples.hull
+        away = np.clip(situation.origin, self._low, self._high) - situation.origin
+        near = np.flatnonzero(np.einsum("mi,mi->m", away, away) <= (radius + tolerance) ** 2)
+        # Extents of the hull along the normals and sides of all directions, from the limb's origin.
+        extents = self.frames @ (situation.rotation @ hull.T)
+        low, high = extents.min(axis=2) - tolerance, extents.max(axis=2) + tolerance
+        offset = self.frames @ situation.origin
+        group = self.group[near]
+        heights = self.offsets[near] - offset[group, 0]
+        meets = (heights >= low[group, 0]) & (heights <= high[group, 0])
+        sides = offset[group, 1:]
+        meets &= (self.side_high[near] - sides >= low[group, 1:]).all(axis=1)
+        meets &= (self.side_low[near] - sides <= high[group, 1:]).all(axis=1)
         return near[meets]
 
     def over(
@@ -137,6 +168,12 @@ class SurfaceTable:
         each = self.over(corners.reshape(-1, 3), np.repeat(numbers, len(footprint)))
         return np.logical_and.reduce(each.reshape(len(points), len(footprint)), axis=1)
 
+    def carries_one(self, corners: FloatArray, number: int) -> bool:
+        """Whether all (c, 3) corners of one footprint in the world project into a polygon [m]."""
+        if self._convex[number]:
+            return bool((corners @ self._walls[number].T <= self._wall_offsets[number]).all())
+        return bool((self.surfaces[number].outside(corners) <= 0.0).all())
+
     def height_of(self, point: FloatArray, numbers: IntArray) -> FloatArray:
         """(m,) signed distance of one world point to the planes of some surfaces [m]."""
         return self.normals[numbers] @ point - self.offsets[numbers]
@@ -164,23 +201,12 @@ def find_candidates(
             tilted more cannot be aligned by small moves of the joints.
         footprint: (c, 3) points of the effector's frame that must lie over the polygon [m].
     """
+    rows, owner, gap = _near_planes(table, numbers, situation, samples, tolerance, float(np.cos(max_tilt)))
     normals = table.normals[numbers] @ situation.rotation
-    heights = table.height_of(situation.origin, numbers)
-    grid = samples.grid
-    at_cells = np.abs(grid.centres @ normals.T + heights) <= tolerance + grid.halves @ np.abs(normals.T)
-    cells, owners = np.nonzero(at_cells)
-    ball = grid.radii[cells] + tolerance
-    near = table.over(situation.to_world(grid.centres)[cells], numbers[owners], ball)
-    rows, of_cell = grid.points_of(cells[near])
-    owner = owners[near][of_cell]
-    upright = _upright(samples, normals, rows, owner, float(np.cos(max_tilt)))
-    rows, owner = rows[upright], owner[upright]
-    gap = _along(samples.positions[rows], normals[owner]) + heights[owner]
-    close = np.abs(gap) <= tolerance
-    rows, owner, gap = rows[close], owner[close], gap[close]
     points = situation.to_world(samples.positions[rows] - gap[:, None] * normals[owner])
-    inside = table.over(points, numbers[owner])
-    rows, owner, points = rows[inside], owner[inside], points[inside]
+    if not table.filled[numbers].all():
+        inside = table.over(points, numbers[owner])
+        rows, owner, points = rows[inside], owner[inside], points[inside]
     if len(footprint) > 1:
         turns = situation.rotation @ samples.rotations[rows]
         inside = table.carries(points, turns, numbers[owner], footprint)
@@ -198,26 +224,43 @@ def find_candidates(
     )
 
 
-def _upright(
-    samples: LimbSamples, normals: FloatArray, rows: IntArray, owner: IntArray, least: float
-) -> NDArray[np.bool_]:
-    """(n,) whether the cosine of the effector's z axis and the surface's normal is at least ``least``.
+def _near_planes(
+    table: SurfaceTable,
+    numbers: IntArray,
+    situation: Situation,
+    samples: LimbSamples,
+    tolerance: float,
+    least: float,
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Samples upright over planes, within the bounds of their polygons; one direction of planes at a time.
 
-    Many surfaces share few normals, as the faces of boxes do: then a table of all samples is quicker.
+    Returns:
+        Rows of the samples, positions of their surfaces in ``numbers``, heights over the planes [m].
     """
-    distinct, which = np.unique(np.round(normals, 9), axis=0, return_inverse=True)
-    if len(distinct) * len(samples) <= 2 * len(rows):
-        table = samples.upward @ distinct.T >= least
-        return table[rows, which.ravel()[owner]]
-    return _along(samples.upward[rows], normals[owner]) >= least
-
-
-def _along(vectors: FloatArray, normals: FloatArray) -> FloatArray:
-    """(n,) dot products of rows; column by column, which is the quickest for many short ones."""
-    found = vectors[:, 0] * normals[:, 0]
-    found += vectors[:, 1] * normals[:, 1]
-    found += vectors[:, 2] * normals[:, 2]
-    return found
+    own_group = table.group[numbers]
+    groups = np.unique(own_group)
+    frames = table.frames[groups] @ situation.rotation
+    upright = frames[:, 0] @ samples.upward.T >= least
+    places = (frames.reshape(-1, 3) @ samples.positions.T).reshape(len(groups), 3, -1)
+    places += (table.frames[groups] @ situation.origin)[..., None]
+    found: list[tuple[IntArray, IntArray, FloatArray]] = []
+    for column, group in enumerate(groups.tolist()):
+        own = np.flatnonzero(own_group == group)
+        surfaces = numbers[own]
+        offsets = table.offsets[surfaces]
+        height = places[column, 0]
+        level = (height >= offsets.min() - tolerance) & (height <= offsets.max() + tolerance)
+        rows = np.flatnonzero(upright[column] & level)
+        gaps = height[rows] - offsets[:, None]
+        inside = np.abs(gaps) <= tolerance
+        for axis in (0, 1):
+            place = places[column, 1 + axis, rows]
+            inside &= place >= table.side_low[surfaces, axis, None]
+            inside &= place <= table.side_high[surfaces, axis, None]
+        which, near = np.nonzero(inside)
+        found.append((rows[near], own[which], gaps[which, near]))
+    rows, owner, gap = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return rows, owner, gap
 
 
 def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:

@@ -1,14 +1,17 @@
 """Whether one limb of a body touches the scene or the rest of the body."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from manikin.body import BodyModel, Limb, ShapeKind
+from manikin.body import BodyModel, Limb, Shape, ShapeKind
 from manikin.contact import ContactKind
+from manikin.contact_planning.candidates import Situation
 from manikin.scene import Scene, segment_of
-from manikin.scene.collision import collision_parts
+from manikin.scene.collision import CollisionPart, collision_parts
 from manikin.spatial import FloatArray
 
 TOUCH = 0.002
@@ -32,7 +35,8 @@ class LimbCollisions:
     def __init__(self, body: BodyModel, limb: Limb, scene: Scene) -> None:
         self._model = body.pinocchio
         self._data = self._model.createData()
-        self._shapes = _with_scene(body, scene)
+        parts = [part for obstacle in scene for part in collision_parts(obstacle)]
+        self._shapes = _with_scene(body, parts)
         moving = _moving_segments(body, limb)
         count = len(body.geometry.geometryObjects)
         names = [item.name for item in self._shapes.geometryObjects]
@@ -41,9 +45,11 @@ class LimbCollisions:
         outer = [(shape, part) for shape in own for part in range(count, len(names))]
         inner = [(names.index(a), names.index(b)) for a, b in body.collision_pairs]
         inner = [pair for pair in inner if (pair[0] in own) != (pair[1] in own) or set(pair) <= set(own)]
+        inner = [(a, b) if a in own else (b, a) for a, b in inner]
         for pair in outer + inner:
             self._shapes.addCollisionPair(pin.CollisionPair(*pair))
         self._placed = pin.GeometryData(self._shapes)
+        self._results = list(self._placed.collisionResults)  # references: making one takes longer
         self._names = [(names[a], names[b].rsplit("#", 1)[0]) for a, b in outer]
         soft, self._depth = yielding(body, limb)
         self._yielding: dict[str, list[int]] = {}
@@ -53,12 +59,28 @@ class LimbCollisions:
                 self._yielding.setdefault(obstacle, []).append(number)
         self._names += [(names[a], names[b]) for a, b in inner]
         self._touched: str | None = None
+        self._far = FarPairs(body, limb, parts, self._shapes, self._placed, outer + inner)
+        self._active = np.ones(len(self._names), dtype=bool)
+        self._tested = list(zip(self._names, self._results, strict=True))
+
+    def begin(self, situation: Situation) -> None:
+        """Leave out what the limb cannot reach wherever its joints are, until the next call."""
+        pin.updateGeometryPlacements(
+            self._model, self._data, self._shapes, self._placed, np.asarray(situation.state.q)
+        )
+        near = self._far.near(situation.origin)
+        for number in np.flatnonzero(near & ~self._active).tolist():
+            self._placed.activateCollisionPair(number)
+        for number in np.flatnonzero(self._active & ~near).tolist():
+            self._placed.deactivateCollisionPair(number)
+        self._active = near
+        self._tested = [(self._names[number], self._results[number]) for number in np.flatnonzero(near)]
 
     def first(self, q: FloatArray, touched: str | None = None) -> tuple[str, str] | None:
         """Names of the first pair that collides at a configuration (nq,), or None.
 
         Args:
-            q: The configuration.
+            q: The configuration; all but the limb as in the situation that was begun, if one was.
             touched: Name of the obstacle on which the limb has its contact.
 
         Returns:
@@ -70,23 +92,99 @@ class LimbCollisions:
             self._touched = touched
         if not pin.computeCollisions(self._model, self._data, self._shapes, self._placed, q, True):
             return None
-        results = self._placed.collisionResults
-        return next(name for name, result in zip(self._names, results, strict=True) if result.isCollision())
+        return next(names for names, result in self._tested if result.isCollision())
 
     def _set_margin(self, obstacle: str | None, depth: float) -> None:
         for number in self._yielding.get(obstacle or "", ()):
             self._placed.collisionRequests[number].security_margin = -depth
 
 
-def _with_scene(body: BodyModel, scene: Scene) -> Any:
+class FarPairs:
+    """Tells which pairs of a limb's shape and something else can never touch while the rest stays.
+
+    A shape of the limb is within a ball around the limb's origin whatever the joints do.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        limb: Limb,
+        parts: Sequence[CollisionPart],
+        shapes: pin.GeometryModel,
+        placed: pin.GeometryData,
+        pairs: Sequence[tuple[int, int]],
+    ) -> None:
+        """Prepare the pairs.
+
+        Args:
+            body: The body.
+            limb: Its limb.
+            parts: Of the scene.
+            shapes: Shapes of the body, then the parts.
+            placed: Where they are, updated by the caller.
+            pairs: (shape of the limb, part, or shape of the body) each.
+        """
+        reaches = _reaches(body, limb)
+        names = [item.name for item in shapes.geometryObjects]
+        count = len(names) - len(parts)
+        self._reach = np.array([reaches[names[first]] for first, _ in pairs])
+        self._others = np.array([second for _, second in pairs], dtype=np.int64)
+        own = {first for first, _ in pairs}
+        self._fixed = [number for number in range(count) if number not in own]
+        self._frames = [placed.oMg[number] for number in self._fixed]  # references: making one takes longer
+        self._radii = np.array([_radius(shapes.geometryObjects[number]) for number in self._fixed])
+        self._rotations = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
+        self._places = np.array([part.translation for part in parts]).reshape(-1, 3)
+        self._low = np.array([part.low for part in parts]).reshape(-1, 3)
+        self._high = np.array([part.high for part in parts]).reshape(-1, 3)
+        self._gaps = np.full(len(names), -np.inf)  # what belongs to the limb is always near
+        self._count = count
+
+    def near(self, origin: FloatArray) -> NDArray[np.bool_]:
+        """(pairs,) whether a pair may touch when the origin of the limb's frame is at (3,) [m]."""
+        away = np.array([frame.translation for frame in self._frames]).reshape(-1, 3) - origin
+        self._gaps[self._fixed] = np.sqrt(np.einsum("ni,ni->n", away, away)) - self._radii
+        local = np.einsum("nji,nj->ni", self._rotations, origin - self._places)
+        outside = np.maximum(np.maximum(self._low - local, local - self._high), 0.0)
+        self._gaps[self._count :] = np.sqrt(np.einsum("ni,ni->n", outside, outside))
+        return self._gaps[self._others] <= self._reach
+
+
+def _with_scene(body: BodyModel, parts: Sequence[CollisionPart]) -> Any:
     """Copy of the body's geometry with the obstacles fixed to the world."""
     shapes = body.geometry.copy()
-    for obstacle in scene:
-        for number, part in enumerate(collision_parts(obstacle)):
-            place = pin.SE3(np.array(part.rotation), np.array(part.translation))
-            name = f"{obstacle.name}#{number}"
-            shapes.addGeometryObject(pin.GeometryObject(name, 0, 0, place, part.geometry))
+    for number, part in enumerate(parts):
+        place = pin.SE3(np.array(part.rotation), np.array(part.translation))
+        name = f"{part.obstacle}#{number}"
+        shapes.addGeometryObject(pin.GeometryObject(name, 0, 0, place, part.geometry))
     return shapes
+
+
+def _reaches(body: BodyModel, limb: Limb) -> dict[str, float]:
+    """Largest distance of each of the limb's shapes from the limb's origin, by the shape's name [m]."""
+    along = {limb.segments[0]: 0.0}
+    for segment in body.segments:
+        if segment.parent in along and segment.name not in along:
+            along[segment.name] = along[segment.parent] + float(np.linalg.norm(segment.origin))
+    return {
+        f"{name}/{shape.name}": length + float(np.linalg.norm(shape.translation)) + _extent(shape)
+        for name, length in along.items()
+        for shape in body.segment(name).shapes
+    }
+
+
+def _extent(shape: Shape) -> float:
+    """Radius of the ball around the centre of a shape [m]."""
+    if shape.kind is ShapeKind.BOX:
+        return 0.5 * float(np.linalg.norm(shape.size))
+    return float(shape.size[0]) + (0.5 * float(shape.size[1]) if len(shape.size) > 1 else 0.0)
+
+
+def _radius(item: pin.GeometryObject) -> float:
+    """Radius of a ball around the origin of a geometry [m]."""
+    item.geometry.computeLocalAABB()
+    box = item.geometry.aabb_local
+    return float(np.linalg.norm(np.maximum(np.abs(box.min_), np.abs(box.max_))))
 
 
 def _moving_segments(body: BodyModel, limb: Limb) -> set[str]:

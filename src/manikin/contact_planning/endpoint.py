@@ -9,7 +9,7 @@ import numpy as np
 from manikin.body import BodyModel, Configuration
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, sole
-from manikin.contact_planning.footholds import Footholds
+from manikin.contact_planning.footholds import Footholds, stature_of
 from manikin.contact_planning.poser import Poser
 from manikin.contact_planning.stage import Stage
 from manikin.scene import Scene, Surface
@@ -64,6 +64,7 @@ class Endpoints:
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
         """
         self._body, self._scene, self._friction = body, scene, friction
+        self._stature = stature_of(body)
         self._poser = Poser(body, scene, reference)
         self._footholds = Footholds(body, scene)
 
@@ -119,7 +120,7 @@ class Endpoints:
     def _seated(
         self, at: FloatArray, heading: float, _habit: Habit, height: float | None
     ) -> Iterator[tuple[dict[str, Contact], FloatArray]]:
-        size = self._body.stature
+        size = self._stature
         low, high = (share * size for share in SEAT_HEIGHTS)
         for floor in self._levels(at, None):
             for seat in self._levels(at, height):
@@ -136,7 +137,7 @@ class Endpoints:
         self, buttocks: Contact, floor: float, heading: float
     ) -> Iterator[tuple[dict[str, Contact], FloatArray]]:
         """Feet on the floor before a seat, the nearest to it first."""
-        turn, size = rotation_from_yaw(heading), self._body.stature
+        turn, size = rotation_from_yaw(heading), self._stature
         q = self._body.posture({**self._body.standing_angles, **_SITTING})
         q[3:7] = _level_turn(heading)
         q[:3] += buttocks.position - Configuration(self._body, q).effector_placement("buttocks")[1]
@@ -145,7 +146,9 @@ class Endpoints:
             for foot, side in (("left_foot", 0.07), ("right_foot", -0.07)):
                 wanted = buttocks.position + turn @ np.array([distance * size, side * size, 0.0])
                 wanted[2] = floor
-                holds = [h for h in self._footholds.near(wanted, heading) if abs(h.position[2] - floor) < 0.02]
+                holds = [
+                    h for h in self._footholds.near(wanted, heading) if abs(h.position[2] - floor) < 0.02
+                ]
                 close = [h for h in holds if np.linalg.norm(h.position - wanted) < 0.05]
                 if close:
                     sizes = self._footholds.length, self._footholds.width

@@ -15,13 +15,12 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
-from manikin.contact_planning.footholds import Footholds
+from manikin.contact_planning.footholds import Footholds, stature_of
 from manikin.contact_planning.guide_line import GuideLine, heading_of
 from manikin.contact_planning.poser import Poser
 from manikin.contact_planning.stage import ContactPlan, Stage
 from manikin.scene import Scene
 from manikin.spatial import FloatArray, rotation_from_yaw
-
 
 LEANING = (0.25, 0.5, 0.75)
 """Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
@@ -133,7 +132,7 @@ class _Search:
         self._body = body = poser.body
         self._footholds = Footholds(body, poser.scene)
         self._feet = _standing_feet(body)
-        self._stride = settings.stride * body.stature / 1.75
+        self._stride = settings.stride * stature_of(body) / 1.75
         self._reasons: Counter[str] = Counter()
         self._backtracks = 0
         self._farthest = 0.0

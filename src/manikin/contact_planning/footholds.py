@@ -9,7 +9,7 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.contact import Contact, sole
 from manikin.contact_planning.touch import onto_normal
-from manikin.errors import ContactError
+from manikin.errors import BodyError, ContactError
 from manikin.scene import Scene, Surface
 from manikin.scene.collision import collision_parts
 from manikin.spatial import FloatArray, finite_number, rotation_from_yaw
@@ -149,3 +149,14 @@ class Footholds:
             if result.isCollision():
                 return False
         return True
+
+
+def stature_of(body: BodyModel) -> float:
+    """Stature of a body that stands on feet [m].
+
+    Raises:
+        BodyError: If the body has none, as creatures have.
+    """
+    if body.stature is None:
+        raise BodyError(f"body {body.name!r} has no stature; valid: a human")
+    return body.stature

@@ -4,14 +4,14 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.body import BodyModel, Configuration, Limb, LimbKinematics, limb_named
+from manikin.body.natural_range import NaturalRange
 from manikin.contact import Contact, ContactKind
-from manikin.contact_planning.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Alignment, align
+from manikin.contact_planning.alignment import TILT_TOLERANCE, Aligner
 from manikin.contact_planning.candidates import Candidates, Situation, SurfaceTable, find_candidates
 from manikin.contact_planning.collisions import LimbCollisions
 from manikin.contact_planning.efort import Task
@@ -22,9 +22,12 @@ from manikin.errors import BodyError
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 
-_BATCHES = (32,)
-"""Numbers of candidates after which the aligned ones are tested before more are aligned."""
-_TILTED = "tilted"
+_GROWTH = 0.15
+"""How much longer each step down the order is than the one before."""
+_STEPS = np.cumsum(1 + (_GROWTH * np.arange(1000)).astype(np.int64)) - 1
+_TILTED, _UNNATURAL = ("", "tilted"), ("", "unnatural")
+NATURAL_SLACK = 0.1
+"""Normalised distance by which the alignment may take a limb of natural samples out of its learnt range."""
 
 
 class Hindrance(StrEnum):
@@ -48,8 +51,7 @@ class GeneratorSettings:
         tolerance: Largest distance of a sample's effector to a surface, closed by inverse kinematics [m].
         max_tilt: Largest angle between the effector's z axis and the normal before the alignment [rad].
         point_tilt: The same after it, for points and grasps; soles lie flat [rad].
-        tries: Candidates that are aligned and tested before giving up: the best third of them in
-            order, the others spread over the rest of the order.
+        tries: Candidates that are aligned and tested before giving up.
     """
 
     tolerance: float = 0.03
@@ -182,41 +184,35 @@ class ContactGenerator:
         kind: ContactKind,
     ) -> GeneratedContact:
         """Steps 3 and 4: best first, the first that can be aligned and is free."""
-        faults: Counter[str] = Counter()
+        faults: Counter[tuple[str, str]] = Counter()
         order = _tried(scores, self.settings.tries)
+        flat = kind is ContactKind.SOLE
+        allowed = TILT_TOLERANCE if flat else self.settings.point_tilt
+        sole = footprint(self.body, kind)
+        goals = tools.goals(situation, candidates, order)
+        surfaces = candidates.surfaces[order].tolist()
+        tools.collisions.begin(situation)
         q = np.array(situation.state.q)
-        allowed = TILT_TOLERANCE if kind is ContactKind.SOLE else self.settings.point_tilt
-        for start, end in pairwise((0, *(size for size in _BATCHES if size < len(order)), len(order))):
-            rows = order[start:end]
-            aligned = tools.align(situation, candidates, rows, allowed)
-            turns = situation.rotation @ aligned.rotations
-            lies = self._lies(aligned, candidates, rows, turns, kind, allowed)
-            faults[_TILTED] += int((~lies).sum())
-            for number in np.flatnonzero(lies).tolist():
-                q[tools.chain.slots] = aligned.angles[number]
-                row, tried = int(rows[number]), start + number + 1
-                touched = self._table.surfaces[int(candidates.surfaces[row])].obstacle
-                hit = tools.collisions.first(q, touched)
-                if hit is None:
-                    return self._found(tools.limb, kind, candidates, row, turns[number], q, scores, tried)
-                faults[f"{hit[0]} in {hit[1]}"] += 1
+        for number, goal in enumerate(zip(*goals, strict=True)):
+            aligned = tools.aligner.align(*goal, allowed)
+            if not aligned.lies(allowed):
+                faults[_TILTED] += 1
+                continue
+            if not tools.natural(aligned.angles):
+                faults[_UNNATURAL] += 1
+                continue
+            q[tools.chain.slots] = aligned.angles
+            hit = tools.collisions.first(q, self._table.surfaces[surfaces[number]].obstacle)
+            if hit is not None:
+                faults[hit] += 1
+                continue
+            row = int(order[number])
+            turn = situation.rotation @ aligned.rotation
+            if flat and not self._table.carries_one(candidates.points[row] + sole @ turn.T, surfaces[number]):
+                faults[_TILTED] += 1
+                continue
+            return self._found(tools.limb, kind, candidates, row, turn, q, scores, number + 1)
         return _none_fits(tools.limb.name, faults, len(candidates), len(order))
-
-    def _lies(
-        self,
-        aligned: Alignment,
-        candidates: Candidates,
-        rows: NDArray[np.int64],
-        turns: FloatArray,
-        kind: ContactKind,
-        max_tilt: float,
-    ) -> NDArray[np.bool_]:
-        """(n,) whether aligned effectors touch as they should, with all of their footprint."""
-        lies = (aligned.error <= POSITION_TOLERANCE) & (aligned.tilt <= max_tilt)
-        if kind is ContactKind.SOLE:
-            corners = footprint(self.body, kind)
-            lies &= self._table.carries(candidates.points[rows], turns, candidates.surfaces[rows], corners)
-        return lies
 
     def _found(
         self,
@@ -243,38 +239,40 @@ class _LimbTools:
         self.limb = limb
         self.samples = samples
         self.chain = LimbKinematics(body, limb)
+        self.aligner = Aligner(self.chain)
         self.collisions = LimbCollisions(body, limb, scene)
-        _ = (
-            samples.grid,
-            samples.upward,
-            samples.manipulability,
-            samples.reach,
-        )  # made now, not during a request
+        self._range = NaturalRange(body, limb) if samples.natural else None
+        _ = samples.upward, samples.manipulability, samples.hull  # made now, not during a request
 
-    def align(
-        self, situation: Situation, candidates: Candidates, rows: NDArray[np.int64], max_tilt: float
-    ) -> Alignment:
-        """Put the effectors of some candidates onto their surfaces."""
-        return align(
-            self.chain,
+    def natural(self, angles: FloatArray) -> bool:
+        """Whether a limb at angles (k,) is hardly beyond a learnt range of motion; so where none counts."""
+        if self._range is None:
+            return True
+        return bool(self._range.volume_distance(angles[None])[0] >= -NATURAL_SLACK)
+
+    def goals(
+        self, situation: Situation, candidates: Candidates, rows: NDArray[np.int64]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Angles to begin with, points and normals in the limb's frame of some candidates."""
+        return (
             self.samples.angles[candidates.samples[rows]],
             (candidates.points[rows] - situation.origin) @ situation.rotation,
             candidates.normals[rows] @ situation.rotation,
-            max_tilt,
         )
 
 
 def _tried(scores: FloatArray, tries: int) -> NDArray[np.int64]:
-    """Candidates to try, best first; after the best few, ever longer steps down the order.
+    """Candidates to try: down the order in ever longer steps, then those left out, best first.
 
     Neighbours in the order are often neighbours in space and collide with the same thing.
     """
     order = np.argsort(-scores, kind="stable")
-    if len(order) <= tries:
-        return order
-    best = tries // 3
-    steps = np.geomspace(best + 1, len(order), tries - best).astype(np.int64) - 1
-    return order[np.unique(np.concatenate([np.arange(best), steps]))]
+    steps = _STEPS[: int(np.searchsorted(_STEPS, len(order)))][:tries]
+    if len(steps) == min(tries, len(order)):
+        return order[steps]
+    left = np.ones(len(order), dtype=bool)
+    left[steps] = False
+    return order[np.concatenate([steps, np.flatnonzero(left)])][:tries]
 
 
 def _failure(
@@ -283,13 +281,15 @@ def _failure(
     return GeneratedContact(limb, None, None, None, -np.inf, candidates, tried, kind, message)
 
 
-def _none_fits(limb: str, faults: Counter[str], candidates: int, tried: int) -> GeneratedContact:
-    tilted = faults.pop(_TILTED, 0)
+def _none_fits(limb: str, faults: Counter[tuple[str, str]], candidates: int, tried: int) -> GeneratedContact:
+    tilted, unnatural = faults.pop(_TILTED, 0), faults.pop(_UNNATURAL, 0)
     collided = sum(faults.values())
     kind = Hindrance.COLLISION if collided > tilted else Hindrance.ALIGNMENT
     what = [f"{tilted} cannot lie flat on the surface"] if tilted else []
+    if unnatural:
+        what.append(f"{unnatural} are beyond the range of motion")
     if collided:
-        reason, count = faults.most_common(1)[0]
-        what.append(f"{collided} collide, {count} by {reason}")
+        (shape, other), count = faults.most_common(1)[0]
+        what.append(f"{collided} collide, {count} by {shape} in {other}")
     message = f"none of {tried} contacts of {limb} out of {candidates} is possible: {', '.join(what)}"
     return _failure(limb, kind, message, candidates, tried)

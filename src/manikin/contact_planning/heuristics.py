@@ -1,6 +1,6 @@
 """What makes one contact better than another: interchangeable scores of candidates."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -9,10 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from manikin.balance import pseudo_wrench, stability_margins, wrench_polytope
 from manikin.body import ReachVolume
+from manikin.body.natural_range import NaturalRange
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.contact_planning.candidates import Candidates, Situation
 from manikin.contact_planning.efort import efort
+from manikin.contact_planning.samples import LimbSamples
 from manikin.contact_planning.touch import ContactRules, make_contact, onto_normal
+from manikin.errors import InputError
 from manikin.spatial import FloatArray
 
 
@@ -60,6 +63,23 @@ class Manipulability:
         return candidates.manipulability
 
 
+@dataclass(frozen=True, eq=False)
+class Comfort:
+    """Far from the ends of the range of motion ([Tonneau2015]_ 4.3.3), see :class:`NaturalRange`.
+
+    Attributes:
+        samples: The samples that are asked, by limb.
+    """
+
+    samples: Mapping[str, LimbSamples]
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """See :class:`Heuristic`."""
+        limb = situation.limb
+        angles = self.samples[limb.name].angles[candidates.samples]
+        return NaturalRange(situation.state.body, limb).normalised(angles)
+
+
 @dataclass(frozen=True)
 class Random:
     """No preference; the same for a seed and the same candidates."""
@@ -69,6 +89,30 @@ class Random:
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:  # noqa: ARG002
         """See :class:`Heuristic`."""
         return np.random.default_rng(self.seed).random(len(candidates))
+
+
+HEURISTICS = ("efort", "distance", "manipulability", "random")
+"""Names of the heuristics that need nothing but the request."""
+
+
+def heuristic_named(name: str, seed: int = 0, *, pulling: bool = False) -> Heuristic:
+    """Heuristic by its name.
+
+    Args:
+        name: One of :data:`HEURISTICS`.
+        seed: Of the random one.
+        pulling: Whether EFORT is that of a limb which holds on and pulls.
+
+    Raises:
+        InputError: If there is none of that name.
+    """
+    found: dict[str, Heuristic] = {
+        "efort": Efort(pulling), "distance": ClosestDistance(), "manipulability": Manipulability(),
+        "random": Random(seed),
+    }  # fmt: skip
+    if name not in found:
+        raise InputError(f"heuristic is {name!r}; valid: {', '.join(HEURISTICS)}")
+    return found[name]
 
 
 @dataclass(frozen=True, eq=False)

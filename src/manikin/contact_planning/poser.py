@@ -120,7 +120,10 @@ class Poser:
             reference=self._reference,
         )
         once = SolverSettings(
-            tolerance=self.settings.tolerance, iterations=self.settings.iterations, restarts=False, explain=False
+            tolerance=self.settings.tolerance,
+            iterations=self.settings.iterations,
+            restarts=False,
+            explain=False,
         )
         if guide is not None:
             # The guide's trunk is free, so that from there no obstacle is passed on its wrong side.

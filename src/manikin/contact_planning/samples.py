@@ -1,5 +1,6 @@
 """Sampled configurations of a limb, made once and asked often ([Tonneau2015]_ 5.1.4, 5.3.1)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,8 +9,8 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Limb, LimbKinematics, ReachVolume, are_mirrored
 from manikin.body.limbs import REFLECTION, parent_segment
+from manikin.body.natural_range import NaturalRange
 from manikin.body.reach_volume import hull_of
-from manikin.contact_planning.grid import SampleGrid
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, finite_number
 
@@ -31,6 +32,7 @@ class LimbSamples:
         rotations: (n, 3, 3) from the effector's axes to the limb frame's.
         products: (n, 3, 3) ``J J^T`` of the effector's translation [m^2].
         threshold: Manipulability [m^3] that every sample has at least.
+        natural: Whether hips and shoulders keep to learnt volumes; contacts made of the samples do then too.
     """
 
     limb: Limb
@@ -41,6 +43,7 @@ class LimbSamples:
     rotations: FloatArray
     products: FloatArray
     threshold: float
+    natural: bool = False
 
     def __post_init__(self) -> None:
         for name in ("origin", "angles", "positions", "rotations", "products"):
@@ -60,9 +63,10 @@ class LimbSamples:
         return np.ascontiguousarray(self.rotations[:, :, 2])
 
     @cached_property
-    def grid(self) -> SampleGrid:
-        """Spatial index of the positions."""
-        return SampleGrid(self.positions)
+    def hull(self) -> tuple[FloatArray, float]:
+        """Corners (h, 3) of the reach in the limb's frame, and the largest distance of one [m]."""
+        corners = self.reach.vertices - self.origin
+        return corners, float(np.linalg.norm(corners, axis=1).max())
 
     @cached_property
     def reach(self) -> ReachVolume:
@@ -87,8 +91,10 @@ def sample_limb(
     rng: np.random.Generator,
     count: int = 10_000,
     threshold: float = THRESHOLD,
+    *,
+    natural: bool = False,
 ) -> LimbSamples:
-    """Draw configurations of a limb within its joint ranges and keep those far from singular.
+    """Draw configurations of a limb within its range of motion and keep those far from singular.
 
     The ratio that EFORT builds on grows without bound towards singular configurations, so those with
     little manipulability are dropped (5.4.1).
@@ -100,6 +106,9 @@ def sample_limb(
         count: Number of samples that are kept, > 0.
         threshold: Smallest manipulability kept, as a share of the largest among the first
             ``count`` samples, in [0, 1).
+        natural: Whether hips and shoulders of the human keep to their learnt volumes (4.3.3) and not
+            to the intervals of their hinges alone; of no effect on other limbs. Off unless asked for:
+            the recordings hold no movement of the largest amplitude, and climbing needs more.
 
     Raises:
         BodyError: If a value is out of its range, or fewer than one sample in fifty passes.
@@ -108,10 +117,11 @@ def sample_limb(
         raise BodyError(f"limb samples count is {count}; valid: at least 4")
     share = finite_number(threshold, "limb samples threshold", at_least=0.0, error=BodyError)
     chain = LimbKinematics(body, limb)
+    angles_of = _source(body, limb, chain, rng, natural)
     parts: list[tuple[FloatArray, ...]] = []
     kept, drawn, least = 0, 0, None
     while kept < count:
-        part, values = _draw(chain, rng, count)
+        part, values = _placed(chain, angles_of(count))
         least = share * float(values.max()) if least is None else least
         good = values >= least
         parts.append(tuple(values[good] for values in part))
@@ -123,14 +133,23 @@ def sample_limb(
             )
     joined = [np.concatenate(arrays)[:count] for arrays in zip(*parts, strict=True)]
     origin = np.array(body.segment(limb.segments[0]).origin)
-    return LimbSamples(limb, parent_segment(body, limb), origin, *joined, threshold=float(least or 0.0))
+    return LimbSamples(
+        limb, parent_segment(body, limb), origin, *joined, threshold=float(least or 0.0), natural=natural
+    )
 
 
-def _draw(
-    chain: LimbKinematics, rng: np.random.Generator, count: int
-) -> tuple[tuple[FloatArray, ...], FloatArray]:
+def _source(
+    body: BodyModel, limb: Limb, chain: LimbKinematics, rng: np.random.Generator, natural: bool
+) -> Callable[[int], FloatArray]:
+    """What draws (count, k) joint angles."""
+    volumes = NaturalRange(body, limb)
+    if natural and volumes.learnt:
+        return lambda count: volumes.random_angles(rng, count)
+    return lambda count: chain.random_angles(rng, count)
+
+
+def _placed(chain: LimbKinematics, angles: FloatArray) -> tuple[tuple[FloatArray, ...], FloatArray]:
     """Angles, positions, rotations, products; and the manipulabilities."""
-    angles = chain.random_angles(rng, count)
     placed = chain.place(angles)
     products = placed.jacobians @ placed.jacobians.transpose(0, 2, 1)
     return (angles, placed.positions, placed.rotations, products), manipulability(products)
@@ -164,6 +183,7 @@ def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
         samples.rotations * flip,
         samples.products * flip,
         samples.threshold,
+        samples.natural,
     )
 
 
@@ -172,6 +192,8 @@ def sample_limbs(
     rng: np.random.Generator,
     count: int = 10_000,
     threshold: float = THRESHOLD,
+    *,
+    natural: bool = False,
 ) -> dict[str, LimbSamples]:
     """Samples of every limb by its name; mirrored limbs share one set, reflected.
 
@@ -180,6 +202,7 @@ def sample_limbs(
         rng: Source of randomness.
         count: Samples per limb.
         threshold: See :func:`sample_limb`.
+        natural: See :func:`sample_limb`.
     """
     found: dict[str, LimbSamples] = {}
     for limb in body.limbs:
@@ -187,5 +210,5 @@ def sample_limbs(
         if twin is not None and are_mirrored(body, twin.limb, limb):
             found[limb.name] = mirrored(body, twin, limb)
         else:
-            found[limb.name] = sample_limb(body, limb, rng, count, threshold)
+            found[limb.name] = sample_limb(body, limb, rng, count, threshold, natural=natural)
     return found

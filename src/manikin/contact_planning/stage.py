@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, Phase, Stance, StanceSequence
 from manikin.spatial import FloatArray, frozen_array
-
 
 COM_ROOM = (0.06, 0.06, 0.06)
 """How far from that of its posture the centre of mass may be when a phase begins [m]; our choice."""
@@ -97,10 +97,7 @@ class ContactPlan:
     @property
     def steps(self) -> int:
         """Number of contacts made."""
-        before = [{}, *(stage.contacts for stage in self.stages)]
-        return sum(
-            len(set(stage.contacts) - set(old)) for old, stage in zip(before[1:], self.stages[1:], strict=False)
-        )
+        return sum(len(set(after.contacts) - set(before.contacts)) for before, after in pairwise(self.stages))
 
 
 def _least_time(stage: Stage, q: FloatArray, com: FloatArray) -> float:

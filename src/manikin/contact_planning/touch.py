@@ -1,5 +1,6 @@
 """The contact that an effector makes where it has been put."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from manikin.body import BodyModel, Limb
 from manikin.contact import Contact, ContactKind, grasp, point, sole
 from manikin.errors import ContactError
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, skew
 
 
 @dataclass(frozen=True)
@@ -75,9 +76,11 @@ def make_contact(
 
 def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
     """(3, 3) the rotation turned by the shortest way so that its z axis is the unit normal exactly."""
-    across = np.cross(normal, rotation[:, 0])
-    length = float(np.linalg.norm(across))
+    across = skew(normal) @ rotation[:, 0]
+    length = math.sqrt(across @ across)
     if length < 1e-9:
         across, length = np.array(rotation[:, 1]), 1.0
     y = across / length
-    return np.column_stack([np.cross(y, normal), y, normal])
+    turned = np.empty((3, 3))
+    turned[:, 0], turned[:, 1], turned[:, 2] = skew(y) @ normal, y, normal
+    return turned

@@ -5,6 +5,7 @@ from manikin.figures.compare_com import compare_planes_figure, compare_scene_fig
 from manikin.figures.compare_margin import compare_margin_figure
 from manikin.figures.compare_postures import compare_postures_figure
 from manikin.figures.compare_timing import compare_timing_figure
+from manikin.figures.contact_choice import ChoicePanel, contact_choice_figure
 from manikin.figures.contacts import contacts_figure
 from manikin.figures.effectors import effectors_figure
 from manikin.figures.flights import flights_figure
@@ -21,12 +22,14 @@ from manikin.figures.zmp import zmp_figure
 __all__ = [
     "COMPARISONS",
     "FIGURES",
+    "ChoicePanel",
     "com_figure",
     "compare_margin_figure",
     "compare_planes_figure",
     "compare_postures_figure",
     "compare_scene_figure",
     "compare_timing_figure",
+    "contact_choice_figure",
     "contacts_figure",
     "effectors_figure",
     "flights_figure",

@@ -5,12 +5,14 @@ came from.  Numbers are written with Python's shortest exact form: what is read 
 bit for bit what was written.
 """
 
+import hashlib
+import json
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from manikin.body import BodyModel, Effector, Hinge, Segment, Shape
+from manikin.body import BodyModel, Effector, Hinge, Limb, Segment, Shape
 from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance, StanceSequence
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
 from manikin.spatial import frozen_array
@@ -19,7 +21,7 @@ Json = dict[str, Any]
 
 
 def describe_body(body: BodyModel) -> Json:
-    """Everything that makes a body: segments, hinges, inertias, shapes, effectors [SI]."""
+    """Everything that makes a body: segments, hinges, inertias, shapes, effectors, limbs [SI]."""
     return {
         "name": body.name,
         "stature_m": body.stature,
@@ -35,6 +37,11 @@ def describe_body(body: BodyModel) -> Json:
         ],
         "standing_angles": dict(body.standing_angles),
         "soft_pairs": sorted(sorted(pair) for pair in body.soft_pairs),
+        "limbs": [
+            {"name": limb.name, "effector": limb.effector, "segments": list(limb.segments),
+             "kind": str(limb.kind), "mirror": limb.mirror}
+            for limb in body.limbs
+        ],
     }  # fmt: skip
 
 
@@ -59,7 +66,18 @@ def body_from(description: Mapping[str, Any]) -> BodyModel:
         sex=description["sex"],
         sole_length=description["sole_length_m"],
         sole_width=description["sole_width_m"],
+        limbs=tuple(_limb_from(limb) for limb in description.get("limbs", ())),
     )
+
+
+def body_key(body: BodyModel) -> str:
+    """Digest of everything that makes a body, to tell whether a file is about the same one."""
+    return hashlib.sha256(json.dumps(describe_body(body), sort_keys=True).encode()).hexdigest()
+
+
+def _limb_from(data: Mapping[str, Any]) -> Limb:
+    kind = ContactKind(data["kind"])
+    return Limb(data["name"], data["effector"], tuple(data["segments"]), kind, data["mirror"])
 
 
 def _describe_segment(segment: Segment) -> Json:

@@ -177,6 +177,13 @@ class ScenarioValues:
         inside = self.folder / name
         return inside if inside.exists() else Path(name)
 
+    @property
+    def start_level(self) -> float:
+        """Height of the supports at the start, or of the floor; 0 without either [m]."""
+        if self.file.supports is None:
+            return self.file.floor_height_m or 0.0
+        return _level(self.explicit_supports().resolved_phases()[0])
+
     def support_level(self) -> SupportLevel:
         """Height of the supports below the CoM, from the start to the goal."""
         ends = [np.array(self._com(end)[:2]) for end in ("start", "goal")]

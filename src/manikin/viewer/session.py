@@ -12,13 +12,13 @@ import pinocchio as pin
 import viser
 from viser import uplot
 
+from manikin.body.triangles import segment_triangles
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.derived import effector_positions
 from manikin.motion.file import MotionFile
 from manikin.scene import HalfSpace, Plane
 from manikin.spatial import FloatArray
-from manikin.viewer.shapes import segment_triangles
 
 HOST = "127.0.0.1"
 """The viewer listens to this computer only."""

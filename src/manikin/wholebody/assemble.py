@@ -19,12 +19,11 @@ from manikin.motion import Motion
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.certificate import WholeBodyRequirements, WholeBodyResiduals, certify
-from manikin.wholebody.configuration_spline import ConfigurationSpline
+from manikin.wholebody.configuration_spline import ConfigurationSpline, align_quaternions
 from manikin.wholebody.fit import FitResult, MotionFit
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
 from manikin.wholebody.forces import plan_forces
-from manikin.wholebody.configuration_spline import align_quaternions
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
 from manikin.wholebody.knots import phase_knots, refined, sample_times, touch_downs_at_speed
 from manikin.wholebody.manner import CLOSE, READY, Manner

@@ -18,8 +18,8 @@ class StateSection(Section):
     heading_deg: Number | None = Field(default=None, description="where to face [deg]")
     height_m: Number | None = Field(
         default=None,
-        description="height of the surface to stand or sit on there [m] (default: the lowest one on which the "
-        "posture exists)",
+        description="height of the surface to stand or sit on there [m] (default: the lowest one on "
+        "which the posture exists)",
     )
     posture: Literal["standing", "seated", "crouched"] | None = Field(
         default=None, description="how the body is at rest there (default: standing)"

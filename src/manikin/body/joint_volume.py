@@ -1,0 +1,188 @@
+"""Range of motion of a ball joint as a volume of its three angles ([Tonneau2015]_ 4.3.3).
+
+The angles of a hip or shoulder depend on each other: how far an arm turns inward depends on where it points.
+One interval for each angle either holds postures that nobody can take or forbids some that people
+do take. The thesis therefore takes the non-convex hull of recorded angles, which it then treats as a
+polytope; a polytope, though, is convex. We keep the hull as the signed distance to its surface, on a grid.
+
+The hull: all places of angle space within ``closing`` of a recorded one, then drawn in by ``closing``
+minus ``margin``. So gaps between recordings narrower than twice ``closing`` are filled, hollows that are
+wider stay, and every recorded place is about ``margin`` inside. Only its largest connected part is kept.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import distance_transform_edt, label
+
+from manikin.errors import BodyError
+from manikin.spatial import FloatArray, finite_number, frozen_array
+
+STEP = float(np.deg2rad(5.0))
+"""Spacing of the grid [rad]; our choice."""
+
+CLOSING = float(np.deg2rad(30.0))
+"""Half the width of the gaps between recorded angles that are filled [rad]; our choice."""
+
+MARGIN = float(np.deg2rad(10.0))
+"""How far beyond recorded angles the volume reaches [rad]; our choice, because our recordings are of
+everyday movement and not, as those of the thesis, of the largest that the subject could do."""
+
+FEWEST = 2
+"""Frames with which a cell of the fine grid counts as seen; our choice, against single wrong frames."""
+
+_FINER = 2
+_MOST_CELLS = 40_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class JointVolume:
+    """Signed distance to the surface of a volume of three angles, on a grid.
+
+    Attributes:
+        origin: (3,) angles of the grid's first point [rad].
+        step: Spacing [rad].
+        distances: (a, b, c) distance to the surface, negative outside [rad].
+    """
+
+    origin: FloatArray
+    step: float
+    distances: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "origin", frozen_array(self.origin, "volume origin", (3,), BodyError))
+        finite_number(self.step, "volume step [rad]", above=0.0, error=BodyError)
+        table = frozen_array(self.distances, "volume distances", (None, None, None), BodyError)
+        if min(table.shape) < 2 or table.max() <= 0.0:
+            raise BodyError(
+                f"volume of shape {table.shape} holds nothing; valid: 2 points each way, one inside"
+            )
+        object.__setattr__(self, "distances", table)
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """(a, b, c, 3) angles of the grid's points [rad]."""
+        index = np.stack(np.meshgrid(*(np.arange(n) for n in self.distances.shape), indexing="ij"), axis=-1)
+        return self.origin + self.step * index
+
+    def distance(self, angles: ArrayLike) -> FloatArray:
+        """(...) distance of (..., 3) angles to the surface, negative outside [rad].
+
+        Linear between the grid's points, whose distances differ by no more than they are apart. Off
+        the grid it is that of the nearest place on it, less the distance to there.
+        """
+        x, beyond = self._on_grid(angles)
+        cell, share = self._cell(x)
+        total = np.zeros(x.shape[:-1])
+        for corner in np.ndindex(2, 2, 2):
+            weight = np.prod(np.where(corner, share, 1.0 - share), axis=-1)
+            total += weight * self._at(cell, corner)
+        return total - beyond
+
+    def gradient(self, angles: ArrayLike) -> FloatArray:
+        """(..., 3) derivative of :meth:`distance`; off the grid that of the nearest place on it."""
+        x, _ = self._on_grid(angles)
+        cell, share = self._cell(x)
+        slope = np.zeros(x.shape)
+        for corner in np.ndindex(2, 2, 2):
+            factors = np.where(corner, share, 1.0 - share)
+            value = self._at(cell, corner)
+            for axis in range(3):
+                others = np.prod(np.delete(factors, axis, axis=-1), axis=-1)
+                slope[..., axis] += (1.0 if corner[axis] else -1.0) * others * value
+        return slope / self.step
+
+    def contains(self, angles: ArrayLike) -> NDArray[np.bool_]:
+        """(...) whether (..., 3) angles are inside or on the surface."""
+        return self.distance(angles) >= 0.0
+
+    def _on_grid(self, angles: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Places on the grid in steps, and the distance [rad] from the angles to there."""
+        q = np.asarray(angles, dtype=np.float64)
+        if q.shape[-1:] != (3,):
+            raise BodyError(f"angles of a ball joint have shape {q.shape}; valid: (..., 3)")
+        wanted = (q - self.origin) / self.step
+        x = np.clip(wanted, 0.0, np.array(self.distances.shape) - 1.0)
+        return x, self.step * np.linalg.norm(wanted - x, axis=-1)
+
+    def _cell(self, x: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+        cell = np.minimum(np.floor(x).astype(np.int64), np.array(self.distances.shape) - 2)
+        return cell, x - cell
+
+    def _at(self, cell: NDArray[np.int64], corner: tuple[int, ...]) -> FloatArray:
+        return self.distances[tuple(cell[..., axis] + corner[axis] for axis in range(3))]
+
+
+def volume_of(
+    angles: ArrayLike,
+    closing: float = CLOSING,
+    margin: float = MARGIN,
+    step: float = STEP,
+    fewest: int = FEWEST,
+) -> JointVolume:
+    """Volume that holds recorded angles, see the module.
+
+    Args:
+        angles: (n, 3) recorded angles [rad].
+        closing: Half the width of gaps that are filled [rad], at least ``margin``.
+        margin: How far the volume reaches beyond the recorded angles [rad], >= 0.
+        step: Spacing of the grid [rad]; the hull is found on one twice as fine.
+        fewest: Frames with which a cell of that one counts as seen.
+
+    Raises:
+        BodyError: If a value is out of its range, no cell is seen often enough, or the angles are
+            spread too wide for the step.
+    """
+    recorded = frozen_array(angles, "recorded angles", (None, 3), BodyError)
+    margin = finite_number(margin, "margin [rad]", at_least=0.0, error=BodyError)
+    closing = finite_number(closing, "closing [rad]", at_least=margin, error=BodyError)
+    fine = finite_number(step, "step [rad]", above=0.0, error=BodyError) / _FINER
+    origin, seen = _seen(recorded, fine, closing + 2.0 * step, fewest)
+    near = _largest_part(fine * _distance_to_zeros(~seen) <= closing)
+    hull = fine * _distance_to_zeros(near) > closing - margin
+    inside, outside = (fine * _distance_to_zeros(part) for part in (hull, ~hull))
+    signed = np.where(hull, inside - 0.5 * fine, 0.5 * fine - outside)
+    kept = signed[::_FINER, ::_FINER, ::_FINER]
+    return _cropped(origin, _FINER * fine, kept)
+
+
+def _seen(
+    recorded: FloatArray, fine: float, border: float, fewest: int
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """First point of a fine grid, and which of its points are near enough recorded angles."""
+    if not len(recorded):
+        raise BodyError("no recorded angles; valid: at least one")
+    origin = np.min(recorded, axis=0) - border
+    shape = np.ceil((np.max(recorded, axis=0) + border - origin) / fine).astype(np.int64) + 1
+    if float(np.prod(shape.astype(np.float64))) > _MOST_CELLS:
+        raise BodyError(f"volume of {shape.tolist()} cells; valid: a larger step or angles less far apart")
+    counts = np.zeros(shape, dtype=np.int64)
+    np.add.at(counts, tuple(np.rint((recorded - origin) / fine).astype(np.int64).T), 1)
+    seen = counts >= fewest
+    if not seen.any():
+        raise BodyError(f"no angles are seen in {fewest} frames; valid: more recorded angles")
+    return origin, seen
+
+
+def _distance_to_zeros(mask: NDArray[np.bool_]) -> FloatArray:
+    """Distance of each point to the nearest one that is False, in points."""
+    return np.asarray(distance_transform_edt(mask), dtype=np.float64)
+
+
+def _largest_part(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    names = np.zeros(mask.shape, dtype=np.int32)
+    label(mask, output=names)
+    return names == 1 + int(np.argmax(np.bincount(names.ravel())[1:]))
+
+
+def _cropped(origin: FloatArray, step: float, distances: FloatArray) -> JointVolume:
+    """The grid without what is far outside."""
+    inside = np.argwhere(distances > 0.0)
+    if not len(inside):
+        raise BodyError("the volume holds no point of its grid; valid: a smaller step or more angles")
+    low = np.maximum(inside.min(axis=0) - 2, 0)
+    high = np.minimum(inside.max(axis=0) + 3, distances.shape)
+    part = distances[tuple(slice(a, b) for a, b in zip(low, high, strict=True))]
+    return JointVolume(origin + step * low, step, part)

@@ -1,0 +1,185 @@
+"""How far a limb's posture is from violating its range of motion ([Tonneau2015]_ 4.3.3).
+
+Hips and shoulders of the human have learnt volumes, see :mod:`manikin.body.human_volumes`; every other
+hinge has its interval.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.body.human_volumes import human_volumes
+from manikin.body.joint_volume import JointVolume
+from manikin.body.limbs import limb_hinges
+from manikin.body.model import BodyModel
+from manikin.body.range_of_motion import human_hinges
+from manikin.body.segments import Hinge, Limb, Segment
+from manikin.errors import BodyError
+from manikin.spatial import FloatArray, frozen_array
+
+_SIDES = ("left", "right")
+
+
+@dataclass(frozen=True, eq=False)
+class BallRange:
+    """A ball joint's volume within the intervals of its hinges.
+
+    Attributes:
+        volume: The volume.
+        lower: (3,) smallest angles [rad].
+        upper: (3,) largest angles [rad].
+        radius: Of the largest ball of angles that is inside both [rad].
+    """
+
+    volume: JointVolume
+    lower: FloatArray
+    upper: FloatArray
+    radius: float
+
+    def normalised(self, angles: FloatArray) -> FloatArray:
+        """(...) distance of (..., 3) angles to the nearer violation per radius, negative outside."""
+        box = np.minimum(angles - self.lower, self.upper - angles).min(axis=-1)
+        return np.minimum(self.volume.distance(angles), box) / self.radius
+
+
+class NaturalRange:
+    """Normalised distance of a limb's angles to a violation of its range of motion.
+
+    Of a ball joint with a volume, it is the distance in the space of its three angles to the surface of
+    the volume or to the end of a hinge's interval, whichever is nearer, divided by the radius of the
+    largest ball inside. Of a hinge without one it is the distance to the nearer end of its interval,
+    divided by half the interval. Of a limb it is the least of its joints. So it is 0 at a violation,
+    negative beyond, and 1 only where every joint is as far from its limits as it can be; 0.1 rad in one
+    angle change it by no more than 0.1 rad over that radius (over half the interval), times the square
+    root of 3 at worst where the grid of the volume is coarse.
+
+    Attributes:
+        limb: The limb.
+        balls: Its ball joints: the columns of their angles and their ranges.
+        columns: (h,) columns of the other hinges.
+    """
+
+    def __init__(self, body: BodyModel, limb: Limb) -> None:
+        self.limb = limb
+        hinges = limb_hinges(body, limb)
+        self.lower = np.array([hinge.lower for hinge in hinges])
+        self.upper = np.array([hinge.upper for hinge in hinges])
+        self.balls: tuple[tuple[slice, BallRange], ...] = tuple(_balls(body, limb))
+        taken = {column for where, _ in self.balls for column in range(where.start, where.stop)}
+        self.columns = np.array([c for c in range(len(hinges)) if c not in taken], dtype=np.int64)
+
+    @property
+    def learnt(self) -> bool:
+        """Whether a joint of the limb has a learnt volume."""
+        return bool(self.balls)
+
+    def normalised(self, angles: ArrayLike) -> FloatArray:
+        """(n,) normalised distance of (n, k) angles, negative outside.
+
+        Raises:
+            BodyError: If the angles are not (n, k).
+        """
+        return self._least(self._checked(angles), lambda q: self._of_hinges(q))
+
+    def volume_distance(self, angles: ArrayLike) -> FloatArray:
+        """(n,) the same of the ball joints with volumes alone; infinite without one.
+
+        Raises:
+            BodyError: If the angles are not (n, k).
+        """
+        return self._least(self._checked(angles), lambda q: np.full(len(q), np.inf))
+
+    def contains(self, angles: ArrayLike) -> NDArray[np.bool_]:
+        """(n,) whether (n, k) angles are within the range of motion."""
+        return self.normalised(angles) >= 0.0
+
+    def random_angles(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """(count, k) angles, uniform within the range of motion [rad]."""
+        parts: list[FloatArray] = []
+        kept = 0
+        while kept < count:
+            drawn = rng.uniform(self.lower, self.upper, (2 * count, len(self.lower)))
+            parts.append(drawn[self.volume_distance(drawn) >= 0.0])
+            kept += len(parts[-1])
+        return np.concatenate(parts)[:count]
+
+    def _least(self, q: FloatArray, others: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        found = others(q)
+        for columns, ball in self.balls:
+            found = np.minimum(found, ball.normalised(q[:, columns]))
+        return found
+
+    def _of_hinges(self, q: FloatArray) -> FloatArray:
+        if not len(self.columns):
+            return np.full(len(q), np.inf)
+        lower, upper = self.lower[self.columns], self.upper[self.columns]
+        part = q[:, self.columns]
+        return np.min(np.minimum(part - lower, upper - part) / (0.5 * (upper - lower)), axis=1)
+
+    def _checked(self, angles: ArrayLike) -> FloatArray:
+        q = np.asarray(angles, dtype=np.float64)
+        if q.ndim != 2 or q.shape[1] != len(self.lower):
+            raise BodyError(
+                f"limb {self.limb.name!r} angles have shape {q.shape}; valid: (n, {len(self.lower)})"
+            )
+        return q
+
+
+def _balls(body: BodyModel, limb: Limb) -> list[tuple[slice, BallRange]]:
+    """Columns and ranges of the limb's ball joints that have a volume."""
+    found, start = [], 0
+    for name in limb.segments:
+        segment = body.segment(name)
+        part = _learnt_part(segment)
+        if part is not None:
+            ends = tuple((hinge.lower, hinge.upper) for hinge in segment.hinges)
+            found.append((slice(start, start + 3), _learnt_range(part, ends)))
+        start += len(segment.hinges)
+    return found
+
+
+def ball_range(volume: JointVolume, lower: ArrayLike, upper: ArrayLike) -> BallRange:
+    """Volume within the intervals of three hinges.
+
+    Args:
+        volume: The volume.
+        lower: (3,) smallest angles [rad].
+        upper: (3,) largest angles [rad].
+
+    Raises:
+        BodyError: If nothing of the volume is within them.
+    """
+    low, high = (frozen_array(end, "range of a ball joint", (3,), BodyError) for end in (lower, upper))
+    ball = BallRange(volume, low, high, 1.0)
+    radius = float(ball.normalised(volume.points).max())
+    if not radius > 0.0:
+        raise BodyError(
+            f"nothing from {low.tolist()} to {high.tolist()} is in the volume; valid: ranges that overlap it"
+        )
+    return BallRange(volume, low, high, radius)
+
+
+@cache
+def _learnt_range(part: str, ends: tuple[tuple[float, float], ...]) -> BallRange:
+    """Range of a learnt part for hinges with these ends; the largest ball takes a while to find."""
+    lower, upper = zip(*ends, strict=True)
+    return ball_range(human_volumes()[part], lower, upper)
+
+
+def _learnt_part(segment: Segment) -> str | None:
+    """Name of the volume of a segment whose hinges are those of the human."""
+    for side in _SIDES:
+        part = segment.name.removeprefix(f"{side}_")
+        if part != segment.name and part in human_volumes():
+            human = human_hinges(part, side, 1.0)
+            own = segment.hinges
+            same = len(own) == len(human) and all(map(_same_hinge, own, human))
+            return part if same else None
+    return None
+
+
+def _same_hinge(first: Hinge, second: Hinge) -> bool:
+    return first.name == second.name and bool(np.allclose(first.axis, second.axis))
