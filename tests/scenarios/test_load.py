@@ -164,11 +164,61 @@ def test_a_missing_key_is_described_and_a_rule_of_two_keys_has_its_line(tmp_path
         load_scenario(write(tmp_path, text))
 
 
+def without_supports(**changes):
+    task = {"start": {"at": [0, 0]}, "goal": {"at": [1, 0]}}
+    return changed(("supports",), ...) | {"task": task} | changes
+
+
 def test_missing_supports_come_before_everything_else_about_them(tmp_path):
-    data = changed(("supports",), ...) | {"task": {"start": {"at": [0, 0]}, "goal": {"at": [1, 0]}}}
-    job = load_scenario(write(tmp_path, data))
-    with pytest.raises(ScenarioError, match=r"supports is missing; valid: .*not planned yet"):
+    job = load_scenario(write(tmp_path, without_supports()))
+    with pytest.raises(ScenarioError, match=r"supports is missing; valid: an explicit sequence of phases"):
         job.build_sequence()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"body": {"model": "point_mass"}}, r"supports is missing; valid: explicit supports for a point_mass"),
+        (
+            {"task": {"start": {"at": [0, 0], "com": [0, 0, 1]}, "goal": {"at": [1, 0]}}},
+            r"task\.start\.com has no meaning without explicit supports; valid: at",
+        ),
+        (
+            {"task": {"start": {"at": [0, 0]}, "goal": {"at": [1, 0], "posture": "seated"}}},
+            r"task\.goal\.posture is seated; valid: standing or crouched",
+        ),
+        (
+            {"task": {"start": {"at": [0, 0], "posture": "lying"}, "goal": {"at": [1, 0]}}},
+            r"task\.start\.posture is 'lying'; valid: .*standing",
+        ),
+        ({"contacts": {"stride_m": 0}}, r"contacts\.stride_m is 0; valid: a number > 0"),
+    ],
+)
+def test_what_contacts_cannot_be_planned_for_is_refused(tmp_path, changes, message):
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario(write(tmp_path, without_supports(**changes)))
+
+
+def test_supports_and_their_planning_exclude_each_other(tmp_path):
+    with pytest.raises(ScenarioError, match=r"contacts is given beside supports; valid: one of them"):
+        load_scenario(write(tmp_path, MINIMAL | {"contacts": {"friction": 0.5}}))
+
+
+def test_a_phase_may_say_where_the_centre_of_mass_begins(tmp_path):
+    """Six planes for each such phase: the faces of a box about the place."""
+    near = {"com_near": [0.01, 0.02, 0.9], "com_within_m": [0.03, 0.04, 0.05]}
+    phases = [*MINIMAL["supports"]["phases"]]
+    phases[1] = phases[1] | near
+    job = load_scenario(write(tmp_path, changed(("supports", "phases"), phases)))
+    planes = job.build_centroidal_problem().key_planes
+    assert [plane.key for plane in planes] == [1] * 6
+    inside, corner = np.array([0.01, 0.02, 0.9]), np.array([0.04, 0.06, 0.95])
+    rooms = [plane.violation(inside) for plane in planes]
+    np.testing.assert_allclose(rooms, [-0.03, -0.03, -0.04, -0.04, -0.05, -0.05], atol=1e-12)
+    assert max(plane.violation(corner) for plane in planes) == pytest.approx(0.0, abs=1e-12)
+    phases[0] = phases[0] | near
+    with pytest.raises(ScenarioError, match=r"supports\.phases\[0\]\.com_near is given"):
+        load_scenario(write(tmp_path, changed(("supports", "phases"), phases)))
 
 
 def test_a_sole_that_no_body_has_is_refused_where_it_is_given(tmp_path):

@@ -80,7 +80,9 @@ class Endpoints:
         reasons: list[str] = []
         tried = self._seated if habit is Habit.SEATED else self._standing
         for contacts, guess in tried(np.asarray(at), heading, habit, height):
-            posed = self._poser.pose(contacts, contacts, guess, guess[:7], restarts=True)
+            # A body that sits has its weight where its upright trunk puts it, not over the root.
+            place = Configuration(self._body, guess).com[:2] if habit is Habit.SEATED else None
+            posed = self._poser.pose(contacts, contacts, guess, guess[:7], place=place, restarts=True)
             if posed.q is not None:
                 return Endpoint(Stage.of(self._body, contacts, posed.q, 0.35))
             reasons.append(posed.reason)

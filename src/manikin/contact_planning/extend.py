@@ -28,6 +28,12 @@ LEANING = (0.25, 0.5, 0.75)
 LEANING_TIME = 0.4
 """Shortest time between two of them [s]."""
 
+RISING_TIME = 1.8
+"""Shortest time from there to standing [s]."""
+
+SETTLING_TIME = 0.8
+"""Shortest time that the body stands then [s]."""
+
 SEATED_ROOM = (0.01, 0.01, 0.006)
 """How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
 
@@ -179,13 +185,13 @@ class _Search:
             posed = self._poser.pose(start.contacts, start.contacts, stages[-1].q, place=place)
             if posed.q is not None:
                 stages.append(Stage.of(self._body, start.contacts, posed.q, LEANING_TIME, SEATED_ROOM))
-        rising = 2.0 * self._settings.swing_duration
+        rising = RISING_TIME
         stages.append(Stage.of(self._body, feet, leaving.q, rising, SEATED_ROOM))
         risen = self._poser.pose(feet, feet, leaving.q, self._guide.at(0.0), restarts=True)
         if risen.q is None:
             self._reasons[risen.reason] += 1
             return None
-        stages.append(Stage.of(self._body, feet, risen.q, self._settings.shift_duration))
+        stages.append(Stage.of(self._body, feet, risen.q, SETTLING_TIME))
         return _State(tuple(stages), along)
 
     def _ended(self, state: _State) -> ContactPlan | None:

@@ -12,6 +12,17 @@ MAX_SUPPORT_DISTANCE = 1.08
 """Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
 
 
+PLANNING_SHARE = (0.8, 0.7)
+"""Length and width of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); our choice."""
+
+PLANNING = {
+    "degree": 5,
+    "zero_end_accelerations": True,
+    "weights": {"margin": 0.3, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]},
+}
+"""Options of the centre-of-mass planner where the file gives none; our choice, those of the passages."""
+
+
 def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     """Return the scenario with the supports of a contact plan, which can be kept and run again.
 
@@ -40,14 +51,25 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     supports = {
         "friction": friction,
         "sole": {"length_m": feet.length, "width_m": feet.width},
+        "planning_sole": {
+            "length_m": PLANNING_SHARE[0] * feet.length,
+            "width_m": PLANNING_SHARE[1] * feet.width,
+        },
         "phases": phases,
     }
     task = {
         "start": {"com": [float(x) for x in plan.stages[0].com]},
         "goal": {"com": [float(x) for x in plan.goal_com]},
     }
+    planning = scenario.planning.model_dump(mode="json", exclude_none=True)
+    if not scenario.planning.model_fields_set:
+        planning = PLANNING
     return scenario.replaced(
-        supports=supports, contacts=None, task=task, com_constraints=_constraints(scenario)
+        supports=supports,
+        contacts=None,
+        task=task,
+        com_constraints=_constraints(scenario),
+        planning=planning,
     )
 
 

@@ -202,7 +202,7 @@ class ScenarioValues:
         if self.file.supports is None:
             raise self.error(
                 ("supports",),
-                "is missing; valid: an explicit sequence of phases, contacts are not planned yet",
+                "is missing; valid: an explicit sequence of phases",
             )
         return self.file.supports
 
