@@ -157,7 +157,8 @@ def test_the_region_of_a_sole_is_the_sole():
 
 
 def test_a_steep_sole_carries_nobody():
-    slope = np.array([[0.5, 0.0, 0.866], [0.0, 1.0, 0.0], [-0.866, 0.0, 0.5]])
+    high = np.sqrt(0.75)
+    slope = np.array([[0.5, 0.0, high], [0.0, 1.0, 0.0], [-high, 0.0, 0.5]])
     contact = sole("left_foot", (0.0, 0.0, 0.0), length=0.28, width=0.12, friction=0.3, rotation=slope)
     region = StaticRegion.of([contact], 75.0)
     assert region.is_empty

@@ -38,6 +38,9 @@ SEATED_ROOM = (0.01, 0.01, 0.006)
 """How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
 
 
+NEARER = (0.7, 0.4)
+"""Shares of the way to its place with which a foot comes nearer when no stride is possible."""
+
 AT_GOAL = 0.06
 """Distance of a foot from its place at the goal that is not worth a step [m]."""
 
@@ -231,12 +234,15 @@ class _Search:
 
     def _wanted(self, state: _State, foot: str) -> Iterator[tuple[float, Contact]]:
         """Contacts to which a foot may go, each with how far along the guide it is."""
+        own = state.along[foot]
         ahead = max(value for name, value in state.along.items() if name != foot)
-        for share in self._settings.shares:
-            along = ahead + share * self._stride
-            if along >= self._guide.length:
+        strides = [ahead + share * self._stride for share in self._settings.shares]
+        # Where no stride leads, the foot comes nearer first, as on a turn.
+        nearer = [own + share * (min(strides[0], self._guide.length) - own) for share in NEARER]
+        for along in (*strides, *nearer):
+            if along >= self._guide.length - 1e-6:
                 yield self._guide.length, self._goal.contacts[foot]
-            elif along > state.along[foot]:
+            elif along > own:
                 for contact in self._places(foot, along):
                     yield along, contact
 
