@@ -31,6 +31,7 @@ from manikin.reachability import (
     UsableSurface,
     World,
     abstraction_of,
+    nearest_fit,
     plan_guide,
     relax,
 )
@@ -151,11 +152,14 @@ class _Search:
         began = clock.perf_counter()
         ends = np.array([start.q[:7], goal.q[:7]])
         world = World(self._scene, self._abstraction(), _region(ends), _condition())
+        checker = world.checker()
+        fits = [nearest_fit(pose, checker) for pose in ends]
+        ends = np.array([pose if fit is None else fit for pose, fit in zip(ends, fits, strict=True)])
         result = plan_guide(world, GuideTask(*ends), self._rng)
         self._summary["guide_samples"] += result.statistics.samples
         if result.path is None:
             return None, result.failure or "no guide"
-        planner = LocalPlanner(world.checker(), tuple(ends))
+        planner = LocalPlanner(checker, tuple(ends))
         poses = relax(result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES)), planner, self._rng)
         line = GuideLine.through(poses)
         self._summary["guide_length_m"] = line.length

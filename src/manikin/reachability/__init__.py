@@ -2,7 +2,7 @@
 
 from manikin.reachability.abstraction import Abstraction, LimbReach, TrunkShape, abstraction_of
 from manikin.reachability.checker import NO_MARGINS, Margins, ReachabilityChecker
-from manikin.reachability.comfort import ComfortSettings, relax
+from manikin.reachability.comfort import ComfortSettings, nearest_fit, relax
 from manikin.reachability.condition import Condition, LimbRule
 from manikin.reachability.guide import (
     GuideResult,
@@ -50,6 +50,7 @@ __all__ = [
     "World",
     "abstraction_of",
     "load_roadmap",
+    "nearest_fit",
     "offline_roadmap",
     "plan_guide",
     "plan_guide_with_restarts",

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from manikin.reachability.checker import ReachabilityChecker
 from manikin.reachability.steering import LocalPlanner
 from manikin.spatial import FloatArray
 
@@ -72,6 +73,41 @@ def relax(
     return _poses(_smoothed(line if raised is None else raised, planner))
 
 
+def nearest_fit(
+    pose: FloatArray, checker: ReachabilityChecker, settings: ComfortSettings | None = None
+) -> FloatArray | None:
+    """The pose above the same place that satisfies the condition with least sinking and leaning, or None.
+
+    A body may bend its back where the guide's stiff trunk has to sink or lean.
+
+    Args:
+        pose: (7,) wanted; returned as it is where the condition holds.
+        checker: Decides about poses.
+        settings: Heights and pitches that are tried.
+    """
+    if checker.holds(pose):
+        return pose
+    settings = settings or ComfortSettings()
+    depth, pitch = _choices(settings)
+    line = np.repeat(_coordinates(pose[None]), len(depth), axis=0)
+    line[:, _Z] -= depth
+    line[:, _PITCH] += pitch
+    poses = _poses(line)
+    order = np.argsort(_comfort(depth, pitch, settings), kind="stable")
+    return next((poses[row] for row in order if checker.holds(poses[row])), None)
+
+
+def _choices(settings: ComfortSettings) -> tuple[FloatArray, FloatArray]:
+    """Depths and pitches that are tried, each with each."""
+    sunk = np.arange(0.0, settings.lowest + 1e-9, settings.height_step)
+    depth, pitch = np.meshgrid(sunk, settings.pitches, indexing="ij")
+    return depth.ravel(), pitch.ravel()
+
+
+def _comfort(depth: FloatArray, pitch: FloatArray, settings: ComfortSettings) -> FloatArray:
+    return (depth / settings.sinking) ** 2 + (pitch / settings.leaning) ** 2
+
+
 def _coordinates(poses: FloatArray) -> FloatArray:
     """(n, 6) position and unwrapped yaw, pitch and roll."""
     angles = np.unwrap(Rotation.from_quat(poses[:, 3:]).as_euler("ZYX"), axis=0)
@@ -116,9 +152,8 @@ def _raised(line: FloatArray, planner: LocalPlanner, settings: ComfortSettings) 
     The ends stay as they are.
     """
     ideal = np.linspace(line[0, _Z], line[-1, _Z], len(line))
-    sunk = np.arange(0.0, settings.lowest + 1e-9, settings.height_step)
-    depth, pitch = (grid.ravel() for grid in np.meshgrid(sunk, settings.pitches, indexing="ij"))
-    comfort = (depth / settings.sinking) ** 2 + (pitch / settings.leaning) ** 2
+    depth, pitch = _choices(settings)
+    comfort = _comfort(depth, pitch, settings)
     moves = ((depth[:, None] - depth) / settings.height_step) ** 2
     moves += ((pitch[:, None] - pitch) / max(float(np.ptp(settings.pitches)), 1e-6) * 4.0) ** 2
     upright = int(np.argmin(comfort))
