@@ -178,7 +178,7 @@ def test_missing_supports_come_before_everything_else_about_them(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"body": {"model": "point_mass"}}, r"supports is missing; valid: explicit supports for a point_mass"),
+        ({"body": {"model": "point_mass"}}, r"supports is missing; valid: explicit supports for a point mass"),
         (
             {"task": {"start": {"at": [0, 0], "com": [0, 0, 1]}, "goal": {"at": [1, 0]}}},
             r"task\.start\.com has no meaning without explicit supports; valid: at",

@@ -114,8 +114,8 @@ class ScenarioFile(Section):
 
     def _check_planned(self) -> None:
         """Refuse what contacts cannot be planned for."""
-        if self.body.model != "human":
-            raise refuse("supports", f"is missing; valid: explicit supports for a {self.body.model}")
+        if self.body.model == "point_mass":
+            raise refuse("supports", "is missing; valid: explicit supports for a point mass")
         for end in ("start", "goal"):
             state = getattr(self.task, end)
             for key in ("com", "velocity_m_s"):

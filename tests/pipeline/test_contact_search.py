@@ -1,0 +1,103 @@
+"""From start and goal alone: contacts, and the motion that is executed on them."""
+
+import numpy as np
+import pytest
+import yaml
+
+from manikin import pipeline
+from manikin.balance import signed_distance, support_polygon
+from manikin.contact import Stance
+from manikin.contact_search import find_supports
+from manikin.scenarios import load_scenario
+from manikin.scene.distance import Proximity
+
+FOUND = ("crouch", "stairs", "stand-up-chair", "stand-up-sofa", "platform@found")
+
+
+def search(name, seed=0):
+    scenario = load_scenario(name)
+    body, scene = scenario.build_body(), scenario.build_scene()
+    return find_supports(scenario, body, scene, np.random.default_rng(seed)), body, scene
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_contacts_are_found_from_start_and_goal(name):
+    found, body, scene = search(name)
+    assert found.failure is None
+    scenario = found.scenario
+    scenario.check_contacts(scene)
+    problem = scenario.build_centroidal_problem()
+    np.testing.assert_allclose(problem.start_com, found.plan.stages[0].com)
+    np.testing.assert_allclose(problem.goal_com, found.plan.goal_com)
+    # At rest on the feet that stay, measured with the polygon of the soles.
+    for before, after in zip(found.plan.stages, found.plan.stages[1:], strict=False):
+        staying = [c for foot, c in before.contacts.items() if after.contacts.get(foot) is c]
+        assert signed_distance(after.com[:2], support_polygon(Stance(staying))) > 0.0
+    # Free of the scene but for what the end segments touch; thighs and pelvis rest on a seat.
+    proximity = Proximity(body, scene)
+    for q in found.plan.postures:
+        for (shape, other), distance in zip(*_near(proximity, q), strict=True):
+            rests = any(part in shape for part in ("foot", "toes", "pelvis", "thigh"))
+            assert rests or distance > 0.01, (shape, other)
+
+
+def _near(proximity, q):
+    result = proximity.evaluate(q, activation=0.05)
+    return result.pairs, result.distance
+
+
+def test_a_scenario_with_planned_supports_can_be_kept_and_run_again(tmp_path):
+    found, _, _ = search("stairs")
+    path = tmp_path / "stairs.yaml"
+    path.write_text(found.scenario.to_yaml())
+    again = load_scenario(path)
+    first, second = found.scenario.build_centroidal_problem(), again.build_centroidal_problem()
+    np.testing.assert_array_equal(first.start_com, second.start_com)
+    assert len(first.key_planes) == len(second.key_planes)
+    for one, other in zip(first.key_planes, second.key_planes, strict=True):
+        assert (one.key, one.offset) == (other.key, other.offset)
+
+
+def test_the_same_seed_has_the_same_contacts():
+    one, _, _ = search("crouch", 3)
+    other, _, _ = search("crouch", 3)
+    np.testing.assert_array_equal(one.plan.postures, other.plan.postures)
+    np.testing.assert_array_equal(one.guide.poses, other.guide.poses)
+
+
+@pytest.mark.parametrize("name", ["crouch", "stairs"])
+def test_every_seed_of_some_succeeds(name):
+    assert [search(name, seed)[0].failure for seed in range(1, 6)] == [None] * 5
+
+
+@pytest.mark.parametrize(
+    ("name", "where", "reason"),
+    [
+        ("crouch@walled-off", "guide", "walled off"),
+        ("stand-up-chair@slippery", "contacts", "cannot leave buttocks"),
+        ("stand-up-sofa@deep", "start", "no surface at the height of a seat"),
+    ],
+)
+def test_what_nobody_can_do_is_explained(name, where, reason, tmp_path):
+    result = pipeline.run(name, out=tmp_path / "run")
+    assert not result.succeeded
+    failure = result.summary["failure"]
+    assert failure["stage"] == "contacts"
+    assert failure["where"] == where
+    assert reason in failure["reason"]
+    assert result.summary["contacts"]["wall_s"] > 0.0
+    assert result.centroidal is None
+    assert (tmp_path / "run/summary.json").exists()
+
+
+@pytest.mark.slow
+def test_a_person_rises_from_a_sofa_in_the_physics_engine(tmp_path):
+    result = pipeline.run("stand-up-sofa", out=tmp_path / "run")
+    assert result.succeeded, result.summary["failure"]
+    executed = result.executed
+    assert not result.summary["execution"]["fell"]
+    assert executed.com[-1, 2] - executed.com[0, 2] > 0.2
+    assert executed.margin.min() > 0.0
+    # The run directory holds the scenario with its supports, ready to run again.
+    kept = yaml.safe_load((tmp_path / "run/scenario.yaml").read_text())
+    assert len(kept["supports"]["phases"]) == result.summary["contacts"]["phases"]
