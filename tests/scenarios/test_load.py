@@ -70,7 +70,7 @@ BAD_VALUES = [
     (("body",), {"mass_kg": float("inf")}, "body.mass_kg", "finite"),
     (("body",), {"mass_kg": True}, "body.mass_kg", "a number"),
     (("body",), {"sex": "other"}, "body.sex", "'male' or 'female'"),
-    (("body",), {"model": "insect"}, "body.model", "'human'"),
+    (("body",), {"model": "robot"}, "body.model", "'human'"),
     (("body",), {"mass": 79}, "body.mass", "mass_kg"),
     (("body",), "human", "body", "a mapping"),
     (("supports", "friction"), 0, "supports.friction", "> 0"),

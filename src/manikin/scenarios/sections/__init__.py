@@ -1,6 +1,6 @@
 """Sections of a scenario file, one pydantic model each; lengths are metres and angles degrees."""
 
-from manikin.scenarios.sections.body import BodySection
+from manikin.scenarios.sections.body import BodySection, LimbSection
 from manikin.scenarios.sections.com_constraint import ComConstraintSection, HeightBandSection
 from manikin.scenarios.sections.contact import ContactSection, SoleSection
 from manikin.scenarios.sections.obstacle import ObstacleSection, RoundSection, SphereSection
@@ -15,6 +15,7 @@ __all__ = [
     "ComConstraintSection",
     "ContactSection",
     "HeightBandSection",
+    "LimbSection",
     "ObstacleSection",
     "PhaseSection",
     "PlanningSection",
