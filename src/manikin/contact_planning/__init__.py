@@ -12,6 +12,7 @@ from manikin.contact_planning.efort import (
     pulling_efort,
     velocity_ellipsoid,
 )
+from manikin.contact_planning.exertable import exertable_force
 from manikin.contact_planning.generator import (
     ContactGenerator,
     GeneratedContact,
@@ -28,6 +29,7 @@ from manikin.contact_planning.heuristics import (
     Heuristic,
     Manipulability,
     Random,
+    StrongEfort,
     WeightedSum,
     duration,
     heuristic_named,
@@ -58,11 +60,13 @@ __all__ = [
     "Manipulability",
     "Random",
     "Situation",
+    "StrongEfort",
     "SurfaceTable",
     "Task",
     "WeightedSum",
     "duration",
     "efort",
+    "exertable_force",
     "find_candidates",
     "force_ellipsoid",
     "force_transmission_ratio",
