@@ -268,6 +268,31 @@ def walls_spacing() -> str:
     return "\n".join(rows) + "\n"
 
 
+# --- heuristics ----------------------------------------------------------------------------------
+
+
+HEURISTIC_SCENES = {"push": "pushing a cupboard", "rise": "getting up from a chair", "climb": "climbing"}
+
+
+def heuristics_table() -> str:
+    """Forces that chosen contacts can exert, measured by ``docs/heuristics.py``."""
+    found = json.loads((DOCS / "heuristics.json").read_text(encoding="utf-8"))
+    names = list(next(iter(found.values()))["mean_force_N"])
+    shown = {"efort": "EFORT", "strength": "EFORT with strengths", "distance": "closest distance"}
+    heads = [shown.get(name, name) for name in names]
+    rows = [
+        f"| scene | {' | '.join(heads)} | EFORT not behind closest distance | contacts |",
+        "|---|" + "---|" * (len(names) + 2),
+    ]
+    for scene, item in found.items():
+        forces = " | ".join(f"{item['mean_force_N'][name]:.0f}" for name in names)
+        rows.append(
+            f"| {HEURISTIC_SCENES[scene]} | {forces} | {100 * item['ahead_of_distance']:.0f} % | "
+            f"{item['compared']} of {item['asked']} |"
+        )
+    return "\n".join(rows) + "\n"
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "scenario": lambda: schema_tables(json_schema()),
     "stance": lambda: schema_tables(StanceFile.model_json_schema()),
@@ -280,6 +305,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "seeds": seeds_table,
     "walls-trials": walls_trials,
     "walls-spacing": walls_spacing,
+    "heuristics": heuristics_table,
 }
 
 

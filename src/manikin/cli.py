@@ -198,16 +198,47 @@ def compare(
 
 @app.command()
 def view(
-    source: RunArgument,
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="DIR|FILE",
+            help="Run directory or motion file (.h5); with --contacts a scenario's name or file.",
+        ),
+    ],
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 picks a free one.")] = 8080,
+    contacts: Annotated[
+        bool, typer.Option("--contacts", help="Drag the body of a scenario and watch its contacts.")
+    ] = False,
+    samples: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=100, max=1_000_000, help="With --contacts: samples of each limb."),
+    ] = None,
 ) -> None:
-    """Show a motion in the browser, on this computer only."""
+    """Show a motion in the browser, or the contacts of a body moved by hand; on this computer only."""
+
+    def announce(url: str) -> None:
+        typer.echo(f"viewer at {url} (Ctrl-C ends it)", err=True)
+
+    if contacts:
+        from manikin.live_contacts import LiveContacts
+        from manikin.scenarios import load_scenario
+        from manikin.scenarios.start import start_posture
+        from manikin.viewer import serve_contacts
+
+        job = load_scenario(source)
+        body = job.build_body()
+        q = start_posture(job, body)
+        live = LiveContacts(body, job.build_scene(), q, samples=samples or 10_000, seed=job.seed)
+        serve_contacts(live, port, announce)
+        return
+    if samples is not None:
+        raise InputError("--samples goes with --contacts; valid: leave it out")
     from manikin.motion.file import read_motions
 
-    content = read_motions(source)
+    content = read_motions(Path(source))
     from manikin.viewer import serve
 
-    serve(content, port=port, announce=lambda url: typer.echo(f"viewer at {url} (Ctrl-C ends it)", err=True))
+    serve(content, port=port, announce=announce)
 
 
 @app.command()

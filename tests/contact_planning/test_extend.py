@@ -128,9 +128,7 @@ def test_a_step_that_no_leg_can_make_is_explained():
 
 
 @settings(max_examples=30, deadline=None)
-@given(
-    x=st.floats(-0.2, 1.8), y=st.floats(-0.3, 0.3), yaw=st.floats(-3.1, 3.1), height=st.floats(0.0, 0.3)
-)
+@given(x=st.floats(-0.2, 1.8), y=st.floats(-0.3, 0.3), yaw=st.floats(-3.1, 3.1), height=st.floats(0.0, 0.3))
 def test_footholds_carry_the_whole_sole_and_leave_the_foot_free(x, y, yaw, height):
     holds = Footholds(BODY, STEPS)
     found = holds.near(np.array([x, y, height]), yaw)

@@ -70,7 +70,7 @@ BAD_VALUES = [
     (("body",), {"mass_kg": float("inf")}, "body.mass_kg", "finite"),
     (("body",), {"mass_kg": True}, "body.mass_kg", "a number"),
     (("body",), {"sex": "other"}, "body.sex", "'male' or 'female'"),
-    (("body",), {"model": "insect"}, "body.model", "'human'"),
+    (("body",), {"model": "robot"}, "body.model", "'human'"),
     (("body",), {"mass": 79}, "body.mass", "mass_kg"),
     (("body",), "human", "body", "a mapping"),
     (("supports", "friction"), 0, "supports.friction", "> 0"),
@@ -178,7 +178,10 @@ def test_missing_supports_come_before_everything_else_about_them(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"body": {"model": "point_mass"}}, r"supports is missing; valid: explicit supports for a point mass"),
+        (
+            {"body": {"model": "point_mass"}},
+            r"supports is missing; valid: explicit supports for a point mass",
+        ),
         (
             {"task": {"start": {"at": [0, 0], "com": [0, 0, 1]}, "goal": {"at": [1, 0]}}},
             r"task\.start\.com has no meaning without explicit supports; valid: at",

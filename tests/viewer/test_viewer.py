@@ -43,7 +43,7 @@ def test_scrubbing_places_the_body_as_the_kinematics_do(session, finished_run):
     motion = finished_run.executed
     index = int(np.searchsorted(motion.time, 1.234))
     body = Configuration(finished_run.body, motion.q[index])
-    for name, frame in session._frames.items():
+    for name, frame in session._shapes.frames.items():
         rotation, position = body.segment_placement(name)
         np.testing.assert_allclose(frame.position, position, atol=1e-12)
         w, x, y, z = frame.wxyz

@@ -5,6 +5,7 @@ than wide. A mesh becomes the smallest of a box, a capsule and a sphere that hol
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -71,7 +72,7 @@ _Primitive = tuple[ShapeKind, FloatArray, FloatArray, FloatArray]
 def _primitive(item: Element, where: str, folder: Path) -> _Primitive:
     """Kind, size, rotation and centre in the frame of the geometry."""
     if item.tag == "mesh":
-        return _around(_vertices(item, where, folder))
+        return _of_mesh(item, where, folder)
     if item.tag == "box":
         return ShapeKind.BOX, vector(item, "size", f"{where} box"), np.eye(3), np.zeros(3)
     radius = number(item, "radius", f"{where} {item.tag}")
@@ -85,21 +86,30 @@ def _primitive(item: Element, where: str, folder: Path) -> _Primitive:
     return ShapeKind.BOX, np.array([2.0 * radius, 2.0 * radius, length]), np.eye(3), np.zeros(3)
 
 
-def _vertices(item: Element, where: str, folder: Path) -> FloatArray:
-    """(n, 3) vertices of a mesh file [m]."""
+def _of_mesh(item: Element, where: str, folder: Path) -> _Primitive:
+    """The shape around a mesh file."""
     name = item.get("filename", "")
     scale = vector(item, "scale", f"{where} mesh", np.ones(3))
     file = _mesh_file(name, folder)
     if file is None:
         raise BodyError(f"{where} mesh {name[:200]!r} is not found from {folder}; valid: a mesh file")
     try:
+        return _around_file(file, file.stat().st_mtime_ns, tuple(scale.tolist()))
+    except BodyError as error:
+        raise BodyError(f"{where} {error}") from None
+
+
+@lru_cache(maxsize=64)
+def _around_file(file: Path, stamp: int, scale: tuple[float, ...]) -> _Primitive:  # noqa: ARG001
+    """The shape around a file as it was at a time; limbs often have one mesh in common."""
+    try:
         points = np.asarray(trimesh.load(file, force="mesh").vertices, dtype=np.float64)
     except Exception as error:  # the readers of each format raise what they like
         reason = " ".join(str(error).split())[:100] or type(error).__name__
-        raise BodyError(f"{where} mesh '{file}' cannot be read ({reason}); valid: a mesh") from None
+        raise BodyError(f"mesh '{file}' cannot be read ({reason}); valid: a mesh") from None
     if len(points) < 4 or not np.all(np.isfinite(points)):
-        raise BodyError(f"{where} mesh '{file}' has {len(points)} vertices; valid: at least 4 finite ones")
-    return points * scale
+        raise BodyError(f"mesh '{file}' has {len(points)} vertices; valid: at least 4 finite ones")
+    return _around(points * np.array(scale))
 
 
 def _mesh_file(name: str, folder: Path) -> Path | None:

@@ -13,6 +13,7 @@ from manikin.contact_planning.efort import (
     velocity_ellipsoid,
 )
 from manikin.contact_planning.endpoint import Endpoint, Endpoints, Habit
+from manikin.contact_planning.exertable import exertable_force
 from manikin.contact_planning.extend import ExtendSettings, Extension, extend
 from manikin.contact_planning.footholds import Foothold, Footholds, FootholdSettings
 from manikin.contact_planning.generator import (
@@ -32,6 +33,7 @@ from manikin.contact_planning.heuristics import (
     Heuristic,
     Manipulability,
     Random,
+    StrongEfort,
     WeightedSum,
     duration,
     heuristic_named,
@@ -80,11 +82,13 @@ __all__ = [
     "Situation",
     "Stage",
     "StaticRegion",
+    "StrongEfort",
     "SurfaceTable",
     "Task",
     "WeightedSum",
     "duration",
     "efort",
+    "exertable_force",
     "extend",
     "find_candidates",
     "force_ellipsoid",

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.balance import pseudo_wrench, stability_margins, wrench_polytope
-from manikin.body import ReachVolume
+from manikin.body import BodyModel, LimbKinematics, ReachVolume
 from manikin.body.natural_range import NaturalRange
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.contact_planning.candidates import Candidates, Situation
@@ -41,6 +41,39 @@ class Efort:
         """See :class:`Heuristic`."""
         direction = situation.reaction @ situation.rotation
         alpha = efort(candidates.products, direction, candidates.normals @ situation.rotation)
+        return -alpha if self.pulling else alpha
+
+
+@dataclass(frozen=True, eq=False)
+class StrongEfort:
+    """EFORT of joints of different strength; ours, the thesis lists it as open (5.4.2).
+
+    The torques of unit norm that EFORT takes are each a share of the joint's largest torque, so that the
+    force ellipsoid is ``f^T (J T^-2 J^T) f <= 1`` with ``T = diag(tau_max)``, and the ratio a force [N].
+
+    Attributes:
+        products: (n, 3, 3) ``J T^-2 J^T`` of the samples of each limb, by its name [N^-2].
+        pulling: Whether the limb holds on and pulls at the surface (5.13).
+    """
+
+    products: Mapping[str, FloatArray]
+    pulling: bool = False
+
+    @staticmethod
+    def of(body: BodyModel, samples: Mapping[str, LimbSamples], *, pulling: bool = False) -> "StrongEfort":
+        """Prepare the samples of some limbs."""
+        found = {}
+        for name, item in samples.items():
+            chain = LimbKinematics(body, item.limb)
+            scaled = chain.place(item.angles).jacobians / chain.torque_limit
+            found[name] = scaled @ scaled.transpose(0, 2, 1)
+        return StrongEfort(found, pulling)
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """See :class:`Heuristic`."""
+        products = self.products[situation.limb.name][candidates.samples]
+        direction = situation.reaction @ situation.rotation
+        alpha = efort(products, direction, candidates.normals @ situation.rotation)
         return -alpha if self.pulling else alpha
 
 

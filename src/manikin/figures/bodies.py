@@ -73,9 +73,8 @@ def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]
         mesh = obstacle.to_trimesh()
         finer = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE)
         triangles = np.asarray(finer[0])[np.asarray(finer[1])]
-        middle = triangles.mean(axis=1)
-        inside = ((middle >= low) & (middle <= high)).all(axis=1)
-        found.append(Solid(triangles[inside], COLOURS["obstacle"], 0.55))
+        inside = ((triangles.max(axis=1) > low) & (triangles.min(axis=1) < high)).all(axis=1)
+        found.append(Solid(np.clip(triangles[inside], low, high), COLOURS["obstacle"], 0.55))
     return found
 
 

@@ -72,6 +72,8 @@ def contact_choice_figure(
     rows = -(-len(panels) // wide)
     figure = new_figure(3.3 * wide, 3.9 * rows + 0.4, title)
     low, high = _box(body, panels)
+    if any(panel.task is not None for panel in panels):
+        high[2] += TASK
     for number, panel in enumerate(panels):
         axes: Axes3D = figure.add_subplot(rows, wide, number + 1, projection="3d")
         _draw(axes, body, scene, panel, low, high)
@@ -91,11 +93,12 @@ def _draw(
     for contact in panel.contacts:
         draw_arrow(axes, contact.position, NORMAL * contact.normal, COLOURS["planned"])
     if panel.task is not None:
-        above = Configuration(body, panel.q).com + np.array([0.0, 0.0, 0.5 * (high[2] - low[2])])
-        start = np.minimum(above, high) - 0.5 * TASK * panel.task
+        middle = np.array(Configuration(body, panel.q).com)
+        middle[2] = high[2] - 0.7 * TASK
+        start = middle - 0.5 * TASK * panel.task
         draw_arrow(axes, start, TASK * panel.task, COLOURS["ink"], 3.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.35)  # type: ignore[arg-type]
+    axes.set_box_aspect(high - low, zoom=1.25)  # type: ignore[arg-type]
     axes.set_axis_off()
     axes.text2D(0.5, 0.98, panel.title, transform=axes.transAxes, ha="center", va="bottom",
                 fontsize=9.5, color=COLOURS["ink"])  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from manikin.scenarios.sections.body import BodySection
+from manikin.scenarios.sections.body import WORDS, BodySection
 from manikin.scenarios.sections.com_constraint import ComConstraintSection
 from manikin.scenarios.sections.contacts import ContactsSection
 from manikin.scenarios.sections.obstacle import ObstacleSection
@@ -139,7 +139,9 @@ class ScenarioFile(Section):
             return
         for key in ("reference_stature_m", "push"):
             if getattr(self, key) is not None:
-                raise refuse(key, "does not apply to a point mass; valid: leave it out")
+                raise refuse(key, f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
+        if self.body.model != "point_mass" and self.supports is not None:
+            raise refuse("supports", f"do not apply to {WORDS[self.body.model]} yet; valid: leave them out")
 
 
 def json_schema() -> dict[str, Any]:

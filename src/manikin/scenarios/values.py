@@ -64,6 +64,10 @@ class ScenarioValues:
     @property
     def mass(self) -> float:
         """Body mass [kg]."""
+        if self.file.body.model == "urdf":
+            from manikin.scenarios.world import build_body
+
+            return build_body(self).mass
         return self.file.body.mass_kg
 
     @property

@@ -1,6 +1,8 @@
 """The body and the scene that a scenario describes."""
 
-from manikin.body import BodyModel, human, point_mass
+import numpy as np
+
+from manikin.body import BodyModel, creature_from_urdf, human, insect, point_mass
 from manikin.errors import InputError
 from manikin.scenarios.obstacles import build_obstacle
 from manikin.scenarios.validation import Path as KeyPath
@@ -14,6 +16,8 @@ def build_body(values: ScenarioValues) -> BodyModel:
     Raises:
         ScenarioError: If the body's data are out of range.
     """
+    if values.file.body.model in ("insect", "urdf"):
+        return _creature(values)
     if values.is_point_mass:
         return point_mass(values.mass)
     data, sole = values.file.body, values.sole
@@ -23,6 +27,24 @@ def build_body(values: ScenarioValues) -> BodyModel:
     except InputError as error:
         path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)
         raise values.refused(path, error) from None
+
+
+def _creature(values: ScenarioValues) -> BodyModel:
+    """An insect, or the creature of a robot description."""
+    data = values.file.body
+    try:
+        if data.model == "insect":
+            return insect(data.length_m, data.mass_kg)
+        sole = data.sole
+        return creature_from_urdf(
+            values.folder / str(data.urdf),
+            {name: limb.model_dump() for name, limb in (data.limbs or {}).items()},
+            standing={name: float(np.deg2rad(angle)) for name, angle in (data.standing_deg or {}).items()},
+            sole_length=None if sole is None else sole.length_m,
+            sole_width=None if sole is None else sole.width_m,
+        )
+    except InputError as error:
+        raise values.refused(("body",), error) from None
 
 
 def build_scene(values: ScenarioValues) -> Scene:

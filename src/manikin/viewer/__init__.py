@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from manikin.errors import InputError
 
 if TYPE_CHECKING:
+    from manikin.live_contacts import LiveContacts
     from manikin.motion.file import MotionFile
 
-__all__ = ["serve"]
+__all__ = ["serve", "serve_contacts"]
 
 
 def serve(content: MotionFile, port: int = 8080, announce: Callable[[str], None] | None = None) -> None:
@@ -24,15 +26,42 @@ def serve(content: MotionFile, port: int = 8080, announce: Callable[[str], None]
     Raises:
         InputError: If the viewer is not installed, the file holds no body or the port is taken.
     """
-    try:
+    with _installed():
         from manikin.viewer.session import ViewerSession
+    session = ViewerSession(content, port)
+    if announce is not None:
+        announce(session.url)
+    session.run()
+
+
+def serve_contacts(
+    live: LiveContacts, port: int = 8080, announce: Callable[[str], None] | None = None
+) -> None:
+    """Let the user drag a body through its scene and watch the contacts of its limbs, until Ctrl-C.
+
+    Args:
+        live: The body, its scene and where it begins.
+        port: Port to listen on; 0 picks a free one.
+        announce: Told the page's address when it can be opened.
+
+    Raises:
+        InputError: If the viewer is not installed or the port is taken.
+    """
+    with _installed():
+        from manikin.viewer.contacts import ContactViewer
+    session = ContactViewer(live, port)
+    if announce is not None:
+        announce(session.url)
+    session.run()
+
+
+@contextmanager
+def _installed() -> Iterator[None]:
+    try:
+        yield
     except ModuleNotFoundError as error:
         if error.name != "viser":
             raise
         raise InputError(
             "the viewer is not installed; install it with: pip install 'manikin[viewer]'"
         ) from None
-    session = ViewerSession(content, port)
-    if announce is not None:
-        announce(session.url)
-    session.run()

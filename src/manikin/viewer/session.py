@@ -1,27 +1,18 @@
 """One viewer in the browser: the scene, the body, the controls and their state."""
 
-import socket
 import threading
 import time as clock
-from contextlib import redirect_stdout
-from io import StringIO
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
-import viser
 from viser import uplot
 
-from manikin.body.triangles import segment_triangles
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.derived import effector_positions
 from manikin.motion.file import MotionFile
-from manikin.scene import HalfSpace, Plane
 from manikin.spatial import FloatArray
-
-HOST = "127.0.0.1"
-"""The viewer listens to this computer only."""
+from manikin.viewer.stage import COLOURS, HOST, BodyShapes, add_scene, side_colour, start_server, stop_server
 
 FRAME_RATE = 30.0
 """Pictures per second while playing."""
@@ -30,16 +21,6 @@ SMALLEST_FORCE = 5.0
 """Contact forces below this are not drawn [N]."""
 PLOT_POINTS = 400
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
-COLOURS = {
-    "planned": (0, 114, 178),
-    "executed": (213, 94, 0),
-    "left": (0, 158, 115),
-    "right": (204, 121, 167),
-    "trunk": (150, 156, 166),
-    "obstacle": (186, 192, 202),
-    "floor": (236, 238, 241),
-    "force": (230, 159, 0),
-}
 
 
 class ViewerSession:
@@ -70,7 +51,6 @@ class ViewerSession:
         self.playing = False
         self.speed = 1.0
         self._body = content.body
-        self._data = content.body.pinocchio.createData()
         self._feet: dict[str, FloatArray] = {}
         if content.body.is_point_mass:
             self._feet = effector_positions(
@@ -78,8 +58,7 @@ class ViewerSession:
             )
         self._lock = threading.RLock()
         self._closed = threading.Event()
-        with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
-            self.server = viser.ViserServer(host=HOST, port=_checked_port(port), verbose=False)
+        self.server = start_server(port)
         self.time = float(self.motion.time[0])
         self._build_scene()
         self._build_body()
@@ -103,7 +82,7 @@ class ViewerSession:
             self.time = float(np.clip(time, motion.time[0], motion.time[-1]))
             index = int(np.clip(np.searchsorted(motion.time, self.time), 0, len(motion.time) - 1))
             with self.server.atomic():
-                self._place_body(motion.q[index])
+                self._shapes.place(motion.q[index])
                 self._place_legs(motion, index)
                 self._place_forces(motion, index)
                 self._com.position = motion.com[index]
@@ -161,32 +140,13 @@ class ViewerSession:
         """Stop the server; a second call does nothing."""
         if not self._closed.is_set():
             self._closed.set()
-            with redirect_stdout(StringIO()):
-                self.server.stop()
+            stop_server(self.server)
 
     # --- what stands still ---------------------------------------------------------------
 
     def _build_scene(self) -> None:
         scene = self.server.scene
-        scene.set_up_direction("+z")
-        for obstacle in self.content.scene or ():
-            if isinstance(obstacle.shape, (HalfSpace, Plane)):
-                continue
-            mesh = obstacle.to_trimesh()
-            scene.add_mesh_simple(
-                f"/scene/{obstacle.name}",
-                np.asarray(mesh.vertices),
-                np.asarray(mesh.faces),
-                color=COLOURS["obstacle"],
-                opacity=0.55,
-                flat_shading=True,
-                side="double",
-            )
-        if self.content.scene is not None and self.content.scene.floor_height is not None:
-            height = self.content.scene.floor_height - 1e-3
-            scene.add_grid(
-                "/floor", width=8.0, height=8.0, cell_size=0.5, plane="xy", position=(0, 0, height)
-            )
+        add_scene(self.server, self.content.scene)
         for name, motion in self.content.motions.items():
             path = _thinned(motion.com)
             segments = np.stack([path[:-1], path[1:]], axis=1)
@@ -209,7 +169,7 @@ class ViewerSession:
                 self.server.scene.add_line_segments(
                     f"/contacts/{number}_{contact.effector}",
                     edges,
-                    np.array(_side_colour(contact.effector)),
+                    np.array(side_colour(contact.effector)),
                     thickness=2.0,
                     thickness_units="screen",
                 )
@@ -224,18 +184,7 @@ class ViewerSession:
 
     def _build_body(self) -> None:
         scene = self.server.scene
-        self._frames: dict[str, viser.FrameHandle] = {}
-        for segment in self._body.segments:
-            triangles = segment_triangles(segment)
-            if triangles is None:
-                continue
-            self._frames[segment.name] = scene.add_frame(f"/body/{segment.name}", show_axes=False)
-            scene.add_mesh_simple(
-                f"/body/{segment.name}/shape",
-                *triangles,
-                color=_side_colour(segment.name),
-                opacity=0.7,  # the centre of mass and its path are inside
-            )
+        self._shapes = BodyShapes(self.server, self._body)  # the centre of mass and its path are inside
         self._com = scene.add_icosphere("/com/now", radius=0.03, color=(34, 34, 34))
         names = dict.fromkeys(
             name for motion in self.content.motions.values() for name in motion.contact_names
@@ -253,13 +202,6 @@ class ViewerSession:
             for name in names
         }
 
-    def _place_body(self, q: FloatArray) -> None:
-        pin.framesForwardKinematics(self._body.pinocchio, self._data, q)
-        for name, frame in self._frames.items():
-            placement = self._data.oMf[self._body.segment_frame(name)]
-            x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
-            frame.wxyz, frame.position = (w, x, y, z), placement.translation
-
     def _place_forces(self, motion: Motion, index: int) -> None:
         for number, name in enumerate(motion.contact_names):
             force = motion.contact_force[index, number, :3]
@@ -272,7 +214,7 @@ class ViewerSession:
     def _effector_place(self, name: str, index: int) -> FloatArray:
         if name in self._feet:
             return self._feet[name][index]
-        return self._data.oMf[self._body.effector_frame(name)].translation
+        return self._shapes.data.oMf[self._body.effector_frame(name)].translation
 
     def _place_legs(self, motion: Motion, index: int) -> None:
         """Draw the massless legs of a point mass as lines, those in contact thicker."""
@@ -281,7 +223,7 @@ class ViewerSession:
             self.server.scene.add_line_segments(
                 f"/legs/{name}",
                 np.array([[motion.com[index], places[index]]]),
-                np.array(_side_colour(name)),
+                np.array(side_colour(name)),
                 thickness=6.0 if on else 2.0,
                 thickness_units="screen",
             )
@@ -293,7 +235,6 @@ class ViewerSession:
 
     def _build_controls(self) -> None:
         gui = self.server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False)
         last = max(float(motion.time[-1]) for motion in self.content.motions.values())
         with gui.add_folder("Playback"):
             self._slider = gui.add_slider("time [s]", min=0.0, max=last, step=0.001, initial_value=self.time)
@@ -368,22 +309,6 @@ class ViewerSession:
                 f"- CoM: {', '.join(f'{value:.3f}' for value in motion.com[index])} m",
             ]
         )
-
-
-def _checked_port(port: int) -> int:
-    """Return a port that is free, or refuse: viser would silently take another one."""
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, port))
-        except (OSError, OverflowError) as error:
-            problem = getattr(error, "strerror", None) or str(error)
-            raise InputError(f"port {port} cannot be used ({problem}); valid: a free port, or 0") from None
-        return int(probe.getsockname()[1])
-
-
-def _side_colour(name: str) -> tuple[int, int, int]:
-    return next((COLOURS[side] for side in ("left", "right") if name.startswith(side)), COLOURS["trunk"])
 
 
 def _css(colour: tuple[int, int, int]) -> str:

@@ -1,6 +1,6 @@
 """Sections of a scenario file, one pydantic model each; lengths are metres and angles degrees."""
 
-from manikin.scenarios.sections.body import BodySection
+from manikin.scenarios.sections.body import BodySection, LimbSection
 from manikin.scenarios.sections.com_constraint import ComConstraintSection, HeightBandSection
 from manikin.scenarios.sections.contact import ContactSection, SoleSection
 from manikin.scenarios.sections.contacts import ContactsSection
@@ -17,6 +17,7 @@ __all__ = [
     "ContactSection",
     "ContactsSection",
     "HeightBandSection",
+    "LimbSection",
     "ObstacleSection",
     "PhaseSection",
     "PlanningSection",

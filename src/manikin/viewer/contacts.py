@@ -1,0 +1,195 @@
+"""The interactive mode: a body is dragged through its scene, and its contacts follow."""
+
+import threading
+from collections.abc import Sequence
+
+import numpy as np
+
+from manikin.contact_planning import HEURISTICS
+from manikin.live_contacts import LiveAnswer, LiveContacts
+from manikin.single_contact import Role
+from manikin.spatial import FloatArray
+from manikin.viewer.stage import HOST, BodyShapes, add_scene, side_colour, start_server, stop_server
+
+FRAME_RATE = 60.0
+"""Largest number of updates per second; a change that comes while one is made waits for the next."""
+NORMAL = 0.2
+"""Length of a contact's normal [m]."""
+TASK = 0.6
+"""Length of the task's arrow [m]."""
+
+
+class ContactViewer:
+    """Serves one body in its scene; every change goes through its methods.
+
+    Callbacks of the page only note what is wanted; :meth:`update` makes the newest of it, so that a
+    fast hand never waits for old poses.
+
+    Attributes:
+        server: The viser server.
+        live: The body, the task and what follows.
+        latest: The last answer shown.
+        updates: Number of answers so far.
+    """
+
+    def __init__(self, live: LiveContacts, port: int = 8080) -> None:
+        """Start the server and show the first contacts.
+
+        Args:
+            live: The body, its scene and where it begins.
+            port: Port to listen on; 0 picks a free one.
+
+        Raises:
+            InputError: If the port is taken.
+        """
+        self.live = live
+        self.updates = 0
+        self._lock = threading.RLock()
+        self._wanted = threading.Event()
+        self._closed = threading.Event()
+        self.server = start_server(port)
+        add_scene(self.server, live.scene)
+        self._shapes = BodyShapes(self.server, live.body)
+        self._build_handles()
+        self._build_controls()
+        self._look_at(live.q[:3])
+        self._wanted.set()
+        self.latest: LiveAnswer = self.update() or live.answer()
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return f"http://{HOST}:{self.server.get_port()}"
+
+    def move(self, position: Sequence[float] | FloatArray, wxyz: Sequence[float] | FloatArray) -> None:
+        """Put the root elsewhere, as the gizmo does.
+
+        Args:
+            position: (3,) [m].
+            wxyz: (4,) quaternion, the real part first as viser has it.
+        """
+        with self._lock:
+            w, x, y, z = wxyz
+            self.live.move(position, (x, y, z, w))
+            self._wanted.set()
+
+    def aim(self, azimuth_deg: float, elevation_deg: float) -> None:
+        """Turn the task."""
+        with self._lock:
+            self.live.aim(azimuth_deg, elevation_deg)
+            self._wanted.set()
+
+    def choose(self, heuristic: str, role: str, pulling: bool, limbs: Sequence[str]) -> None:
+        """Set what the limbs are asked for."""
+        with self._lock:
+            self.live.heuristic, self.live.role, self.live.pulling = heuristic, Role(role), pulling
+            self.live.ask(limbs)
+            self._wanted.set()
+
+    def update(self) -> LiveAnswer | None:
+        """Find and show the contacts, if anything has changed since the last time."""
+        if not self._wanted.is_set():
+            return None
+        with self._lock:
+            self._wanted.clear()
+            answer = self.live.answer()
+            self._show(answer)
+            self.latest = answer
+            self.updates += 1
+            return answer
+
+    def run(self) -> None:
+        """Serve until :meth:`close` is called or Ctrl-C is pressed."""
+        try:
+            while not self._closed.wait(1.0 / FRAME_RATE):
+                self.update()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Stop the server; a second call does nothing."""
+        if not self._closed.is_set():
+            self._closed.set()
+            stop_server(self.server)
+
+    def _build_handles(self) -> None:
+        scene, (x, y, z, w) = self.server.scene, self.live.q[3:7]
+        self.gizmo = scene.add_transform_controls(
+            "/move", scale=0.35, position=self.live.q[:3], wxyz=(w, x, y, z), depth_test=False
+        )
+        self.gizmo.on_update(lambda _: self.move(self.gizmo.position, self.gizmo.wxyz))
+        self._task = scene.add_arrows("/task", _arrow(np.zeros(3), np.ones(3)), np.zeros(3, dtype=np.uint8))
+        self._normals = {
+            limb.name: scene.add_arrows(
+                f"/contacts/{limb.name}",
+                _arrow(np.zeros(3), np.ones(3)),
+                np.array(side_colour(limb.name), dtype=np.uint8),
+                shaft_radius=0.012,
+                head_radius=0.03,
+                head_length=0.06,
+                visible=False,
+            )
+            for limb in self.live.body.limbs
+        }
+
+    def _build_controls(self) -> None:
+        gui, names = self.server.gui, [limb.name for limb in self.live.body.limbs]
+        with gui.add_folder("Task"):
+            self.azimuth = gui.add_slider(
+                "azimuth [deg]", min=-180.0, max=180.0, step=1.0, initial_value=self.live.azimuth_deg
+            )
+            self.elevation = gui.add_slider(
+                "elevation [deg]", min=-90.0, max=90.0, step=1.0, initial_value=self.live.elevation_deg
+            )
+            self.role = gui.add_dropdown("limbs move", tuple(Role), initial_value=self.live.role.value)
+            self.pulling = gui.add_checkbox("hold on and pull", initial_value=self.live.pulling)
+        with gui.add_folder("Contacts"):
+            self.heuristic = gui.add_dropdown("heuristic", HEURISTICS, initial_value=self.live.heuristic)
+            self.limbs = {
+                name: gui.add_checkbox(name.replace("_", " "), initial_value=name in self.live.limbs)
+                for name in names
+            }
+        with gui.add_folder("Now"):
+            self._text = gui.add_markdown("")
+        for handle in (self.azimuth, self.elevation):
+            handle.on_update(lambda _: self.aim(self.azimuth.value, self.elevation.value))
+        for handle in (self.role, self.pulling, self.heuristic, *self.limbs.values()):
+            handle.on_update(lambda _: self._chosen())
+
+    def _chosen(self) -> None:
+        wanted = [name for name, handle in self.limbs.items() if handle.value]
+        self.choose(self.heuristic.value, self.role.value, self.pulling.value, wanted)
+
+    def _show(self, answer: LiveAnswer) -> None:
+        with self.server.atomic():
+            self._shapes.place(answer.q)
+            head = answer.q[:3] + np.array([0.0, 0.0, 1.05])
+            self._task.points = _arrow(head, TASK * self.live.direction)
+            for name, arrow in self._normals.items():
+                found = answer.answers.get(name)
+                contact = None if found is None else found.contact
+                if contact is not None:
+                    arrow.points = _arrow(contact.position, NORMAL * contact.normal)
+                arrow.visible = contact is not None
+        self._text.content = "\n".join([f"**{1e3 * answer.wall_s:.1f} ms**", "", *_lines(answer)])
+
+    def _look_at(self, middle: FloatArray) -> None:
+        self.server.initial_camera.look_at = middle
+        self.server.initial_camera.position = middle + np.array([-1.7, -1.9, 0.5])
+        self.server.initial_camera.up = (0.0, 0.0, 1.0)
+
+
+def _lines(answer: LiveAnswer) -> list[str]:
+    """What each limb found, in one line each."""
+    lines = []
+    for name, found in answer.answers.items():
+        words = f"{found.obstacle}, EFORT {answer.efforts[name]:.2f}" if found.found else found.message
+        lines.append(f"- {name.replace('_', ' ')}: {words}")
+    return lines
+
+
+def _arrow(start: FloatArray, vector: FloatArray) -> FloatArray:
+    """(1, 2, 3) points of an arrow."""
+    return np.array([[start, start + vector]])

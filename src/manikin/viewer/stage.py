@@ -1,0 +1,121 @@
+"""What every viewer shows: the server, the obstacles and the body's shapes."""
+
+import socket
+from contextlib import redirect_stdout
+from io import StringIO
+
+import numpy as np
+import pinocchio as pin
+import viser
+
+from manikin.body import BodyModel
+from manikin.body.triangles import segment_triangles
+from manikin.errors import InputError
+from manikin.scene import HalfSpace, Plane, Scene
+from manikin.spatial import FloatArray
+
+HOST = "127.0.0.1"
+"""The viewer listens to this computer only."""
+
+COLOURS = {
+    "planned": (0, 114, 178),
+    "executed": (213, 94, 0),
+    "left": (0, 158, 115),
+    "right": (204, 121, 167),
+    "trunk": (150, 156, 166),
+    "obstacle": (186, 192, 202),
+    "floor": (236, 238, 241),
+    "force": (230, 159, 0),
+}
+
+
+def start_server(port: int) -> viser.ViserServer:
+    """Start a server on this computer.
+
+    Args:
+        port: Port to listen on; 0 picks a free one.
+
+    Raises:
+        InputError: If the port is taken.
+    """
+    with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
+        server = viser.ViserServer(host=HOST, port=_checked_port(port), verbose=False)
+    server.scene.set_up_direction("+z")
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    return server
+
+
+def stop_server(server: viser.ViserServer) -> None:
+    """Stop a server without a word."""
+    with redirect_stdout(StringIO()):
+        server.stop()
+
+
+def add_scene(server: viser.ViserServer, scene: Scene | None) -> None:
+    """Draw the finite obstacles and the floor."""
+    for obstacle in scene or ():
+        if isinstance(obstacle.shape, (HalfSpace, Plane)):
+            continue
+        mesh = obstacle.to_trimesh()
+        server.scene.add_mesh_simple(
+            f"/scene/{obstacle.name}",
+            np.asarray(mesh.vertices),
+            np.asarray(mesh.faces),
+            color=COLOURS["obstacle"],
+            opacity=0.55,
+            flat_shading=True,
+            side="double",
+        )
+    if scene is not None and scene.floor_height is not None:
+        height = scene.floor_height - 1e-3
+        server.scene.add_grid(
+            "/floor", width=8.0, height=8.0, cell_size=0.5, plane="xy", position=(0, 0, height)
+        )
+
+
+class BodyShapes:
+    """The shapes of a body on the page.
+
+    Attributes:
+        frames: One frame for each segment with shapes.
+        data: Pinocchio's data of the configuration shown.
+    """
+
+    def __init__(self, server: viser.ViserServer, body: BodyModel, opacity: float = 0.7) -> None:
+        """Draw the body; what is inside it stays visible."""
+        self._body = body
+        self.data = body.pinocchio.createData()
+        self.frames: dict[str, viser.FrameHandle] = {}
+        for segment in body.segments:
+            triangles = segment_triangles(segment)
+            if triangles is None:
+                continue
+            self.frames[segment.name] = server.scene.add_frame(f"/body/{segment.name}", show_axes=False)
+            server.scene.add_mesh_simple(
+                f"/body/{segment.name}/shape", *triangles, color=side_colour(segment.name), opacity=opacity
+            )
+
+    def place(self, q: FloatArray) -> None:
+        """Show the configuration (nq,)."""
+        pin.framesForwardKinematics(self._body.pinocchio, self.data, q)
+        for name, frame in self.frames.items():
+            placement = self.data.oMf[self._body.segment_frame(name)]
+            x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+            frame.wxyz, frame.position = (w, x, y, z), placement.translation
+
+
+def side_colour(name: str) -> tuple[int, int, int]:
+    """Colour of what belongs to a side of the body, by its name."""
+    return next((COLOURS[side] for side in ("left", "right") if name.startswith(side)), COLOURS["trunk"])
+
+
+def _checked_port(port: int) -> int:
+    """Return a port that is free, or refuse: viser would silently take another one."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            problem = getattr(error, "strerror", None) or str(error)
+            raise InputError(f"port {port} cannot be used ({problem}); valid: a free port, or 0") from None
+        return int(probe.getsockname()[1])
