@@ -136,7 +136,7 @@ def test_footholds_carry_the_whole_sole_and_leave_the_foot_free(x, y, yaw, heigh
     for hold in found:
         contact = hold.contact("left_foot", holds.length, holds.width, 0.7)
         assert STEPS.supporting_surface(contact, 1e-9).obstacle == hold.obstacle
-        corners = contact.points_in_world + [0.0, 0.0, 0.05]
+        corners = contact.points_in_world + np.array([0.0, 0.0, 0.05])
         assert all(STEPS.nearest(corner)[1] > 0.01 for corner in corners)
 
 
