@@ -140,7 +140,7 @@ def certify_refined(
     times = {name: float(motion.time[int(np.argmax(values))]) for name, values in series.items()}
     times["min_margin"] = float(motion.time[int(np.argmin(margin))])
     apart = proximity.minimum_over(motion.q, obstacles.during_flights(), tolerance=1e-5)
-    flying = proximity.minimum_over(motion.q, obstacles.ignored, tolerance=1e-5)
+    flying = proximity.minimum_over(motion.q, obstacles.touching(), tolerance=1e-5)
     times["min_clearance_m"] = float(motion.time[apart.sample])
     times["max_penetration_m"] = float(motion.time[flying.sample])
     return RefineResiduals(

@@ -54,12 +54,8 @@ def contact_targets(
             contact, at a variable of 1.
     """
     targets = {}
-    phases = schedule.phase_at(time)
     for name in schedule.sequence.effectors:
         place = _Place.nowhere(len(time))
-        for number, phase in enumerate(schedule.sequence):
-            if name in phase.stance:
-                place.hold(phases == number, phase.stance[name])
         for swing in schedule.sequence.swings():
             if swing.effector == name:
                 start, end = schedule.swing_interval(swing)
@@ -69,6 +65,10 @@ def contact_targets(
                 ):
                     if contact is not None:
                         place.approach(near, contact, variables[name], approach)
+        for number, phase in enumerate(schedule.sequence):
+            if name in phase.stance:
+                start, end = schedule.instants[number : number + 2]
+                place.hold((time >= start) & (time <= end), phase.stance[name])
         targets[name] = EffectorTarget(
             place.position, place.rotation, place.weight, place.rotation_weight, place.along
         )
@@ -92,8 +92,8 @@ class _Place:
 
     def hold(self, rows: FloatArray, contact: Contact) -> None:
         self._put(rows, contact)
-        self.weight[rows] = 1.0
-        self.rotation_weight[rows] = _turn_weight(contact)
+        self.weight[rows], self.rotation_weight[rows] = 1.0, _turn_weight(contact)
+        self.along[rows] = np.eye(3)
 
     def approach(self, rows: FloatArray, contact: Contact, variable: FloatArray, weight: float) -> None:
         """Keep to the contact's normal; the height above the surface is left to the distances."""

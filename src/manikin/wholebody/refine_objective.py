@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.contact import ContactSchedule
+from manikin.body.limb import hanging_segment
+from manikin.contact import ContactKind, ContactSchedule
 from manikin.contact_planning.efort import Task
 from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint
@@ -72,8 +73,10 @@ def refine_targets(
     variables = contact_variables(schedule, time)
     obstacles = RefineObstacles(body, scene, schedule, time, padded)
     n = len(time)
-    guide = np.full(body.nv, scales.guide)
+    reference, guide = path.at(time), np.full(body.nv, scales.guide)
     guide[:3] = np.inf
+    for joint in sole_toes(body, schedule):
+        reference[:, 7 + joint], guide[6 + joint] = 0.0, scales.toes
     fit = FitTargets(
         time=time,
         effectors=contact_targets(schedule, time, variables, scales.position / scales.approach),
@@ -81,12 +84,23 @@ def refine_targets(
         com_weight=np.zeros(n),
         com_acceleration=np.zeros((n, 3)),
         margin=np.zeros(n),
-        reference=path.at(time),
+        reference=reference,
         reference_scale=guide,
         ignored=obstacles.ignored,
     )
     limbs = limb_directions(body, path, schedule, time, task)
     return RefineTargets(fit, variables, limbs, obstacles, schedule)
+
+
+def sole_toes(body: BodyModel, schedule: ContactSchedule) -> tuple[int, ...]:
+    """Joints of the toes of what stands on soles: flat ones do not go into the ground."""
+    found = set[int]()
+    for phase in schedule.sequence:
+        for contact in phase.stance:
+            hanging = hanging_segment(body, body.effector(contact.effector).segment)
+            if contact.kind is ContactKind.SOLE and hanging is not None:
+                found.update(body.joint_index(hinge.name) for hinge in hanging.hinges)
+    return tuple(sorted(found))
 
 
 class RefineObjective(MotionObjective):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.contact import ContactSchedule
+from manikin.contact import ContactKind, ContactSchedule
 from manikin.scene import Scene
 from manikin.scene.distance import ProximitySamples, segment_of
 from manikin.spatial import FloatArray
@@ -20,6 +20,9 @@ from manikin.wholebody.meeting import Ignored
 RISE = 0.3
 """Share of a flight after which the full clearance is wanted from what was left, and before what is reached."""
 
+GRASPED = -0.05
+"""Distance at which a hand that holds on to something begins to be pushed off it [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class _Side:
@@ -28,10 +31,12 @@ class _Side:
     Attributes:
         pairs: Segments and the obstacle that they leave or reach.
         away: (n,) 0 at the contact, 1 far from it; 1 outside the flight.
+        grasped: Whether the hand has its fingers around the obstacle.
     """
 
     pairs: Ignored
     away: FloatArray
+    grasped: bool
 
 
 class RefineObstacles:
@@ -73,17 +78,27 @@ class RefineObstacles:
                 if contact is not None:
                     share = np.clip(gone / (RISE * (end - start)), 0.0, 1.0)
                     away = np.where(rows, share**2 * (3.0 - 2.0 * share), 1.0)
-                    self._sides.append(_Side(touch_pairs(body, scene, contact), away))
+                    grasped = contact.kind is ContactKind.GRASP
+                    self._sides.append(_Side(touch_pairs(body, scene, contact), away, grasped))
+
+    def touching(self) -> tuple[Ignored, ...]:
+        """Pairs that may go into each other at each sample: those in contact, and a hand about a grasp."""
+        return self._with([side for side in self._sides if side.grasped])
 
     def during_flights(self) -> tuple[Ignored, ...]:
         """Pairs that do not count as clearance at each sample: those in contact, leaving it or reaching it."""
-        flown = [
-            frozenset[tuple[str, str]]().union(
-                *(side.pairs for side in self._sides if side.away[sample] < 1.0)
-            )
-            for sample in range(len(self.ignored))
-        ]
-        return tuple(held | free for held, free in zip(self.ignored, flown, strict=True))
+        return self._with(self._sides)
+
+    def _with(self, sides: list[_Side]) -> tuple[Ignored, ...]:
+        known: dict[tuple[Ignored, tuple[bool, ...]], Ignored] = {}
+        found = []
+        for sample, held in enumerate(self.ignored):
+            near = tuple(bool(side.away[sample] < 1.0) for side in sides)
+            if (held, near) not in known:
+                pairs = (side.pairs for side, close in zip(sides, near, strict=True) if close)
+                known[held, near] = held.union(*pairs)
+            found.append(known[held, near])
+        return tuple(found)
 
     def wanted(self, found: ProximitySamples, safe: float, touching: float) -> FloatArray:
         """(k,) wanted distance of close pairs [m].
@@ -100,5 +115,6 @@ class RefineObstacles:
             for segment, obstacle in side.pairs:
                 rows |= (named[:, 0] == segment) & (named[:, 1] == obstacle)
             share = side.away[found.sample[rows]]
-            wanted[rows] = np.minimum(wanted[rows], share * safe + (1.0 - share) * touching)
+            inside = GRASPED if side.grasped else touching
+            wanted[rows] = np.minimum(wanted[rows], share * safe + (1.0 - share) * inside)
         return wanted

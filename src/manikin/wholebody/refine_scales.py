@@ -22,6 +22,7 @@ class RefineScales(FitScales):
         approach: Distance to the normal through its contact at a contact variable of 1, in flight [m].
         efort: Square root of ``c / alpha`` (7.8).
         guide: Deviation of a joint from the input [rad].
+        toes: Angle of the toes of what stands on soles [rad].
         end_position: Deviation of the pelvis from the input at both ends [m].
         end_angle: Deviation of a joint, or of the pelvis' attitude, there [rad].
     """
@@ -40,5 +41,6 @@ class RefineScales(FitScales):
     approach: float = 0.02
     efort: float = 3.0
     guide: float = 0.6
+    toes: float = 0.02
     end_position: float = 0.01
     end_angle: float = 0.05
