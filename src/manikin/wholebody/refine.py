@@ -51,10 +51,13 @@ REPAIRS = 5
 SLOWER = 1.3
 """Factor by which a phase gets longer in which balance or speed is missed again."""
 
+CAUGHT = -0.02
+"""Below this clearance a part of the body is caught on the wrong side of another, and the fit begins anew [m]."""
+
 STRONGER = 0.5
 """Factor of the scales of what was missed."""
 
-PATIENT = 0.01
+PATIENT = 0.004
 """Relative decrease of the objective below which a repair stops."""
 
 Progress = Callable[[float], None]
@@ -225,6 +228,11 @@ class _Refinement:
             broken = last.certificate.broken(self.settings.requirements)
             if not broken:
                 break
+            if last.certificate.min_clearance_m < CAUGHT:
+                scales = _reweighed(scales, broken & {"min_clearance_m"})
+                last = self._attempt(scales, fine)
+                best = self._better(best, last)
+                continue
             scales = _reweighed(scales, broken)
             slower = number > 0 and self.settings.retime and bool(broken & _SLOWED)
             finer = number > 0 and not fine and bool(broken & _EXACT)

@@ -7,6 +7,7 @@ each residual divided by the scale at which it matters (:class:`RefineScales`); 
 here the control points of one spline, and every derivative is analytic.
 """
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ from manikin.spatial import FloatArray
 from manikin.wholebody.banded import SampledBasis
 from manikin.wholebody.configuration_spline import turn_derivatives
 from manikin.wholebody.fit_scales import FitScales
+from manikin.wholebody.forces import load_shares
 from manikin.wholebody.momentum_rate import MomentumRate
 from manikin.wholebody.motion_samples import MotionSamples
 from manikin.wholebody.objective import Linearised, MotionObjective, to_raw
@@ -33,7 +35,7 @@ from manikin.wholebody.refine_physics import ContactForces, WrenchCost, WrenchSa
 from manikin.wholebody.refine_scales import RefineScales
 from manikin.wholebody.targets import FitTargets
 
-TOUCHING = 4.0
+TOUCHING = 2.0
 """A pair that is about to touch is wanted this many widths of the penalty's bend inside."""
 
 _LEAST_CURVATURE = 1e-12
@@ -125,13 +127,15 @@ class RefineObjective(MotionObjective):
         super().__init__(body, proximity, targets.fit, basis)
         self._refine = targets
         schedule, self._names = targets.schedule, tuple(targets.fit.effectors)
-        phases = schedule.phase_at(targets.fit.time)
+        time = targets.fit.time
+        # At a key instant the stances on both sides of it have to do.
         self._stances = [
-            (np.flatnonzero(phases == number), ContactForces(phase.stance, self._names), rooms[number])
-            for number, phase in enumerate(schedule.sequence)
-            if np.any(phases == number)
+            (np.flatnonzero((time >= start) & (time <= end)), ContactForces(phase.stance, self._names), room)
+            for phase, room, (start, end) in zip(
+                schedule.sequence, rooms, itertools.pairwise(schedule.instants), strict=True
+            )
         ]
-        self._load = np.stack([targets.variables[name] for name in self._names], axis=1)
+        self._load = load_shares(schedule, time, self._names)
         model = body.pinocchio
         moves = moves_by_joint(model)
         self._chains = {
@@ -177,7 +181,9 @@ class RefineObjective(MotionObjective):
             cost = share.cost + room.cost(
                 part, scales.margin, scales.margin_violation, scales.margin_softness
             )
-            value[rows], gradient[rows], curvature[rows] = cost.value, cost.gradient, cost.curvature
+            value[rows] += cost.value
+            gradient[rows] += cost.gradient
+            curvature[rows] += cost.curvature
         return WrenchCost(value, gradient, curvature)
 
     def _add_contact_motion(self, out: Linearised, motion: MotionSamples, scales: RefineScales) -> None:

@@ -6,8 +6,9 @@ form of [Mordatch2012]_):
     min_x |b - A x|^2 / (2 s^2) + sum_j (k x_j / c_j)^2 / 2,   0 <= x_j <= u_j,
 
 with the wrench ``b`` that the whole body needs, the edges ``A`` of the friction pyramids and the axes of
-the grasps, and the contact variable ``c_j`` of each: the larger it is, the less its force costs, so that
-load passes smoothly from one contact to the next.  Caps on sums of forces are left to the margin.
+the grasps, and the contact variable ``c_j`` of each: the larger it is, the less its force costs.  Here it
+rises and falls within the time that the contact is held, so that load passes smoothly from one contact to
+the next.  Caps on sums of forces are left to the margin.
 """
 
 from dataclasses import dataclass

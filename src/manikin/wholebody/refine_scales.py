@@ -35,12 +35,12 @@ class RefineScales(FitScales):
     missing_wrench: float = 10.0
     force: float = 1.0
     margin: float = 15.0
-    margin_violation: float = 4.0
+    margin_violation: float = 1.0
     margin_softness: float = 3.0
     slide: float = 0.1
     approach: float = 0.02
     efort: float = 3.0
-    guide: float = 0.6
+    guide: float = 0.4
     toes: float = 0.02
     end_position: float = 0.01
     end_angle: float = 0.05
