@@ -217,6 +217,7 @@ class MotionObjective:
 
     def _wanted_distance(self, found: ProximitySamples, scales: FitScales) -> FloatArray | float:
         """Wanted clearance of close pairs [m]."""
+        del found
         return scales.safe_distance
 
     def _add_reference(self, out: Linearised, motion: MotionSamples) -> None:

@@ -52,7 +52,7 @@ SLOWER = 1.3
 """Factor by which a phase gets longer in which balance or speed is missed again."""
 
 CAUGHT = -0.02
-"""Below this clearance a part of the body is caught on the wrong side of another, and the fit begins anew [m]."""
+"""Below this clearance a part of the body is caught on the wrong side of another: the fit begins anew [m]."""
 
 STRONGER = 0.5
 """Factor of the scales of what was missed."""
@@ -246,9 +246,7 @@ class _Refinement:
         progress(1.0)
         return self._result(best, given, began)
 
-    def _attempt(
-        self, scales: RefineScales, fine: bool, near: ConfigurationSpline | None = None
-    ) -> _Attempt:
+    def _attempt(self, scales: RefineScales, fine: bool, near: ConfigurationSpline | None = None) -> _Attempt:
         knots = phase_knots(self.schedule.instants, self.settings.knot_spacing, DEGREE)
         knots = refined(knots, self.schedule.instants, DEGREE) if fine else knots
         time = sample_times(knots, self.settings.samples_per_span)
@@ -272,7 +270,9 @@ class _Refinement:
         return _Attempt(self.path, self.schedule, fit, found.spline, motion, certificate)
 
     def _objective(self, targets: RefineTargets) -> Callable[..., MotionObjective]:
-        def make(body: BodyModel, proximity: Proximity | None, _: object, basis: SampledBasis) -> MotionObjective:
+        def make(
+            body: BodyModel, proximity: Proximity | None, _: object, basis: SampledBasis
+        ) -> MotionObjective:
             return RefineObjective(body, proximity, targets, basis, self.rooms)
 
         return make
@@ -290,7 +290,7 @@ class _Refinement:
     def _certified(self, spline: ConfigurationSpline) -> tuple[Motion, RefineResiduals]:
         """Sample a spline and measure it."""
         schedule = self.schedule
-        time = sample_uniformly(*schedule.instants[[0, -1]], self.settings.sampling)
+        time = sample_uniformly(schedule, self.settings.sampling)
         q, v, a = spline.evaluate(time)
         forces = plan_forces(self.body, schedule, time, q, v, a)
         wrench = whole_body_wrench(self.body, q, v, a)
@@ -304,9 +304,7 @@ class _Refinement:
         )  # fmt: skip
         obstacles = RefineObstacles(self.body, self.scene, schedule, time, self.padded)
         flat = tuple(room.is_flat for room in self.rooms)
-        certificate = certify_refined(
-            self.body, self.proximity, schedule, obstacles, motion, violation, flat
-        )
+        certificate = certify_refined(self.body, self.proximity, schedule, obstacles, motion, violation, flat)
         return motion, certificate
 
     def _margin(self, time: FloatArray, wrench: FloatArray) -> FloatArray:
@@ -335,7 +333,7 @@ class _Refinement:
 
     def _result(self, found: _Attempt, given: float, began: float) -> RefineResult:
         schedule, path = found.schedule, found.path
-        time = sample_uniformly(*schedule.instants[[0, -1]], STEP)
+        time = sample_uniformly(schedule, STEP)
         obstacles = RefineObstacles(self.body, self.scene, schedule, time, self.padded)
         knots = phase_knots(schedule.instants, self.settings.knot_spacing, DEGREE)
         input_samples = path.at(time)

@@ -22,7 +22,7 @@ class RefineRequirements:
         support_turn: Largest angle of a sole from its contact [rad].
         clearance: Least distance between what is not in contact, flights away from their supports
             included [m].
-        penetration: Largest depth of an effector in flight in what it leaves or reaches [m].
+        penetration: Largest depth of anything in anything but what it holds on to, flights included [m].
         joint_limit: Largest violation of a joint range [rad].
         velocity_share: Largest share of a joint's velocity limit.
         physics_violation: Largest wrench that no admissible contact force supplies [N].
@@ -50,7 +50,7 @@ class RefineResiduals:
         max_support_turn_rad: Angle of a sole from its contact [rad].
         min_clearance_m: Least counted distance [m].
         closest_pair: Names of the shapes at that distance.
-        max_penetration_m: Depth of an effector in flight in what it leaves or reaches [m].
+        max_penetration_m: Depth of anything in anything but what it holds on to [m].
         max_joint_limit_violation_rad: Violation of a joint range [rad].
         max_velocity_share: Largest share of a joint's velocity limit.
         max_physics_violation: Wrench that no admissible contact force supplies, about the stance's mean
@@ -82,9 +82,7 @@ class RefineResiduals:
 
     def broken(self, requirements: RefineRequirements) -> frozenset[str]:
         """Names of the fields that are not kept."""
-        return frozenset(
-            name for name, value, limit, _ in self._checks(requirements) if not value <= limit
-        )
+        return frozenset(name for name, value, limit, _ in self._checks(requirements) if not value <= limit)
 
     def _checks(self, requirements: RefineRequirements) -> list[tuple[str, float, float, str]]:
         """Field, value, limit and wording of every requirement."""
@@ -95,7 +93,7 @@ class RefineResiduals:
             ("max_support_error_m", self.max_support_error_m, r.support_error, "support error [m]"),
             ("max_support_turn_rad", self.max_support_turn_rad, r.support_turn, "support turn [rad]"),
             ("min_clearance_m", -self.min_clearance_m, -r.clearance, f"clearance [m] of {pair}, negated,"),
-            ("max_penetration_m", self.max_penetration_m, r.penetration, "depth of a flight in its support [m]"),
+            ("max_penetration_m", self.max_penetration_m, r.penetration, "penetration [m]"),
             ("max_joint_limit_violation_rad", self.max_joint_limit_violation_rad, r.joint_limit,
              "joint range violation [rad]"),
             ("max_velocity_share", self.max_velocity_share, r.velocity_share, "share of a velocity limit"),

@@ -9,6 +9,7 @@ unknowns; where ``c`` is 1 the place is met exactly by multipliers.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.contact import Contact, ContactKind, ContactSchedule
 from manikin.spatial import FloatArray, skew
@@ -90,12 +91,14 @@ class _Place:
         identity = np.tile(np.eye(3), (n, 1, 1))
         return cls(np.zeros((n, 3)), identity, np.zeros(n), np.zeros(n), identity.copy())
 
-    def hold(self, rows: FloatArray, contact: Contact) -> None:
+    def hold(self, rows: NDArray[np.bool_], contact: Contact) -> None:
         self._put(rows, contact)
         self.weight[rows], self.rotation_weight[rows] = 1.0, _turn_weight(contact)
         self.along[rows] = np.eye(3)
 
-    def approach(self, rows: FloatArray, contact: Contact, variable: FloatArray, weight: float) -> None:
+    def approach(
+        self, rows: NDArray[np.bool_], contact: Contact, variable: FloatArray, weight: float
+    ) -> None:
         """Keep to the contact's normal; the height above the surface is left to the distances."""
         self._put(rows, contact)
         # Weights are of residuals, the contact variable of their squares.
@@ -104,7 +107,7 @@ class _Place:
         self.along[rows] = np.eye(3) - np.outer(contact.normal, contact.normal)
         self.rotation_weight[rows] = weight * share * _turn_weight(contact)
 
-    def _put(self, rows: FloatArray, contact: Contact) -> None:
+    def _put(self, rows: NDArray[np.bool_], contact: Contact) -> None:
         self.position[rows], self.rotation[rows] = contact.position, contact.rotation_contact_to_world
 
 

@@ -81,7 +81,9 @@ def check_input(body: BodyModel, path: KeyPath, schedule: ContactSchedule) -> No
         ContactError: If the body has no such effector or a part of a sole is asked for.
     """
     if path.q.shape[1] != body.nq:
-        raise InputError(f"key configurations have {path.q.shape[1]} columns; valid: {body.nq} of {body.name!r}")
+        raise InputError(
+            f"key configurations have {path.q.shape[1]} columns; valid: {body.nq} of {body.name!r}"
+        )
     ends, wanted = (path.time[0], path.time[-1]), (schedule.instants[0], schedule.instants[-1])
     if np.abs(np.subtract(ends, wanted)).max() > 1e-6:
         raise InputError(

@@ -4,6 +4,7 @@ Velocities and accelerations are differences of the sampled configurations, so t
 velocity jumps at its keys, and the refined motion are measured with the same yardstick.
 """
 
+import itertools
 from dataclasses import asdict, dataclass, fields
 
 import daqp
@@ -44,7 +45,7 @@ class RefineMeasures:
         max_physics_violation: Largest of it [N].
         min_clearance_m: Least signed distance between what is not in contact; flights count as far as
             they keep off what they leave or reach [m].
-        max_penetration_m: Depth to which an effector in flight is in what it leaves or reaches [m].
+        max_penetration_m: Depth of anything in anything but what it holds on to [m].
         contact_error_m: Mean over time of ``sum c |e|``, see
             :mod:`~manikin.wholebody.refine_contacts` [m].
         contact_slide_mps: Mean over time of ``sum c |e'|`` [m/s].
@@ -80,8 +81,9 @@ class RefineMeasures:
         )
 
 
-def sample_uniformly(start: float, end: float, step: float) -> FloatArray:
-    """Times from ``start`` to ``end`` at most ``step`` apart, both included [s]."""
+def sample_uniformly(schedule: ContactSchedule, step: float) -> FloatArray:
+    """Times from the first to the last instant, both included, at most ``step`` apart [s]."""
+    start, end = float(schedule.instants[0]), float(schedule.instants[-1])
     return np.linspace(start, end, max(2, int(np.ceil((end - start) / step - 1e-9))) + 1)
 
 
@@ -92,7 +94,7 @@ def differences(body: BodyModel, time: FloatArray, q: FloatArray) -> tuple[Float
     """
     model, step = body.pinocchio, float(time[1] - time[0])
     extended = [q[0], *q, q[-1]]
-    rate = np.array([pin.difference(model, a, b) for a, b in zip(extended, extended[1:], strict=False)])
+    rate = np.array([pin.difference(model, a, b) for a, b in itertools.pairwise(extended)])
     rate /= step
     return 0.5 * (rate[1:] + rate[:-1]), (rate[1:] - rate[:-1]) / step
 

@@ -71,7 +71,7 @@ def refine_targets(
     task: Task | None,
     padded: tuple[str, ...] = (),
 ) -> RefineTargets:
-    """Lay out what is to be done at ``time`` (n,) [s]; see :func:`~manikin.wholebody.refine.refine_motion`."""
+    """Lay out what is to be done at ``time`` (n,) [s]; see :func:`.refine_motion`."""
     variables = contact_variables(schedule, time)
     obstacles = RefineObstacles(body, scene, schedule, time, padded)
     n = len(time)
@@ -144,6 +144,7 @@ class RefineObjective(MotionObjective):
         }
 
     def linearise(self, points: FloatArray, scales: FitScales, shift: FloatArray) -> Linearised:
+        """Evaluate every term at :class:`RefineScales`; see :meth:`MotionObjective.linearise`."""
         assert isinstance(scales, RefineScales)
         out = super().linearise(points, scales, shift)
         motion = self._sampled(points)

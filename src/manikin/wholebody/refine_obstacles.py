@@ -18,7 +18,7 @@ from manikin.wholebody.flights import touch_pairs
 from manikin.wholebody.meeting import Ignored
 
 RISE = 0.3
-"""Share of a flight after which the full clearance is wanted from what was left, and before what is reached."""
+"""Share of a flight in which the wanted clearance to what was left, or is to be reached, rises or falls."""
 
 GRASPED = -0.05
 """Distance at which a hand that holds on to something begins to be pushed off it [m]."""
@@ -86,7 +86,7 @@ class RefineObstacles:
         return self._with([side for side in self._sides if side.grasped])
 
     def during_flights(self) -> tuple[Ignored, ...]:
-        """Pairs that do not count as clearance at each sample: those in contact, leaving it or reaching it."""
+        """Pairs that do not count as clearance at each sample: in contact, leaving it or reaching it."""
         return self._with(self._sides)
 
     def _with(self, sides: list[_Side]) -> tuple[Ignored, ...]:

@@ -194,4 +194,5 @@ class ContactForces:
         """Like :meth:`_solve` for one sample, by a general solver."""
         stacked = np.vstack([self._matrix / tolerance, np.diag(gain**-0.5)])
         wanted = np.concatenate([target / tolerance, np.zeros(len(gain))])
-        return lsq_linear(stacked, wanted, bounds=(0.0, self._limit), method="bvls", tol=1e-12).x
+        found = lsq_linear(stacked, wanted, bounds=(0.0, self._limit), method="bvls", tol=1e-12).x
+        return np.clip(found, 0.0, self._limit)
