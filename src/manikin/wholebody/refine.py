@@ -368,7 +368,7 @@ _SCALES = MappingProxyType(
         "max_support_error_m": ("tolerance",),
         "max_support_turn_rad": ("turn_tolerance",),
         "min_clearance_m": ("clearance",),
-        "max_penetration_m": ("clearance",),
+        "max_penetration_m": ("clearance", "touching"),
         "max_joint_limit_violation_rad": ("joint_limit",),
         "max_velocity_share": ("joint_velocity",),
         "max_physics_violation": ("missing_wrench", "margin_violation"),

@@ -35,9 +35,6 @@ from manikin.wholebody.refine_physics import ContactForces, WrenchCost, WrenchSa
 from manikin.wholebody.refine_scales import RefineScales
 from manikin.wholebody.targets import FitTargets
 
-TOUCHING = 2.0
-"""A pair that is about to touch is wanted this many widths of the penalty's bend inside."""
-
 _LEAST_CURVATURE = 1e-12
 """Added to the curvature of the wrench's cost, relative to its largest element, to factorise it."""
 
@@ -149,11 +146,12 @@ class RefineObjective(MotionObjective):
         out = super().linearise(points, scales, shift)
         motion = self._sampled(points)
         self._add_contact_motion(out, motion, scales)
-        self._add_ends(out, motion, scales)
+        self._add_place(out, motion, scales)
         return out
 
     def _wanted_distance(self, found: ProximitySamples, scales: FitScales) -> FloatArray:
-        return self._refine.obstacles.wanted(found, scales.safe_distance, -TOUCHING * scales.softness)
+        assert isinstance(scales, RefineScales)
+        return self._refine.obstacles.wanted(found, scales.safe_distance, -scales.touching)
 
     def _add_dynamics(self, out: Linearised, motion: MotionSamples, scales: FitScales) -> None:
         """Physics violation and balance, which depend on the wrench that the whole body needs."""
@@ -206,10 +204,11 @@ class RefineObjective(MotionObjective):
                 slope = np.where(alpha > LEAST, -0.5 * cost / clamped, 0.0)[:, None] * slope
                 out.add(0, to_raw(slope[:, None, :], motion.tangent), cost[:, None])
 
-    def _add_ends(self, out: Linearised, motion: MotionSamples, scales: RefineScales) -> None:
-        """Begin and end where the input does."""
+    def _add_place(self, out: Linearised, motion: MotionSamples, scales: RefineScales) -> None:
+        """Carry the pelvis about where the input does, and begin and end there."""
         raw, reference = motion.raw[0], self._targets.reference
         weight = np.zeros_like(raw)
+        weight[:, :3] = 1.0 / scales.guide_position
         weight[[0, -1]] = 1.0 / scales.end_angle
         weight[[0, -1], :3] = 1.0 / scales.end_position
         out.add_diagonal(0, weight, weight * (raw - reference))

@@ -21,7 +21,10 @@ class RefineScales(FitScales):
         slide: Speed of an effector at a contact variable of 1 [m/s].
         approach: Distance to the normal through its contact at a contact variable of 1, in flight [m].
         efort: Square root of ``c / alpha`` (7.8).
+        touching: Depth from which an effector is pushed out of what it leaves or reaches, at the ends of a
+            flight [m].
         guide: Deviation of a joint from the input [rad].
+        guide_position: Deviation of the pelvis from the input [m].
         toes: Angle of the toes of what stands on soles [rad].
         end_position: Deviation of the pelvis from the input at both ends [m].
         end_angle: Deviation of a joint, or of the pelvis' attitude, there [rad].
@@ -40,7 +43,9 @@ class RefineScales(FitScales):
     slide: float = 0.1
     approach: float = 0.02
     efort: float = 3.0
+    touching: float = 8.0e-3
     guide: float = 0.4
+    guide_position: float = 0.03
     toes: float = 0.02
     end_position: float = 0.01
     end_angle: float = 0.05
