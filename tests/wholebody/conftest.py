@@ -1,5 +1,9 @@
 """A short step on flat ground, planned once for all tests of the whole-body room."""
 
+import importlib.util
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -46,3 +50,13 @@ def step_com(person) -> CentroidalTrajectory:
 @pytest.fixture(scope="session")
 def step_motion(person, flat_ground, step_com) -> WholeBodyResult:
     return plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
+
+
+@pytest.fixture(scope="session")
+def cases():
+    """Inputs of the refinement, see ``refine_cases.py`` beside this file."""
+    spec = importlib.util.spec_from_file_location("refine_cases", Path(__file__).parent / "refine_cases.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["refine_cases"] = module
+    spec.loader.exec_module(module)
+    return module

@@ -13,6 +13,10 @@ from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import PlannedSwing
 from manikin.wholebody.key_postures import KeyPosture, KeyPostures, find_key_postures
 from manikin.wholebody.passage import Passage, head_segments, measure_passage
+from manikin.wholebody.refine import RefineFailure, RefineResult, RefineSettings, refine_motion
+from manikin.wholebody.refine_certificate import RefineRequirements, RefineResiduals
+from manikin.wholebody.refine_measures import RefineMeasures
+from manikin.wholebody.refine_scales import RefineScales
 from manikin.wholebody.seated import SeatedContinuation, continue_seated
 
 __all__ = [
@@ -23,6 +27,13 @@ __all__ = [
     "KeyPostures",
     "Passage",
     "PlannedSwing",
+    "RefineFailure",
+    "RefineMeasures",
+    "RefineRequirements",
+    "RefineResiduals",
+    "RefineResult",
+    "RefineScales",
+    "RefineSettings",
     "SeatedContinuation",
     "WholeBodyFailure",
     "WholeBodyRequirements",
@@ -35,4 +46,5 @@ __all__ = [
     "head_segments",
     "measure_passage",
     "plan_whole_body",
+    "refine_motion",
 ]

@@ -136,7 +136,7 @@ def certify(
         wrench: (n, 6) pseudo-wrench of the whole body about the world origin, per sample.
         meeting: What is met at speed, at the motion's samples.
     """
-    support, turn = _support_errors(body, trajectory, motion)
+    support, turn = support_errors(body, trajectory.schedule, motion)
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
     com = np.where(trajectory.binds(motion.time), com, 0.0)
     angles = motion.q[:, 7:]
@@ -187,15 +187,14 @@ def _impact(schedule: ContactSchedule, time: FloatArray) -> NDArray[np.bool_]:
     return found
 
 
-def _support_errors(
-    body: BodyModel, trajectory: CentroidalTrajectory, motion: Motion
+def support_errors(
+    body: BodyModel, schedule: ContactSchedule, motion: Motion
 ) -> tuple[FloatArray, FloatArray]:
     """(n,) largest position [m] and orientation [rad] error of the effectors in contact.
 
     Of a contact that is still settling, what it is below its surface counts.
     """
     model, data = body.pinocchio, body.pinocchio.createData()
-    schedule = trajectory.schedule
     position, turn = np.zeros(len(motion.time)), np.zeros(len(motion.time))
     phases = schedule.phase_at(motion.time)
     settling = {name: schedule.settling(motion.time, name) for name in schedule.sequence.effectors}

@@ -6,6 +6,7 @@ smooth by construction, and the rate of its centroidal momentum follows what the
 plan assumes, so that the whole body keeps the balance that was planned for its centre of mass.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,10 @@ LEAST_DAMPING = 1.0
 
 MOST_DAMPING = 1.0e6
 """Largest one."""
+
+
+ObjectiveMaker = Callable[[BodyModel, Proximity | None, FitTargets, SampledBasis], MotionObjective]
+"""Makes the objective of a fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +64,7 @@ class MotionFit:
         knots: Clamped knots of the spline [s].
         degree: Its degree.
         scales: Residual scales and limits of the iteration.
+        objective: Makes the objective from the first three and the spline's basis at the targets' times.
     """
 
     def __init__(
@@ -69,27 +75,20 @@ class MotionFit:
         knots: FloatArray,
         degree: int = 5,
         scales: FitScales | None = None,
+        objective: ObjectiveMaker = MotionObjective,
     ) -> None:
         self._knots, self._degree = knots, degree
         self._final = scales or FitScales()
         self._time = targets.time
         self._basis = SampledBasis.at(targets.time, knots, degree)
         self._system = BlockBandedSystem(self._basis, body.nq)
-        self.objective = MotionObjective(body, proximity, targets, self._basis)
+        self.objective = objective(body, proximity, targets, self._basis)
         self._damping = np.ones(self._basis.size)
         self._multiplier = np.zeros((len(targets.time), self.objective.task_rows))
 
     def initial_spline(self, configurations: FloatArray) -> ConfigurationSpline:
         """Least-squares spline through configurations (n, nq) at the targets' times."""
-        system = BlockBandedSystem(self._basis, 1)
-        n = len(configurations)
-        points = []
-        for column in configurations.T:
-            system.reset()
-            system.add(np.ones((n, 1, 1)), -column[:, None])
-            system.add(np.full((n, 1, 1), 1e-4), np.zeros((n, 1)), order=1)
-            points.append(system.solve(1e-9)[:, 0])
-        return ConfigurationSpline(self._knots, np.stack(points, axis=1), self._degree)
+        return spline_through(configurations, self._basis, self._knots, self._degree)
 
     def solve(self, start: ConfigurationSpline) -> FitResult:
         """Solve from ``start``: first with loose tasks, so that the posture stays natural, then exactly.
@@ -164,3 +163,25 @@ class MotionFit:
         else:
             factor = np.where(new > old, 8.0, 1.0)
         self._damping = np.clip(self._damping * factor, LEAST_DAMPING, MOST_DAMPING)
+
+
+def spline_through(
+    configurations: FloatArray, basis: SampledBasis, knots: FloatArray, degree: int
+) -> ConfigurationSpline:
+    """Least-squares spline through configurations.
+
+    Args:
+        configurations: (n, nq) at the samples of the basis.
+        basis: Of the knots at n times.
+        knots: Clamped knots [s].
+        degree: Of the spline.
+    """
+    system = BlockBandedSystem(basis, 1)
+    n = len(configurations)
+    points = []
+    for column in configurations.T:
+        system.reset()
+        system.add(np.ones((n, 1, 1)), -column[:, None])
+        system.add(np.full((n, 1, 1), 1e-4), np.zeros((n, 1)), order=1)
+        points.append(system.solve(1e-9)[:, 0])
+    return ConfigurationSpline(knots, np.stack(points, axis=1), degree)

@@ -15,6 +15,7 @@ from scipy.special import expit
 
 from manikin.body import BodyModel
 from manikin.scene import Proximity
+from manikin.scene.distance import ProximitySamples
 from manikin.scene.placed import KnownDistances
 from manikin.spatial import FloatArray, rotation_vector, rotation_vector_jacobian
 from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
@@ -159,7 +160,7 @@ class MotionObjective:
         self._add_ranges(out, raw[0], scales)
         self._add_rates(out, raw[1], scales)
         self._add_accelerations(out, raw[2], scales)
-        self._add_momentum_rate(out, motion.momentum, scales)
+        self._add_dynamics(out, motion, scales)
         return out
 
     def _sampled(self, points: FloatArray) -> MotionSamples:
@@ -188,7 +189,7 @@ class MotionObjective:
         jacobian[:, -3:] = (weight / scales.com)[:, None, None] * motion.com_jacobian
         residual[:, -3:] = (weight / scales.com)[:, None] * error
         out.com_error = float(np.linalg.norm(error[weight >= 1.0], axis=1).max(initial=0.0))
-        out.task_residual, out.task_jacobian = residual, _to_raw(jacobian, motion.tangent)
+        out.task_residual, out.task_jacobian = residual, to_raw(jacobian, motion.tangent)
         out.add(0, out.task_jacobian, residual + shift)
 
     def _add_clearance(self, out: Linearised, motion: MotionSamples, scales: FitScales) -> None:
@@ -204,7 +205,7 @@ class MotionObjective:
         worst = int(np.argmin(apart))
         out.clearance, out.closest = float(apart[worst]), found.pairs[worst]
         # A softened hinge: it also holds back what is about to come too close.
-        missing = (scales.safe_distance - found.distance) / scales.softness
+        missing = (self._wanted_distance(found, scales) - found.distance) / scales.softness
         value = scales.softness * np.logaddexp(0.0, missing) / scales.clearance
         rows = -expit(missing)[:, None] * found.gradient / scales.clearance
         if meeting is not None and np.any(met):
@@ -212,7 +213,12 @@ class MotionObjective:
             value = np.where(met, weight * found.distance, value)
             rows = np.where(met[:, None], weight[:, None] * found.gradient, rows)
         jacobian, residual = _padded(found.sample, rows, value, len(motion.com))
-        out.add(0, _to_raw(jacobian, motion.tangent), residual)
+        out.add(0, to_raw(jacobian, motion.tangent), residual)
+
+    def _wanted_distance(self, found: ProximitySamples, scales: FitScales) -> FloatArray | float:
+        """Wanted clearance of close pairs [m]."""
+        del found
+        return scales.safe_distance
 
     def _add_reference(self, out: Linearised, motion: MotionSamples) -> None:
         """Deviation from the reference posture; the pelvis' place does not count."""
@@ -259,9 +265,9 @@ class MotionObjective:
         weight[:, :7] = 1.0 / scales.pelvis_acceleration
         out.add_diagonal(2, weight, weight * second)
 
-    def _add_momentum_rate(self, out: Linearised, momentum: MomentumRate, scales: FitScales) -> None:
+    def _add_dynamics(self, out: Linearised, motion: MotionSamples, scales: FitScales) -> None:
         """Rate of the centroidal momentum against what the planned trajectory needs."""
-        targets = self._targets
+        targets, momentum = self._targets, motion.momentum
         scale = np.full((len(targets.time), 6), scales.force)
         scale[:, :3] /= np.maximum(targets.com_weight, LEAST_FORCE_WEIGHT)[:, None]
         scale[:, 3:] = scales.moment_share * np.maximum(targets.margin, LEAST_MARGIN)[:, None]
@@ -300,7 +306,7 @@ def _held_rows(target: EffectorTarget) -> NDArray[np.bool_]:
     return np.repeat(np.stack(rows, axis=1), 3, axis=1)
 
 
-def _to_raw(jacobian: FloatArray, tangent: FloatArray) -> FloatArray:
+def to_raw(jacobian: FloatArray, tangent: FloatArray) -> FloatArray:
     """Map tangent Jacobians (n, m, nv) to raw coordinates (n, m, nq)."""
     return np.concatenate([jacobian[:, :, :6] @ tangent[:, :6, :], jacobian[:, :, 6:]], axis=2)
 

@@ -1,0 +1,235 @@
+"""Every term of the refinement, measured on samples of a motion without its spline or solver.
+
+Velocities and accelerations are differences of the sampled configurations, so that the input, whose
+velocity jumps at its keys, and the refined motion are measured with the same yardstick.
+"""
+
+import itertools
+from dataclasses import asdict, dataclass, fields
+
+import daqp
+import numpy as np
+import pinocchio as pin
+
+from manikin.balance import pseudo_wrench
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule
+from manikin.contact_planning.efort import Task
+from manikin.scene import Proximity
+from manikin.scene.distance import moves_by_joint
+from manikin.spatial import FloatArray
+from manikin.wholebody.refine_balance import BalanceRoom
+from manikin.wholebody.refine_contacts import contact_variables
+from manikin.wholebody.refine_efort import LEAST, efort_with_derivative, limb_directions
+from manikin.wholebody.refine_input import KeyPath
+from manikin.wholebody.refine_obstacles import RefineObstacles
+from manikin.wholebody.refine_physics import about, centre_of
+
+STEP = 0.01
+"""Spacing of the samples that are measured [s]."""
+
+_GRAM = 1e-3
+"""Margin below which the missing wrench is computed [N.m]; above, it is zero."""
+
+
+@dataclass(frozen=True)
+class RefineMeasures:
+    """What every term of the refinement measures on a motion.
+
+    Attributes:
+        duration_s: [s].
+        squared_accelerations: Integral of the squared joint accelerations [rad^2/s^3].
+        squared_pelvis_accelerations: Integral of the pelvis' squared linear acceleration [m^2/s^3].
+        physics_violation: Mean over time of the wrench that no admissible contact force supplies, about
+            the stance's mean contact point with 1 m [N].
+        max_physics_violation: Largest of it [N].
+        min_clearance_m: Least signed distance between what is not in contact; flights count as far as
+            they keep off what they leave or reach [m].
+        max_penetration_m: Depth of anything in anything but what it holds on to [m].
+        contact_error_m: Mean over time of ``sum c |e|``, see
+            :mod:`~manikin.wholebody.refine_contacts` [m].
+        contact_slide_mps: Mean over time of ``sum c |e'|`` [m/s].
+        efort_cost: Mean over time of ``sum c / alpha`` (7.9), alpha clamped.
+        max_joint_limit_violation_rad: [rad].
+        max_velocity_share: Largest share of a joint's velocity limit.
+        min_margin: Least margin of the whole body's wrench about the stance's mean contact point [N.m].
+    """
+
+    duration_s: float
+    squared_accelerations: float
+    squared_pelvis_accelerations: float
+    physics_violation: float
+    max_physics_violation: float
+    min_clearance_m: float
+    max_penetration_m: float
+    contact_error_m: float
+    contact_slide_mps: float
+    efort_cost: float
+    max_joint_limit_violation_rad: float
+    max_velocity_share: float
+    min_margin: float
+
+    def as_dict(self) -> dict[str, float]:
+        """The measures by name."""
+        return asdict(self)
+
+    def table(self, other: "RefineMeasures") -> str:
+        """Lines ``name  this -> other``."""
+        return "\n".join(
+            f"{item.name:32s}{getattr(self, item.name):12.4g} -> {getattr(other, item.name):12.4g}"
+            for item in fields(self)
+        )
+
+
+def sample_uniformly(schedule: ContactSchedule, step: float) -> FloatArray:
+    """Times from the first to the last instant, both included, at most ``step`` apart [s]."""
+    start, end = float(schedule.instants[0]), float(schedule.instants[-1])
+    return np.linspace(start, end, max(2, int(np.ceil((end - start) / step - 1e-9))) + 1)
+
+
+def differences(body: BodyModel, time: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Velocities and accelerations (n, nv) of samples at a constant step, by central differences.
+
+    Before and after the motion the body rests.
+    """
+    model, step = body.pinocchio, float(time[1] - time[0])
+    extended = [q[0], *q, q[-1]]
+    rate = np.array([pin.difference(model, a, b) for a, b in itertools.pairwise(extended)])
+    rate /= step
+    return 0.5 * (rate[1:] + rate[:-1]), (rate[1:] - rate[:-1]) / step
+
+
+def whole_body_wrench(body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
+    """(n, 6) wrench that the scene must apply, about the world origin [N, N.m]."""
+    model, data = body.pinocchio, body.pinocchio.createData()
+    com, rate = np.zeros((len(q), 3)), np.zeros((len(q), 6))
+    for k in range(len(q)):
+        pin.computeCentroidalMomentumTimeVariation(model, data, q[k], v[k], a[k])
+        com[k], rate[k] = data.com[0], data.dhg.vector
+    return pseudo_wrench(body.mass, com, rate[:, :3] / body.mass, rate[:, 3:])
+
+
+def physics_violation(room: BalanceRoom, stance_wrench: FloatArray) -> FloatArray:
+    """(n,) distance of wrenches (n, 6) about the mean contact point to the polytope of a stance [N].
+
+    The polytope holds what all admissible contact forces can supply; the nearest point of it is found
+    by a quadratic program for each wrench outside.
+    """
+    H, h = np.array(room.polytope.H), room.polytope.h
+    missing = np.zeros(len(stance_wrench))
+    # Around the wrench itself, in units of the body's weight, the program is well scaled.
+    for k in np.flatnonzero(room.polytope.margin(stance_wrench) < -_GRAM):
+        unit = max(1.0, float(np.abs(stance_wrench[k]).max()))
+        bound = (h - H @ stance_wrench[k]) / unit
+        found, _, flag, _ = daqp.solve(
+            np.eye(6), np.zeros(6), H, bound, np.full(len(h), -1e30),
+            np.zeros(len(h), dtype=np.int32),
+        )  # fmt: skip
+        missing[k] = unit * np.linalg.norm(found) if flag > 0 else max(0.0, -bound.min() * unit)
+    return missing
+
+
+def rooms_of(schedule: ContactSchedule) -> tuple[BalanceRoom, ...]:
+    """Wrench polytope of each phase."""
+    return tuple(BalanceRoom(phase.stance) for phase in schedule.sequence)
+
+
+def balance_of(
+    schedule: ContactSchedule, rooms: tuple[BalanceRoom, ...], time: FloatArray, wrench: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(n,) margin and physics violation of wrenches (n, 6) about the world origin."""
+    phases = schedule.phase_at(time)
+    margin, violation = np.zeros(len(time)), np.zeros(len(time))
+    for number, (phase, room) in enumerate(zip(schedule.sequence, rooms, strict=True)):
+        rows = phases == number
+        if np.any(rows):
+            local = wrench[rows] @ about(centre_of(phase.stance)).T
+            margin[rows] = room.polytope.margin(local)
+            violation[rows] = physics_violation(room, local)
+    return margin, violation
+
+
+def measure(
+    body: BodyModel,
+    proximity: Proximity,
+    obstacles: RefineObstacles,
+    path: KeyPath,
+    schedule: ContactSchedule,
+    rooms: tuple[BalanceRoom, ...],
+    time: FloatArray,
+    q: FloatArray,
+    task: Task | None = None,
+) -> RefineMeasures:
+    """Measure every term.
+
+    Args:
+        body: The body.
+        proximity: Distances of the body to the scene and to itself.
+        obstacles: What may touch at the samples.
+        path: The input, for the directions of EFORT.
+        schedule: Contacts in time.
+        rooms: Wrench polytope of each phase.
+        time: (n,) samples at a constant step [s].
+        q: (n, nq) configurations.
+        task: As for :func:`~manikin.wholebody.refine.refine_motion`.
+    """
+    v, a = differences(body, time, q)
+    step = float(time[1] - time[0])
+    margin, violation = balance_of(schedule, rooms, time, whole_body_wrench(body, q, v, a))
+    error, slide, cost = _contact_terms(body, path, schedule, time, q, v, task)
+    outside = np.maximum(body.lower - q[:, 7:], q[:, 7:] - body.upper).max()
+    clearance = proximity.minimum_over(q, obstacles.during_flights(), tolerance=1e-5)
+    flying = proximity.minimum_over(q, obstacles.touching(), tolerance=1e-5)
+    return RefineMeasures(
+        duration_s=float(time[-1] - time[0]),
+        squared_accelerations=step * float(np.sum(a[:, 6:] ** 2)),
+        squared_pelvis_accelerations=step * float(np.sum(a[:, :3] ** 2)),
+        physics_violation=float(violation.mean()),
+        max_physics_violation=float(violation.max()),
+        min_clearance_m=float(clearance.distance),
+        max_penetration_m=max(0.0, -float(flying.distance)),
+        contact_error_m=error,
+        contact_slide_mps=slide,
+        efort_cost=cost,
+        max_joint_limit_violation_rad=max(0.0, float(outside)),
+        max_velocity_share=float((np.abs(v[:, 6:]) / body.velocity_limit).max(initial=0.0)),
+        min_margin=float(margin.min()),
+    )
+
+
+def _contact_terms(
+    body: BodyModel,
+    path: KeyPath,
+    schedule: ContactSchedule,
+    time: FloatArray,
+    q: FloatArray,
+    v: FloatArray,
+    task: Task | None,
+) -> tuple[float, float, float]:
+    """Means over time of the contact-invariant term's distance and speed, and of EFORT's cost."""
+    model, data = body.pinocchio, body.pinocchio.createData()
+    names = schedule.sequence.effectors
+    place, jacobian = np.empty((len(q), len(names), 3)), np.empty((len(q), len(names), 6, model.nv))
+    for k, state in enumerate(q):
+        pin.computeJointJacobians(model, data, state)
+        pin.updateFramePlacements(model, data)
+        for column, name in enumerate(names):
+            frame = body.effector_frame(name)
+            place[k, column] = data.oMf[frame].translation
+            jacobian[k, column] = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+    variables, limbs = contact_variables(schedule, time), limb_directions(body, path, schedule, time, task)
+    moves, phases = moves_by_joint(model), schedule.phase_at(time)
+    error = slide = cost = 0.0
+    for column, name in enumerate(names):
+        variable = variables[name]
+        for number, phase in enumerate(schedule.sequence):
+            if name in phase.stance:
+                away = place[phases == number, column] - phase.stance[name].position
+                error += float(np.linalg.norm(away, axis=1).sum()) / len(time)
+        speed = np.linalg.norm((jacobian[:, column, :3] @ v[:, :, None])[:, :, 0], axis=1)
+        slide += float(np.mean(variable * speed))
+        if name in limbs:
+            chain = np.flatnonzero(moves[model.frames[body.effector_frame(name)].parentJoint])
+            alpha, _ = efort_with_derivative(limbs[name], jacobian[:, column], chain)
+            cost += float(np.mean(variable / np.maximum(alpha, LEAST)))
+    return error, slide, cost

@@ -1,0 +1,51 @@
+"""How much each term of the refinement matters."""
+
+from dataclasses import dataclass
+
+from manikin.wholebody.fit_scales import FitScales
+
+
+@dataclass(frozen=True)
+class RefineScales(FitScales):
+    """Size at which each residual of the refinement costs one unit.
+
+    The scales of :class:`~manikin.wholebody.fit_scales.FitScales` that speak of a planned centre of mass
+    (``com``, ``force``, ``moment_share``) do not matter here: there is no such plan.
+
+    Attributes:
+        missing_wrench: Wrench that no contact supplies, moments divided by :data:`ARM` [N].
+        force: Contact force that costs one unit, relative to the body's weight, at a contact variable of 1.
+        margin: Wanted margin of the wrench about the stance's mean contact point [N.m].
+        margin_violation: Missing margin [N.m].
+        margin_softness: Width of the bend of its softened penalty [N.m].
+        slide: Speed of an effector at a contact variable of 1 [m/s].
+        approach: Distance to the normal through its contact at a contact variable of 1, in flight [m].
+        efort: Square root of ``c / alpha`` (7.8).
+        touching: Depth from which an effector is pushed out of what it leaves or reaches, at the ends of a
+            flight [m].
+        guide: Deviation of a joint from the input [rad].
+        guide_position: Deviation of the pelvis from the input [m].
+        toes: Angle of the toes of what stands on soles [rad].
+        end_position: Deviation of the pelvis from the input at both ends [m].
+        end_angle: Deviation of a joint, or of the pelvis' attitude, there [rad].
+    """
+
+    stages: tuple[float, ...] = (3.0, 1.0)
+    safe_distance: float = 0.02
+    softness: float = 0.004
+    acceleration: float = 6.0
+    pelvis_acceleration: float = 3.0
+    missing_wrench: float = 10.0
+    force: float = 1.0
+    margin: float = 15.0
+    margin_violation: float = 1.0
+    margin_softness: float = 3.0
+    slide: float = 0.1
+    approach: float = 0.02
+    efort: float = 3.0
+    touching: float = 8.0e-3
+    guide: float = 0.4
+    guide_position: float = 0.03
+    toes: float = 0.02
+    end_position: float = 0.01
+    end_angle: float = 0.05

@@ -1,0 +1,238 @@
+"""Refined motions: what they gain on their input, and what is caught where they fail."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
+from manikin.errors import ContactError, InputError
+from manikin.scene import Proximity, Scene
+from manikin.spatial import GRAVITY_VECTOR
+from manikin.wholebody import RefineSettings, refine_motion
+from manikin.wholebody.refine import _Refinement
+from manikin.wholebody.refine_certificate import RefineRequirements, certify_refined
+from manikin.wholebody.refine_contacts import contact_variables
+from manikin.wholebody.refine_input import KeyPath, stretched_around, stretched_for_speed
+from manikin.wholebody.refine_measures import balance_of, differences, rooms_of, whole_body_wrench
+from manikin.wholebody.refine_obstacles import RefineObstacles
+
+FEET = [
+    sole(f"{side}_foot", (0.0, y, 0.0), length=0.28, width=0.12, friction=0.7)
+    for side, y in (("left", 0.1), ("right", -0.1))
+]
+
+
+@pytest.fixture(scope="module")
+def crouching(cases):
+    case = cases.crouch(2)
+    return case, refine_motion(*case)
+
+
+@pytest.fixture(scope="module")
+def climbing(cases):
+    case = cases.climb(2)
+    return case, refine_motion(*case)
+
+
+@pytest.mark.parametrize("name", ["crouching", "climbing"])
+def test_a_refined_motion_keeps_every_requirement(name, request):
+    _, result = request.getfixturevalue(name)
+    assert result.failure is None, result.failure
+    assert result.certificate.violation(RefineRequirements()) is None
+
+
+@pytest.mark.parametrize("name", ["crouching", "climbing"])
+def test_a_refined_motion_is_smoother_and_physical(name, request):
+    """At least a fifth of the squared accelerations, a tenth of the violation, and no penetration.
+
+    Both are measured by differences every 10 ms, at the same timing.
+    """
+    _, result = request.getfixturevalue(name)
+    before, after = result.before, result.after
+    assert before.duration_s == pytest.approx(after.duration_s)
+    assert after.squared_accelerations <= before.squared_accelerations / 5.0
+    assert before.physics_violation > 0.0
+    assert after.physics_violation <= before.physics_violation / 10.0
+    assert after.min_clearance_m >= max(0.0, min(before.min_clearance_m, 0.01))
+    assert after.max_penetration_m <= 1e-3
+    assert after.contact_slide_mps < before.contact_slide_mps
+
+
+@pytest.mark.parametrize("name", ["crouching", "climbing"])
+def test_a_refined_motion_is_smoother_than_a_spline_through_its_input(name, request):
+    """The jumps of the input's velocity at its keys do not decide the comparison."""
+    _, result = request.getfixturevalue(name)
+    assert result.after.squared_accelerations < result.smoothed.squared_accelerations / 2.0
+
+
+@pytest.mark.parametrize("name", ["crouching", "climbing"])
+def test_margin_is_positive_every_10_ms(name, request):
+    """Measured from differences of the configurations alone, with the scene's own polytopes."""
+    (body, *_), result = request.getfixturevalue(name)
+    time = np.arange(0.0, result.motion.time[-1], 0.01)
+    q = result.spline.evaluate(time).q
+    v, a = differences(body, time, q)
+    margin, violation = balance_of(
+        result.schedule, rooms_of(result.schedule), time[1:-1], whole_body_wrench(body, q, v, a)[1:-1]
+    )
+    assert margin.min() > 0.0
+    assert violation.max() == 0.0
+    assert result.motion.margin.min() > 0.0
+
+
+def test_the_motion_is_consistent(crouching):
+    """Velocities are derivatives, forces carry the weight, and the motion rests at both ends."""
+    (body, *_), result = crouching
+    motion = result.motion
+    step = motion.time[1] - motion.time[0]
+    for k in (50, 200, 400):
+        rate = pin.difference(body.pinocchio, motion.q[k - 1], motion.q[k + 1]) / (2.0 * step)
+        np.testing.assert_allclose(motion.v[k], rate, atol=2e-3)
+    force = motion.contact_force[:, :, :3].sum(axis=1)
+    com_rate = np.gradient(np.gradient(motion.com, step, axis=0), step, axis=0)
+    needed = body.mass * (com_rate - GRAVITY_VECTOR)
+    np.testing.assert_allclose(force[5:-5], needed[5:-5], atol=0.02 * body.mass * 9.81)
+    assert np.abs(motion.v[[0, -1]]).max() < 0.02
+
+
+def test_the_motion_begins_and_ends_where_its_input_does(crouching):
+    case, result = crouching
+    for k in (0, -1):
+        moved = pin.difference(case.body.pinocchio, case.q[k], np.array(result.motion.q[k]))
+        assert np.abs(moved[:3]).max() < 0.05
+        assert np.abs(moved[6:]).max() < 0.3
+
+
+def test_the_same_input_has_the_same_motion(climbing):
+    case, result = climbing
+    assert np.array_equal(refine_motion(*case).motion.q, result.motion.q)
+
+
+def test_a_motion_that_is_too_fast_is_slowed_down(cases):
+    """A step in 0.1 s is beyond the velocity limits; the motion lasts longer and keeps them."""
+    result = refine_motion(*cases.crouch(1, duration=0.1))
+    assert result.stretch > 1.2
+    assert result.certificate.max_velocity_share <= 1.0
+
+
+def test_retiming_keeps_what_is_asked_for(cases):
+    """Every joint needs its peak time between two keys, and contacts move with the keys."""
+    case = cases.crouch(1, duration=0.05)
+    path = KeyPath(case.time, case.q)
+    slower, schedule = stretched_for_speed(case.body, path, case.schedule, 0.9)
+    speed = np.abs(np.diff(slower.q[:, 7:], axis=0)) / np.diff(slower.time)[:, None]
+    assert np.all(speed <= 0.9 * case.body.velocity_limit / 1.6 + 1e-9)
+    np.testing.assert_allclose(schedule.instants[[0, -1]], slower.time[[0, -1]])
+    np.testing.assert_allclose(slower.at(slower.time)[3], slower.q[3], atol=1e-12)
+
+
+def test_a_longer_phase_leaves_the_others_as_long(cases):
+    schedule = cases.crouch(1).schedule
+    path = KeyPath(schedule.instants[[0, -1]], np.tile([0.0, 0, 1, 0, 0, 0, 1], (2, 1)))
+    _, longer = stretched_around(path, schedule, 0.9, 1.4)
+    np.testing.assert_allclose(longer.durations, 0.6 * np.array([1.2, 1.4, 1.2, 1.0, 1.0]))
+
+
+def test_the_certificate_catches_a_bad_motion(crouching):
+    """The input itself, sampled: it penetrates, slides, is out of balance and says when."""
+    case, result = crouching
+    job = _Refinement(
+        case.body, case.scene, KeyPath(case.time, case.q), case.schedule, RefineSettings(), None, ()
+    )
+    good, bad = result.motion, case.q[np.searchsorted(case.time, result.motion.time, side="right") - 1]
+    shifted = np.array(bad)
+    shifted[:, 2] -= 0.03
+    motion = replace(good, q=shifted, margin=np.full(len(bad), -5.0), v=40.0 * np.ones_like(good.v))
+    obstacles = RefineObstacles(case.body, case.scene, result.schedule, good.time)
+    flat = (False,) * len(result.schedule.sequence)
+    found = certify_refined(
+        case.body, job.proximity, result.schedule, obstacles, motion, np.full(len(bad), 7.0), flat
+    )
+    broken = found.broken(RefineRequirements())
+    assert broken >= {
+        "max_support_error_m", "max_penetration_m", "max_velocity_share", "max_physics_violation",
+        "min_margin",
+    }  # fmt: skip
+    reason, _ = found.violation(RefineRequirements())
+    assert "support error" in reason
+    assert found.max_support_error_m > 0.029
+
+
+def test_an_impossible_contact_is_an_explained_failure(person):
+    """A foot 1.5 m ahead of the other is out of reach: a result that says what and when."""
+    far = sole("left_foot", (1.5, 0.1, 0.0), length=0.28, width=0.12, friction=0.7)
+    schedule = ContactSchedule(StanceSequence([Phase(Stance([far, FEET[1]], 1500.0))]), [0.0, 0.6])
+    q = np.tile(person.standing_posture(), (2, 1))
+    result = refine_motion(person, Scene(), [0.0, 0.6], q, schedule)
+    assert not result.succeeded
+    assert "support error" in result.failure.reason
+    assert result.failure.where == "phase 0 on left_foot, right_foot"
+
+
+def test_inputs_that_do_not_fit_are_refused(person):
+    schedule = ContactSchedule(StanceSequence([Phase(Stance(FEET, 1500.0))]), [0.0, 1.0])
+    q = np.tile(person.standing_posture(), (2, 1))
+    with pytest.raises(InputError, match="same interval"):
+        refine_motion(person, Scene(), [0.0, 0.9], q, schedule)
+    with pytest.raises(InputError, match="strictly increasing"):
+        refine_motion(person, Scene(), [0.0, 0.0], q, schedule)
+    with pytest.raises(InputError, match="at least two"):
+        refine_motion(person, Scene(), [0.0], q[:1], schedule)
+    with pytest.raises(InputError, match="columns"):
+        refine_motion(person, Scene(), [0.0, 1.0], q[:, :20], schedule)
+    tail = sole("tail", (0.0, 0.0, 0.0), length=0.1, width=0.1, friction=0.7)
+    other = ContactSchedule(StanceSequence([Phase(Stance([tail], 1500.0))]), [0.0, 1.0])
+    with pytest.raises(ContactError, match="tail"):
+        refine_motion(person, Scene(), [0.0, 1.0], q, other)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.0, 4.2))
+def test_contact_variables_are_one_in_contact_and_fade_out(time):
+    schedule = crouch_schedule()
+    variables = contact_variables(schedule, np.array([time]))
+    held = schedule.stance_at(time).effectors
+    for name, value in variables.items():
+        assert 0.0 <= value[0] <= 1.0
+        if name in held:
+            assert value[0] == 1.0
+    middle = 0.5 * (schedule.instants[1] + schedule.instants[2])
+    assert contact_variables(schedule, np.array([middle]))["left_foot"][0] == 0.0
+
+
+def crouch_schedule() -> ContactSchedule:
+    """Both feet, the right one, both; 1.4 s each."""
+    stances = (FEET, FEET[1:], FEET)
+    return ContactSchedule(StanceSequence([Phase(Stance(c, 1500.0)) for c in stances]), 1.4 * np.arange(4))
+
+
+def test_clearance_of_a_flight_rises_and_falls(person):
+    """Nothing is wanted of what is held; a flying foot has to keep off the floor in mid-flight only."""
+    schedule, scene = crouch_schedule(), Scene()
+    time = np.array([0.5, 1.4, 2.1, 2.79])
+    obstacles = RefineObstacles(person, scene, schedule, time)
+    assert ("left_foot", "floor") in obstacles.ignored[0]
+    assert ("left_foot", "floor") not in obstacles.ignored[2]
+    q = np.tile(person.standing_posture(), (4, 1))
+    found = Proximity(person, scene).evaluate_over(q, 0.1, obstacles.ignored)
+    wanted = obstacles.wanted(found, 0.02, -0.01)
+    left = np.array([pair == ("left_foot/sole", "floor") for pair in found.pairs])
+    by_sample = {int(k): float(w) for k, w in zip(found.sample[left], wanted[left], strict=True)}
+    assert by_sample[1] == pytest.approx(-0.01)
+    assert by_sample[2] == pytest.approx(0.02)
+    assert by_sample[3] < 0.0
+
+
+@pytest.mark.slow
+def test_a_long_climb_and_a_long_crouch(cases):
+    """The acceptance cases in full: eight moves on the wall, six steps under the slab."""
+    for case in (cases.climb(8), cases.crouch(5)):
+        result = refine_motion(*case)
+        assert result.succeeded, result.failure
+        assert result.after.squared_accelerations <= result.before.squared_accelerations / 5.0
+        assert result.after.physics_violation <= result.before.physics_violation / 10.0
+        assert result.after.min_margin > 0.0
