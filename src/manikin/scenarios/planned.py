@@ -13,7 +13,7 @@ MAX_SUPPORT_DISTANCE = 1.08
 
 
 PLANNING_SHARE = (0.8, 0.7)
-"""Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); our choice."""
+"""Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
 
 PLANNING = {
     "degree": 5,
