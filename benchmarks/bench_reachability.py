@@ -1,15 +1,13 @@
 """Guides for the root of a human: `pytest benchmarks/bench_reachability.py`.
 
-The reach of the limbs is a rough stand-in (balls cut off), a little larger than that of a body.
+The reach of the limbs is that of the body, from 10,000 samples each.
 """
-
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import trimesh
 
-from manikin.body import human
+from manikin.body import human, limbs_of, reach_volume
 from manikin.reachability import (
     Condition,
     GuideTask,
@@ -33,24 +31,10 @@ HOLDS = (
 )  # fmt: skip
 
 
-def ball(centre, radius, count=400):
-    points = np.random.default_rng(0).normal(size=(count, 3))
-    return np.asarray(centre) + radius * points / np.linalg.norm(points, axis=1, keepdims=True)
-
-
 @pytest.fixture(scope="module")
 def creature():
-    volumes = []
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        leg = ball((0.1, 0.15 * sign, -0.15), 0.78)
-        arm = ball((0.0, 0.2 * sign, 0.5), 0.62)
-        for name, segment, parts, points in (
-            ("leg", "pelvis", ("thigh", "leg", "foot"), leg[leg[:, 2] < 0.6]),
-            ("arm", "thorax", ("upper_arm", "forearm", "hand"), arm - [0.0, 0.0, 0.3]),
-        ):
-            limb = SimpleNamespace(name=f"{side}_{name}", segments=tuple(f"{side}_{part}" for part in parts))
-            volumes.append(SimpleNamespace(limb=limb, segment=segment, vertices=points))
-    return abstraction_of(human(1.75, 79.0, "male"), volumes)
+    body, rng = human(1.75, 79.0, "male"), np.random.default_rng(0)
+    return abstraction_of(body, [reach_volume(body, limb, rng) for limb in limbs_of(body)])
 
 
 def crouch(creature):
@@ -138,6 +122,14 @@ def test_request(benchmark, asked):
     planner = LocalPlanner(world.checker(), (task.start, task.goal))
     route = benchmark(lambda: request(roadmap, planner, task.start, task.goal, np.random.default_rng(0)))
     benchmark.extra_info["found"] = route.succeeded
+
+
+def test_refinement(benchmark, asked):
+    """With a finished roadmap: request, pruning, spline and shortcuts."""
+    world, task = asked
+    roadmap = offline_roadmap(world, np.random.default_rng(0))
+    result = benchmark(lambda: plan_guide(world, task, np.random.default_rng(0), roadmap))
+    assert result.succeeded, result.failure
 
 
 def test_guide(benchmark, asked):

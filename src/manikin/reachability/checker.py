@@ -95,10 +95,7 @@ class ReachabilityChecker:
             if surface.key not in targets:
                 targets[surface.key] = _targets(scene, triangles, surface)
         self._limbs = _Queries(
-            [
-                (convex_geometry(limb.shrunk(self.margins.reach)), pin.SE3.Identity())
-                for limb in abstraction.limbs
-            ],
+            [_volume_object(limb, self.margins.reach) for limb in abstraction.limbs],
             [targets[self.condition.surface(limb.name).key] for limb in abstraction.limbs],
         )
         self._trunk_radius = max(shape.radius_about_root for shape in abstraction.trunk)
