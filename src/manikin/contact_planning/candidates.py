@@ -254,7 +254,10 @@ def _near_planes(
         own = np.flatnonzero(own_group == group)
         surfaces = numbers[own]
         offsets = table.offsets[surfaces] - shifts[column, 0]
-        low, high = table.side_low[surfaces] - shifts[column, 1:], table.side_high[surfaces] - shifts[column, 1:]
+        low, high = (
+            table.side_low[surfaces] - shifts[column, 1:],
+            table.side_high[surfaces] - shifts[column, 1:],
+        )
         rows = np.flatnonzero(upright[column])
         height = places[column, 0].take(rows)
         level = (height >= offsets.min() - tolerance) & (height <= offsets.max() + tolerance)
