@@ -164,6 +164,12 @@ class SurfaceTable:
             numbers: (n,) indices of the surfaces.
             footprint: (c, 3) points of the effector's frame [m].
         """
+        if self.filled[numbers].all():
+            sides = self.frames[self.group[numbers], 1:]
+            places = (sides @ points[..., None]) + (sides @ turns) @ footprint.T
+            inside = places >= self.side_low[numbers][..., None]
+            inside &= places <= self.side_high[numbers][..., None]
+            return inside.all(axis=(1, 2))
         corners = points[:, None] + footprint @ turns.transpose(0, 2, 1)
         each = self.over(corners.reshape(-1, 3), np.repeat(numbers, len(footprint)))
         return np.logical_and.reduce(each.reshape(len(points), len(footprint)), axis=1)
@@ -242,23 +248,33 @@ def _near_planes(
     frames = table.frames[groups] @ situation.rotation
     upright = frames[:, 0] @ samples.upward.T >= least
     places = (frames.reshape(-1, 3) @ samples.positions.T).reshape(len(groups), 3, -1)
-    places += (table.frames[groups] @ situation.origin)[..., None]
+    shifts = table.frames[groups] @ situation.origin
     found: list[tuple[IntArray, IntArray, FloatArray]] = []
     for column, group in enumerate(groups.tolist()):
         own = np.flatnonzero(own_group == group)
         surfaces = numbers[own]
-        offsets = table.offsets[surfaces]
-        height = places[column, 0]
+        offsets = table.offsets[surfaces] - shifts[column, 0]
+        low, high = (
+            table.side_low[surfaces] - shifts[column, 1:],
+            table.side_high[surfaces] - shifts[column, 1:],
+        )
+        rows = np.flatnonzero(upright[column])
+        height = places[column, 0].take(rows)
         level = (height >= offsets.min() - tolerance) & (height <= offsets.max() + tolerance)
-        rows = np.flatnonzero(upright[column] & level)
-        gaps = height[rows] - offsets[:, None]
+        rows, height = rows[level], height[level]
+        if not len(rows):
+            continue
+        gaps = height - offsets[:, None]
         inside = np.abs(gaps) <= tolerance
         for axis in (0, 1):
-            place = places[column, 1 + axis, rows]
-            inside &= place >= table.side_low[surfaces, axis, None]
-            inside &= place <= table.side_high[surfaces, axis, None]
+            place = places[column, 1 + axis].take(rows)
+            inside &= place >= low[:, axis, None]
+            inside &= place <= high[:, axis, None]
         which, near = np.nonzero(inside)
         found.append((rows[near], own[which], gaps[which, near]))
+    if not found:
+        none = np.zeros(0, dtype=np.int64)
+        return none, none, np.zeros(0)
     rows, owner, gap = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return rows, owner, gap
 
