@@ -380,7 +380,7 @@ class _Run:
             return find_key_postures(
                 self._body, self._scene, trajectory, manner=self._settings.manner,
                 requirements=self._settings.requirements, range_margin=range_margin,
-                tolerance=tolerance,
+                tolerance=tolerance, known=self._known_postures,
             )  # fmt: skip
 
         return find_eligible_plan(planned, self._on_real_supports, look, replan=self._keyframes is None)

@@ -33,7 +33,7 @@ class PoserSettings:
 
     clearance: float = 0.014
     range_margin: float = 0.05
-    inset: float = 0.03
+    inset: float = 0.045
     root_weight: float = 2.0
     turn_weight: float = 2.0
     tolerance: float = 2e-4

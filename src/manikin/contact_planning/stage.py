@@ -11,7 +11,7 @@ from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, Phase, Stance, StanceSequence
 from manikin.spatial import FloatArray, frozen_array
 
-COM_ROOM = (0.06, 0.06, 0.06)
+COM_ROOM = (0.06, 0.06, 0.03)
 """How far from that of its posture the centre of mass may be when a phase begins [m]; our choice."""
 
 

@@ -18,7 +18,7 @@ PLANNING_SHARE = (0.8, 0.7)
 PLANNING = {
     "degree": 5,
     "zero_end_accelerations": True,
-    "weights": {"margin": 0.3, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]},
+    "weights": {"margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]},
 }
 """Options of the centre-of-mass planner where the file gives none; our choice, those of the passages."""
 

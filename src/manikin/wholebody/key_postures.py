@@ -21,6 +21,7 @@ from manikin.posture import Placement, PostureProblem, PostureResult, SolverSett
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.certificate import WholeBodyRequirements
+from manikin.wholebody.configuration_spline import align_quaternions
 from manikin.wholebody.foot_roll import FootRoll, foot_roll
 from manikin.wholebody.manner import READY, Manner
 from manikin.wholebody.reference import reference_motion
@@ -119,6 +120,7 @@ def find_key_postures(
     requirements: WholeBodyRequirements | None = None,
     range_margin: float = 0.0,
     tolerance: float = SETTINGS.tolerance,
+    known: FloatArray | None = None,
 ) -> KeyPostures:
     """Look for a posture at every key instant until which the trajectory binds.
 
@@ -130,11 +132,15 @@ def find_key_postures(
         requirements: What the finished motion must keep; the clearance is asked of the postures.
         range_margin: Angle that the postures keep from the ends of the hinge ranges [rad].
         tolerance: How exact contacts and centre of mass have to be [m].
+        known: (phases + 1, nq) postures from which each search starts and to which it stays near; the
+            posture before and the manner's when omitted.
     """
     instants = trajectory.schedule.instants
     time = instants[trajectory.binds(instants)]
     search = _Search(body, scene, trajectory, time, manner, requirements or WholeBodyRequirements())
     search.range_margin, search.settings = range_margin, replace(SETTINGS, tolerance=tolerance)
+    if known is not None:
+        search.know(align_quaternions(np.array(known[: len(time)])))
     return KeyPostures(search.run())
 
 
@@ -158,12 +164,18 @@ class _Search:
         self._reference = reference_motion(body, trajectory, time, manner)
         _extend_toes(body, self._rolls, time, self._reference)
         self.range_margin, self.settings = 0.0, SETTINGS
+        self._known = False
         self._explained_one = False  # An examination takes seconds; the first is the one that is reported.
         self._ignored = _ignored(body, scene, trajectory.schedule, time)
+
+    def know(self, postures: FloatArray) -> None:
+        """Start from, and stay near, one posture for each key instant."""
+        self._reference, self._known = postures, True
 
     def run(self) -> tuple[KeyPosture, ...]:
         q, found = self._reference[0], []
         for key in range(len(self._time)):
+            q = self._reference[key] if self._known else q
             problem = self._problem(key)
             result = generate_posture(problem, q, settings=self.settings)
             found.append(self._posture(key, problem, result))
