@@ -381,6 +381,7 @@ class _Run:
                 self._body, self._scene, trajectory, manner=self._settings.manner,
                 requirements=self._settings.requirements, range_margin=range_margin,
                 tolerance=tolerance, known=self._known_postures,
+                padded=() if self._known_postures is None else self._scenario.padded,
             )  # fmt: skip
 
         return find_eligible_plan(planned, self._on_real_supports, look, replan=self._keyframes is None)

@@ -28,6 +28,9 @@ LEANING = (0.25, 0.5, 0.75)
 LEANING_TIME = 0.4
 """Shortest time between two of them [s]."""
 
+SEAT_OFF_INSET = 0.015
+"""Distance of the centre of mass to the edge of where it may rest on the feet when a seat is left [m]."""
+
 RISING_TIME = 1.8
 """Shortest time from there to standing [s]."""
 
@@ -177,7 +180,7 @@ class _Search:
         along = dict.fromkeys(feet, 0.0)
         if len(feet) == len(start.contacts):
             return _State((start,), along)
-        leaving = self._poser.pose(start.contacts, feet, start.q, restarts=True)
+        leaving = self._poser.pose(start.contacts, feet, start.q, inset=SEAT_OFF_INSET, restarts=True)
         if leaving.q is None:
             self._reasons[leaving.reason] += 1
             return None

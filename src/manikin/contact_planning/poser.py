@@ -88,6 +88,7 @@ class Poser:
         guide: FloatArray | None = None,
         *,
         place: FloatArray | None = None,
+        inset: float | None = None,
         restarts: bool = False,
     ) -> Posed:
         """Find a posture that holds contacts and rests on some of them alone.
@@ -98,12 +99,13 @@ class Poser:
             start: (nq,) where to begin.
             guide: (7,) pose of the root to be near; none when omitted.
             place: (2,) where the centre of mass has to be [m]; near the guide, or where it is, when omitted.
+            inset: Distance of that place to the edges of where it may rest [m]; the settings' own when omitted.
             restarts: Whether to try again from crouched postures.
         """
         if place is None:
             near = Configuration(self.body, start).com[:2] if guide is None else guide[:2]
             region = StaticRegion.of(carrying.values(), self.body.mass)
-            place = region.nearest(np.asarray(near), self.settings.inset)
+            place = region.nearest(np.asarray(near), self.settings.inset if inset is None else inset)
         if place is None:
             return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
         self.searches += 1

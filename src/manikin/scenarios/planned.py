@@ -12,6 +12,9 @@ MAX_SUPPORT_DISTANCE = 1.08
 """Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
 
 
+ABOVE = 0.01
+"""How far above that of its posture the centre of mass may be [m]; our choice."""
+
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
 
@@ -43,7 +46,9 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         }
         phase["min_duration_s"] = stage.min_duration
         if number:
-            phase["com_near"] = [float(x) for x in stage.com]
+            x, y, z = (float(value) for value in stage.com)
+            # Legs are soon at full length: there is less room above a posture than below it.
+            phase["com_near"] = [x, y, z - max(0.0, stage.com_room[2] - ABOVE)]
             phase["com_within_m"] = list(stage.com_room)
         before = dict(stage.contacts)
         phases.append(phase)

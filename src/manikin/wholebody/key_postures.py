@@ -121,6 +121,7 @@ def find_key_postures(
     range_margin: float = 0.0,
     tolerance: float = SETTINGS.tolerance,
     known: FloatArray | None = None,
+    padded: Sequence[str] = (),
 ) -> KeyPostures:
     """Look for a posture at every key instant until which the trajectory binds.
 
@@ -134,10 +135,12 @@ def find_key_postures(
         tolerance: How exact contacts and centre of mass have to be [m].
         known: (phases + 1, nq) postures from which each search starts and to which it stays near; the
             posture before and the manner's when omitted.
+        padded: Obstacles that any part of the body may lean on.
     """
     instants = trajectory.schedule.instants
     time = instants[trajectory.binds(instants)]
     search = _Search(body, scene, trajectory, time, manner, requirements or WholeBodyRequirements())
+    search.lean_on(padded)
     search.range_margin, search.settings = range_margin, replace(SETTINGS, tolerance=tolerance)
     if known is not None:
         search.know(align_quaternions(np.array(known[: len(time)])))
@@ -167,6 +170,11 @@ class _Search:
         self._known = False
         self._explained_one = False  # An examination takes seconds; the first is the one that is reported.
         self._ignored = _ignored(body, scene, trajectory.schedule, time)
+
+    def lean_on(self, padded: Sequence[str]) -> None:
+        """Ask for no clearance to some obstacles."""
+        pairs = frozenset((segment.name, name) for segment in self._body.segments for name in padded)
+        self._ignored = tuple(ignored | pairs for ignored in self._ignored)
 
     def know(self, postures: FloatArray) -> None:
         """Start from, and stay near, one posture for each key instant."""
