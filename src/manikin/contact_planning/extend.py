@@ -22,10 +22,10 @@ from manikin.contact_planning.stage import ContactPlan, Stage
 from manikin.scene import Scene
 from manikin.spatial import FloatArray, rotation_from_yaw
 
-LEANING = (0.25, 0.5, 0.75)
+LEANING = (0.2, 0.4, 0.6, 0.8, 0.92)
 """Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
 
-LEANING_TIME = 0.4
+LEANING_TIME = 0.3
 """Shortest time between two of them [s]."""
 
 SEAT_OFF_INSET = 0.015
