@@ -114,8 +114,8 @@ class RefineObstacles:
     def wanted(self, found: ProximitySamples, safe: float, touching: float) -> FloatArray:
         """(k,) wanted distance of close pairs [m].
 
-        Where an effector is held its distance to other obstacles is given as well, and less of it is wanted: a
-        push that ended with the contact would tear it off.
+        Where an effector is held its distance to other obstacles is given as well, and less of it is wanted:
+        a push that ended with the contact would tear it off.
 
         Args:
             found: The pairs.

@@ -43,7 +43,7 @@ class RefineScales(FitScales):
     slide: float = 0.1
     approach: float = 0.02
     efort: float = 3.0
-    touching: float = 4.0e-3
+    touching: float = 8.0e-3
     guide: float = 0.4
     guide_position: float = 0.03
     toes: float = 0.02
