@@ -226,9 +226,9 @@ def view(
         from manikin.viewer import serve_contacts
 
         job = load_scenario(source)
-        body = job.build_body()
-        q = start_posture(job, body)
-        live = LiveContacts(body, job.build_scene(), q, samples=samples or 10_000, seed=job.seed)
+        body, scene = job.build_body(), job.build_scene()
+        q = start_posture(job, body, scene)
+        live = LiveContacts(body, scene, q, samples=samples or 10_000, seed=job.seed)
         serve_contacts(live, port, announce)
         return
     if samples is not None:
@@ -300,7 +300,7 @@ def contact(
     job = load_scenario(scenario)
     with _stdout_kept_clean():
         body, scene = job.build_body(), job.build_scene()
-        q = start_posture(job, body, at=at, heading_deg=heading, posture=posture)
+        q = start_posture(job, body, scene, at=at, heading_deg=heading, posture=posture)
         question = ContactQuestion.of(
             limb, task, role, pull, heuristic, kind, samples, job.seed if seed is None else seed
         )

@@ -12,7 +12,7 @@ from manikin.contact import ContactKind
 from manikin.contact_planning import ContactGenerator, GeneratedContact, Task, heuristic_named, sample_limbs
 from manikin.errors import BodyError
 from manikin.scene import Scene
-from manikin.single_contact import Role, reached_efort
+from manikin.single_contact import SOME_EFORT, Role, reached_efort
 from manikin.spatial import FloatArray, frozen_array
 
 
@@ -116,7 +116,7 @@ class LiveContacts:
                 if name not in answers or (effort is not None and effort > efforts.get(name, -np.inf)):
                     answers[name] = found
                     efforts |= {} if effort is None else {name: effort}
-                if (effort or 0.0) > 0.0:
+                if (effort or 0.0) > SOME_EFORT:
                     break
             reached = answers[name].q
             q = q if reached is None else np.array(reached)

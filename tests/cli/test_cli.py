@@ -513,7 +513,7 @@ def test_built_in_scenarios_are_asked_at_the_place_of_their_feet(capfd):
         ([*PUSHING, "--role", "hero"], "role is 'hero'; valid: auto, body, object"),
         ([*PUSHING, "--kind", "glue"], "kind is 'glue'; valid: sole, point, grasp"),
         ([*PUSHING, "--heuristic", "hope"], "heuristic is 'hope'; valid: efort, distance"),
-        ([*PUSHING, "--posture", "flying"], "posture is 'flying'; valid: standing"),
+        ([*PUSHING, "--posture", "flying"], "posture is 'flying'; valid: standing, seated, crouched"),
         ([*PUSHING, "--samples", "3"], "--samples"),
         ([*PUSHING, "--at", "nan", "0"], "at x [m]"),
         ([*PUSHING, "--heading", "inf"], "heading [deg]"),
@@ -522,6 +522,19 @@ def test_built_in_scenarios_are_asked_at_the_place_of_their_feet(capfd):
 )
 def test_wrong_questions_about_a_contact_are_refused_in_one_line(capfd, cupboard, changed, says):
     assert_refused(capfd, ["contact", cupboard, *changed], says)
+
+
+def test_a_seated_body_gets_up_with_its_hands_on_what_is_level(capfd):
+    """The start of a scenario without supports: hands press on the table or the seat, below them."""
+    asked = ["--limb", "left_arm", "--task", "0", "0", "1", "--json"]
+    assert main(["contact", "stand-up-chair", *asked]) == DONE
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["obstacle"] in ("table", "seat")
+    assert answer["normal"] == pytest.approx([0.0, 0.0, 1.0])
+    assert answer["role"] == "body"
+    assert_refused(
+        capfd, ["contact", "platform", *asked, "--posture", "seated"], "no posture", "valid: another"
+    )
 
 
 def test_a_body_without_limbs_is_refused(capfd):

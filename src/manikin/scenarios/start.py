@@ -3,18 +3,17 @@
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
+from manikin.contact_planning import Endpoints, Habit
 from manikin.errors import ScenarioError
 from manikin.scenarios.values import ScenarioValues
+from manikin.scene import Scene
 from manikin.spatial import FloatArray, finite_number
-
-STANDING = "standing"
-POSTURES = (STANDING,)
-"""Names of postures."""
 
 
 def start_posture(
     values: ScenarioValues,
     body: BodyModel,
+    scene: Scene,
     *,
     at: tuple[float, float] | None = None,
     heading_deg: float | None = None,
@@ -22,36 +21,40 @@ def start_posture(
 ) -> FloatArray:
     """(nq,) configuration at the start: a posture turned and moved to its place.
 
-    The place is that of the root, or puts the centre of mass over the file's; the height is that of
-    the supports it stands on, or of the floor.
+    A standing body is the standing posture as it is: its root at the place, or its centre of mass over
+    the file's, its soles at the height of the supports or of the floor. A seated or crouched one is what
+    planning would start from (:class:`manikin.contact_planning.Endpoints`).
 
     Args:
         values: The scenario's values.
         body: Its body.
+        scene: Its scene.
         at: Where to stand, x and y [m]; the file's own place when omitted.
         heading_deg: Where to face, counter-clockwise from world x [deg]; the file's own, or that of
             its feet, when omitted.
         posture: Name of a posture; the file's own, or standing, when omitted.
 
     Raises:
-        ScenarioError: If the posture is not known or the file gives no place.
+        ScenarioError: If the posture is not known, does not exist there, or the file gives no place.
         InputError: If a number is not finite.
     """
     start = values.file.task.start
-    name = posture or start.posture or STANDING
-    if name not in POSTURES:
-        if posture is None:
-            raise values.error(("task", "start", "posture"), f"is {name!r}; valid: {', '.join(POSTURES)}")
-        raise ScenarioError(f"posture is {name!r}; valid: {', '.join(POSTURES)}")
+    name = posture or start.posture or Habit.STANDING
+    if name not in list(Habit):
+        raise ScenarioError(f"posture is {name!r}; valid: {', '.join(Habit)}")
     heading_deg = None if heading_deg is None else finite_number(heading_deg, "heading [deg]")
     at = None if at is None else (finite_number(at[0], "at x [m]"), finite_number(at[1], "at y [m]"))
-    q = turned(body.standing_posture(), np.deg2rad(_heading(values) if heading_deg is None else heading_deg))
-    q[2] += values.start_level
+    yaw = float(np.deg2rad(_heading(values) if heading_deg is None else heading_deg))
     place = at or start.at
-    if place is not None:
-        q[:2] = place
-    else:
-        q[:2] += values.start_com[:2] - Configuration(body, q).com[:2]
+    if name != Habit.STANDING:
+        spot = np.array(values.start_com[:2] if place is None else place)
+        found = Endpoints(body, scene, _friction(values)).find(spot, yaw, Habit(name), start.height_m)
+        if found.stage is None:
+            raise ScenarioError(f"{values.source}: {found.failure}; valid: another place or posture")
+        return np.array(found.stage.q)
+    q = turned(body.standing_posture(), yaw)
+    q[2] += values.start_level
+    q[:2] = place if place is not None else q[:2] + values.start_com[:2] - Configuration(body, q).com[:2]
     return q
 
 
@@ -77,3 +80,8 @@ def _heading(values: ScenarioValues) -> float:
     contacts = values.explicit_supports().resolved_phases()[0]
     yaws = np.deg2rad([item.yaw_deg for name, item in contacts.items() if "foot" in name] or [0.0])
     return float(np.rad2deg(np.arctan2(np.sin(yaws).sum(), np.cos(yaws).sum())))
+
+
+def _friction(values: ScenarioValues) -> float:
+    supports = values.file.supports
+    return values.contacts.friction if supports is None else supports.friction

@@ -51,6 +51,9 @@ REPAIRS = 5
 SLOWER = 1.3
 """Factor by which a phase gets longer in which balance or speed is missed again."""
 
+FINEST = 2
+"""How often the spline's knots near the key instants are doubled at most."""
+
 CAUGHT = -0.02
 """Below this clearance a part of the body is caught on the wrong side of another: the fit begins anew [m]."""
 
@@ -221,7 +224,7 @@ class _Refinement:
         if self.settings.retime:
             share = self.settings.scales.velocity_share
             self.path, self.schedule = stretched_for_speed(self.body, self.path, self.schedule, share)
-        scales, fine = self.settings.scales, False
+        scales, fine = self.settings.scales, 0
         best = last = self._attempt(scales, fine)
         for number in range(REPAIRS):
             progress((number + 1) / (REPAIRS + 1))
@@ -235,9 +238,9 @@ class _Refinement:
                 continue
             scales = _reweighed(scales, broken)
             slower = number > 0 and self.settings.retime and bool(broken & _SLOWED)
-            finer = number > 0 and not fine and bool(broken & _EXACT)
+            finer = number > 0 and fine < FINEST and bool(broken & _EXACT)
             if slower or finer:
-                fine = fine or finer
+                fine += finer
                 near = self._slow_down(last, broken) if slower else last.spline
                 last = self._attempt(scales, fine, near)
             else:
@@ -246,9 +249,10 @@ class _Refinement:
         progress(1.0)
         return self._result(best, given, began)
 
-    def _attempt(self, scales: RefineScales, fine: bool, near: ConfigurationSpline | None = None) -> _Attempt:
+    def _attempt(self, scales: RefineScales, fine: int, near: ConfigurationSpline | None = None) -> _Attempt:
         knots = phase_knots(self.schedule.instants, self.settings.knot_spacing, DEGREE)
-        knots = refined(knots, self.schedule.instants, DEGREE) if fine else knots
+        for _ in range(fine):
+            knots = refined(knots, self.schedule.instants, DEGREE)
         time = sample_times(knots, self.settings.samples_per_span)
         targets = refine_targets(
             self.body, self.scene, self.path, self.schedule, time, scales, self.task, self.padded

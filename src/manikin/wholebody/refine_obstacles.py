@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.body import BodyModel
+from manikin.body.limb import end_segments
 from manikin.contact import ContactKind, ContactSchedule
 from manikin.scene import Scene
 from manikin.scene.distance import ProximitySamples, segment_of
@@ -19,6 +20,9 @@ from manikin.wholebody.meeting import Ignored
 
 RISE = 0.3
 """Share of a flight in which the wanted clearance to what was left, or is to be reached, rises or falls."""
+
+HELD_SHARE = 0.4
+"""Share of the wanted clearance that an effector in contact has to keep from other obstacles."""
 
 GRASPED = -0.05
 """Distance at which a hand that holds on to something begins to be pushed off it [m]."""
@@ -70,7 +74,13 @@ class RefineObstacles:
             for phase in schedule.sequence
         ]
         self.ignored: tuple[Ignored, ...] = tuple(held[phase] for phase in schedule.phase_at(time))
+        self._obstacles = [obstacle.name for obstacle in scene]
+        self._ends = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self._sides = list[_Side]()
+        self._near = {
+            name: np.where(schedule.support(time, (name,))[:, 0], 0.0, 1.0)
+            for name in schedule.sequence.effectors
+        }
         for swing in schedule.sequence.swings():
             start, end = schedule.swing_interval(swing)
             rows = (time >= start) & (time < end)
@@ -78,6 +88,7 @@ class RefineObstacles:
                 if contact is not None:
                     share = np.clip(gone / (RISE * (end - start)), 0.0, 1.0)
                     away = np.where(rows, share**2 * (3.0 - 2.0 * share), 1.0)
+                    self._near[swing.effector] = np.minimum(self._near[swing.effector], away)
                     grasped = contact.kind is ContactKind.GRASP
                     self._sides.append(_Side(touch_pairs(body, scene, contact), away, grasped))
 
@@ -103,6 +114,9 @@ class RefineObstacles:
     def wanted(self, found: ProximitySamples, safe: float, touching: float) -> FloatArray:
         """(k,) wanted distance of close pairs [m].
 
+        Where an effector is held its distance to other obstacles is given as well, and less of it is wanted:
+        a push that ended with the contact would tear it off.
+
         Args:
             found: The pairs.
             safe: Wanted far from contacts [m].
@@ -110,6 +124,10 @@ class RefineObstacles:
         """
         wanted = np.full(len(found.distance), safe)
         named = np.array([(segment_of(shape), segment_of(other)) for shape, other in found.pairs])
+        for name, ends in self._ends.items():
+            rows = np.isin(named[:, 0], ends) & np.isin(named[:, 1], self._obstacles)
+            share = np.maximum(self._near[name][found.sample[rows]], HELD_SHARE)
+            wanted[rows] = np.minimum(wanted[rows], share * safe)
         for side in self._sides:
             rows = np.zeros(len(wanted), dtype=bool)
             for segment, obstacle in side.pairs:
