@@ -99,7 +99,7 @@ class Poser:
             start: (nq,) where to begin.
             guide: (7,) pose of the root to be near; none when omitted.
             place: (2,) where the centre of mass has to be [m]; near the guide, or where it is, when omitted.
-            inset: Distance of that place to the edges of where it may rest [m]; the settings' own when omitted.
+            inset: Distance of that place to the edges of where it may rest [m]; the settings' when omitted.
             restarts: Whether to try again from crouched postures.
         """
         if place is None:
