@@ -6,10 +6,11 @@ import yaml
 
 from manikin import pipeline
 from manikin.balance import signed_distance, support_polygon
-from manikin.contact import Stance
+from manikin.contact import ContactSchedule, Stance
 from manikin.contact_search import find_supports
 from manikin.scenarios import load_scenario
 from manikin.scene.distance import Proximity
+from manikin.wholebody import refine_motion
 
 FOUND = ("crouch", "stairs", "stand-up-chair", "stand-up-sofa", "platform@found")
 
@@ -101,3 +102,17 @@ def test_a_person_rises_from_a_sofa_in_the_physics_engine(tmp_path):
     # The run directory holds the scenario with its supports, ready to run again.
     kept = yaml.safe_load((tmp_path / "run/scenario.yaml").read_text())
     assert len(kept["supports"]["phases"]) == result.summary["contacts"]["phases"]
+
+
+def test_refinement_makes_a_contact_plan_a_motion():
+    """Against the postures joined by straight lines, at the same timing."""
+    found, body, scene = search("crouch")
+    sequence = found.scenario.build_sequence()
+    time = np.concatenate([[0.0], np.cumsum([phase.min_duration for phase in sequence])])
+    refined = refine_motion(body, scene, time, found.plan.postures, ContactSchedule(sequence, time))
+    assert refined.failure is None
+    before, after = refined.before, refined.after
+    assert before.physics_violation > 10.0 * after.physics_violation
+    assert before.squared_accelerations > 5.0 * after.squared_accelerations
+    assert after.min_clearance_m > max(0.0, before.min_clearance_m)
+    assert refined.certificate.min_margin > 0.0
