@@ -13,7 +13,7 @@ MAX_SUPPORT_DISTANCE = 1.08
 
 
 ABOVE = 0.01
-"""How far above that of its posture the centre of mass may be [m]; our choice."""
+"""How far above that of its posture the centre of mass of a rising body may be [m]; our choice."""
 
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
@@ -37,6 +37,8 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         plan: For its body and scene.
     """
     friction = scenario.contacts.friction
+    # Rising legs are soon at full length: there is less room above such postures than below them.
+    lower = float("buttocks" in plan.stages[0].contacts)
     before: dict[str, Contact] = {}
     phases: list[dict[str, Any]] = []
     for number, stage in enumerate(plan.stages):
@@ -47,8 +49,7 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         phase["min_duration_s"] = stage.min_duration
         if number:
             x, y, z = (float(value) for value in stage.com)
-            # Legs are soon at full length: there is less room above a posture than below it.
-            phase["com_near"] = [x, y, z - max(0.0, stage.com_room[2] - ABOVE)]
+            phase["com_near"] = [x, y, z - lower * max(0.0, stage.com_room[2] - ABOVE)]
             phase["com_within_m"] = list(stage.com_room)
         before = dict(stage.contacts)
         phases.append(phase)
