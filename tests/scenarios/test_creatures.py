@@ -50,7 +50,7 @@ def test_a_creature_is_built_from_its_file(write):
     assert [limb.name for limb in body.limbs] == NAMES
     assert scenario.mass == pytest.approx(12.0)
     assert body.standing_angles["rear_left_knee"] == pytest.approx(np.deg2rad(68.0))
-    q = start_posture(scenario, body)
+    q = start_posture(scenario, body, scenario.build_scene())
     np.testing.assert_allclose(q[:2], [0.0, 0.1])
     assert q[5] == pytest.approx(np.sqrt(0.5))
 
