@@ -40,7 +40,6 @@ SETTLING_TIME = 0.8
 SEATED_ROOM = (0.01, 0.01, 0.006)
 """How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
 
-
 NEARER = (0.7, 0.4)
 """Shares of the way to its place with which a foot comes nearer when no stride is possible."""
 

@@ -11,7 +11,6 @@ from manikin.scenarios.values import ScenarioValues
 MAX_SUPPORT_DISTANCE = 1.08
 """Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
 
-
 ABOVE = 0.01
 """How far above that of its posture the centre of mass of a rising body may be [m]; our choice."""
 
@@ -23,7 +22,7 @@ PLANNING = {
     "zero_end_accelerations": True,
     "weights": {"margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]},
 }
-"""Options of the centre-of-mass planner where the file gives none; our choice, those of the passages."""
+"""Options of the centre-of-mass planner where the file gives none; our choice."""
 
 
 def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
@@ -38,7 +37,7 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     """
     friction = scenario.contacts.friction
     # Rising legs are soon at full length: there is less room above such postures than below them.
-    lower = float("buttocks" in plan.stages[0].contacts)
+    rises = "buttocks" in plan.stages[0].contacts
     before: dict[str, Contact] = {}
     phases: list[dict[str, Any]] = []
     for number, stage in enumerate(plan.stages):
@@ -49,7 +48,8 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         phase["min_duration_s"] = stage.min_duration
         if number:
             x, y, z = (float(value) for value in stage.com)
-            phase["com_near"] = [x, y, z - lower * max(0.0, stage.com_room[2] - ABOVE)]
+            drop = max(0.0, stage.com_room[2] - ABOVE) if rises else 0.0
+            phase["com_near"] = [x, y, z - drop]
             phase["com_within_m"] = list(stage.com_room)
         before = dict(stage.contacts)
         phases.append(phase)
