@@ -20,6 +20,7 @@ from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.certificate import WholeBodyRequirements, WholeBodyResiduals, certify
 from manikin.wholebody.configuration_spline import ConfigurationSpline, align_quaternions
+from manikin.wholebody.failure import WholeBodyFailure
 from manikin.wholebody.fit import FitResult, MotionFit
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
@@ -85,21 +86,6 @@ class WholeBodySettings:
     fit: FitScales = field(default_factory=FitScales)
     requirements: WholeBodyRequirements = field(default_factory=WholeBodyRequirements)
     manner: Manner = READY
-
-
-@dataclass(frozen=True)
-class WholeBodyFailure:
-    """Why no whole-body motion was found.
-
-    Attributes:
-        reason: What could not be met, in one line.
-        time: When [s].
-        where: The phase and what it stands on.
-    """
-
-    reason: str
-    time: float
-    where: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -393,12 +379,7 @@ class _Planner:
         near = [failure for failure in guide.failures if abs(failure.time - time) < 0.2]
         if near:
             reason = f"{reason}; posture at {near[0].time:.2f} s: {near[0].reason}"
-        return WholeBodyFailure(reason, time, self._where(time))
-
-    def _where(self, time: float) -> str:
-        index = int(self.trajectory.schedule.phase_at(time))
-        held = ", ".join(self.trajectory.schedule.sequence[index].stance.effectors) or "no contact"
-        return f"phase {index} on {held}"
+        return WholeBodyFailure.at(self.trajectory.schedule, time, reason)
 
     def _report(self, share: float) -> None:
         if self._progress is not None:

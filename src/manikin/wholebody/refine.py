@@ -23,6 +23,7 @@ from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.banded import SampledBasis
 from manikin.wholebody.configuration_spline import ConfigurationSpline
+from manikin.wholebody.failure import WholeBodyFailure
 from manikin.wholebody.fit import FitResult, MotionFit, spline_through
 from manikin.wholebody.forces import plan_forces
 from manikin.wholebody.knots import phase_knots, refined, sample_times
@@ -41,6 +42,7 @@ from manikin.wholebody.refine_measures import (
 from manikin.wholebody.refine_objective import RefineObjective, RefineTargets, refine_targets
 from manikin.wholebody.refine_obstacles import RefineObstacles
 from manikin.wholebody.refine_scales import RefineScales
+from manikin.wholebody.reweigh import stronger
 
 DEGREE = 5
 """Degree of the spline: four continuous derivatives."""
@@ -56,9 +58,6 @@ FINEST = 2
 
 CAUGHT = -0.02
 """Below this clearance a part of the body is caught on the wrong side of another: the fit begins anew [m]."""
-
-STRONGER = 0.5
-"""Factor of the scales of what was missed."""
 
 PATIENT = 0.004
 """Relative decrease of the objective below which a repair stops."""
@@ -88,21 +87,6 @@ class RefineSettings:
     retime: bool = True
 
 
-@dataclass(frozen=True)
-class RefineFailure:
-    """Why a refined motion is no success.
-
-    Attributes:
-        reason: What could not be met, in one line.
-        time: When [s].
-        where: The phase and what it stands on.
-    """
-
-    reason: str
-    time: float
-    where: str
-
-
 @dataclass(frozen=True, eq=False)
 class RefineResult:
     """A refined motion, or the best attempt and what it breaks.
@@ -128,7 +112,7 @@ class RefineResult:
     smoothed: RefineMeasures
     after: RefineMeasures
     certificate: RefineResiduals
-    failure: RefineFailure | None
+    failure: WholeBodyFailure | None
     stretch: float
     iterations: int
     wall_time: float
@@ -354,7 +338,7 @@ class _Refinement:
         failure = None
         if violation is not None:
             reason, when = violation
-            failure = RefineFailure(reason, when, _where(schedule, when))
+            failure = WholeBodyFailure.at(schedule, when, reason)
         return RefineResult(
             found.motion, found.spline, schedule, before, start, after, found.certificate, failure,
             path.duration / given, self.iterations, clock.perf_counter() - began,
@@ -384,15 +368,7 @@ _SCALES = MappingProxyType(
 
 def _reweighed(scales: RefineScales, broken: frozenset[str]) -> RefineScales:
     """Scales at which the broken requirements weigh more, and more patience."""
-    names = sorted({scale for field_name in broken for scale in _SCALES.get(field_name, ())})
-    finer = {name: STRONGER * getattr(scales, name) for name in names}
-    return replace(scales, **finer, decrease=PATIENT)
-
-
-def _where(schedule: ContactSchedule, time: float) -> str:
-    index = int(schedule.phase_at(time))
-    held = ", ".join(schedule.sequence[index].stance.effectors) or "no contact"
-    return f"phase {index} on {held}"
+    return replace(stronger(scales, broken, _SCALES), decrease=PATIENT)
 
 
 def _silent(share: float) -> None:

@@ -4,10 +4,14 @@ The fit weighs everything that is wanted of a motion against everything else; wh
 finds broken gets more weight, and the fit goes on from where it was.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
+from typing import TypeVar
 
 from manikin.wholebody.fit_scales import FitScales
+
+S = TypeVar("S", bound=FitScales)
 
 STRONGER = 0.5
 """Factor of the scales of what was missed."""
@@ -56,9 +60,19 @@ def reweighed(
     """
     if narrow and "min_clearance_m" in broken:
         scales = replace(scales, **_nearer(scales))
-    names = {scale for field in broken for scale in _SCALES.get(field, ())}
-    finer = {name: STRONGER * getattr(scales, name) for name in sorted(names)}
-    return replace(scales, **finer, multiplier_rounds=MORE_ROUNDS, decrease=decrease)
+    return replace(stronger(scales, broken, _SCALES), multiplier_rounds=MORE_ROUNDS, decrease=decrease)
+
+
+def stronger(scales: S, broken: frozenset[str], table: Mapping[str, tuple[str, ...]]) -> S:
+    """Return scales at which what was missed weighs more.
+
+    Args:
+        scales: Those of the fit before.
+        broken: Names of fields of a certificate.
+        table: Scales that decide each field.
+    """
+    names = {scale for field in broken for scale in table.get(field, ())}
+    return replace(scales, **{name: STRONGER * getattr(scales, name) for name in sorted(names)})
 
 
 def _nearer(scales: FitScales) -> dict[str, float]:
