@@ -420,6 +420,9 @@ def _print_summary(summary: dict[str, Any], directory: Path | None) -> None:
     failure = summary.get("failure")
     if failure:
         typer.echo(f"failed in {failure['stage']}: {failure['reason']}", err=True)
+    fault = (summary.get("execution") or {}).get("failure")
+    if fault and not failure:
+        typer.echo(f"its execution, an attempt, failed: {fault['reason']}", err=True)
     if directory is not None:
         typer.echo(f"files in {directory}; see them with: manikin view {directory}", err=True)
 

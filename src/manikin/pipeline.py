@@ -24,19 +24,23 @@ from manikin.centroidal import (
     plan_com_through_key_frames,
 )
 from manikin.contact import ContactSchedule, StanceSequence
+from manikin.contact_planning import ContactPlan
 from manikin.contact_search import find_supports
 from manikin.control import ControlSettings, SupportSettings
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
 from manikin.output import MOTION, RunDirectory
+from manikin.refinement import KeyedContacts, refined_summary
 from manikin.scenarios import Scenario, load_scenario
+from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
 from manikin.scene import Scene
 from manikin.simulation import Execution, Push, execute
-from manikin.spatial import FloatArray, rotation_from_yaw
+from manikin.spatial import GRAVITY, FloatArray, rotation_from_yaw
 from manikin.wholebody import (
     Eligibility,
     KeyPostures,
+    RefineResult,
     WholeBodyResult,
     WholeBodySettings,
     continue_seated,
@@ -44,6 +48,7 @@ from manikin.wholebody import (
     find_key_postures,
     measure_passage,
     plan_whole_body,
+    refine_motion,
 )
 from manikin.wholebody.configuration_spline import rotation_from_quaternion
 from manikin.wholebody.manner import manner_of
@@ -144,7 +149,7 @@ class RunResult:
         summary: As printed by ``manikin run --json``.
         planned: Planned whole-body motion, or that of a point mass; None when there is none.
         executed: Executed motion, or None.
-        centroidal: Result of the centre-of-mass stage, or None where no contacts were found.
+        centroidal: Result of the centre-of-mass stage, or None where there was none.
         wholebody: Result of the whole-body stage, or None.
         execution: Result of the execution, or None.
         directory: Where the files are, or None.
@@ -154,13 +159,13 @@ class RunResult:
     planned: Motion | None
     executed: Motion | None
     centroidal: CentroidalResult | None
-    wholebody: WholeBodyResult | None
+    wholebody: WholeBodyResult | RefineResult | None
     execution: Execution | None
     directory: Path | None
 
     @property
     def succeeded(self) -> bool:
-        """Whether every stage met its requirements."""
+        """Whether every stage met its requirements; an execution only where the scenario requires it."""
         return bool(self.summary["succeeded"])
 
     @property
@@ -231,7 +236,7 @@ class _Run:
         self._scenario, self._requirements = scenario, requirements
         self._settings = settings or WholeBodySettings(manner=manner_of(scenario.manner))
         self._progress = progress or _silent
-        self._known_postures: FloatArray | None = None
+        self._plan: ContactPlan | None = None
         self._body: BodyModel = scenario.build_body()
         self._scene: Scene = scenario.build_scene()
         if scenario.file.supports is not None:
@@ -249,6 +254,8 @@ class _Run:
     def run(self) -> RunResult:
         if self._scenario.file.supports is None and not self._find_contacts():
             return self._result(None, None, None, None)
+        if self._scenario.refines:
+            return self._run_refined()
         centroidal = self._plan_com()
         if self._scenario.is_point_mass:
             return self._result(centroidal, self._move_point_mass(centroidal), None, None)
@@ -262,8 +269,30 @@ class _Run:
                 wholebody = None if trajectory is None else self._plan_whole_body(trajectory)
         execution = None
         if trajectory is not None and wholebody is not None and wholebody.succeeded:
-            execution = self._execute(trajectory, wholebody)
+            execution = self._execute(trajectory.schedule, wholebody.motion)
         return self._result(centroidal, None if wholebody is None else wholebody.motion, wholebody, execution)
+
+    def _run_refined(self) -> RunResult:
+        centroidal, keyed = None, None
+        if self._plan is not None:
+            cap = BODY_WEIGHTS_CAP * self._scenario.mass * GRAVITY
+            keyed = KeyedContacts.of_plan(self._plan, cap)
+        else:
+            planned = self._plan_com()
+            found = self._test_key_postures(planned, KEY_TOLERANCES[0])
+            centroidal, trajectory = self._take(planned, found)
+            if trajectory is not None and found is not None and found.postures is not None:
+                keyed = KeyedContacts.of_postures(trajectory.schedule, found.postures)
+        if keyed is None:
+            return self._result(centroidal, None, None, None)
+        refined, execution = self._refine(keyed), None
+        if refined.succeeded:
+            execution = self._execute(refined.schedule, refined.motion)
+        return self._result(centroidal, refined.motion, refined, execution)
+
+    @property
+    def _known_postures(self) -> FloatArray | None:
+        return None if self._plan is None else self._plan.postures
 
     def _take_scenario(self, scenario: Scenario) -> None:
         """Pose the problem of a scenario with supports."""
@@ -283,10 +312,11 @@ class _Run:
         if found.scenario is None:
             self._fail("contacts", found.failure or "", 0.0, found.where)
             return False
-        self._take_scenario(found.scenario)
-        self._known_postures = None if found.plan is None else found.plan.postures
-        if self._directory is not None:
-            self._directory.write_scenario(found.scenario.to_yaml())
+        self._plan = found.plan
+        if not self._scenario.refines:
+            self._take_scenario(found.scenario)
+            if self._directory is not None:
+                self._directory.write_scenario(found.scenario.to_yaml())
         self._progress("contacts", 1.0)
         return True
 
@@ -294,7 +324,7 @@ class _Run:
         self,
         centroidal: CentroidalResult | None,
         planned: Motion | None,
-        wholebody: WholeBodyResult | None,
+        wholebody: WholeBodyResult | RefineResult | None,
         execution: Execution | None,
     ) -> RunResult:
         self._summary["succeeded"] = self._summary["failure"] is None
@@ -381,7 +411,7 @@ class _Run:
                 self._body, self._scene, trajectory, manner=self._settings.manner,
                 requirements=self._settings.requirements, range_margin=range_margin,
                 tolerance=tolerance, known=self._known_postures,
-                padded=() if self._known_postures is None else self._scenario.padded,
+                padded=() if self._plan is None else self._scenario.padded,
             )  # fmt: skip
 
         return find_eligible_plan(planned, self._on_real_supports, look, replan=self._keyframes is None)
@@ -405,7 +435,7 @@ class _Run:
         if centroidal.trajectory is None:
             return None
         motion = point_mass_motion(centroidal.problem, centroidal.trajectory, centroidal.polytopes)
-        self._keep_motions(centroidal.trajectory, motion, None)
+        self._keep_motions(centroidal.trajectory.schedule, motion, None)
         return motion
 
     def _plan_whole_body(self, trajectory: CentroidalTrajectory) -> WholeBodyResult:
@@ -417,36 +447,59 @@ class _Run:
             progress=lambda share: self._progress("wholebody", share),
         )  # fmt: skip
         drawn = rng.bit_generator.state != unused
-        block = wholebody_summary(result) | self._passage(trajectory, result.motion)
+        block = wholebody_summary(result) | self._passage(trajectory.schedule, result.motion)
         self._finish("wholebody", block | {"seed_matters": drawn})
         if result.failure is not None:
             self._fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
-        self._keep_motions(trajectory, result.motion, None)
+        self._keep_motions(trajectory.schedule, result.motion, None)
         return result
 
-    def _execute(self, trajectory: CentroidalTrajectory, planned: WholeBodyResult) -> Execution:
+    def _refine(self, keyed: KeyedContacts) -> RefineResult:
+        result = refine_motion(
+            self._body, self._scene, keyed.schedule.instants, keyed.q, keyed.schedule,
+            padded=self._scenario.padded, progress=lambda share: self._progress("wholebody", share),
+        )  # fmt: skip
+        block = refined_summary(result) | self._passage(result.schedule, result.motion)
+        self._finish("wholebody", block | {"seed_matters": self._plan is not None})
+        if result.failure is not None:
+            self._fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
+        self._keep_motions(result.schedule, result.motion, None)
+        return result
+
+    def _execute(self, schedule: ContactSchedule, planned: Motion) -> Execution:
         result = execute(
-            self._body, self._scene, planned.motion, trajectory.schedule, pushes=self._pushes(planned.motion),
+            self._body, self._scene, planned, schedule, pushes=self._pushes(planned),
             padded=self._scenario.padded, settings=self._control_settings(),
             progress=lambda share: self._progress("execution", share),
         )  # fmt: skip
-        self._finish("execution", result.summary() | self._passage(trajectory, result.motion))
-        seated = self._scenario.seated_from is not None
-        broken = self._requirements.violation(result, seated)
-        if result.failure:
-            broken = result.failure, float(result.failure_time_s or 0.0)
-        if broken is not None:
-            reason, time = broken
-            phase = int(trajectory.schedule.phase_at(time))
-            held = ", ".join(trajectory.schedule.sequence[phase].stance.effectors)
-            self._fail("execution", reason, time, _place(phase, held))
-        self._keep_motions(trajectory, planned.motion, result.motion)
+        failure = self._execution_failure(schedule, result)
+        required = self._scenario.execution_required
+        block = {
+            "required": required,
+            "failure": None if failure is None else failure.as_dict(),
+            **result.summary(),
+            **self._passage(schedule, result.motion),
+        }
+        self._finish("execution", block)
+        if failure is not None and required:
+            self._summary["failure"] = failure.as_dict()
+        self._keep_motions(schedule, planned, result.motion)
         return result
 
-    def _passage(self, trajectory: CentroidalTrajectory, motion: Motion) -> dict[str, float | None]:
+    def _execution_failure(self, schedule: ContactSchedule, result: Execution) -> Failure | None:
+        broken = self._requirements.violation(result, self._scenario.seated_from is not None)
+        if result.failure:
+            broken = result.failure, float(result.failure_time_s or 0.0)
+        if broken is None:
+            return None
+        reason, time = broken
+        phase = int(schedule.phase_at(time))
+        held = ", ".join(schedule.sequence[phase].stance.effectors)
+        return Failure("execution", reason, time, _place(phase, held))
+
+    def _passage(self, schedule: ContactSchedule, motion: Motion) -> dict[str, float | None]:
         """How low the body came, and how near its head to the scene."""
-        padded = self._scenario.padded
-        return measure_passage(self._body, self._scene, trajectory.schedule, motion, padded).summary()
+        return measure_passage(self._body, self._scene, schedule, motion, self._scenario.padded).summary()
 
     def _control_settings(self) -> ControlSettings:
         """The defaults; with the share of the friction that planning keeps to where it has its own."""
@@ -471,11 +524,9 @@ class _Run:
     def _fail(self, stage: str, reason: str, time: float, where: str) -> None:
         self._summary["failure"] = Failure(stage, reason, float(time), where).as_dict()
 
-    def _keep_motions(
-        self, trajectory: CentroidalTrajectory, planned: Motion, executed: Motion | None
-    ) -> None:
+    def _keep_motions(self, schedule: ContactSchedule, planned: Motion, executed: Motion | None) -> None:
         if self._directory is not None:
-            content = MotionFile(planned, executed, self._body, self._scene, trajectory.schedule)
+            content = MotionFile(planned, executed, self._body, self._scene, schedule)
             write_motions(self._directory.path / MOTION, content)
 
 
@@ -514,6 +565,7 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
     """Return the ``wholebody`` block of the summary."""
     certificate = result.certificate
     return {
+        "method": "follow",
         "max_support_error_m": certificate.max_support_error_m,
         "max_meeting_error_m": certificate.max_meeting_error_m,
         "max_com_error_m": certificate.max_com_error_m,

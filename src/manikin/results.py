@@ -23,8 +23,23 @@ _RUN_WITH = ("stature_m", "mass_kg", "seed")
 
 _KEPT: dict[str, tuple[str, ...]] = {
     "centroidal": ("duration_s", "min_margin", "margin_unit", "feasibility_radius", "wall_s"),
-    "wholebody": ("min_clearance_m", "lowest_com_m", "head_clearance_m", "wall_s"),
-    "execution": ("min_margin", "com_rms_error_m", "lowest_com_m", "head_clearance_m", "fell", "wall_s"),
+    "wholebody": (
+        "duration_s",
+        "min_margin",
+        "min_clearance_m",
+        "lowest_com_m",
+        "head_clearance_m",
+        "wall_s",
+    ),
+    "execution": (
+        "min_margin",
+        "com_rms_error_m",
+        "lowest_com_m",
+        "head_clearance_m",
+        "fell",
+        "failure",
+        "wall_s",
+    ),
 }
 """Keys of a run's summary that the tables show."""
 
@@ -77,13 +92,15 @@ def _reduced_run(run: Mapping[str, Any]) -> dict[str, Any]:
     kept["failure"] = None if failure is None else {key: failure[key] for key in ("stage", "reason")}
     for stage, keys in _KEPT.items():
         block = run[stage]
-        kept[stage] = None if block is None else {key: _rounded(block.get(key)) for key in keys}
+        kept[stage] = None if block is None else {key: _rounded(block[key]) for key in keys if key in block}
     return {**kept, "wall_s": _rounded(run["wall_s"])}
 
 
 def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
     com, body, executed = (run[stage] or {} for stage in _KEPT)
-    walls = [block.get("wall_s") for block in (com, body, executed)]
+    if not com:  # a motion that was refined without a planned centre of mass
+        com = body | {"margin_unit": "N.m"}
+    walls = [block.get("wall_s") for block in (run["centroidal"] or {}, body, executed)]
     return (
         str(run["scenario"]).partition("@")[0],
         run["variant"] or NOTHING,
@@ -102,7 +119,9 @@ def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
 def result(run: Mapping[str, Any]) -> str:
     """How a run ended, in words."""
     if run["failure"] is None:
-        return "succeeded" if run["as_expected"] else "succeeded although a failure was expected"
+        word = "succeeded" if run["as_expected"] else "succeeded although a failure was expected"
+        fault = (run.get("execution") or {}).get("failure")
+        return word if fault is None else f"{word}, but for its attempted execution: {fault['reason']}"
     word = "failed as expected" if run["as_expected"] else "FAILED"
     return f"{word} ({run['failure']['stage']}): {run['failure']['reason']}"
 

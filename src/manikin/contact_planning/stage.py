@@ -85,9 +85,16 @@ class ContactPlan:
         ]
         return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
 
-    def sequence(self) -> StanceSequence:
-        """The stances in order, as the stages that follow take them."""
-        return StanceSequence([Phase(stage.stance, stage.min_duration) for stage in self.stages])
+    def sequence(self, normal_force_cap: float | None = None) -> StanceSequence:
+        """The stances in order, as the stages that follow take them.
+
+        Args:
+            normal_force_cap: On the sum of the normal forces of each [N]; None leaves it to the contacts.
+        """
+        stances = [Stance(list(stage.contacts.values()), normal_force_cap) for stage in self.stages]
+        return StanceSequence(
+            [Phase(stance, stage.min_duration) for stance, stage in zip(stances, self.stages, strict=True)]
+        )
 
     @property
     def postures(self) -> FloatArray:

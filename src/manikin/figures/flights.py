@@ -72,7 +72,7 @@ def _methods(record: RunRecord, swings: list[Swing]) -> list[str]:
     """How each flight was planned, as far as the summary says; nothing of what just follows the body."""
     block = record.summary.get("wholebody") or {}
     told: dict[str, list[str]] = {}
-    for item in block.get("swings", []):
+    for item in block.get("swings") or ():
         if isinstance(item, dict):
             told.setdefault(str(item.get("effector")), []).append(str(item.get("method", "")))
     counts = Counter(swing.effector for swing in swings)

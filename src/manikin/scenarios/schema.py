@@ -17,6 +17,7 @@ from manikin.scenarios.sections.planning import PlanningSection
 from manikin.scenarios.sections.push import PushSection
 from manikin.scenarios.sections.supports import SupportsSection
 from manikin.scenarios.sections.task import TaskSection
+from manikin.scenarios.sections.wholebody import WholebodySection
 from manikin.scenarios.validation import Name, Number, Positive, Section, Text, refuse
 
 
@@ -56,6 +57,14 @@ class ScenarioFile(Section):
         default_factory=list, description="constraints on the centre of mass"
     )
     planning: PlanningSection = Field(default=PlanningSection(), description="options of the planner")
+    wholebody: WholebodySection = Field(
+        default=WholebodySection(), description="how the whole body's motion is found"
+    )
+    execution: Literal["required", "attempted"] = Field(
+        default="required",
+        description="whether a run succeeds only when the motion is executed without a fault, or the "
+        "execution is an attempt whose fault is reported and leaves the plan a success",
+    )
     manner: Literal["ready", "walking", "close"] = Field(
         default="ready",
         description="how the body carries itself where the task leaves freedom: ready, arms raised and bent, "
@@ -91,6 +100,7 @@ class ScenarioFile(Section):
                         f"({', '.join(names) or 'it has none'})",
                     )
         self._check_body()
+        self._check_wholebody()
         if self.supports is None:
             self._check_planned()
         elif self.contacts is not None:
@@ -111,6 +121,15 @@ class ScenarioFile(Section):
                         "has no meaning beside explicit supports; valid: only com, [x, y, z]",
                     )
         return self
+
+    def _check_wholebody(self) -> None:
+        """Refuse what cannot be refined."""
+        if self.wholebody.method != "refine":
+            return
+        if self.body.model == "point_mass":
+            raise refuse("wholebody.method", "is refine; valid: follow for a point mass, which has no joints")
+        if self.supports is not None and self.supports.foot != "flat":
+            raise refuse("wholebody.method", "is refine; valid: follow for feet that roll, or flat ones")
 
     def _check_planned(self) -> None:
         """Refuse what contacts cannot be planned for."""

@@ -81,6 +81,16 @@ class ScenarioValues:
         return self.file.planning
 
     @property
+    def refines(self) -> bool:
+        """Whether the whole body's motion is found by refinement."""
+        return self.file.wholebody.method == "refine"
+
+    @property
+    def execution_required(self) -> bool:
+        """Whether a fault of the execution is one of the run."""
+        return self.file.execution == "required"
+
+    @property
     def manner(self) -> str:
         """How the body carries itself where the task leaves freedom."""
         return self.file.manner

@@ -23,6 +23,7 @@ from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.banded import SampledBasis
 from manikin.wholebody.configuration_spline import ConfigurationSpline
+from manikin.wholebody.contact_slack import contact_slack
 from manikin.wholebody.failure import WholeBodyFailure
 from manikin.wholebody.fit import FitResult, MotionFit, spline_through
 from manikin.wholebody.forces import plan_forces
@@ -58,6 +59,9 @@ FINEST = 2
 
 CAUGHT = -0.02
 """Below this clearance a part of the body is caught on the wrong side of another: the fit begins anew [m]."""
+
+LEAST_SLACK = -1e-6
+"""Slack of the contacts' limits below which no contact forces balance the body: 0 but for rounding."""
 
 PATIENT = 0.004
 """Relative decrease of the objective below which a repair stops."""
@@ -99,6 +103,8 @@ class RefineResult:
         smoothed: The spline through the input from which the optimisation begins.
         after: The refined motion.
         certificate: Measured on the samples of the motion.
+        contact_slack: Room that all limits of the contacts have in common, the least at samples 10 ms
+            apart, by linear programs, see :mod:`manikin.wholebody.contact_slack` [N, N.m].
         failure: Why it is no success, or None.
         stretch: Duration of the motion relative to the input's.
         iterations: Gauss-Newton steps.
@@ -112,6 +118,7 @@ class RefineResult:
     smoothed: RefineMeasures
     after: RefineMeasures
     certificate: RefineResiduals
+    contact_slack: float
     failure: WholeBodyFailure | None
     stretch: float
     iterations: int
@@ -334,15 +341,25 @@ class _Refinement:
             )
             for samples in (input_samples, smoothed, found.spline.evaluate(time).q)
         )
+        slack, when = self._slack(found, time)
         violation = found.certificate.violation(self.settings.requirements)
+        if violation is None and slack < LEAST_SLACK:
+            violation = f"least slack of the contacts' limits is {slack:.4g}; allowed 0", when
         failure = None
         if violation is not None:
             reason, when = violation
             failure = WholeBodyFailure.at(schedule, when, reason)
         return RefineResult(
-            found.motion, found.spline, schedule, before, start, after, found.certificate, failure,
+            found.motion, found.spline, schedule, before, start, after, found.certificate, slack, failure,
             path.duration / given, self.iterations, clock.perf_counter() - began,
         )  # fmt: skip
+
+    def _slack(self, found: _Attempt, time: FloatArray) -> tuple[float, float]:
+        """Least slack of the contacts' limits, and when [s]."""
+        wrench = whole_body_wrench(self.body, *found.spline.evaluate(time))
+        slack = contact_slack(found.schedule, time, wrench)
+        worst = int(np.argmin(slack))
+        return float(slack[worst]), float(time[worst])
 
 
 _SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin"})

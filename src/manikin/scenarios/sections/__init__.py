@@ -10,6 +10,7 @@ from manikin.scenarios.sections.planning import PlanningSection, WeightsSection
 from manikin.scenarios.sections.push import PushSection
 from manikin.scenarios.sections.supports import SupportsSection
 from manikin.scenarios.sections.task import StateSection, TaskSection
+from manikin.scenarios.sections.wholebody import WholebodySection
 
 __all__ = [
     "BodySection",
@@ -29,4 +30,5 @@ __all__ = [
     "SupportsSection",
     "TaskSection",
     "WeightsSection",
+    "WholebodySection",
 ]

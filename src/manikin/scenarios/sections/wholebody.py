@@ -1,0 +1,17 @@
+"""Section of a scenario file: how the whole body's motion is found."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from manikin.scenarios.validation import Section
+
+
+class WholebodySection(Section):
+    """How the whole body's motion is found."""
+
+    method: Literal["follow", "refine"] = Field(
+        default="follow",
+        description="follow: contacts, swings and a planned centre of mass; refine: smooth the postures at "
+        "the changes of contact into a motion that keeps to physics, with no centre of mass prescribed",
+    )

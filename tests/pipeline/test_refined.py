@@ -1,0 +1,120 @@
+"""Runs whose whole-body motion is refined, from start and goal and from supports."""
+
+import json
+
+import numpy as np
+import pytest
+
+from manikin import pipeline
+from manikin.errors import ScenarioError
+from manikin.figures.flights import flights_figure
+from manikin.motion.file import read_motions
+from manikin.pipeline import ExecutionRequirements
+from manikin.record import read_run
+from manikin.results import result
+from manikin.scenarios import load_scenario
+from manikin.wholebody.contact_slack import contact_slack
+from manikin.wholebody.refine_measures import whole_body_wrench
+
+REFINED = ("wholebody.method=refine", "execution=attempted")
+
+
+@pytest.fixture(scope="module")
+def risen(tmp_path_factory):
+    """Rising from a chair, whose execution is held to what no execution keeps."""
+    out = tmp_path_factory.mktemp("runs") / "rise"
+    strict = ExecutionRequirements(com_rms_error=0.0)
+    return pipeline.run("stand-up-chair", overrides=REFINED, out=out, requirements=strict)
+
+
+def test_contacts_become_a_motion_that_keeps_to_physics(risen):
+    """The requirements of the refinement, and ten and five times less than its input."""
+    body = risen.summary["wholebody"]
+    assert risen.summary["failure"] is None
+    assert risen.summary["centroidal"] is None
+    assert body["method"] == "refine"
+    assert body["min_margin"] > 0.0
+    assert body["min_clearance_m"] > 0.0
+    assert body["max_support_error_m"] <= 1e-3
+    assert body["max_joint_limit_violation_rad"] <= 1e-9
+    assert body["max_velocity_share"] <= 1.0
+    measures = body["refinement"]
+    assert measures["min_contact_slack"] > 0.0
+    before, after = measures["before"], measures["after"]
+    assert before["physics_violation"] > 10.0 * after["physics_violation"]
+    assert measures["squared_accelerations_fall"] > 5.0
+
+
+def test_the_balance_of_the_motion_file_is_that_of_linear_programs(risen):
+    """Every 10 ms, from the positions, velocities and accelerations in the file alone."""
+    content = read_motions(risen.directory)
+    motion = content.planned
+    every = slice(None, None, 2)
+    wrench = whole_body_wrench(content.body, motion.q[every], motion.v[every], motion.a[every])
+    slack = contact_slack(content.schedule, motion.time[every], wrench)
+    assert slack.min() > 0.0
+    assert slack.min() == pytest.approx(
+        risen.summary["wholebody"]["refinement"]["min_contact_slack"], rel=0.1
+    )
+
+
+def test_an_attempted_execution_that_fails_is_told_and_leaves_the_plan_a_success(risen):
+    executed = risen.summary["execution"]
+    assert risen.succeeded
+    assert executed["required"] is False
+    assert executed["failure"]["stage"] == "execution"
+    assert "RMS error of the centre of mass" in executed["failure"]["reason"]
+    entry = {**risen.summary, "as_expected": True}
+    assert "but for its attempted execution: RMS error" in result(entry)
+
+
+def test_the_run_directory_is_like_any_other(risen):
+    on_disk = json.loads((risen.directory / "summary.json").read_text())
+    assert on_disk["wholebody"] == json.loads(json.dumps(risen.summary["wholebody"]))
+    record = read_run(risen.directory)
+    assert set(record.motions) == {"planned", "executed"}
+    assert flights_figure(record) is not None
+    # Start and goal stay what the scenario says: the same run again gives the same motion.
+    again = load_scenario(risen.directory / "scenario.yaml")
+    assert again.file.supports is None
+    assert again.refines
+
+
+def test_a_person_rises_in_the_physics_engine(risen):
+    """By the defaults of the execution this run is a success as well."""
+    assert ExecutionRequirements().violation(risen.execution) is None
+    assert risen.execution.succeeded
+    assert risen.executed.com[-1, 2] - risen.executed.com[0, 2] > 0.2
+
+
+STEP = """
+name: step
+supports:
+  friction: 0.7
+  sole: {length_m: 0.28, width_m: 0.12}
+  normal_force_cap_N: 1500
+  phases:
+    - {left_foot: {position: [0, 0.1, 0]}, right_foot: {position: [0, -0.1, 0]}}
+    - {left_foot: same, min_duration_s: 0.5}
+    - {left_foot: same, right_foot: {position: [0.2, -0.1, 0]}}
+task: {start: {com: [0, 0, 0.9]}, goal: {com: [0.1, 0, 0.9]}}
+wholebody: {method: refine}
+"""
+
+
+def test_listed_supports_are_refined_between_their_key_postures(tmp_path):
+    (tmp_path / "step.yaml").write_text(STEP)
+    result = pipeline.run(tmp_path / "step.yaml")
+    assert result.succeeded, result.summary["failure"]
+    summary = result.summary
+    assert summary["centroidal"]["key_postures"] == {"count": 4, "failed": []}
+    assert result.planned.time[-1] >= summary["centroidal"]["duration_s"] - 1e-9
+    np.testing.assert_allclose(result.planned.com[-1], [0.1, 0.0, 0.9], atol=0.05)
+    assert summary["wholebody"]["refinement"]["min_contact_slack"] > 0.0
+    assert summary["execution"]["required"] is True
+
+
+@pytest.mark.parametrize("name", ["walk", "walls"])
+def test_what_cannot_be_refined_is_refused(name):
+    with pytest.raises(ScenarioError, match=r"wholebody\.method is refine; valid: follow"):
+        load_scenario(name, overrides=REFINED)
