@@ -98,14 +98,15 @@ def _reduced_run(run: Mapping[str, Any]) -> dict[str, Any]:
 
 def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
     com, body, executed = (run[stage] or {} for stage in _KEPT)
+    unit = f" {com.get('margin_unit', '')}"
     if not com:  # a motion that was refined without a planned centre of mass
-        com = body | {"margin_unit": "N.m"}
+        com, unit = body, " N.m"
     walls = [block.get("wall_s") for block in (run["centroidal"] or {}, body, executed)]
     return (
         str(run["scenario"]).partition("@")[0],
         run["variant"] or NOTHING,
         number(com.get("duration_s"), 2),
-        number(com.get("min_margin"), 1, f" {com.get('margin_unit', '')}"),
+        number(com.get("min_margin"), 1, unit),
         number(com.get("feasibility_radius"), 1),
         number(body.get("min_clearance_m"), 1, scale=1000.0),
         number(executed.get("min_margin"), 1),

@@ -98,6 +98,7 @@ supports:
     - {left_foot: same, min_duration_s: 0.5}
     - {left_foot: same, right_foot: {position: [0.2, -0.1, 0]}}
 task: {start: {com: [0, 0, 0.9]}, goal: {com: [0.1, 0, 0.9]}}
+com_constraints: [{height_band: {lower: "0.86", upper: "0.94"}}]
 wholebody: {method: refine}
 """
 
