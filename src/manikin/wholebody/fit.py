@@ -17,6 +17,7 @@ from manikin.spatial import FloatArray
 from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
 from manikin.wholebody.configuration_spline import ConfigurationSpline
 from manikin.wholebody.fit_scales import FitScales
+from manikin.wholebody.motion_scales import MotionScales
 from manikin.wholebody.objective import Linearised, MotionObjective
 from manikin.wholebody.targets import FitTargets
 
@@ -74,7 +75,7 @@ class MotionFit:
         targets: FitTargets,
         knots: FloatArray,
         degree: int = 5,
-        scales: FitScales | None = None,
+        scales: MotionScales | None = None,
         objective: ObjectiveMaker = MotionObjective,
     ) -> None:
         self._knots, self._degree = knots, degree
@@ -98,11 +99,11 @@ class MotionFit:
         """
         return self._solve(start, self._final, self._final.stages)
 
-    def improve(self, start: ConfigurationSpline, scales: FitScales) -> FitResult:
+    def improve(self, start: ConfigurationSpline, scales: MotionScales) -> FitResult:
         """Go on from an earlier solution ``start`` with other scales, at its multipliers."""
         return self._solve(start, scales, scales.stages[-1:])
 
-    def _solve(self, start: ConfigurationSpline, final: FitScales, stages: tuple[float, ...]) -> FitResult:
+    def _solve(self, start: ConfigurationSpline, final: MotionScales, stages: tuple[float, ...]) -> FitResult:
         points, iterations = np.array(start.control_points), 0
         scales = final.loosened(stages[0])
         state = self.objective.linearise(points, scales, self._multiplier)
@@ -133,7 +134,7 @@ class MotionFit:
         state.shift_tasks(before, self._multiplier)
 
     def _descend(
-        self, points: FloatArray, current: Linearised, scales: FitScales, most: int
+        self, points: FloatArray, current: Linearised, scales: MotionScales, most: int
     ) -> tuple[FloatArray, Linearised, int]:
         """Damped Gauss-Newton at fixed scales; the damping is kept from call to call.
 

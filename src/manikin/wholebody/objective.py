@@ -22,6 +22,7 @@ from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.momentum_rate import MomentumRate
 from manikin.wholebody.motion_samples import MotionSampler, MotionSamples
+from manikin.wholebody.motion_scales import MotionScales
 from manikin.wholebody.targets import EffectorTarget, FitTargets
 
 LEAST_MARGIN = 10.0
@@ -142,7 +143,7 @@ class MotionObjective:
         self.exact_rows = np.hstack([*held, np.repeat(targets.com_weight[:, None] >= 1.0, 3, axis=1)])
         """(n, task_rows) whether a task has to be met exactly: contacts and centre of mass."""
 
-    def linearise(self, points: FloatArray, scales: FitScales, shift: FloatArray) -> Linearised:
+    def linearise(self, points: FloatArray, scales: MotionScales, shift: FloatArray) -> Linearised:
         """Evaluate every term.
 
         Args:
@@ -170,7 +171,7 @@ class MotionObjective:
         return self._last[1]
 
     def _add_tasks(
-        self, out: Linearised, motion: MotionSamples, scales: FitScales, shift: FloatArray
+        self, out: Linearised, motion: MotionSamples, scales: MotionScales, shift: FloatArray
     ) -> None:
         """Places of the effectors and of the centre of mass."""
         n, nv = motion.com_jacobian.shape[0], motion.com_jacobian.shape[2]
@@ -186,13 +187,19 @@ class MotionObjective:
             out.support_turn = max(out.support_turn, float(turn[_held_rows(target)[:, 3]].max(initial=0.0)))
         weight = self._targets.com_weight
         error = motion.com - self._targets.com
-        jacobian[:, -3:] = (weight / scales.com)[:, None, None] * motion.com_jacobian
-        residual[:, -3:] = (weight / scales.com)[:, None] * error
+        scaled = self._com_weight(scales)
+        jacobian[:, -3:] = scaled[:, None, None] * motion.com_jacobian
+        residual[:, -3:] = scaled[:, None] * error
         out.com_error = float(np.linalg.norm(error[weight >= 1.0], axis=1).max(initial=0.0))
         out.task_residual, out.task_jacobian = residual, to_raw(jacobian, motion.tangent)
         out.add(0, out.task_jacobian, residual + shift)
 
-    def _add_clearance(self, out: Linearised, motion: MotionSamples, scales: FitScales) -> None:
+    def _com_weight(self, scales: MotionScales) -> FloatArray:
+        """(n,) weight of the centre of mass's error [1/m]."""
+        assert isinstance(scales, FitScales)
+        return self._targets.com_weight / scales.com
+
+    def _add_clearance(self, out: Linearised, motion: MotionSamples, scales: MotionScales) -> None:
         if self._proximity is None:
             return
         reach = scales.safe_distance + 4.0 * scales.softness
@@ -215,7 +222,7 @@ class MotionObjective:
         jacobian, residual = _padded(found.sample, rows, value, len(motion.com))
         out.add(0, to_raw(jacobian, motion.tangent), residual)
 
-    def _wanted_distance(self, found: ProximitySamples, scales: FitScales) -> FloatArray | float:
+    def _wanted_distance(self, found: ProximitySamples, scales: MotionScales) -> FloatArray | float:
         """Wanted clearance of close pairs [m]."""
         del found
         return scales.safe_distance
@@ -240,7 +247,7 @@ class MotionObjective:
         size = np.linalg.norm(raw[:, 3:7], axis=1)
         out.add(0, tangent[:, 6:] / _RADIAL_SCALE, (size - 1.0)[:, None] / _RADIAL_SCALE)
 
-    def _add_ranges(self, out: Linearised, raw: FloatArray, scales: FitScales) -> None:
+    def _add_ranges(self, out: Linearised, raw: FloatArray, scales: MotionScales) -> None:
         buffer = np.minimum(scales.joint_buffer, 0.25 * (self._body.upper - self._body.lower))
         lower, upper = self._body.lower + buffer, self._body.upper - buffer
         outside = np.minimum(raw[:, 7:] - lower, 0.0) + np.maximum(raw[:, 7:] - upper, 0.0)
@@ -249,7 +256,7 @@ class MotionObjective:
         residual[:, 7:] = outside / scales.joint_limit
         out.add_diagonal(0, weight, residual)
 
-    def _add_rates(self, out: Linearised, rate: FloatArray, scales: FitScales) -> None:
+    def _add_rates(self, out: Linearised, rate: FloatArray, scales: MotionScales) -> None:
         limit = scales.velocity_share * self._body.velocity_limit
         excess = np.sign(rate[:, 7:]) * np.maximum(np.abs(rate[:, 7:]) - limit, 0.0)
         weight, residual = np.zeros_like(rate), np.zeros_like(rate)
@@ -260,13 +267,14 @@ class MotionObjective:
         out.add_diagonal(1, weight, residual)
 
     @staticmethod
-    def _add_accelerations(out: Linearised, second: FloatArray, scales: FitScales) -> None:
+    def _add_accelerations(out: Linearised, second: FloatArray, scales: MotionScales) -> None:
         weight = np.full_like(second, 1.0 / scales.acceleration)
         weight[:, :7] = 1.0 / scales.pelvis_acceleration
         out.add_diagonal(2, weight, weight * second)
 
-    def _add_dynamics(self, out: Linearised, motion: MotionSamples, scales: FitScales) -> None:
+    def _add_dynamics(self, out: Linearised, motion: MotionSamples, scales: MotionScales) -> None:
         """Rate of the centroidal momentum against what the planned trajectory needs."""
+        assert isinstance(scales, FitScales)
         targets, momentum = self._targets, motion.momentum
         scale = np.full((len(targets.time), 6), scales.force)
         scale[:, :3] /= np.maximum(targets.com_weight, LEAST_FORCE_WEIGHT)[:, None]
@@ -279,7 +287,7 @@ class MotionObjective:
 
 
 def _effector_rows(
-    target: EffectorTarget, place: FloatArray, by_joints: FloatArray, scales: FitScales
+    target: EffectorTarget, place: FloatArray, by_joints: FloatArray, scales: MotionScales
 ) -> tuple[FloatArray, FloatArray]:
     """Scaled residuals (n, 6) of an effector at its places (n, 4, 4) and their derivatives (n, 6, nv)."""
     along = np.eye(3) if target.along is None else target.along

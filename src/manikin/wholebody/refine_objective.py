@@ -21,10 +21,10 @@ from manikin.scene.distance import ProximitySamples, moves_by_joint
 from manikin.spatial import FloatArray
 from manikin.wholebody.banded import SampledBasis
 from manikin.wholebody.configuration_spline import turn_derivatives
-from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.forces import load_shares
 from manikin.wholebody.momentum_rate import MomentumRate
 from manikin.wholebody.motion_samples import MotionSamples
+from manikin.wholebody.motion_scales import MotionScales
 from manikin.wholebody.objective import Linearised, MotionObjective, to_raw
 from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_contacts import contact_targets, contact_variables, effector_speed
@@ -140,7 +140,7 @@ class RefineObjective(MotionObjective):
             for name in self._names
         }
 
-    def linearise(self, points: FloatArray, scales: FitScales, shift: FloatArray) -> Linearised:
+    def linearise(self, points: FloatArray, scales: MotionScales, shift: FloatArray) -> Linearised:
         """Evaluate every term at :class:`RefineScales`; see :meth:`MotionObjective.linearise`."""
         assert isinstance(scales, RefineScales)
         out = super().linearise(points, scales, shift)
@@ -149,11 +149,15 @@ class RefineObjective(MotionObjective):
         self._add_place(out, motion, scales)
         return out
 
-    def _wanted_distance(self, found: ProximitySamples, scales: FitScales) -> FloatArray:
+    def _wanted_distance(self, found: ProximitySamples, scales: MotionScales) -> FloatArray:
         assert isinstance(scales, RefineScales)
         return self._refine.obstacles.wanted(found, scales.safe_distance, -scales.touching)
 
-    def _add_dynamics(self, out: Linearised, motion: MotionSamples, scales: FitScales) -> None:
+    def _com_weight(self, scales: MotionScales) -> FloatArray:
+        del scales
+        return self._targets.com_weight  # zero: there is no planned centre of mass
+
+    def _add_dynamics(self, out: Linearised, motion: MotionSamples, scales: MotionScales) -> None:
         """Physics violation and balance, which depend on the wrench that the whole body needs."""
         assert isinstance(scales, RefineScales)
         wrench = WrenchSamples.of(motion, self._body.mass)

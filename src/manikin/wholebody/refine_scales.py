@@ -2,15 +2,12 @@
 
 from dataclasses import dataclass
 
-from manikin.wholebody.fit_scales import FitScales
+from manikin.wholebody.motion_scales import MotionScales
 
 
 @dataclass(frozen=True)
-class RefineScales(FitScales):
+class RefineScales(MotionScales):
     """Size at which each residual of the refinement costs one unit.
-
-    The scales of :class:`~manikin.wholebody.fit_scales.FitScales` that speak of a planned centre of mass
-    (``com``, ``force``, ``moment_share``) do not matter here: there is no such plan.
 
     Attributes:
         missing_wrench: Wrench that no contact supplies, moments divided by :data:`ARM` [N].

@@ -10,8 +10,9 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from manikin.wholebody.fit_scales import FitScales
+from manikin.wholebody.motion_scales import MotionScales
 
-S = TypeVar("S", bound=FitScales)
+S = TypeVar("S", bound=MotionScales)
 
 STRONGER = 0.5
 """Factor of the scales of what was missed."""
