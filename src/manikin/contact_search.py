@@ -4,8 +4,6 @@ The first stage of the pipeline for a scenario that lists no supports ([Tonneau2
 """
 
 import time as clock
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +19,8 @@ from manikin.contact_planning import (
     extend,
     heading_of,
 )
+from manikin.found_contacts import ContactSearch
+from manikin.limb_contact_search import find_limb_contacts
 from manikin.reachability import (
     Abstraction,
     Condition,
@@ -57,36 +57,6 @@ GUIDE_POSES = 200
 """Poses by which the contact planner knows a guide."""
 
 
-@dataclass(frozen=True, eq=False)
-class ContactSearch:
-    """Supports for a scenario, or why there are none.
-
-    Attributes:
-        scenario: The scenario with supports, or None.
-        plan: The contacts with their postures, or None.
-        guide: The root's way, or None.
-        summary: The ``contacts`` block of the run's summary.
-        failure: None, or the reason in one line.
-        where: Stage of the search that failed.
-    """
-
-    scenario: Scenario | None
-    plan: ContactPlan | None
-    guide: GuideLine | None
-    summary: Mapping[str, Any]
-    failure: str | None = None
-    where: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Guide and postures in plain values."""
-        plan = self.plan
-        return {
-            **self.summary,
-            "guide": None if self.guide is None else self.guide.poses.tolist(),
-            "postures": None if plan is None else plan.postures.tolist(),
-        }
-
-
 def find_supports(
     scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
 ) -> ContactSearch:
@@ -98,6 +68,8 @@ def find_supports(
         scene: Its scene.
         rng: Source of all randomness.
     """
+    if scenario.contact_limbs is not None:
+        return find_limb_contacts(scenario, body, scene, rng)
     return _Search(scenario, body, scene, rng).run()
 
 

@@ -303,17 +303,21 @@ class _Run:
 
     def _find_contacts(self) -> bool:
         """Plan the supports of a scenario that lists none, and go on with them; False without any."""
+        if self._scenario.contact_limbs is not None and not self._scenario.refines:
+            raise self._scenario.error(
+                ("wholebody", "method"), "is follow; valid: refine, for contacts of any limbs"
+            )
         self._progress("contacts", 0.0)
         rng = np.random.default_rng(self._scenario.seed)
         found = find_supports(self._scenario, self._body, self._scene, rng)
         self._summary["contacts"] = dict(found.summary)
         if self._directory is not None:
             self._directory.write_stage("contacts", found.to_dict())
-        if found.scenario is None:
+        if found.plan is None:
             self._fail("contacts", found.failure or "", 0.0, found.where)
             return False
         self._plan = found.plan
-        if not self._scenario.refines:
+        if not self._scenario.refines and found.scenario is not None:
             self._take_scenario(found.scenario)
             if self._directory is not None:
                 self._directory.write_scenario(found.scenario.to_yaml())
@@ -456,7 +460,7 @@ class _Run:
 
     def _refine(self, keyed: KeyedContacts) -> RefineResult:
         result = refine_motion(
-            self._body, self._scene, keyed.schedule.instants, keyed.q, keyed.schedule,
+            self._body, self._scene, keyed.time, keyed.q, keyed.schedule,
             padded=self._scenario.padded, progress=lambda share: self._progress("wholebody", share),
         )  # fmt: skip
         block = refined_summary(result) | self._passage(result.schedule, result.motion)

@@ -17,10 +17,12 @@ class KeyedContacts:
 
     Attributes:
         schedule: Contacts in time.
-        q: (phases + 1, nq) postures at its key instants.
+        time: (n,) key times [s].
+        q: (n, nq) postures at them.
     """
 
     schedule: ContactSchedule
+    time: FloatArray
     q: FloatArray
 
     @classmethod
@@ -31,15 +33,13 @@ class KeyedContacts:
             plan: Found from start and goal.
             normal_force_cap: Of every stance [N].
         """
-        sequence = plan.sequence(normal_force_cap)
-        lengths = [phase.min_duration for phase in sequence]
-        schedule = ContactSchedule(sequence, np.concatenate([[0.0], np.cumsum(lengths)]))
-        return cls(schedule, plan.postures)
+        schedule = plan.schedule(normal_force_cap)
+        return cls(schedule, *plan.keys(schedule.instants))
 
     @classmethod
     def of_postures(cls, schedule: ContactSchedule, postures: KeyPostures) -> "KeyedContacts":
         """Postures found at the key instants of a planned centre of mass, with its timing."""
-        return cls(schedule, np.array([item.q for item in postures.postures]))
+        return cls(schedule, schedule.instants, np.array([item.q for item in postures.postures]))
 
 
 def refined_summary(result: RefineResult) -> dict[str, Any]:

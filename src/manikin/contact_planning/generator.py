@@ -154,6 +154,37 @@ class ContactGenerator:
             BodyError: If there are no samples of such a limb or ``q`` does not fit.
             ContactError: If a sole is asked for of a body without soles.
         """
+        return self.request_several(q, limb, task, heuristic, kind=kind)[0]
+
+    def request_several(
+        self,
+        q: ArrayLike,
+        limb: str,
+        task: Task,
+        heuristic: Heuristic | None = None,
+        *,
+        kind: ContactKind | None = None,
+        most: int = 1,
+        apart: float = 0.05,
+    ) -> list[GeneratedContact]:
+        """Find the best contacts of one limb in different places, best first.
+
+        Args:
+            q: As for :meth:`request`.
+            limb: As there.
+            task: As there.
+            heuristic: As there.
+            kind: As there.
+            most: Largest number of contacts.
+            apart: Distance between two of them [m].
+
+        Returns:
+            Contacts, or one answer without a contact.
+
+        Raises:
+            BodyError: As there.
+            ContactError: As there.
+        """
         if limb not in self._tools:
             raise BodyError(f"no samples of limb {limb!r}; valid: {', '.join(self._tools) or 'none'}")
         tools = self._tools[limb]
@@ -161,19 +192,21 @@ class ContactGenerator:
         situation = Situation.of(self._state.update(q), tools.limb, task.reaction_on(limb))
         near = self._table.within_reach(situation, tools.samples, self.settings.tolerance)
         if not len(near):
-            return _failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")
+            return [_failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")]
         candidates = find_candidates(
             self._table, near, situation, tools.samples, tolerance=self.settings.tolerance,
-            max_tilt=self.settings.max_tilt, footprint=footprint(self.body, touch),
+            max_tilt=self.settings.max_tilt, footprint=footprint(self.body, touch, self.rules),
         )  # fmt: skip
         if not len(candidates):
             names = sorted({self._table.surfaces[number].obstacle for number in near})
-            return _failure(
-                limb, Hindrance.SURFACE,
-                f"no sample of {limb} lies flat on a surface of {', '.join(names)}, though these are near",
-            )  # fmt: skip
+            return [
+                _failure(
+                    limb, Hindrance.SURFACE, f"no sample of {limb} lies flat on a surface of "
+                    f"{', '.join(names)}, though these are near",
+                )
+            ]  # fmt: skip
         scores = (heuristic or Efort()).score(situation, candidates)
-        return self._choose(tools, situation, candidates, scores, touch)
+        return self._choose(tools, situation, candidates, scores, touch, most, apart)
 
     def _choose(
         self,
@@ -182,18 +215,24 @@ class ContactGenerator:
         candidates: Candidates,
         scores: FloatArray,
         kind: ContactKind,
-    ) -> GeneratedContact:
-        """Steps 3 and 4: best first, the first that can be aligned and is free."""
+        most: int,
+        apart: float,
+    ) -> list[GeneratedContact]:
+        """Steps 3 and 4: best first, the first that can be aligned and are free."""
+        found: list[GeneratedContact] = []
         faults: Counter[tuple[str, str]] = Counter()
         order = _tried(scores, self.settings.tries)
         flat = kind is ContactKind.SOLE
         allowed = TILT_TOLERANCE if flat else self.settings.point_tilt
-        sole = footprint(self.body, kind)
+        sole = footprint(self.body, kind, self.rules)
         goals = tools.goals(situation, candidates, order)
         surfaces = candidates.surfaces[order].tolist()
         tools.collisions.begin(situation)
         q = np.array(situation.state.q)
         for number, goal in enumerate(zip(*goals, strict=True)):
+            row = int(order[number])
+            if _is_near(candidates.points[row], found, apart):
+                continue
             aligned = tools.aligner.align(*goal, allowed)
             if not aligned.lies(allowed):
                 faults[_TILTED] += 1
@@ -206,13 +245,14 @@ class ContactGenerator:
             if hit is not None:
                 faults[hit] += 1
                 continue
-            row = int(order[number])
             turn = situation.rotation @ aligned.rotation
             if flat and not self._table.carries_one(candidates.points[row] + sole @ turn.T, surfaces[number]):
                 faults[_TILTED] += 1
                 continue
-            return self._found(tools.limb, kind, candidates, row, turn, q, scores, number + 1)
-        return _none_fits(tools.limb.name, faults, len(candidates), len(order))
+            found.append(self._found(tools.limb, kind, candidates, row, turn, q.copy(), scores, number + 1))
+            if len(found) == most:
+                break
+        return found or [_none_fits(tools.limb.name, faults, len(candidates), len(order))]
 
     def _found(
         self,
@@ -273,6 +313,12 @@ def _tried(scores: FloatArray, tries: int) -> NDArray[np.int64]:
     left = np.ones(len(order), dtype=bool)
     left[steps] = False
     return order[np.concatenate([steps, np.flatnonzero(left)])][:tries]
+
+
+def _is_near(point: FloatArray, found: list[GeneratedContact], apart: float) -> bool:
+    """Whether one of the contacts is nearer to a point (3,) than a distance [m]."""
+    places = (item.contact.position for item in found if item.contact is not None)
+    return any(np.linalg.norm(point - place) < apart for place in places)
 
 
 def _failure(

@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel, Configuration
+from manikin.body.segments import Effector
 from manikin.contact import Contact
 from manikin.contact_planning.static_region import StaticRegion
 from manikin.posture import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
@@ -38,6 +39,13 @@ class PoserSettings:
     turn_weight: float = 2.0
     tolerance: float = 2e-4
     iterations: int = 40
+
+    def scaled(self, factor: float) -> "PoserSettings":
+        """The same for a body of another size: lengths times a factor."""
+        return replace(
+            self, clearance=factor * self.clearance, inset=factor * self.inset,
+            root_weight=self.root_weight / factor**2,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +83,13 @@ class Poser:
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
             settings: What to keep to.
         """
-        self.body, self.scene, self._reference = body, scene, reference
+        self.body, self._root = _with_root(body)
+        self.scene, self._reference = scene, reference
         self.settings = settings or PoserSettings()
         self.searches = 0
-        self._proximity = Proximity(body, scene)
+        self._proximity = Proximity(self.body, scene)
+        self._regions: dict[frozenset[Contact], StaticRegion] = {}
+        self._touched: dict[Contact, str] = {}
 
     def pose(
         self,
@@ -90,6 +101,7 @@ class Poser:
         place: FloatArray | None = None,
         inset: float | None = None,
         restarts: bool = False,
+        placements: Mapping[str, Placement] | None = None,
     ) -> Posed:
         """Find a posture that holds contacts and rests on some of them alone.
 
@@ -101,18 +113,20 @@ class Poser:
             place: (2,) where the centre of mass has to be [m]; near the guide, or where it is, when omitted.
             inset: Distance of that place to the edges of where it may rest [m]; the settings' when omitted.
             restarts: Whether to try again from crouched postures.
+            placements: Where further effectors should be, by name.
         """
         if place is None:
             near = Configuration(self.body, start).com[:2] if guide is None else guide[:2]
-            region = StaticRegion.of(carrying.values(), self.body.mass)
-            place = region.nearest(np.asarray(near), self.settings.inset if inset is None else inset)
+            place = self._region(carrying).nearest(
+                np.asarray(near), self.settings.inset if inset is None else inset
+            )
         if place is None:
             return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
         self.searches += 1
         problem = PostureProblem(
             self.body,
             tuple(held.values()),
-            self._wish(guide),
+            {**self._wish(guide), **(placements or {})},
             com=np.array([*place, np.nan]),
             proximity=self._proximity,
             clearance=self.settings.clearance,
@@ -137,15 +151,35 @@ class Poser:
         return Posed(found.q) if found.succeeded else Posed(None, found.failure or "no posture")
 
     def _wish(self, guide: FloatArray | None) -> dict[str, Placement]:
-        if guide is None or ROOT not in self.body.effectors:
+        if guide is None:
             return {}
         pose = pin.XYZQUATToSE3(guide)
         return {
-            ROOT: Placement(
+            self._root: Placement(
                 pose.translation, pose.rotation, self.settings.turn_weight, self.settings.root_weight
             )
         }
 
     def _touching(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
-        pairs = [(name, self.scene.touched_obstacle(contact)) for name, contact in held.items()]
-        return touching_pairs(self.body, pairs)
+        for contact in held.values():
+            if contact not in self._touched:
+                self._touched[contact] = self.scene.touched_obstacle(contact)
+        return touching_pairs(self.body, [(name, self._touched[item]) for name, item in held.items()])
+
+    def _region(self, carrying: Mapping[str, Contact]) -> StaticRegion:
+        """Where the body may rest; asked again and again for the same contacts."""
+        key = frozenset(carrying.values())
+        if key not in self._regions:
+            self._regions[key] = StaticRegion.of(carrying.values(), self.body.mass)
+        return self._regions[key]
+
+
+def _with_root(body: BodyModel) -> tuple[BodyModel, str]:
+    """The body, and the effector at the origin of its root; one is added where there is none."""
+    if ROOT in body.effectors:
+        return body, ROOT
+    name = body.segments[0].name
+    while name in body.effectors:
+        name += "_root"
+    root = Effector(name, body.segments[0].name, np.zeros(3))
+    return replace(body, effectors={**body.effectors, name: root}), name

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact, Phase, Stance, StanceSequence
+from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence
 from manikin.spatial import FloatArray, frozen_array
 
 COM_ROOM = (0.06, 0.06, 0.03)
@@ -32,6 +32,8 @@ class Stage:
         com: (3,) its centre of mass [m].
         min_duration: Shortest time that the phase should last [s].
         com_room: How far from there the centre of mass of a motion may be, along x, y and z [m].
+        via: (nq,) posture in the middle of the phase, in which the limb that moves is off everything; None
+            where the plan has none.
     """
 
     contacts: Mapping[str, Contact]
@@ -39,6 +41,7 @@ class Stage:
     com: FloatArray
     min_duration: float
     com_room: tuple[float, float, float] = COM_ROOM
+    via: FloatArray | None = None
 
     @classmethod
     def of(
@@ -48,11 +51,13 @@ class Stage:
         q: FloatArray,
         min_duration: float,
         com_room: tuple[float, float, float] = COM_ROOM,
+        via: FloatArray | None = None,
     ) -> "Stage":
         """Stage with the centre of mass of its posture."""
         com = frozen_array(Configuration(body, q).com, "com [m]", (3,))
         kept = MappingProxyType(dict(contacts))
-        return cls(kept, frozen_array(q, "posture", (body.nq,)), com, min_duration, com_room)
+        between = None if via is None else frozen_array(via, "posture between", (body.nq,))
+        return cls(kept, frozen_array(q, "posture", (body.nq,)), com, min_duration, com_room, between)
 
     @property
     def stance(self) -> Stance:
@@ -75,12 +80,21 @@ class ContactPlan:
     goal_com: FloatArray
 
     @classmethod
-    def of(cls, body: BodyModel, stages: Sequence[Stage], goal: FloatArray) -> "ContactPlan":
-        """Plan with the centre of mass of its last posture."""
+    def of(
+        cls, body: BodyModel, stages: Sequence[Stage], goal: FloatArray, hinge_pace: float = HINGE_PACE
+    ) -> "ContactPlan":
+        """Plan with the centre of mass of its last posture.
+
+        Args:
+            body: The body.
+            stages: From the start to the goal.
+            goal: (nq,) posture with which the last one ends.
+            hinge_pace: Mean speed of the hinge that turns most between two postures [rad/s].
+        """
         com = frozen_array(Configuration(body, goal).com, "goal com [m]", (3,))
         ends = [(stage.q, stage.com) for stage in stages[1:]] + [(goal, com)]
         timed = [
-            replace(stage, min_duration=max(stage.min_duration, _least_time(stage, q, there)))
+            replace(stage, min_duration=max(stage.min_duration, _least_time(stage, q, there, hinge_pace)))
             for stage, (q, there) in zip(stages, ends, strict=True)
         ]
         return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
@@ -96,6 +110,31 @@ class ContactPlan:
             [Phase(stance, stage.min_duration) for stance, stage in zip(stances, self.stages, strict=True)]
         )
 
+    def schedule(self, normal_force_cap: float) -> ContactSchedule:
+        """The stances in time, each as short as it may be, from zero on.
+
+        Args:
+            normal_force_cap: On the sum of the normal forces of each [N].
+        """
+        durations = [stage.min_duration for stage in self.stages]
+        return ContactSchedule(self.sequence(normal_force_cap), np.concatenate([[0.0], np.cumsum(durations)]))
+
+    def keys(self, instants: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Key times (k,) [s] and configurations (k, nq): at every change, and in between where there is one.
+
+        Args:
+            instants: (n + 1,) times of the changes [s].
+        """
+        times, keys = [float(instants[0])], [self.stages[0].q]
+        ends = [*(stage.q for stage in self.stages[1:]), self.goal]
+        for number, (stage, end) in enumerate(zip(self.stages, ends, strict=True)):
+            if stage.via is not None:
+                times.append(0.5 * float(instants[number] + instants[number + 1]))
+                keys.append(stage.via)
+            times.append(float(instants[number + 1]))
+            keys.append(end)
+        return np.array(times), np.array(keys)
+
     @property
     def postures(self) -> FloatArray:
         """(n + 1, nq) the posture at every change and at the goal."""
@@ -107,7 +146,8 @@ class ContactPlan:
         return sum(len(set(after.contacts) - set(before.contacts)) for before, after in pairwise(self.stages))
 
 
-def _least_time(stage: Stage, q: FloatArray, com: FloatArray) -> float:
+def _least_time(stage: Stage, q: FloatArray, com: FloatArray, hinge_pace: float) -> float:
     """Time that the change to the next posture takes at an unhurried pace [s]."""
-    turn = float(np.abs(q[7:] - stage.q[7:]).max(initial=0.0))
-    return max(turn / HINGE_PACE, float(np.linalg.norm(com - stage.com)) / COM_PACE)
+    between = stage.q[None] if stage.via is None else np.array([stage.q, stage.via])
+    turn = float(np.abs(np.diff([*between[:, 7:], q[7:]], axis=0)).max(axis=1, initial=0.0).sum())
+    return max(turn / hinge_pace, float(np.linalg.norm(com - stage.com)) / COM_PACE)

@@ -1,14 +1,14 @@
 """The contact that an effector makes where it has been put."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from manikin.body import BodyModel, Limb
 from manikin.contact import Contact, ContactKind, grasp, point, sole
 from manikin.errors import ContactError
-from manikin.spatial import FloatArray, skew
+from manikin.spatial import FloatArray, frozen_array, skew
 
 
 @dataclass(frozen=True)
@@ -19,15 +19,23 @@ class ContactRules:
         friction: Coulomb coefficient of soles and points.
         grasp_force: Largest force of a grasp along each world axis [N].
         grasp_moment: Largest moment of a grasp along each world axis [N.m].
+        patch: Part of a sole that has to touch, as its start and end along the sole's x axis and its
+            width [m]; the whole sole when None. A climber stands on the front of the feet.
     """
 
     friction: float = 0.7
     grasp_force: float = 400.0
     grasp_moment: float = 10.0
+    patch: tuple[float, float, float] | None = None
 
 
-def footprint(body: BodyModel, kind: ContactKind) -> FloatArray:
+def footprint(body: BodyModel, kind: ContactKind, rules: ContactRules | None = None) -> FloatArray:
     """(c, 3) points of the effector's frame that must lie on the surface [m].
+
+    Args:
+        body: The body.
+        kind: How it touches.
+        rules: Which part of a sole has to touch; all of it when omitted.
 
     Raises:
         ContactError: If a sole is asked for of a body without soles.
@@ -36,6 +44,10 @@ def footprint(body: BodyModel, kind: ContactKind) -> FloatArray:
         return np.zeros((1, 3))
     if body.sole_length is None or body.sole_width is None:
         raise ContactError(f"body {body.name!r} has no soles; valid: a contact of kind point or grasp")
+    if rules is not None and rules.patch is not None:
+        start, end, width = rules.patch
+        side = 0.5 * width
+        return np.array([[end, side, 0.0], [end, -side, 0.0], [start, -side, 0.0], [start, side, 0.0]])
     half = 0.5 * np.array([body.sole_length, body.sole_width, 0.0])
     return np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]]) * half
 
@@ -69,9 +81,12 @@ def make_contact(
     if kind is ContactKind.POINT:
         return point(limb.effector, position, friction=rules.friction, rotation=rotation)
     length, width = 2.0 * footprint(body, kind)[0, :2]
-    return sole(
+    whole = sole(
         limb.effector, position, length=length, width=width, friction=rules.friction, rotation=rotation
     )
+    if rules.patch is None:
+        return whole
+    return replace(whole, points=frozen_array(footprint(body, kind, rules), "sole's patch [m]", (4, 3)))
 
 
 def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:

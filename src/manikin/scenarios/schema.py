@@ -65,11 +65,11 @@ class ScenarioFile(Section):
         description="whether a run succeeds only when the motion is executed without a fault, or the "
         "execution is an attempt whose fault is reported and leaves the plan a success",
     )
-    manner: Literal["ready", "walking", "close"] = Field(
+    manner: Literal["ready", "walking", "close", "climbing"] = Field(
         default="ready",
         description="how the body carries itself where the task leaves freedom: ready, arms raised and bent, "
         "clear of the thighs; walking, upright with arms that swing against the legs; close, arms bent close "
-        "to the body",
+        "to the body; climbing, arms raised and legs bent and spread",
     )
     push: PushSection | None = Field(default=None, description="disturbance during the execution")
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
@@ -143,6 +143,12 @@ class ScenarioFile(Section):
                         f"task.{end}.{key}",
                         "has no meaning without explicit supports; valid: at, heading_deg, height_m, posture",
                     )
+        if self.task.start.posture == "climbing":
+            raise refuse("task.start.posture", "is climbing; valid: standing, seated or crouched")
+        if self.task.goal.posture == "climbing" and (self.contacts is None or self.contacts.limbs is None):
+            raise refuse(
+                "task.goal.posture", "is climbing; valid: beside contacts.limbs, the limbs that hold on"
+            )
         if self.task.goal.posture == "seated":
             raise refuse("task.goal.posture", "is seated; valid: standing or crouched, or explicit supports")
 

@@ -157,6 +157,14 @@ class ScenarioValues:
         return self.file.contacts or ContactsSection()
 
     @property
+    def contact_limbs(self) -> tuple[str, ...] | None:
+        """Limbs that planned contacts are made with; an empty tuple means all, None a human's feet."""
+        given = self.contacts.limbs
+        if given is not None:
+            return tuple(given)
+        return None if self.file.body.model == "human" else ()
+
+    @property
     def sole(self) -> SoleSection | None:
         """Size of the soles; None leaves it to the body."""
         if self.file.supports is not None:

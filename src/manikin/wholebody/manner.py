@@ -101,7 +101,27 @@ CLOSE = Manner(
 )
 """Arms kept close to the body, as in a narrow place."""
 
-MANNERS: Mapping[str, Manner] = MappingProxyType({manner.name: manner for manner in (READY, WALKING, CLOSE)})
+CLIMBING = Manner(
+    "climbing",
+    MappingProxyType(
+        {
+            "shoulder_flexion": np.deg2rad(115.0),
+            "shoulder_abduction": np.deg2rad(20.0),
+            "elbow_flexion": np.deg2rad(70.0),
+            "hip_flexion": np.deg2rad(45.0),
+            "hip_abduction": np.deg2rad(25.0),
+            "hip_rotation": np.deg2rad(-20.0),
+            "knee_flexion": np.deg2rad(65.0),
+        }
+    ),
+    MappingProxyType({**READY.scales, "shoulder": 1.0, "elbow": 1.0, "wrist": 0.5}),
+    preferences=Preferences(arms=0.0, grasp=0.0),
+)  # fmt: skip
+"""Raised arms and bent, spread legs of a person on a wall."""
+
+MANNERS: Mapping[str, Manner] = MappingProxyType(
+    {manner.name: manner for manner in (READY, WALKING, CLOSE, CLIMBING)}
+)
 """Every manner by its name."""
 
 

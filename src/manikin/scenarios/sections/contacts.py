@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field
 
 from manikin.scenarios.sections.contact import SoleSection
-from manikin.scenarios.validation import Positive, Section
+from manikin.scenarios.validation import Positive, Section, Text
 
 
 class ContactsSection(Section):
@@ -17,6 +17,16 @@ class ContactsSection(Section):
     )
     stride_m: Positive = Field(
         default=0.36, description="length of a step [m] of a body of 1.75 m, scaled to the actual one"
+    )
+    limbs: list[Text] | None = Field(
+        default=None,
+        description="names of the limbs that make contacts, hands as grasps (default: a human's feet, in "
+        "steps on surfaces that carry the whole sole; all limbs of other bodies)",
+    )
+    grasp_force_N: Positive = Field(default=400.0, description="largest force of a grasp along each axis [N]")
+    forefoot_m: Positive | None = Field(
+        default=None,
+        description="length of the front of the soles that has to lie on a hold [m] (default: whole soles)",
     )
     attempts: Annotated[int, Field(strict=True, ge=1, le=20)] = Field(
         default=3, description="guides that are tried before giving up"

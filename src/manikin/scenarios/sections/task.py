@@ -21,8 +21,10 @@ class StateSection(Section):
         description="height of the surface to stand or sit on there [m] (default: the lowest one on "
         "which the posture exists)",
     )
-    posture: Literal["standing", "seated", "crouched"] | None = Field(
-        default=None, description="how the body is at rest there (default: standing)"
+    posture: Literal["standing", "seated", "crouched", "climbing"] | None = Field(
+        default=None,
+        description="how the body is at rest there (default: standing); climbing, of a goal only: on what "
+        "its limbs hold, as high as if it stood on that height",
     )
 
     @model_validator(mode="after")

@@ -1,0 +1,317 @@
+"""Contacts of any limbs along a guide of the root: [Tonneau2015]_ 7.2, algorithm 7, with a repair step.
+
+One limb moves at a time: the one whose contact is farthest behind on the guide, to a place that the
+generator finds where the limb should be when the root has gone ahead.  All others are maintained.  A
+change counts only with three postures: one that still holds the old contact, one in which the limb is
+free, one that holds the new contact, all free of collision, within the joint ranges and at rest on the
+contacts that stay.  Where one is missing, another place, a shorter way or another limb is tried, and then
+the change before is taken back.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manikin.contact import Contact, ContactKind
+from manikin.contact_planning.extend import Extension
+from manikin.contact_planning.generator import GeneratedContact
+from manikin.contact_planning.guide_line import GuideLine
+from manikin.contact_planning.limb_places import LimbPlaces
+from manikin.contact_planning.poser import Posed, Poser
+from manikin.contact_planning.stage import ContactPlan, Stage
+from manikin.posture import Placement
+from manikin.spatial import FloatArray
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class LimbExtendSettings:
+    """How contacts follow a guide; the values are our choice.
+
+    Attributes:
+        stride: Way of the root while every limb moves once [m].
+        shares: Shares of it that are tried, in order.
+        places: Places that are tried for each.
+        searches: Most postures that are looked for.
+        same_place: Distance between two contacts that is not worth a move [m].
+        lift: How far a limb in flight keeps from the line between its contacts [m].
+        swing_duration: Shortest flight of a limb [s].
+        swing_speed: Its mean speed on longer ways [m/s].
+        shift_duration: Shortest time between two flights [s].
+        hinge_pace: Mean speed of the hinge that turns most [rad/s].
+        goal_distance: Distance of the root from its goal at which it is reached [m].
+        goal_turn: The same for its attitude [rad].
+    """
+
+    stride: float = 0.36
+    shares: tuple[float, ...] = (1.0, 0.6, 0.3)
+    places: int = 4
+    searches: int = 600
+    same_place: float = 0.12
+    lift: float = 0.08
+    swing_duration: float = 0.7
+    swing_speed: float = 0.7
+    shift_duration: float = 0.35
+    hinge_pace: float = 1.3
+    goal_distance: float = 0.08
+    goal_turn: float = float(np.deg2rad(15.0))
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Where the search is: stages so far and how far along the guide the contact of each limb is."""
+
+    stages: tuple[Stage, ...]
+    along: Mapping[str, float]
+
+    @property
+    def last(self) -> Stage:
+        return self.stages[-1]
+
+    @property
+    def here(self) -> float:
+        """How far along the guide the root is."""
+        held = [self.along[name] for name in self.last.contacts]
+        return float(np.mean(held)) if held else 0.0
+
+
+def extend_limbs(
+    poser: Poser,
+    places: LimbPlaces,
+    guide: GuideLine,
+    start: Stage,
+    settings: LimbExtendSettings | None = None,
+) -> Extension:
+    """Find the contacts with which a body follows a guide on any of its limbs.
+
+    Args:
+        poser: Finds postures of the body in its scene.
+        places: Offers contacts of its limbs.
+        guide: Way of the root, from where it is at the start.
+        start: Contacts and posture at the start; limbs without a contact make one where they can.
+        settings: How to search.
+    """
+    return _Search(poser, places, guide, settings or LimbExtendSettings()).run(start)
+
+
+class _Search:
+    """Depth-first search over changes of contact."""
+
+    def __init__(
+        self, poser: Poser, places: LimbPlaces, guide: GuideLine, settings: LimbExtendSettings
+    ) -> None:
+        self._poser, self._places, self._guide, self._settings = poser, places, guide, settings
+        self._body = poser.body
+        self._searches = poser.searches
+        self._reasons: Counter[str] = Counter()
+        self._backtracks = 0
+        self._farthest = 0.0
+
+    def run(self, start: Stage) -> Extension:
+        free = -self._settings.stride
+        along = {name: 0.0 if name in start.contacts else free for name in self._places.limbs}
+        along.update(dict.fromkeys(start.contacts, 0.0))
+        first = _State((start,), along)
+        states, options = [first], [self._options(first)]
+        while states:
+            self._farthest = max(self._farthest, states[-1].here)
+            ended = self._ended(states[-1])
+            if ended is not None:
+                return Extension(ended, self._spent, self._backtracks)
+            following = None if self._is_spent else next(options[-1], None)
+            if following is not None:
+                states.append(following)
+                options.append(self._options(following))
+                continue
+            if self._is_spent:
+                return self._failed(f"no contacts after {self._spent} postures")
+            states.pop()
+            options.pop()
+            self._backtracks += 1
+        return self._failed("no contacts follow the guide")
+
+    @property
+    def _spent(self) -> int:
+        return self._poser.searches - self._searches
+
+    @property
+    def _is_spent(self) -> bool:
+        return self._spent >= self._settings.searches
+
+    def _ended(self, state: _State) -> ContactPlan | None:
+        """The plan, when the root can be where the guide ends."""
+        if state.here < self._guide.length - 0.5 * self._settings.stride:
+            return None
+        contacts, goal = state.last.contacts, self._guide.at(self._guide.length)
+        posed = self._poser.pose(contacts, contacts, state.last.q, goal)
+        if posed.q is None:
+            return None
+        away = float(np.linalg.norm(posed.q[:3] - goal[:3]))
+        turn = Rotation.from_quat(posed.q[3:7]) * Rotation.from_quat(goal[3:]).inv()
+        if away > self._settings.goal_distance or turn.magnitude() > self._settings.goal_turn:
+            self._reasons[f"the root stays {away:.2f} m from its goal"] += 1
+            return None
+        return ContactPlan.of(self._body, state.stages, posed.q, self._settings.hinge_pace)
+
+    def _options(self, state: _State) -> Iterator[_State]:
+        """States one change further, of the limb that is farthest behind first."""
+        for name in sorted(state.along, key=lambda limb: state.along[limb]):
+            lifting = self._lifted(state, name)
+            if lifting.q is None:
+                self._reasons[f"{name} cannot leave its contact: {lifting.reason}"] += 1
+                continue
+            if name not in self._places.limbs:
+                yield self._left(state, name, lifting.q)
+                continue
+            for along in self._aims(state, name):
+                yield from self._moves(state, name, lifting.q, along)
+                if self._is_spent:
+                    return
+
+    def _left(self, state: _State, name: str, lifting: FloatArray) -> _State:
+        """A contact that no limb makes, such as a seat, left for good."""
+        staying = {other: contact for other, contact in state.last.contacts.items() if other != name}
+        stage = Stage.of(self._body, staying, lifting, self._settings.swing_duration)
+        along = {other: value for other, value in state.along.items() if other != name}
+        return _State((*state.stages, stage), along)
+
+    def _aims(self, state: _State, name: str) -> Iterator[float]:
+        """How far along the guide the limb may go next."""
+        held = [state.along[other] for other in state.last.contacts if other != name]
+        ahead, own = max(held, default=0.0), state.along[name]
+        step = self._settings.stride / max(1, len(self._places.limbs) - 1)
+        if name not in state.last.contacts:
+            step = 0.0
+        tried: list[float] = []
+        for share in self._settings.shares:
+            along = min(max(ahead, 0.0) + share * step, self._guide.length)
+            if along > own + 1e-6 and along not in tried:
+                tried.append(along)
+                yield along
+
+    def _lifted(self, state: _State, name: str) -> Posed:
+        """Posture that holds all contacts and rests on all but one."""
+        held = state.last.contacts
+        if name not in held:
+            return Posed(state.last.q)
+        carrying = {other: contact for other, contact in held.items() if other != name}
+        return self._pose(held, carrying, state.last.q, self._guide.at(state.here))
+
+    def _moves(self, state: _State, name: str, lifting: FloatArray, along: float) -> Iterator[_State]:
+        """States in which one limb has moved to a place ahead."""
+        held = state.last.contacts
+        staying = {other: contact for other, contact in held.items() if other != name}
+        progress = {**state.along, name: along}
+        there = float(np.mean([progress[other] for other in (*staying, name)]))
+        ahead = self._pose(staying, staying, lifting, self._guide.at(there))
+        if ahead.q is None:
+            self._reasons[f"the root cannot go on without {name}: {ahead.reason}"] += 1
+            return
+        direction = self._direction(there)
+        found = self._places.find(name, ahead.q, self._guide.at(along), direction, self._settings.places)
+        for place in found:
+            following = self._landed(state, name, lifting, place, progress, there)
+            if following is not None:
+                yield following
+            if self._is_spent:
+                return
+
+    def _landed(
+        self,
+        state: _State,
+        name: str,
+        lifting: FloatArray,
+        place: GeneratedContact,
+        along: Mapping[str, float],
+        there: float,
+    ) -> _State | None:
+        """The limb put to a place, or None where a posture is missing."""
+        if place.contact is None or place.q is None:
+            self._reasons[place.message] += 1
+            return None
+        contact = replace(place.contact, oriented=False)
+        held = state.last.contacts
+        before = held.get(name)
+        if (
+            before is not None
+            and np.linalg.norm(before.position - contact.position) < self._settings.same_place
+        ):
+            return replace(state, along=along)
+        staying = {other: item for other, item in held.items() if other != name}
+        landed = {**staying, name: contact}
+        landing = self._pose(landed, staying, place.q, self._guide.at(there))
+        if landing.q is None:
+            self._reasons[f"{name} cannot be put down: {landing.reason}"] += 1
+            return None
+        way = 0.0 if before is None else float(np.linalg.norm(contact.position - before.position))
+        flight = max(self._settings.swing_duration, way / self._settings.swing_speed)
+        stages = state.stages
+        if before is None:
+            # The limb is free already: it reaches its contact while the phase before lasts.
+            stages = (*stages[:-1], replace(stages[-1], min_duration=max(stages[-1].min_duration, flight)))
+        else:
+            via = self._between(staying, lifting, landing.q, before, contact)
+            if via is None:
+                self._reasons[f"{name} finds no way around"] += 1
+                return None
+            stages = (*stages, Stage.of(self._body, staying, lifting, flight, via=via))
+        stages = (*stages, Stage.of(self._body, landed, landing.q, self._settings.shift_duration))
+        return _State(stages, along)
+
+    def _between(
+        self,
+        staying: Mapping[str, Contact],
+        lifting: FloatArray,
+        landing: FloatArray,
+        before: Contact,
+        after: Contact,
+    ) -> FloatArray | None:
+        """Posture in the middle of a flight, the limb off the line between its contacts, or None."""
+        lift = self._settings.lift
+        middle = 0.5 * (before.position + after.position)
+        root = np.concatenate([0.5 * (lifting[:3] + landing[:3]), landing[3:7]])
+        start = np.concatenate([root, 0.5 * (lifting + landing)[7:]])
+        inward = (root[:3] - middle) * [1.0, 1.0, 0.0]
+        inward /= max(float(np.linalg.norm(inward)), 1e-9)
+        # What stands out of a wall is passed on the body's side, the ground from above.
+        for share in (0.7, 0.0, 2.0):
+            out = 0.5 * (before.normal + after.normal) + share * inward
+            place = middle + lift * out / max(float(np.linalg.norm(out)), 1e-9)
+            wish = {before.effector: Placement(place, None, None, 0.5 / lift**2)}
+            posed = self._poser.pose(staying, staying, start, root, placements=wish)
+            if posed.q is not None:
+                return posed.q
+        return None
+
+    def _pose(
+        self,
+        held: Mapping[str, Contact],
+        carrying: Mapping[str, Contact],
+        start: FloatArray,
+        guide: FloatArray,
+    ) -> Posed:
+        """A posture whose points stand upright on their surfaces, as far as they can."""
+        wish = {
+            name: Placement(None, contact.rotation_contact_to_world, 0.05)
+            for name, contact in held.items()
+            if contact.kind is ContactKind.POINT
+        }
+        return self._poser.pose(held, carrying, start, guide, placements=wish)
+
+    def _direction(self, along: float) -> FloatArray:
+        """(3,) where the scene shall push a limb: onward and up against the weight."""
+        onward = self._guide.at(along + 0.3 * self._settings.stride)[:3] - self._guide.at(along)[:3]
+        length = float(np.linalg.norm(onward))
+        direction = UP + (onward / length if length > 1e-9 else 0.0)
+        return direction if np.linalg.norm(direction) > 0.1 else UP
+
+    def _failed(self, what: str) -> Extension:
+        reached = self._farthest / self._guide.length if self._guide.length > 0.0 else 0.0
+        most = self._reasons.most_common(1)
+        why = f"; most often: {most[0][0]}" if most else ""
+        text = f"{what} beyond {100.0 * reached:.0f} % of it ({self._farthest:.2f} m){why}"
+        return Extension(None, self._spent, self._backtracks, text, reached)

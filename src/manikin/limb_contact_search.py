@@ -1,0 +1,245 @@
+"""From start and goal to contacts of any limbs: guide, then algorithm 7 ([Tonneau2015]_ chapters 6 and 7)."""
+
+import time as clock
+from typing import Any
+
+import numpy as np
+
+from manikin.body import BodyModel, Limb, limb_named
+from manikin.contact import Contact, ContactKind
+from manikin.contact_planning import (
+    ContactRules,
+    Endpoints,
+    GuideLine,
+    Habit,
+    Poser,
+    PoserSettings,
+    Stage,
+    heading_of,
+    sample_limbs,
+)
+from manikin.contact_planning.limb_extend import LimbExtendSettings, extend_limbs
+from manikin.contact_planning.limb_places import LimbPlaces
+from manikin.found_contacts import ContactSearch
+from manikin.reachability import (
+    Abstraction,
+    Condition,
+    GuideTask,
+    LimbRule,
+    LocalPlanner,
+    SamplingRegion,
+    UsableSurface,
+    World,
+    abstraction_of,
+    nearest_fit,
+    plan_guide,
+    relax,
+)
+from manikin.scenarios import Scenario
+from manikin.scene import Scene
+from manikin.spatial import FloatArray
+from manikin.wholebody.manner import manner_of
+
+STANDING_HEIGHT = 0.92
+"""Height of the root of a standing person of 1.75 m, the unit in which bodies are compared [m]."""
+
+SMALLEST = 0.3
+"""Least factor on distances that are kept for safety, however small the body."""
+
+STRIDE = 0.4
+"""Stride of a creature as a share of the reach of its limbs; our choice."""
+
+AROUND = 1.3
+"""Room around start and goal in which the root is led, in heights of a standing root."""
+
+PATCH_WIDTH = 0.7
+"""Width of the front of a sole that has to lie on a hold, relative to the sole's."""
+
+TOE_ROOM = 0.01
+"""Distance of that part to the tip of the sole [m]."""
+
+STEEPEST = float(np.deg2rad(50.0))
+"""Largest slope on which a limb that cannot hold on counts as within reach; our choice."""
+
+LEAN = 0.35
+"""How far the root may lean in any direction [rad]; our choice."""
+
+GUIDE_POSES = 200
+"""Poses by which the contact planner knows a guide."""
+
+
+def find_limb_contacts(
+    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
+) -> ContactSearch:
+    """Plan contacts of the limbs that a scenario names, all limbs where it names none.
+
+    Args:
+        scenario: Without supports.
+        body: Its body.
+        scene: Its scene.
+        rng: Source of all randomness.
+
+    Raises:
+        BodyError: If the body has no such limb.
+    """
+    return _LimbSearch(scenario, body, scene, rng).run()
+
+
+class _LimbSearch:
+    def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
+        self._began = clock.perf_counter()
+        self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
+        self._limbs = _limbs(body, scenario.contact_limbs or ())
+        self._kinds = {limb.name: _kind(body, limb) for limb in self._limbs}
+        self._size = float(body.standing_posture()[2]) / STANDING_HEIGHT
+        safe = max(self._size, SMALLEST)
+        self._reference = _as_climbing(body, scenario.manner)
+        self._poser = Poser(body, scene, self._reference, PoserSettings().scaled(safe))
+        samples = sample_limbs(body, np.random.default_rng(0))
+        self._places = LimbPlaces(
+            body, scene, self._limbs, self._kinds, self._rules(), self._reference, samples
+        )
+        volumes = [samples[limb.name].reach for limb in self._limbs]
+        self._abstraction: Abstraction = abstraction_of(body, volumes)
+        self._summary: dict[str, Any] = {
+            "attempts": 0, "steps": None, "phases": None, "guide_length_m": None, "guide_samples": 0,
+            "postures": 0, "backtracks": 0, "guide_wall_s": 0.0, "wall_s": 0.0,
+        }  # fmt: skip
+
+    def run(self) -> ContactSearch:
+        start, goal = self._start(), self._goal()
+        if isinstance(start, str):
+            return self._failed(start, "start")
+        if isinstance(goal, str):
+            return self._failed(goal, "goal")
+        reason = ""
+        for _ in range(self._scenario.contacts.attempts):
+            self._summary["attempts"] += 1
+            line, reason = self._guide(start.q[:7], goal)
+            if line is None:
+                return self._failed(reason, "guide")
+            found = extend_limbs(self._poser, self._places, line, start, self._settings())
+            self._summary["postures"] += found.searches
+            self._summary["backtracks"] += found.backtracks
+            if found.plan is not None:
+                self._summary.update(steps=found.plan.steps, phases=len(found.plan.stages))
+                return ContactSearch(None, found.plan, line, self._done())
+            reason = found.failure or ""
+        return self._failed(reason, "contacts")
+
+    def _rules(self) -> ContactRules:
+        options, patch = self._scenario.contacts, None
+        if options.forefoot_m is not None and self._body.sole_length and self._body.sole_width:
+            end = 0.5 * self._body.sole_length - TOE_ROOM
+            patch = (end - options.forefoot_m, end, PATCH_WIDTH * self._body.sole_width)
+        return ContactRules(options.friction, options.grasp_force_N, patch=patch)
+
+    def _settings(self) -> LimbExtendSettings:
+        """Lengths by the size of the body, times by how fast a body of that size moves."""
+        options, plain = self._scenario.contacts, LimbExtendSettings()
+        size, pace = self._size, float(np.sqrt(self._size))
+        human = self._body.stature is not None
+        return LimbExtendSettings(
+            stride=options.stride_m * size if human else STRIDE * self._places.reach,
+            same_place=plain.same_place * size,
+            lift=plain.lift * max(size, SMALLEST),
+            swing_duration=plain.swing_duration * pace,
+            swing_speed=plain.swing_speed * pace,
+            shift_duration=plain.shift_duration * pace,
+            hinge_pace=plain.hinge_pace / pace,
+            goal_distance=plain.goal_distance * max(size, SMALLEST),
+        )
+
+    def _start(self) -> Stage | str:
+        """Where the body is at the start, or why it cannot be there."""
+        state = self._scenario.file.task.start
+        at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
+        if self._body.stature is not None:
+            ends = Endpoints(self._body, self._scene, self._scenario.contacts.friction)
+            found = ends.find(at, yaw, Habit(state.posture or "standing"), state.height_m)
+            return found.stage or f"the start: {found.failure}"
+        q = self._standing(at, yaw, state.height_m)
+        contacts: dict[str, Contact] = {}
+        for name, limb in self._places.limbs.items():
+            place = self._places.find(name, q, q[:7], np.array([0.0, 0.0, 1.0]), 1)[0]
+            if place.contact is not None:
+                contacts[limb.effector] = place.contact
+        posed = self._poser.pose(contacts, contacts, q, q[:7]) if contacts else None
+        if posed is None or posed.q is None:
+            why = "no limb has a contact" if posed is None else posed.reason
+            return f"the start: no posture at {at.round(3).tolist()} m: {why}"
+        return Stage.of(self._body, contacts, posed.q, self._settings().shift_duration)
+
+    def _goal(self) -> FloatArray | str:
+        """(7,) pose of the root at the goal, or why there is none."""
+        state = self._scenario.file.task.goal
+        at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
+        if self._body.stature is None or state.posture == "climbing":
+            return self._standing(at, yaw, state.height_m)[:7]
+        ends = Endpoints(self._body, self._scene, self._scenario.contacts.friction)
+        found = ends.find(at, yaw, Habit(state.posture or "standing"), state.height_m)
+        return found.stage.q[:7] if found.stage is not None else f"the goal: {found.failure}"
+
+    def _standing(self, at: FloatArray, yaw: float, height: float | None) -> FloatArray:
+        """(nq,) reference posture at a place, as high as if it stood there."""
+        q = np.array(self._reference)
+        q[:2] = at
+        q[2] += height if height is not None else self._scenario.start_level
+        q[3:7] = [0.0, 0.0, np.sin(0.5 * yaw), np.cos(0.5 * yaw)]
+        return q
+
+    def _guide(self, start: FloatArray, goal: FloatArray) -> tuple[GuideLine | None, str]:
+        began = clock.perf_counter()
+        ends = np.array([start, goal])
+        world = World(self._scene, self._abstraction, self._region(ends), self._condition())
+        checker = world.checker()
+        fits = [nearest_fit(pose, checker) for pose in ends]
+        ends = np.array([pose if fit is None else fit for pose, fit in zip(ends, fits, strict=True)])
+        result = plan_guide(world, GuideTask(*ends), self._rng)
+        self._summary["guide_samples"] += result.statistics.samples
+        if result.path is None:
+            return None, result.failure or "no guide"
+        poses = result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES))
+        line = GuideLine.through(relax(poses, LocalPlanner(checker, tuple(ends)), self._rng))
+        self._summary["guide_length_m"] = line.length
+        self._summary["guide_wall_s"] += clock.perf_counter() - began
+        return line, ""
+
+    def _region(self, ends: FloatArray) -> SamplingRegion:
+        """Box around start and goal; headings between theirs, and a little beyond."""
+        room = AROUND * STANDING_HEIGHT * self._size
+        headings = np.unwrap([heading_of(pose) for pose in ends])
+        yaw = (headings.min() - LEAN, headings.max() + LEAN)
+        lean = (-LEAN, LEAN)
+        return SamplingRegion(
+            ends[:, :3].min(axis=0) - room, ends[:, :3].max(axis=0) + room, yaw=yaw, pitch=lean, roll=lean
+        )
+
+    def _condition(self) -> Condition:
+        """What cannot hold on reaches something to stand on: all but two of more than four such limbs."""
+        bearing = [name for name, kind in self._kinds.items() if kind is not ContactKind.GRASP]
+        least = len(bearing) if len(bearing) <= 4 else len(bearing) - 2
+        rule = LimbRule(tuple(bearing) if least == len(bearing) else (), least)
+        return Condition((rule,), dict.fromkeys(bearing, UsableSurface((0.0, 0.0, 1.0), STEEPEST)))
+
+    def _failed(self, reason: str, where: str) -> ContactSearch:
+        return ContactSearch(None, None, None, self._done(), reason, where)
+
+    def _done(self) -> dict[str, Any]:
+        return self._summary | {"wall_s": clock.perf_counter() - self._began}
+
+
+def _limbs(body: BodyModel, names: tuple[str, ...]) -> tuple[Limb, ...]:
+    return tuple(limb_named(body, name) for name in names) if names else body.limbs
+
+
+def _kind(body: BodyModel, limb: Limb) -> ContactKind:
+    """A person's hands hold on; all other limbs touch in their own way."""
+    return ContactKind.GRASP if body.stature is not None and "hand" in limb.effector else limb.kind
+
+
+def _as_climbing(body: BodyModel, manner: str) -> FloatArray:
+    """(nq,) posture to be like: of a manner for a person, else standing."""
+    if body.stature is None:
+        return np.array(body.standing_posture())
+    return manner_of(manner).posture(body)
