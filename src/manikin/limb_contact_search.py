@@ -12,14 +12,15 @@ from manikin.contact_planning import (
     Endpoints,
     GuideLine,
     Habit,
+    LimbExtendSettings,
+    LimbPlaces,
     Poser,
     PoserSettings,
     Stage,
+    extend_limbs,
     heading_of,
     sample_limbs,
 )
-from manikin.contact_planning.limb_extend import LimbExtendSettings, extend_limbs
-from manikin.contact_planning.limb_places import LimbPlaces
 from manikin.found_contacts import ContactSearch
 from manikin.reachability import (
     Abstraction,
@@ -63,6 +64,9 @@ STEEPEST = float(np.deg2rad(50.0))
 
 LEAN = 0.35
 """How far the root may lean in any direction [rad]; our choice."""
+
+NEAR_GOAL = 0.2
+"""Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
 GUIDE_POSES = 200
 """Poses by which the contact planner knows a guide."""
@@ -127,6 +131,10 @@ class _LimbSearch:
             reason = found.failure or ""
         return self._failed(reason, "contacts")
 
+    @property
+    def _climbs(self) -> bool:
+        return self._scenario.file.task.goal.posture == "climbing"
+
     def _rules(self) -> ContactRules:
         options, patch = self._scenario.contacts, None
         if options.forefoot_m is not None and self._body.sole_length and self._body.sole_width:
@@ -147,7 +155,7 @@ class _LimbSearch:
             swing_speed=plain.swing_speed * pace,
             shift_duration=plain.shift_duration * pace,
             hinge_pace=plain.hinge_pace / pace,
-            goal_distance=plain.goal_distance * max(size, SMALLEST),
+            goal_distance=plain.goal_distance * max(size, SMALLEST) if not self._climbs else NEAR_GOAL,
         )
 
     def _start(self) -> Stage | str:
@@ -174,7 +182,7 @@ class _LimbSearch:
         """(7,) pose of the root at the goal, or why there is none."""
         state = self._scenario.file.task.goal
         at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
-        if self._body.stature is None or state.posture == "climbing":
+        if self._body.stature is None or self._climbs:
             return self._standing(at, yaw, state.height_m)[:7]
         ends = Endpoints(self._body, self._scene, self._scenario.contacts.friction)
         found = ends.find(at, yaw, Habit(state.posture or "standing"), state.height_m)

@@ -21,7 +21,9 @@ _HEADING_DEG = {"front": 40.0, "middle": 0.0, "rear": -40.0}
 """Direction in which a leg stands, forward of straight sideways [deg]."""
 _HIP_Y = 0.13
 _LENGTHS = {"femur": 0.34, "tibia": 0.42, "tarsus": 0.14}
-_RADII = {"femur": 0.035, "tibia": 0.025, "tarsus": 0.018}
+_RADII = {"femur": 0.035, "tibia": 0.025, "tarsus": 0.012}
+_TIP_FREE = 0.4
+"""Distance of the tarsus' shape to its tip in radii, so that a tip may lean by 45 degrees where it stands."""
 _MASS_SHARES = {"femur": 0.025, "tibia": 0.015, "tarsus": 0.005}
 _TRUNK_RADIUS = 0.11
 _SPEED = 12.0
@@ -108,8 +110,8 @@ def _hinges(name: str, part: str, sign: float, strength: float) -> tuple[Hinge, 
 
 
 def _rod_shape(part: str, radius: float, reach: FloatArray) -> Shape:
-    """Capsule from the joint to the next, ending a radius before it so that the tip is free."""
-    span = float(np.abs(reach[1])) - radius
+    """Capsule from the joint to the next, ending at it; a tarsus ends a little before its tip."""
+    span = float(np.abs(reach[1])) - radius * (1.0 + (_TIP_FREE if part == "tarsus" else 0.0))
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     centre = 0.5 * span * np.sign(reach)
     return Shape(part, ShapeKind.CAPSULE, (radius, span), centre, turn)

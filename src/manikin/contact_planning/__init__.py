@@ -38,9 +38,13 @@ from manikin.contact_planning.heuristics import (
     duration,
     heuristic_named,
 )
+from manikin.contact_planning.limb_extend import LimbExtendSettings, extend_limbs
+from manikin.contact_planning.limb_places import LimbPlaces, Near
+from manikin.contact_planning.plan_certificate import PlanCertificate, certify_plan
 from manikin.contact_planning.poser import Posed, Poser, PoserSettings
 from manikin.contact_planning.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
 from manikin.contact_planning.stage import ContactPlan, Stage
+from manikin.contact_planning.static_forces import static_room, static_torque_share
 from manikin.contact_planning.static_region import StaticRegion
 from manikin.contact_planning.storage import load_samples, samples_for, save_samples
 from manikin.contact_planning.touch import ContactRules, make_contact
@@ -73,8 +77,12 @@ __all__ = [
     "Heuristic",
     "Hindrance",
     "LimbCollisions",
+    "LimbExtendSettings",
+    "LimbPlaces",
     "LimbSamples",
     "Manipulability",
+    "Near",
+    "PlanCertificate",
     "Posed",
     "Poser",
     "PoserSettings",
@@ -86,10 +94,12 @@ __all__ = [
     "SurfaceTable",
     "Task",
     "WeightedSum",
+    "certify_plan",
     "duration",
     "efort",
     "exertable_force",
     "extend",
+    "extend_limbs",
     "find_candidates",
     "force_ellipsoid",
     "force_transmission_ratio",
@@ -104,5 +114,7 @@ __all__ = [
     "sample_limbs",
     "samples_for",
     "save_samples",
+    "static_room",
+    "static_torque_share",
     "velocity_ellipsoid",
 ]

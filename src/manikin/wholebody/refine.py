@@ -166,7 +166,15 @@ def refine_motion(
     began = clock.perf_counter()
     path = KeyPath(time, q)
     check_input(body, path, schedule)
-    job = _Refinement(body, scene, path, schedule, settings or RefineSettings(), task, tuple(padded))
+    job = _Refinement(
+        body,
+        scene,
+        path,
+        schedule,
+        settings or RefineSettings(scales=RefineScales.of(body)),
+        task,
+        tuple(padded),
+    )
     return job.run(began, progress or _silent)
 
 

@@ -1,8 +1,18 @@
 """How much each term of the refinement matters."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from manikin.body import BodyModel
 from manikin.wholebody.motion_scales import MotionScales
+
+PERSON_ROOT = 0.92
+"""Height of the root of the person whose scales these are [m]."""
+
+PERSON_MASS = 75.0
+"""Mass of that person [kg]."""
+
+LEAST_NEAR = 0.25
+"""Least factor on distances for safety."""
 
 
 @dataclass(frozen=True)
@@ -46,3 +56,28 @@ class RefineScales(MotionScales):
     toes: float = 0.02
     end_position: float = 0.01
     end_angle: float = 0.05
+
+    @classmethod
+    def of(cls, body: BodyModel) -> "RefineScales":
+        """The scales for a body; a creature's are those of a person, brought to its size and mass.
+
+        With lengths by ``l`` and masses by ``m``, at the same gravity, forces go by ``m``, moments by ``m l``
+        and accelerations of the joints by ``1 / l``. Distances for safety shrink to a quarter at most.
+
+        Args:
+            body: The body.
+        """
+        plain = cls()
+        if body.stature is not None:
+            return plain
+        length = float(body.standing_posture()[2]) / PERSON_ROOT
+        force, near = body.mass / PERSON_MASS, max(length, LEAST_NEAR)
+        return replace(
+            plain,
+            safe_distance=plain.safe_distance * near, softness=plain.softness * near,
+            clearance=plain.clearance * near, touching=plain.touching * near, approach=plain.approach * near,
+            acceleration=plain.acceleration / length, guide_position=plain.guide_position * near,
+            missing_wrench=plain.missing_wrench * force, margin=plain.margin * force * length,
+            margin_violation=plain.margin_violation * force * length,
+            margin_softness=plain.margin_softness * force * length,
+        )  # fmt: skip

@@ -1,0 +1,109 @@
+"""Contacts of hands, feet on holds and the legs of an insect, from start and goal alone."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from manikin.contact import ContactKind
+from manikin.contact_planning import certify_plan
+from manikin.contact_search import find_supports
+from manikin.scenarios import load_scenario
+from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
+from manikin.spatial import GRAVITY
+from manikin.wholebody import refine_motion
+
+
+def search(name, *overrides, seed=0):
+    scenario = load_scenario(name, overrides=overrides)
+    body, scene = scenario.build_body(), scenario.build_scene()
+    return find_supports(scenario, body, scene, np.random.default_rng(seed)), body, scene
+
+
+SHORT = {
+    "climb-wall": ("task.goal.height_m=0.35",),
+    "insect-books": ("task.start.at=[-0.25, 0.0]", "task.goal.at=[-0.05, 0.0]", "task.goal.height_m=0.05"),
+}
+"""Two rows of holds; and onto the first books."""
+
+
+@pytest.fixture(scope="module", params=SHORT)
+def found(request):
+    return search(request.param, *SHORT[request.param])
+
+
+def test_every_posture_is_free_balanced_and_on_its_contacts(found):
+    """Measured afresh, balance by a linear program on contact forces; one contact changes at a time."""
+    result, body, scene = found
+    assert result.failure is None
+    certificate = certify_plan(body, scene, result.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    assert certificate.changes == 1
+    assert certificate.max_contact_error_m < 3e-4
+    assert certificate.max_sole_turn_rad < 3e-4
+    assert certificate.min_clearance_m > 0.004
+    assert certificate.max_range_violation_rad == 0.0
+    assert certificate.min_room_m > 0.01
+    assert certificate.max_torque_share < 1.0
+
+
+def test_the_root_gets_to_its_goal(found):
+    """To a few centimetres where it can stand anywhere, to half a row of holds on a wall."""
+    result, body, _ = found
+    room = 0.03 if body.stature is None else 0.2
+    assert np.linalg.norm(result.plan.goal[:3] - result.guide.poses[-1, :3]) <= room
+
+
+def test_contacts_lie_on_surfaces_and_hands_on_holds(found):
+    result, _, scene = found
+    for stage in result.plan.stages:
+        for contact in stage.contacts.values():
+            if contact.kind is ContactKind.GRASP:
+                assert scene.touched_obstacle(contact).startswith("hold")
+            else:
+                scene.supporting_surface(contact, 1e-6)
+
+
+def test_a_flight_passes_a_posture_off_its_contacts(found):
+    result, _, _ = found
+    for before, after in pairwise(result.plan.stages):
+        left = set(before.contacts) - set(after.contacts)
+        assert (after.via is not None) == bool(left)
+    schedule = result.plan.schedule(1000.0)
+    times, keys = result.plan.keys(schedule.instants)
+    flights = sum(stage.via is not None for stage in result.plan.stages)
+    assert len(keys) == len(times) == len(result.plan.stages) + 1 + flights
+    assert np.all(np.diff(times) > 0.0)
+
+
+def test_the_same_seed_has_the_same_contacts(found):
+    result, body, _ = found
+    name = "insect-books" if body.stature is None else "climb-wall"
+    again, _, _ = search(name, *SHORT[name])
+    np.testing.assert_array_equal(again.plan.postures, result.plan.postures)
+
+
+@pytest.mark.parametrize(
+    ("name", "where", "reason"),
+    [
+        ("climb-wall@bare", "guide", "reaches no usable surface"),
+        ("insect-books@gap", "guide", "walled off"),
+    ],
+)
+def test_what_no_limb_can_reach_is_explained(name, where, reason):
+    result, _, _ = search(name)
+    assert result.plan is None
+    assert result.where == where
+    assert reason in result.failure
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(SHORT))
+def test_all_the_way_and_refined(name):
+    """Margin at every sample of 5 ms, no penetration, contacts kept: the refinement's own certificate."""
+    result, body, scene = search(name)
+    assert result.failure is None
+    schedule = result.plan.schedule(BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    refined = refine_motion(body, scene, *result.plan.keys(schedule.instants), schedule)
+    assert refined.failure is None, refined.failure
+    assert refined.certificate.min_margin > 0.0
+    assert refined.certificate.max_penetration_m < 1e-3
