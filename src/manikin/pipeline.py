@@ -261,12 +261,12 @@ class _Run:
             return self._result(centroidal, self._move_point_mass(centroidal), None, None)
         planned, found = centroidal, self._test_key_postures(centroidal, KEY_TOLERANCES[0])
         centroidal, trajectory = self._take(planned, found)
-        wholebody = None if trajectory is None else self._plan_whole_body(trajectory)
+        wholebody = None if trajectory is None else self._plan_whole_body(trajectory, _postures(found))
         if wholebody is not None and not wholebody.succeeded:
             other = self._stricter_plan(planned, found)
             if other is not None:
                 centroidal, trajectory = self._take(planned, other)
-                wholebody = None if trajectory is None else self._plan_whole_body(trajectory)
+                wholebody = None if trajectory is None else self._plan_whole_body(trajectory, other.postures)
         execution = None
         if trajectory is not None and wholebody is not None and wholebody.succeeded:
             execution = self._execute(trajectory.schedule, wholebody.motion)
@@ -442,12 +442,14 @@ class _Run:
         self._keep_motions(centroidal.trajectory.schedule, motion, None)
         return motion
 
-    def _plan_whole_body(self, trajectory: CentroidalTrajectory) -> WholeBodyResult:
+    def _plan_whole_body(
+        self, trajectory: CentroidalTrajectory, waypoints: KeyPostures | None
+    ) -> WholeBodyResult:
         rng = np.random.default_rng(self._scenario.seed)
         unused = rng.bit_generator.state
         result = plan_whole_body(
             self._body, self._scene, trajectory, rng=rng, settings=self._settings,
-            padded=self._scenario.padded, key_postures=self._known_postures,
+            padded=self._scenario.padded, key_postures=self._known_postures, waypoints=waypoints,
             progress=lambda share: self._progress("wholebody", share),
         )  # fmt: skip
         drawn = rng.bit_generator.state != unused
@@ -584,6 +586,10 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
         "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],
         "wall_s": result.wall_time,
     }
+
+
+def _postures(found: Eligibility | None) -> KeyPostures | None:
+    return None if found is None else found.postures
 
 
 def _place(phase: int | None, where: str) -> str:

@@ -26,6 +26,7 @@ from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
 from manikin.wholebody.forces import plan_forces
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
+from manikin.wholebody.key_postures import KeyPostures
 from manikin.wholebody.knots import phase_knots, refined, sample_times, touch_downs_at_speed
 from manikin.wholebody.manner import CLOSE, READY, Manner
 from manikin.wholebody.meeting import meeting_at
@@ -53,8 +54,8 @@ REPAIRS = 3
 """Most fits that follow a failed one with other weights."""
 
 CAUGHT = -0.02
-"""Below this clearance a part of the body is caught on the wrong side of another: the fit begins anew,
-with more weight on clearance, because no small step leads out [m]."""
+"""Below this clearance a part of the body is caught on the wrong side of another, and no small step leads
+out: the fit begins anew, led by the key postures, and then with more weight on clearance [m]."""
 
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
@@ -118,6 +119,16 @@ class WholeBodyResult:
         return self.failure is None
 
 
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """A fit with the postures that led it, and what it comes to."""
+
+    guide: Guide
+    fit: MotionFit
+    found: FitResult
+    result: WholeBodyResult
+
+
 def plan_whole_body(
     body: BodyModel,
     scene: Scene,
@@ -127,6 +138,7 @@ def plan_whole_body(
     settings: WholeBodySettings | None = None,
     padded: Sequence[str] = (),
     key_postures: FloatArray | None = None,
+    waypoints: KeyPostures | None = None,
     progress: Progress | None = None,
 ) -> WholeBodyResult:
     """Find a whole-body motion that keeps contacts, centre of mass and distances.
@@ -142,6 +154,8 @@ def plan_whole_body(
             possible, but the certificate does not ask for it.
         key_postures: (phases + 1, nq) postures known for the key instants, which the motion stays near;
             the manner's when omitted.
+        waypoints: Postures of the plan's key instants, which lead the motion where one that is led by
+            the manner is caught on the wrong side of an obstacle.
         progress: Called now and then with the share done.
 
     Returns:
@@ -154,6 +168,8 @@ def plan_whole_body(
     planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), progress)
     if key_postures is not None:
         planner.known = Guide(trajectory.schedule.instants, align_quaternions(np.array(key_postures)), ())
+    if waypoints is not None and key_postures is None:
+        planner.waypoints = waypoints.guide()
     planner.leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
     return planner.run(began)
 
@@ -178,6 +194,7 @@ class _Planner:
         )  # fmt: skip
         self.leaning: Ignored = frozenset()
         self.known: Guide | None = None
+        self.waypoints: Guide | None = None
         self._progress = progress
 
     def run(self, began: float) -> WholeBodyResult:
@@ -217,18 +234,15 @@ class _Planner:
 
     def _attempt(self, swings: tuple[PlannedSwing, ...], began: float) -> WholeBodyResult:
         """Fit a motion to the swings; where it misses a little, fit on with more weight on that."""
-        guide = self._guide(swings)
-        self._report(0.4)
+        first = self._first_fit(swings, began)
+        guide, fit, found = first.guide, first.fit, first.found
         scales = self._scales()
-        fit, start = self._prepare(swings, guide, self._knots(), scales)
-        found = fit.solve(start)
-        self._report(0.8)
-        result = last = self._judged(found, swings, guide, began)
+        result = last = first.result
         for number in range(REPAIRS):
             if result.succeeded:
                 break
             broken = last.certificate.broken(self.settings.requirements)
-            if last.certificate.min_clearance_m < CAUGHT:
+            if _is_caught(last):
                 scales = reweighed(scales, broken & {"min_clearance_m"})
                 fit, start = self._prepare(swings, guide, self._knots(), scales)
                 found = fit.solve(start)
@@ -243,6 +257,25 @@ class _Planner:
             last = self._judged(found, swings, guide, began)
             result = _better(result, last)
         return result
+
+    def _first_fit(self, swings: tuple[PlannedSwing, ...], began: float) -> "_Fitted":
+        """The fit led by the manner, or by the key postures where that one is caught and theirs is not."""
+        usual = self._fitted(swings, began)
+        if self.waypoints is None or not _is_caught(usual.result):
+            return usual
+        self.known = self.waypoints
+        led = self._fitted(swings, began)
+        self.known = None
+        return usual if _is_caught(led.result) else led
+
+    def _fitted(self, swings: tuple[PlannedSwing, ...], began: float) -> "_Fitted":
+        """Guide postures and the first fit near them."""
+        guide = self._guide(swings)
+        self._report(0.4)
+        fit, start = self._prepare(swings, guide, self._knots(), self._scales())
+        found = fit.solve(start)
+        self._report(0.8)
+        return _Fitted(guide, fit, found, self._judged(found, swings, guide, began))
 
     def _prepare(
         self,
@@ -392,6 +425,11 @@ def _with_joints(configurations: FloatArray, angles: Mapping[int, FloatArray]) -
     for joint, values in angles.items():
         changed[:, 7 + joint] = values
     return changed
+
+
+def _is_caught(result: WholeBodyResult) -> bool:
+    """Whether a part of the body is on the wrong side of another or of an obstacle."""
+    return result.certificate.min_clearance_m < CAUGHT
 
 
 def _better(first: WholeBodyResult, second: WholeBodyResult) -> WholeBodyResult:

@@ -23,6 +23,7 @@ from manikin.spatial import FloatArray
 from manikin.wholebody.certificate import WholeBodyRequirements
 from manikin.wholebody.configuration_spline import align_quaternions
 from manikin.wholebody.foot_roll import FootRoll, foot_roll
+from manikin.wholebody.guide import Guide
 from manikin.wholebody.manner import READY, Manner
 from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.targets import Ignored, ignored_pairs
@@ -92,6 +93,11 @@ class KeyPostures:
     def failed(self) -> tuple[KeyPosture, ...]:
         """Those that were not found."""
         return tuple(posture for posture in self.postures if not posture.found)
+
+    def guide(self) -> Guide:
+        """The postures as a guide, to be gone through one after the other."""
+        time = np.array([item.time for item in self.postures])
+        return Guide(time, align_quaternions(np.array([item.q for item in self.postures])), ())
 
     def summary(self) -> dict[str, Any]:
         """Return the block ``key_postures`` of the summary."""
