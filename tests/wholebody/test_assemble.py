@@ -9,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.scene import Box, Obstacle, Scene
-from manikin.wholebody import WholeBodyRequirements, WholeBodySettings, flights, plan_whole_body
+from manikin.wholebody import (
+    KeyPostures,
+    WholeBodyRequirements,
+    WholeBodySettings,
+    assemble,
+    find_key_postures,
+    flights,
+    plan_whole_body,
+)
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.knots import CLOSEST_KNOTS, phase_knots, refined, sample_times
 from manikin.wholebody.reweigh import reweighed
@@ -104,6 +112,28 @@ def test_a_motion_that_breaks_its_requirement_is_a_failure_that_says_so(person, 
     assert not result.succeeded
     assert "centre-of-mass error" in result.failure.reason
     assert result.failure.where.startswith("phase ")
+
+
+@pytest.mark.parametrize("led_is_caught", [False, True])
+def test_a_caught_fit_is_led_by_the_key_postures_unless_that_is_caught_too(
+    led_is_caught, step_motion, person, flat_ground, step_com, monkeypatch
+):
+    postures = find_key_postures(person, flat_ground, step_com)
+    # Arms unlike the manner's: they show which guide was followed.
+    arm = 7 + person.joint_index("left_elbow_flexion")
+    bent = [replace(p, q=np.where(np.arange(person.nq) == arm, 1.4, p.q)) for p in postures.postures]
+    answers = iter([True, led_is_caught])
+    monkeypatch.setattr(assemble, "_is_caught", lambda _: next(answers, False))
+    result = plan_whole_body(
+        person, flat_ground, step_com, rng=np.random.default_rng(0), waypoints=KeyPostures(tuple(bent))
+    )
+    assert result.succeeded, result.failure
+    if led_is_caught:
+        np.testing.assert_array_equal(result.motion.q, step_motion.motion.q)
+    else:
+        middle = slice(len(result.motion.q) // 3, -len(result.motion.q) // 3)
+        assert np.abs(result.motion.q[middle, arm] - 1.4).max() < 0.1
+        assert np.abs(step_motion.motion.q[middle, arm] - 1.4).min() > 0.2
 
 
 @pytest.mark.slow

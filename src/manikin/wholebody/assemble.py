@@ -33,7 +33,14 @@ from manikin.wholebody.meeting import meeting_at
 from manikin.wholebody.reference import reference_motion
 from manikin.wholebody.reweigh import FIRST_DECREASE, LATER_DECREASE, reweighed
 from manikin.wholebody.swing import SwingLimits
-from manikin.wholebody.targets import FitTargets, Ignored, effector_targets, ignored_pairs, toe_angles
+from manikin.wholebody.targets import (
+    FitTargets,
+    Ignored,
+    effector_targets,
+    flat_share,
+    ignored_pairs,
+    toe_angles,
+)
 
 DEGREE = 5
 """Degree of the whole-body spline: four continuous derivatives."""
@@ -47,8 +54,8 @@ LOOSE_COM = 0.01
 SECOND_SEARCH = 600
 """Random points of the Bi-RRT where a smooth curve exists but the body cannot follow it."""
 
-ROLLING_TOES = 2.0e-3
-"""Deviation of toes from lying flat, or straight, that costs one unit where feet roll [rad]."""
+FLAT_TOES = 2.0e-3
+"""Deviation of toes from lying flat, or straight, that costs one unit while feet are held or roll [rad]."""
 
 REPAIRS = 3
 """Most fits that follow a failed one with other weights."""
@@ -344,8 +351,12 @@ class _Planner:
         schedule, settings = self.trajectory.schedule, self.settings
         time = sample_times(knots, settings.samples_per_span)
         toes = toe_angles(self.body, swings, time)
-        scale = self.settings.manner.scale(self.body)
-        scale[[6 + joint for joint in toes]] = ROLLING_TOES
+        scale = np.tile(self.settings.manner.scale(self.body), (len(time), 1))
+        reference = guide.at(time)
+        for joint, flat in flat_share(self.body, schedule, time).items():
+            reference[:, 7 + joint] *= 1.0 - flat
+            scale[:, 6 + joint] *= (FLAT_TOES / scale[:, 6 + joint]) ** flat
+        scale[:, [6 + joint for joint in toes]] = FLAT_TOES
         return FitTargets(
             time=time,
             effectors=effector_targets(schedule, swings, time),
@@ -353,7 +364,7 @@ class _Planner:
             com_weight=np.where(self.trajectory.binds(time), 1.0, LOOSE_COM),
             com_acceleration=self.trajectory.acceleration(time),
             margin=self._margin(time, self._point_mass_wrench(time)),
-            reference=_with_joints(guide.at(time), toes),
+            reference=_with_joints(reference, toes),
             reference_scale=scale,
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
             meeting=meeting_at(self.body, self.scene, schedule, time),

@@ -137,7 +137,7 @@ class MotionObjective:
         self._ignored = targets.ignored if meeting is None else meeting.without(targets.ignored)
         self._last: tuple[FloatArray, MotionSamples] | None = None
         with np.errstate(divide="ignore"):
-            self._reference_weight = 1.0 / targets.reference_scale
+            self._reference_weight = np.atleast_2d(1.0 / targets.reference_scale)
         self.task_rows = 6 * len(targets.effectors) + 3
         held = [_held_rows(target) for target in targets.effectors.values()]
         self.exact_rows = np.hstack([*held, np.repeat(targets.com_weight[:, None] >= 1.0, 3, axis=1)])
@@ -234,12 +234,12 @@ class MotionObjective:
         turn = relative.as_rotvec()
         out.add(
             0,
-            weight[3:6, None] * (rotation_vector_jacobian(turn) @ motion.tangent[:, 3:6]),
-            weight[3:6] * turn,
+            weight[:, 3:6, None] * (rotation_vector_jacobian(turn) @ motion.tangent[:, 3:6]),
+            weight[:, 3:6] * turn,
         )
         diagonal, residual = np.zeros_like(q), np.zeros_like(q)
-        diagonal[:, 7:] = weight[6:]
-        residual[:, 7:] = weight[6:] * (q[:, 7:] - reference[:, 7:])
+        diagonal[:, 7:] = weight[:, 6:]
+        residual[:, 7:] = weight[:, 6:] * (q[:, 7:] - reference[:, 7:])
         out.add_diagonal(0, diagonal, residual)
 
     def _add_radial(self, out: Linearised, raw: FloatArray, tangent: FloatArray) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
-from manikin.contact import Contact, ContactKind, ContactSchedule
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.flights import PlannedSwing, hangs, touch_pairs
@@ -47,8 +47,8 @@ class FitTargets:
         com_acceleration: (n, 3) its acceleration [m/s^2].
         margin: (n,) balance margin of the planned centre of mass [N.m].
         reference: (n, nq) preferred configuration.
-        reference_scale: (nv,) deviation of the tangent [m, rad] that costs as much as one
-            unit of every other residual; infinite entries are free.
+        reference_scale: (nv,), or (n, nv) by sample, deviation of the tangent [m, rad] that costs as
+            much as one unit of every other residual; infinite entries are free.
         ignored: Pairs whose distance does not count, per sample.
         meeting: What is met at speed, per sample, or None without.
     """
@@ -139,6 +139,32 @@ def toe_angles(body: BodyModel, swings: Sequence[PlannedSwing], time: FloatArray
         rows = (time >= item.roll.instants[0]) & (time < item.roll.instants[2])
         found.setdefault(joint, np.zeros(len(time)))[rows] = item.roll.toe_extension(time[rows])
     return found
+
+
+def flat_share(body: BodyModel, schedule: ContactSchedule, time: FloatArray) -> dict[int, FloatArray]:
+    """How much (n,) each joint of toes has to be straight, by joint index: wholly while their sole is held.
+
+    What a foot stands on does not count as an obstacle: nothing else keeps its toes out of it.
+    """
+    found: dict[int, FloatArray] = {}
+    for name in schedule.sequence.effectors:
+        toes = hanging_segment(body, body.effector(name).segment)
+        if toes is None:
+            continue
+        held = np.zeros(len(time))
+        for phase, start, end in zip(
+            schedule.sequence, schedule.instants[:-1], schedule.instants[1:], strict=True
+        ):
+            if name in phase.stance and phase.stance[name].part is SolePart.FULL:
+                away = np.maximum(np.maximum(start - time, time - end), 0.0)
+                held = np.maximum(held, 1.0 - np.clip(away / STRAIGHTENING, 0.0, 1.0))
+        for hinge in toes.hinges:
+            found[body.joint_index(hinge.name)] = held
+    return found
+
+
+STRAIGHTENING = 0.1
+"""Time before and after a foot is held in which its toes become straight, and may bend again [s]."""
 
 
 def settled_share(schedule: ContactSchedule, phase: int, contact: Contact, time: FloatArray) -> FloatArray:
