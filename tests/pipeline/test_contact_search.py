@@ -66,6 +66,16 @@ def test_the_same_seed_has_the_same_contacts():
     np.testing.assert_array_equal(one.guide.poses, other.guide.poses)
 
 
+def test_a_seed_that_is_given_changes_no_options_of_the_planner():
+    scenario = load_scenario("stand-up-sofa")
+    body, scene = scenario.build_body(), scenario.build_scene()
+    plans = [
+        find_supports(item, body, scene, np.random.default_rng(0)).scenario.to_yaml()
+        for item in (scenario, scenario.with_seed(scenario.seed), scenario.with_body(stature_m=1.75))
+    ]
+    assert plans[0] == plans[1] == plans[2]
+
+
 @pytest.mark.parametrize("name", ["crouch", "stairs"])
 def test_every_seed_of_some_succeeds(name):
     assert [search(name, seed)[0].failure for seed in range(1, 6)] == [None] * 5

@@ -22,7 +22,7 @@ PLANNING = {
     "zero_end_accelerations": True,
     "weights": {"margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]},
 }
-"""Options of the centre-of-mass planner where the file gives none; our choice."""
+"""Options of the centre-of-mass planner where the file leaves the defaults; our choice."""
 
 
 def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
@@ -68,7 +68,7 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         "goal": {"com": [float(x) for x in plan.goal_com]},
     }
     planning = scenario.planning.model_dump(mode="json", exclude_none=True)
-    if not scenario.planning.model_fields_set:
+    if scenario.planning == type(scenario.planning)():
         planning = PLANNING
     return scenario.replaced(
         supports=supports,

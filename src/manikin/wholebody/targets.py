@@ -156,15 +156,19 @@ def flat_share(body: BodyModel, schedule: ContactSchedule, time: FloatArray) -> 
             schedule.sequence, schedule.instants[:-1], schedule.instants[1:], strict=True
         ):
             if name in phase.stance and phase.stance[name].part is SolePart.FULL:
-                away = np.maximum(np.maximum(start - time, time - end), 0.0)
-                held = np.maximum(held, 1.0 - np.clip(away / STRAIGHTENING, 0.0, 1.0))
+                coming = 1.0 - np.clip((start - time - STRAIGHT) / STRAIGHTENING, 0.0, 1.0)
+                leaving = 1.0 - np.clip((time - end) / STRAIGHT, 0.0, 1.0)
+                held = np.maximum(held, np.minimum(coming, leaving))
         for hinge in toes.hinges:
             found[body.joint_index(hinge.name)] = held
     return found
 
 
-STRAIGHTENING = 0.1
-"""Time before and after a foot is held in which its toes become straight, and may bend again [s]."""
+STRAIGHT = 0.1
+"""Time before a landing in which toes are straight already, and after a lift-off until they may bend [s]."""
+
+STRAIGHTENING = 0.2
+"""Time before that in which they become straight [s]."""
 
 
 def settled_share(schedule: ContactSchedule, phase: int, contact: Contact, time: FloatArray) -> FloatArray:
