@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from manikin.act_stage import act_of
+from manikin.acting import Brace, BraceSettings, arrival, find_brace, with_hands
 from manikin.body import BodyModel, limbs_of, reach_volume
 from manikin.contact_planning import (
     ContactPlan,
@@ -18,6 +20,7 @@ from manikin.contact_planning import (
     Stage,
     extend,
     heading_of,
+    sample_limbs,
 )
 from manikin.found_contacts import ContactSearch
 from manikin.limb_contact_search import find_limb_contacts
@@ -79,15 +82,17 @@ class _Search:
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
         self._reference = manner_of(scenario.manner).posture(body)
         self._endpoints = Endpoints(body, scene, scenario.contacts.friction, self._reference)
+        self._brace: Brace | None = None
         self._summary: dict[str, Any] = {
             "attempts": 0, "steps": None, "phases": None, "guide_length_m": None, "guide_samples": 0,
             "postures": 0, "backtracks": 0, "guide_wall_s": 0.0, "wall_s": 0.0,
         }  # fmt: skip
 
     def run(self) -> ContactSearch:
-        start, goal = self._end("start"), self._end("goal")
+        start = self._end("start")
         if isinstance(start, str):
             return self._failed(start, "start")
+        goal = self._end("goal") if self._scenario.act is None else self._place_to_act(start)
         if isinstance(goal, str):
             return self._failed(goal, "goal")
         standing = self._endpoints.risen(start) if "buttocks" in start.contacts else None
@@ -103,7 +108,7 @@ class _Search:
             self._summary["postures"] += extension.searches
             self._summary["backtracks"] += extension.backtracks
             if extension.plan is not None:
-                return self._found(extension.plan, line)
+                return self._found(self._acting(extension.plan), line)
             reason = extension.failure or ""
         return self._failed(reason, "contacts")
 
@@ -119,6 +124,28 @@ class _Search:
             state.height_m,
         )  # fmt: skip
         return found.stage or f"the {end}: {found.failure}"
+
+    def _place_to_act(self, start: Stage) -> Stage | str:
+        """Where to stand for the act, on the level of the start, or why it cannot be done."""
+        act = act_of(self._scenario)
+        if act is None:
+            return "there is no act"
+        samples = sample_limbs(self._body, self._rng)
+        friction = self._scenario.contacts.friction
+        found = find_brace(
+            self._body, self._scene, samples, act, start.com[:2],
+            level=min(contact.position[2] for contact in start.contacts.values()),
+            settings=BraceSettings(friction=friction), reference=self._reference,
+        )  # fmt: skip
+        self._summary["act_places"] = found.tried
+        if found.brace is None:
+            return found.failure or ""
+        self._brace = found.brace
+        return arrival(self._body, found.brace)
+
+    def _acting(self, way: ContactPlan) -> ContactPlan:
+        """The way, and the hands on the object where there is an act."""
+        return way if self._brace is None else with_hands(self._body, way, self._brace)
 
     def _guide(self, start: Stage, goal: Stage) -> tuple[GuideLine | None, str]:
         began = clock.perf_counter()

@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from manikin.act_stage import ActStage, act_of
+from manikin.acting import PlannedAct
 from manikin.balance import pseudo_wrench
 from manikin.body import BodyModel
 from manikin.centroidal import (
@@ -237,6 +239,7 @@ class _Run:
         self._settings = settings or WholeBodySettings(manner=manner_of(scenario.manner))
         self._progress = progress or _silent
         self._plan: ContactPlan | None = None
+        self._acting: PlannedAct | None = None
         self._body: BodyModel = scenario.build_body()
         self._scene: Scene = scenario.build_scene()
         if scenario.file.supports is not None:
@@ -248,7 +251,8 @@ class _Run:
         self._summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "succeeded": False, "failure": None,
-            "contacts": None, "centroidal": None, "wholebody": None, "execution": None, "wall_s": 0.0,
+            "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None,
+            "wall_s": 0.0,
         }  # fmt: skip
 
     def run(self) -> RunResult:
@@ -269,7 +273,10 @@ class _Run:
                 wholebody = None if trajectory is None else self._plan_whole_body(trajectory, other.postures)
         execution = None
         if trajectory is not None and wholebody is not None and wholebody.succeeded:
-            execution = self._execute(trajectory.schedule, wholebody.motion)
+            motion, schedule = self._act(wholebody.motion, trajectory.schedule)
+            wholebody = replace(wholebody, motion=motion)
+            if self._summary["failure"] is None:
+                execution = self._execute(schedule, motion)
         return self._result(centroidal, None if wholebody is None else wholebody.motion, wholebody, execution)
 
     def _run_refined(self) -> RunResult:
@@ -472,13 +479,46 @@ class _Run:
         self._keep_motions(result.schedule, result.motion, None)
         return result
 
+    def _act_stage(self) -> ActStage | None:
+        act = act_of(self._scenario)
+        return None if act is None else ActStage(self._scenario, self._body, act)
+
+    def _act(self, motion: Motion, schedule: ContactSchedule) -> tuple[Motion, ContactSchedule]:
+        """A motion and its contacts with the scenario's act at the end; without one, as they are."""
+        stage = self._act_stage()
+        if stage is None:
+            return motion, schedule
+        found = stage.plan(motion, schedule)
+        self._finish("act", found.summary)
+        if found.planned is None:
+            self._fail("wholebody", found.failure or "", float(motion.time[-1]), stage.act.obstacle)
+            return motion, schedule
+        self._acting = found.planned
+        self._keep_motions(found.planned.schedule, found.planned.motion, None)
+        return found.planned.motion, found.planned.schedule
+
+    def _act_failure(self, result: Execution) -> Failure | None:
+        """Add what was exerted to the report; a failure where it is too little or too much."""
+        stage, planned = self._act_stage(), self._acting
+        if stage is None or planned is None:
+            return None
+        found = stage.measure(result.motion, planned)
+        self._finish("act", self._summary["act"] | found.summary)
+        if found.failure is None:
+            return None
+        return Failure("execution", found.failure, planned.timing.end, stage.act.obstacle)
+
     def _execute(self, schedule: ContactSchedule, planned: Motion) -> Execution:
+        acting = self._acting
         result = execute(
             self._body, self._scene, planned, schedule, pushes=self._pushes(planned),
             padded=self._scenario.padded, settings=self._control_settings(),
+            wishes=() if acting is None else acting.wishes,
             progress=lambda share: self._progress("execution", share),
         )  # fmt: skip
         failure = self._execution_failure(schedule, result)
+        exerted = self._act_failure(result)
+        failure = exerted if failure is None else failure
         required = self._scenario.execution_required
         block = {
             "required": required,

@@ -2,6 +2,7 @@
 
 from manikin.control.build_qp import ControlProblem, QuadraticProgram, build_qp
 from manikin.control.controller import Controller, ControlOutput
+from manikin.control.force_wish import ForceWish
 from manikin.control.settings import (
     ControlSettings,
     Impedance,
@@ -18,6 +19,7 @@ __all__ = [
     "ControlProblem",
     "ControlSettings",
     "Controller",
+    "ForceWish",
     "Impedance",
     "Impedances",
     "QuadraticProgram",

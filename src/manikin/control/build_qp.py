@@ -78,11 +78,15 @@ class LoadedContact:
         basis: The force map.
         cap: Largest normal force now [N].
         grasp_share: Share of a grasp's limits that it may use now, in [0, 1].
+        wished: (3,) force that it should feel now [N], or None.
+        wish_weight: Of the squared error of that force [1/N^2].
     """
 
     basis: ContactForceBasis
     cap: float
     grasp_share: float = 1.0
+    wished: FloatArray | None = None
+    wish_weight: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +174,7 @@ def build_qp(
     rows_upper = np.concatenate((-state.bias[:6], bounds.torque - joint_offset, cap_limits))
     lower, upper = _variable_bounds(contacts, bounds)
     hessian, gradient = _cost(tasks, nv, size, acceleration_weight, force_weight)
+    _add_wishes(hessian, gradient, contacts, nv)
     program = QuadraticProgram(hessian, gradient, rows, rows_lower, rows_upper, lower, upper, 6)
     return ControlProblem(program, state, tuple(tasks), tuple(contacts), joint_map, joint_offset)
 
@@ -219,6 +224,20 @@ def _cost(
     gradient = np.zeros(size)
     gradient[:nv] = -target @ weighted
     return hessian, gradient
+
+
+def _add_wishes(
+    hessian: FloatArray, gradient: FloatArray, contacts: Sequence[LoadedContact], nv: int
+) -> None:
+    """Add ``weight |force - wished|^2 / 2`` of the contacts that should feel a force."""
+    start = nv
+    for loaded in contacts:
+        end = start + len(loaded.basis.normal)
+        if loaded.wished is not None:
+            forces = loaded.basis.wrench[:3]
+            hessian[start:end, start:end] += loaded.wish_weight * forces.T @ forces
+            gradient[start:end] -= loaded.wish_weight * forces.T @ loaded.wished
+        start = end
 
 
 def _normal_force_rows(

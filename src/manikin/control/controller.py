@@ -1,6 +1,6 @@
 """Weighted multi-task control of a planned motion ([Qiu2012]_ 6.3)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from manikin.control.contact_forces import (
     touches,
 )
 from manikin.control.dynamics import Dynamics, DynamicsState
+from manikin.control.force_wish import ForceWish
 from manikin.control.reference import Reference, ReferenceSample
 from manikin.control.settings import ControlSettings
 from manikin.control.solver import QPSolution, make_solver
@@ -95,6 +96,7 @@ class Controller:
         settings: ControlSettings | None = None,
         *,
         joint_damping: ArrayLike | None = None,
+        wishes: Sequence[ForceWish] = (),
     ) -> None:
         """Prepare the controller.
 
@@ -105,6 +107,7 @@ class Controller:
             settings: Weights, gains and limits; the defaults when omitted.
             joint_damping: (nv - 6,) passive damping of the controlled body's joints
                 [N.m.s/rad]; none when omitted.
+            wishes: Forces that effectors in contact should feel, at most one of each.
 
         Raises:
             InputError: If the motion or the schedule does not belong to the body.
@@ -115,6 +118,7 @@ class Controller:
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
         self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
+        self._wishes = {wish.effector: wish for wish in wishes}
         self._switch = SupportSwitch(schedule, self.settings.supports)
         self._geometry = _geometries(body, schedule, self.settings.supports.sole_inset)
         self._along = {key: points_along(body, geometry) for key, geometry in self._geometry.items()}
@@ -147,7 +151,7 @@ class Controller:
         supports = self._switch.update(time, touching)
         state = self._dynamics.evaluate(q, v)
         reference = self.reference.sample(time)
-        problem = self.problem(state, reference, supports)
+        problem = self.problem(state, reference, supports, time)
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else problem.torque(solution.x)
         self._previous = tau
@@ -167,14 +171,18 @@ class Controller:
         )
 
     def problem(
-        self, state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState]
+        self,
+        state: DynamicsState,
+        reference: ReferenceSample,
+        supports: Mapping[str, SupportState],
+        time: float = -np.inf,
     ) -> ControlProblem:
-        """Build the program of one step, without solving it."""
+        """Build the program of one step, without solving it; wished forces are those of the time [s]."""
         return build_qp(
             state,
             self.tasks(state, reference, supports),
             [
-                self._loaded(support, support.contact, state)
+                self._wishing(self._loaded(support, support.contact, state), time)
                 for support in supports.values()
                 if support.mode is SupportMode.STANCE and support.contact is not None
             ],
@@ -226,7 +234,9 @@ class Controller:
             # A hand turns in its grasp; what settles is on its way.
             if support.mode is SupportMode.LANDING and not grasps:
                 planned = landing_reference(support, planned)
-            return swing_task(name, frame, planned, gains.swing, weight)
+            # A hand that presses yields to what it presses on: stiff, it would take off some of the force.
+            gain = gains.stance if name in self._wishes and grasps else gains.swing
+            return swing_task(name, frame, planned, gain, weight)
         if support.mode is SupportMode.STANCE:
             return stance_task(name, frame, support, gains.stance, weight)
         if support.mode is SupportMode.LANDING:
@@ -259,6 +269,13 @@ class Controller:
             limits = state.mass * GRAVITY * self._point_shares(support, contact)
             basis = replace(basis, upper=np.minimum(basis.upper, limits))
         return LoadedContact(basis, cap, min(support.load_share, support.unload_share))
+
+    def _wishing(self, loaded: LoadedContact, time: float) -> LoadedContact:
+        """The contact with the force that it should feel at a time, where there is one."""
+        wish = self._wishes.get(loaded.basis.contact.effector)
+        if wish is None or time < wish.start:
+            return loaded
+        return replace(loaded, wished=wish.at(time), wish_weight=wish.weight)
 
     @staticmethod
     def _low_shares(geometry: ContactGeometry, contact: Contact, state: DynamicsState) -> FloatArray:

@@ -26,7 +26,7 @@ KeepGoing = Callable[[], bool]
 CHUNK = 10
 """Poses drawn between two looks at whether start and goal are joined."""
 
-PATIENCE = 3
+PATIENCE = 5
 """Times as many rejections in a row end a search for one task as end an offline roadmap."""
 
 

@@ -29,7 +29,7 @@ class RoadmapSettings:
         farthest: Guards farther than this are not asked.
     """
 
-    failures: int = 80
+    failures: int = 50
     samples: int = 1500
     position_share: float = 0.5
     nearest: int = 15

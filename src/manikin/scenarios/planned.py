@@ -3,7 +3,10 @@
 import math
 from typing import Any
 
-from manikin.contact import Contact
+import numpy as np
+import pinocchio as pin
+
+from manikin.contact import Contact, ContactKind
 from manikin.contact_planning import ContactPlan
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.values import ScenarioValues
@@ -13,6 +16,9 @@ MAX_SUPPORT_DISTANCE = 1.08
 
 ABOVE = 0.01
 """How far above that of its posture the centre of mass of a rising body may be [m]; our choice."""
+
+LOWEST = 0.1
+"""How far below those of its postures the centre of mass may go on the way to an act [m]; our choice."""
 
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
@@ -67,6 +73,8 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         "start": {"com": [float(x) for x in plan.stages[0].com]},
         "goal": {"com": [float(x) for x in plan.goal_com]},
     }
+    if scenario.act is not None:
+        task["act"] = scenario.act.model_dump(mode="json")
     planning = scenario.planning.model_dump(mode="json", exclude_none=True)
     if scenario.planning == type(scenario.planning)():
         planning = PLANNING
@@ -74,12 +82,14 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         supports=supports,
         contacts=None,
         task=task,
-        com_constraints=_constraints(scenario),
+        com_constraints=_constraints(scenario, plan),
         planning=planning,
     )
 
 
 def _entry(contact: Contact, friction: float) -> dict[str, Any]:
+    if contact.kind is ContactKind.GRASP:
+        return _grasp_entry(contact)
     entry: dict[str, Any] = {
         "position": [float(x) for x in contact.position],
         "yaw_deg": math.degrees(contact.yaw),
@@ -91,10 +101,38 @@ def _entry(contact: Contact, friction: float) -> dict[str, Any]:
     return entry
 
 
-def _constraints(values: ScenarioValues) -> list[dict[str, Any]]:
-    """The file's constraints, and one that a body on its feet keeps to."""
+def _grasp_entry(contact: Contact) -> dict[str, Any]:
+    turn = np.rad2deg(pin.rpy.matrixToRpy(contact.rotation_contact_to_world))
+    return {
+        "position": [float(x) for x in contact.position],
+        "rpy_deg": [float(x) for x in turn],
+        "max_force_N": contact.max_force,
+    }
+
+
+def _constraints(values: ScenarioValues, plan: ContactPlan) -> list[dict[str, Any]]:
+    """The file's constraints, and those that a body on its feet keeps to."""
     given = [item.model_dump(mode="json", exclude_none=True) for item in values.file.com_constraints]
     keys = {key for item in given for key in item}
     if "max_support_distance_m" not in keys:
         given.append({"max_support_distance_m": MAX_SUPPORT_DISTANCE * values.file.body.stature_m / 1.75})
+    if values.act is not None and "height_band" not in keys:
+        given.append({"height_band": _below_postures(plan)})
     return given
+
+
+def _below_postures(plan: ContactPlan) -> dict[str, str]:
+    """Band up to a line from start to end, just above the centres of mass of all postures.
+
+    Who goes down to an act and rises in between would have to lift the arms for it.
+    """
+    coms = np.array([*(stage.com for stage in plan.stages), plan.goal_com])
+    way = coms[-1, :2] - coms[0, :2]
+    along = way / max(float(way @ way), 1e-6)
+    drop = coms[-1, 2] - coms[0, 2]
+    shares = (coms[:, :2] - coms[0, :2]) @ along
+    level = float((coms[:, 2] - drop * shares).max()) + ABOVE
+    x, y = (float(value) for value in drop * along)
+    start = float(level - coms[0, 0] * x - coms[0, 1] * y)
+    line = f"{start:.4f} + {x:.4f}*x + {y:.4f}*y"
+    return {"lower": f"{float(coms[:, 2].min()) - LOWEST:.4f}", "upper": line.replace("+ -", "- ")}

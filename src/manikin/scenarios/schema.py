@@ -65,11 +65,11 @@ class ScenarioFile(Section):
         description="whether a run succeeds only when the motion is executed without a fault, or the "
         "execution is an attempt whose fault is reported and leaves the plan a success",
     )
-    manner: Literal["ready", "walking", "close", "climbing"] = Field(
+    manner: Literal["ready", "walking", "close", "hanging", "climbing"] = Field(
         default="ready",
         description="how the body carries itself where the task leaves freedom: ready, arms raised and bent, "
         "clear of the thighs; walking, upright with arms that swing against the legs; close, arms bent close "
-        "to the body; climbing, arms raised and legs bent and spread",
+        "to the body; hanging, arms that hang; climbing, arms raised and legs bent and spread",
     )
     push: PushSection | None = Field(default=None, description="disturbance during the execution")
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
@@ -99,6 +99,13 @@ class ScenarioFile(Section):
                         f"is {name!r}; valid: automatic, or the name of an obstacle of the scene "
                         f"({', '.join(names) or 'it has none'})",
                     )
+        if self.task.act is not None and self.task.act.on not in names:
+            raise refuse(
+                "task.act.on", f"is {self.task.act.on!r}; valid: the name of an obstacle of the scene "
+                f"({', '.join(names) or 'it has none'})",
+            )  # fmt: skip
+        if self.task.act is not None and self.contacts is not None and self.contacts.limbs:
+            raise refuse("contacts.limbs", "are given beside task.act; valid: one of them")
         self._check_body()
         self._check_wholebody()
         if self.supports is None:
@@ -130,6 +137,8 @@ class ScenarioFile(Section):
             raise refuse("wholebody.method", "is refine; valid: follow for a point mass, which has no joints")
         if self.supports is not None and self.supports.foot != "flat":
             raise refuse("wholebody.method", "is refine; valid: follow for feet that roll, or flat ones")
+        if self.task.act is not None:
+            raise refuse("wholebody.method", "is refine; valid: follow for a task with an act")
 
     def _check_planned(self) -> None:
         """Refuse what contacts cannot be planned for."""
@@ -162,6 +171,8 @@ class ScenarioFile(Section):
                             f"is no part of a human; valid: {', '.join(EFFECTORS)}, or a point_mass",
                         )
             return
+        if self.task.act is not None:
+            raise refuse("task.act", f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
         for key in ("reference_stature_m", "push"):
             if getattr(self, key) is not None:
                 raise refuse(key, f"does not apply to {WORDS[self.body.model]}; valid: leave it out")

@@ -14,6 +14,7 @@ from manikin.scenarios.expressions import Expression
 from manikin.scenarios.heights import HeightBand, SupportLevel
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.sections import (
+    ActSection,
     ComConstraintSection,
     ContactSection,
     ContactsSection,
@@ -99,6 +100,11 @@ class ScenarioValues:
     def push(self) -> PushSection | None:
         """Disturbance during the execution, or None."""
         return self.file.push
+
+    @property
+    def act(self) -> ActSection | None:
+        """What the hands do to an object at the end, or None."""
+        return self.file.task.act
 
     @property
     def stature_scale(self) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.body.limb import end_segments
 from manikin.contact import Contact, ContactKind, ContactSchedule
-from manikin.control import Controller, ControlOutput, ControlSettings
+from manikin.control import Controller, ControlOutput, ControlSettings, ForceWish
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.errors import InputError
 from manikin.motion import Motion
@@ -84,6 +84,7 @@ def execute(
     hold: float = 1.0,
     pushes: Sequence[Push] = (),
     padded: Sequence[str] = (),
+    wishes: Sequence[ForceWish] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Execution:
     """Execute a planned motion and stand for a while after its end.
@@ -98,6 +99,7 @@ def execute(
         hold: Time to stand at the end [s].
         pushes: Forces that disturb the execution, in the motion's time.
         padded: Obstacles that any part of the body may lean on, such as a backrest.
+        wishes: Forces that effectors in contact should feel.
         progress: Called with the share done, in [0, 1], after every control step.
 
     Returns:
@@ -109,7 +111,7 @@ def execute(
         ContactError: If a support does not lie on a surface of the scene.
     """
     finite_number(hold, "hold [s]", at_least=0.0)
-    run = _Run(body, scene, motion, schedule, settings, physics, pushes, padded)
+    run = _Run(body, scene, motion, schedule, settings, physics, pushes, padded, wishes)
     return run.execute(hold, progress)
 
 
@@ -126,6 +128,7 @@ class _Run:
         physics: PhysicsOptions | None,
         pushes: Sequence[Push],
         padded: Sequence[str] = (),
+        wishes: Sequence[ForceWish] = (),
     ) -> None:
         self.body, self.plan = body, motion
         settings = settings or ControlSettings()
@@ -133,7 +136,7 @@ class _Run:
         self.period = settings.period
         self.substeps = _substeps(settings.period, physics.timestep)
         damping = np.full(body.nv - 6, physics.joint_damping)
-        self.controller = Controller(body, motion, schedule, settings, joint_damping=damping)
+        self.controller = Controller(body, motion, schedule, settings, joint_damping=damping, wishes=wishes)
         self.holds = _holds(body, scene, schedule)
         self.world = World(compile_model(body, scene, physics), padded)
         for push in pushes:
@@ -189,6 +192,9 @@ class _Run:
             self.world.release(effector)
         for contact in held.values():
             self._grip(contact)
+        for item in grasps:
+            if item.start - GRASPING <= time < item.start and item.contact.effector not in held:
+                self.world.open_hand(item.contact.effector)
 
     def _grip(self, contact: Contact) -> None:
         self.world.grip(Grip(contact.effector, contact.position, contact.max_force))

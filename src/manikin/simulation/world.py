@@ -228,6 +228,13 @@ class World:
         self._grips[grip.effector] = grip
         self._set_scene_contact(grip.effector, False)
 
+    def open_hand(self, effector: str) -> None:
+        """Let the segment of an effector pass through the scene until it has gripped and let go.
+
+        A rigid hand cannot open its fingers around what it is about to hold.
+        """
+        self._set_scene_contact(effector, False)
+
     def release(self, effector: str) -> None:
         """Let go; nothing happens where nothing was held."""
         if self._grips.pop(effector, None) is not None:

@@ -119,8 +119,22 @@ CLIMBING = Manner(
 )  # fmt: skip
 """Raised arms and bent, spread legs of a person on a wall."""
 
+HANGING = Manner(
+    "hanging",
+    MappingProxyType(
+        {
+            "shoulder_flexion": np.deg2rad(5.0),
+            "shoulder_abduction": np.deg2rad(12.0),
+            "elbow_flexion": np.deg2rad(25.0),
+        }
+    ),
+    CLOSE.scales,
+    preferences=CLOSE.preferences,
+)
+"""Arms that hang, as of a person who comes near to something."""
+
 MANNERS: Mapping[str, Manner] = MappingProxyType(
-    {manner.name: manner for manner in (READY, WALKING, CLOSE, CLIMBING)}
+    {manner.name: manner for manner in (READY, WALKING, CLOSE, HANGING, CLIMBING)}
 )
 """Every manner by its name."""
 

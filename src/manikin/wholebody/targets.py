@@ -236,6 +236,10 @@ def _flight_weight(share: FloatArray, middle: float, leaving: float, landing: fl
     return np.where(blend > 0.0, inside, 1.0)
 
 
+TAKING_HOLD = 0.35
+"""Time before its first contact in which an effector that was free may come close to it [s]."""
+
+
 def ignored_pairs(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
 ) -> tuple[Ignored, ...]:
@@ -256,6 +260,10 @@ def ignored_pairs(
         if swing.end is not None and not hangs(body, swing.effector):
             end = schedule.swing_interval(swing)[1]
             landing.append((end - SITTING_DOWN, end, set(touch_pairs(body, scene, swing.end))))
+            continue
+        if swing.end is not None and swing.start is None:
+            end = schedule.swing_interval(swing)[1]
+            landing.append((end - TAKING_HOLD, end, set(touch_pairs(body, scene, swing.end))))
             continue
         for index in range(swing.first_phase, swing.last_phase + 1):
             for contact in (swing.start, swing.end):

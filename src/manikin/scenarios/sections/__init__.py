@@ -9,10 +9,11 @@ from manikin.scenarios.sections.phase import PhaseSection
 from manikin.scenarios.sections.planning import PlanningSection, WeightsSection
 from manikin.scenarios.sections.push import PushSection
 from manikin.scenarios.sections.supports import SupportsSection
-from manikin.scenarios.sections.task import StateSection, TaskSection
+from manikin.scenarios.sections.task import ActSection, StateSection, TaskSection
 from manikin.scenarios.sections.wholebody import WholebodySection
 
 __all__ = [
+    "ActSection",
     "BodySection",
     "ComConstraintSection",
     "ContactSection",

@@ -1,10 +1,20 @@
 """Sections of a scenario file: from where to where."""
 
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from manikin.scenarios.validation import Number, Section, Vector2, Vector3, refuse
+from manikin.scenarios.validation import (
+    NonNegative,
+    Number,
+    Positive,
+    Section,
+    Text,
+    Vector2,
+    Vector3,
+    refuse,
+    rule_error,
+)
 
 
 class StateSection(Section):
@@ -34,8 +44,39 @@ class StateSection(Section):
         return self
 
 
+class ActSection(Section):
+    """What the hands do to an object where the way ends."""
+
+    kind: Literal["push", "pull"] = Field(description="press with the palms, or hold on and draw")
+    on: Text = Field(description="name of an obstacle; it does not move")
+    direction: Vector3 = Field(description="where the force on the object points; level")
+    force_N: Positive = Field(description="force on the object [N]")
+    ramp_s: Positive = Field(default=1.0, description="time in which the force rises from none [s]")
+    hold_s: NonNegative = Field(default=2.0, description="time for which it is held then [s]")
+
+    @field_validator("direction")
+    @classmethod
+    def _level(cls, direction: Any) -> Any:
+        if not any(direction) or direction[2] != 0.0:
+            raise rule_error("a direction that is level (its z 0) and not zero")
+        return direction
+
+
 class TaskSection(Section):
-    """From where to where."""
+    """From where to where, and what is done there."""
 
     start: StateSection = Field(description="state at the beginning, at rest")
-    goal: StateSection = Field(description="state at the end, at rest")
+    goal: StateSection = Field(
+        description="state at the end, at rest; found, and may be left out, with an act and no supports"
+    )
+    act: ActSection | None = Field(
+        default=None, description="what the hands do to an object at the end; where to stand for it is found"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _goal_of_act(cls, data: Any) -> Any:
+        """Leave the goal of an act to the planner."""
+        if isinstance(data, dict) and data.get("act") is not None and "goal" not in data and "start" in data:
+            return {**data, "goal": data["start"]}
+        return data

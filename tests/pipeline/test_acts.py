@@ -1,0 +1,72 @@
+"""Acts on objects, from the start alone to the force that is held in the physics engine."""
+
+import numpy as np
+import pytest
+
+from manikin import pipeline
+from manikin.contact_search import find_supports
+from manikin.errors import ScenarioError
+from manikin.scenarios import load_scenario
+from manikin.scenarios.planned import PLANNING, with_supports
+
+
+def search(name, variant=None, overrides=()):
+    scenario = load_scenario(name, variant, overrides)
+    body, scene = scenario.build_body(), scenario.build_scene()
+    return find_supports(scenario, body, scene, np.random.default_rng(0)), scene
+
+
+def test_a_way_ends_with_both_hands_on_the_object():
+    found, scene = search("pull-rope")
+    assert found.failure is None
+    found.scenario.check_contacts(scene)
+    last = found.plan.stages[-1]
+    assert {"left_hand", "right_hand"} <= set(last.contacts)
+    assert all(scene.touched_obstacle(last.contacts[hand]) == "bar" for hand in ("left_hand", "right_hand"))
+    assert found.scenario.act.force_N == 200.0
+
+
+def test_an_object_out_of_reach_ends_in_an_explained_failure():
+    result = pipeline.run("push-cupboard", variant="out-of-reach")
+    assert not result.succeeded
+    assert result.summary["failure"]["stage"] == "contacts"
+    assert "within reach" in result.summary["failure"]["reason"]
+
+
+def test_another_seed_keeps_the_planner_s_options():
+    """A scenario that was changed has every default written out; its planning is still nobody's choice."""
+    found, _ = search("pull-rope")
+    scenario = load_scenario("pull-rope").with_seed(3)
+    planning = with_supports(scenario, found.plan).planning
+    assert planning.degree == PLANNING["degree"]
+    assert planning.weights.smoothness == PLANNING["weights"]["smoothness"]
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("task.act.on=wardrobe", "task.act.on"),
+        ("task.act.direction=[0, 0, 1]", "level"),
+        ("task.act.force_N=-1", "task.act.force_N"),
+        ("wholebody.method=refine", "follow"),
+    ],
+)
+def test_an_act_that_makes_no_sense_is_refused(override, words):
+    with pytest.raises(ScenarioError, match=words):
+        load_scenario("push-cupboard", None, [override])
+
+
+@pytest.mark.slow
+def test_the_force_is_held_in_the_physics_engine(tmp_path):
+    """200 N within 5 % for two seconds, without falling, sliding palms or an unplanned touch."""
+    result = pipeline.run("push-cupboard", out=tmp_path / "push")
+    assert result.summary["failure"] is None
+    act = result.summary["act"]
+    assert act["mean_force_N"] == pytest.approx(200.0, rel=0.05)
+    assert act["least_force_N"] >= 0.95 * 200.0
+    assert act["palm_friction_share"] <= 1.0
+    assert act["min_feet_margin"] > 0.0
+    assert act["held_s"] >= 1.95
+    assert act["max_torque_share"] <= 1.0
+    assert act["equilibrium_residual"] < 1e-6
+    assert not result.summary["execution"]["fell"]
