@@ -247,7 +247,7 @@ class _Run:
         self._directory = None if out is None else RunDirectory(out)
         if self._directory is not None:
             self._directory.write_scenario(scenario.to_yaml())
-        stature = None if scenario.is_point_mass else scenario.file.body.stature_m
+        stature = None if scenario.is_point_mass else self._body.stature
         self._summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "succeeded": False, "failure": None,

@@ -20,6 +20,7 @@ from manikin.body.model import BodyModel
 from manikin.body.natural_range import NaturalRange
 from manikin.body.point_mass import point_mass
 from manikin.body.reach_volume import ReachVolume, reach_volume
+from manikin.body.root import with_root
 from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKind
 
 __all__ = [
@@ -56,4 +57,5 @@ __all__ = [
     "reach_volume",
     "volume_of",
     "with_knees_and_elbows",
+    "with_root",
 ]

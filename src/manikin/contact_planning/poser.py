@@ -6,16 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from manikin.body import BodyModel, Configuration
-from manikin.body.segments import Effector
+from manikin.body import BodyModel, Configuration, with_root
 from manikin.contact import Contact
 from manikin.contact_planning.static_region import StaticRegion
 from manikin.posture import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
-
-ROOT = "pelvis"
-"""Effector of a human's root, that the guide leads."""
 
 
 @dataclass(frozen=True)
@@ -83,10 +79,12 @@ class Poser:
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
             settings: What to keep to.
         """
-        self.body, self._root = _with_root(body)
+        self.body, self._root = with_root(body)
         self.scene, self._reference = scene, reference
         self.settings = settings or PoserSettings()
         self.searches = 0
+        standing = np.array(body.standing_posture())
+        self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
         self._proximity = Proximity(self.body, scene)
         self._regions: dict[frozenset[Contact], StaticRegion] = {}
         self._touched: dict[Contact, str] = {}
@@ -116,7 +114,7 @@ class Poser:
             placements: Where further effectors should be, by name.
         """
         if place is None:
-            near = Configuration(self.body, start).com[:2] if guide is None else guide[:2]
+            near = Configuration(self.body, start).com[:2] if guide is None else self._over(guide)
             place = self._region(carrying).nearest(
                 np.asarray(near), self.settings.inset if inset is None else inset
             )
@@ -150,6 +148,10 @@ class Poser:
         found = generate_posture(problem, start, settings=replace(once, restarts=restarts))
         return Posed(found.q) if found.succeeded else Posed(None, found.failure or "no posture")
 
+    def _over(self, guide: FloatArray) -> FloatArray:
+        """(2,) where the centre of mass is in a body whose root has a (7,) pose: a person's over the root."""
+        return guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
+
     def _wish(self, guide: FloatArray | None) -> dict[str, Placement]:
         if guide is None:
             return {}
@@ -172,14 +174,3 @@ class Poser:
         if key not in self._regions:
             self._regions[key] = StaticRegion.of(carrying.values(), self.body.mass)
         return self._regions[key]
-
-
-def _with_root(body: BodyModel) -> tuple[BodyModel, str]:
-    """The body, and the effector at the origin of its root; one is added where there is none."""
-    if ROOT in body.effectors:
-        return body, ROOT
-    name = body.segments[0].name
-    while name in body.effectors:
-        name += "_root"
-    root = Effector(name, body.segments[0].name, np.zeros(3))
-    return replace(body, effectors={**body.effectors, name: root}), name

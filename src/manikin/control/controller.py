@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.body import BodyModel
+from manikin.body import BodyModel, with_root
 from manikin.body.limb import hanging_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.control.build_qp import (
@@ -44,8 +44,6 @@ from manikin.control.tasks import (
 )
 from manikin.motion import Motion
 from manikin.spatial import GRAVITY, FloatArray, frozen_array
-
-_PELVIS = "pelvis"
 
 RAISED = 0.006
 """Points this far above the lowest one of a contact that still settles may carry all of its load, twice as
@@ -112,6 +110,7 @@ class Controller:
         Raises:
             InputError: If the motion or the schedule does not belong to the body.
         """
+        body, self._root = with_root(body)
         self.body = body
         self.schedule = schedule
         self.settings = settings or ControlSettings()
@@ -123,7 +122,7 @@ class Controller:
         self._geometry = _geometries(body, schedule, self.settings.supports.sole_inset)
         self._along = {key: points_along(body, geometry) for key, geometry in self._geometry.items()}
         self._hanging = {name: _hanging_joints(body, name) for name in self._switch.effectors}
-        frames = {name: body.effector_frame(name) for name in (*self._switch.effectors, _PELVIS)}
+        frames = {name: body.effector_frame(name) for name in (*self._switch.effectors, self._root)}
         segments = {
             segment_key(segment): body.segment_frame(segment)
             for geometry in self._geometry.values()
@@ -201,7 +200,11 @@ class Controller:
         if not self._rests(supports):
             tasks.append(
                 orientation_task(
-                    _PELVIS, state.frames[_PELVIS], reference.effectors[_PELVIS], gains.pelvis, weights.pelvis
+                    self._root,
+                    state.frames[self._root],
+                    reference.effectors[self._root],
+                    gains.pelvis,
+                    weights.pelvis,
                 )
             )
         tasks += [self._effector_task(support, state, reference) for support in supports.values()]
@@ -215,7 +218,7 @@ class Controller:
 
     def _rests(self, supports: Mapping[str, SupportState]) -> bool:
         """Whether the pelvis itself is on a support, which then says how it is turned."""
-        segment = self.body.effector(_PELVIS).segment
+        segment = self.body.effector(self._root).segment
         return any(
             support.mode is SupportMode.STANCE and self.body.effector(name).segment == segment
             for name, support in supports.items()
