@@ -1,17 +1,25 @@
 """Contacts of hands, feet on holds and the legs of an insect, from start and goal alone."""
 
+import shutil
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+import yaml
 
+from manikin import pipeline
 from manikin.contact import ContactKind
 from manikin.contact_planning import certify_plan
 from manikin.contact_search import find_supports
+from manikin.errors import ScenarioError
 from manikin.scenarios import load_scenario
 from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
 from manikin.spatial import GRAVITY
 from manikin.wholebody import refine_motion
+
+DOG = Path(__file__).parents[1] / "body" / "data" / "dog.urdf"
 
 
 def search(name, *overrides, seed=0):
@@ -107,3 +115,40 @@ def test_all_the_way_and_refined(name):
     assert refined.failure is None, refined.failure
     assert refined.certificate.min_margin > 0.0
     assert refined.certificate.max_penetration_m < 1e-3
+
+
+def test_a_creature_from_a_robot_description_walks_up_a_step(tmp_path):
+    """Four point feet, three of which carry it while the fourth is in the air."""
+    shutil.copy(DOG, tmp_path)
+    trimesh.creation.capsule(height=140.0, radius=15.0).export(tmp_path / "shank.stl")
+    names = [f"{end}_{side}" for end in ("front", "rear") for side in ("left", "right")]
+    content = {
+        "name": "dog",
+        "body": {
+            "urdf": "dog.urdf",
+            "limbs": {name: {"tip": f"{name}_foot", "position": [0.02, 0.0, 0.0]} for name in names},
+            "standing_deg": {
+                f"{name}_{joint}": angle
+                for name in names
+                for joint, angle in (("pitch", 34.4), ("knee", 68.8))
+            },
+        },
+        "scene": [{"name": "step", "box": [0.5, 1.2, 0.04], "position": [0.6, 0.0, 0.02]}],
+        "wholebody": {"method": "refine"},
+        "task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.6, 0.0], "height_m": 0.04}},
+    }
+    path = tmp_path / "dog.yaml"
+    path.write_text(yaml.safe_dump(content))
+    result, body, scene = search(path)
+    assert result.failure is None
+    certificate = certify_plan(body, scene, result.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    assert certificate.changes == 1
+    assert certificate.min_room_m > 0.005
+    last = result.plan.stages[-1].contacts.values()
+    assert sum(contact.position[2] == pytest.approx(0.04) for contact in last) >= 2
+
+
+def test_contacts_of_any_limbs_need_the_refinement():
+    scenario = load_scenario("climb-wall", overrides=["wholebody.method=follow"])
+    with pytest.raises(ScenarioError, match=r"wholebody\.method is follow; valid: refine"):
+        pipeline.run(scenario)
