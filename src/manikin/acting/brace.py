@@ -12,6 +12,7 @@ from manikin.acting.act import Act, ActKind
 from manikin.acting.capacity import BracedForces, largest_force, share_force
 from manikin.acting.footing import Footing, Loads, Mirrored, Natural
 from manikin.body import BodyModel, Configuration
+from manikin.body.root import PELVIS as ROOT
 from manikin.contact import Contact, grasp
 from manikin.contact_planning import (
     ContactGenerator,
@@ -24,7 +25,6 @@ from manikin.contact_planning import (
     WeightedSum,
 )
 from manikin.contact_planning.footholds import stature_of
-from manikin.contact_planning.poser import ROOT
 from manikin.posture import (
     Placement,
     PostureProblem,
