@@ -4,6 +4,7 @@ The first stage of the pipeline for a scenario that lists no supports ([Tonneau2
 """
 
 import time as clock
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,9 @@ ROLL = (-0.1, 0.1)
 TURN = float(np.deg2rad(75.0))
 """How far the root may turn from the headings of start and goal, where these are that close [rad]."""
 
+SEARCHES_AGAIN = 60
+"""Postures that are looked for along every guide after the first."""
+
 GUIDE_POSES = 200
 """Poses by which the contact planner knows a guide."""
 
@@ -99,12 +103,13 @@ class _Search:
         if standing is not None and standing.stage is None:
             return self._failed(standing.failure or "", "start")
         first = start if standing is None or standing.stage is None else standing.stage
-        for _ in range(self._scenario.contacts.attempts):
+        for number in range(self._scenario.contacts.attempts):
             self._summary["attempts"] += 1
             line, reason = self._guide(first, goal)
             if line is None:
                 return self._failed(reason, "guide")
-            extension = extend(self._body, self._scene, line, start, goal, self._settings(), self._reference)
+            settings = self._settings(again=number > 0)
+            extension = extend(self._body, self._scene, line, start, goal, settings, self._reference)
             self._summary["postures"] += extension.searches
             self._summary["backtracks"] += extension.backtracks
             if extension.plan is not None:
@@ -112,9 +117,11 @@ class _Search:
             reason = extension.failure or ""
         return self._failed(reason, "contacts")
 
-    def _settings(self) -> ExtendSettings:
+    def _settings(self, *, again: bool) -> ExtendSettings:
+        """How contacts are looked for; along another guide, which is much like the first, not as long."""
         options = self._scenario.contacts
-        return ExtendSettings(stride=options.stride_m, friction=options.friction)
+        settings = ExtendSettings(stride=options.stride_m, friction=options.friction)
+        return replace(settings, searches=SEARCHES_AGAIN) if again else settings
 
     def _end(self, end: str) -> Stage | str:
         """Start or goal, or why there is none."""

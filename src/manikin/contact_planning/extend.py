@@ -17,7 +17,7 @@ from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
 from manikin.contact_planning.footholds import Footholds, stature_of
 from manikin.contact_planning.guide_line import GuideLine, heading_of
-from manikin.contact_planning.poser import Poser
+from manikin.contact_planning.poser import Posed, Poser
 from manikin.contact_planning.stage import ContactPlan, Stage
 from manikin.scene import Scene
 from manikin.spatial import FloatArray, rotation_from_yaw
@@ -145,6 +145,7 @@ class _Search:
         self._feet = _standing_feet(body)
         self._stride = settings.stride * stature_of(body) / 1.75
         self._reasons: Counter[str] = Counter()
+        self._lifted: dict[tuple[int, str], tuple[Stage, Posed]] = {}  # by identity of the stage
         self._backtracks = 0
         self._farthest = 0.0
 
@@ -268,7 +269,7 @@ class _Search:
         landed = {**standing, foot: contact}
         here = float(np.mean(list(state.along.values())))
         there = float(np.mean([along, *(value for name, value in state.along.items() if name != foot)]))
-        lifting = self._poser.pose(held, standing, state.last.q, self._guide.at(here))
+        lifting = self._lifting(state, foot, here)
         if lifting.q is None:
             self._reasons[f"{foot} cannot be lifted: {lifting.reason}"] += 1
             return None
@@ -284,6 +285,21 @@ class _Search:
             Stage.of(self._body, landed, landing.q, self._settings.shift_duration),
         )
         return _State(stages, {**state.along, foot: along})
+
+    def _lifting(self, state: _State, foot: str, here: float) -> Posed:
+        """Posture before a foot is lifted: the same wherever it goes, and looked for once.
+
+        It counts every time, so that a foot that cannot be lifted uses up the search.
+        """
+        key = id(state.last), foot
+        if key in self._lifted:
+            self._poser.searches += 1
+            return self._lifted[key][1]
+        held = state.last.contacts
+        standing = {name: other for name, other in held.items() if name != foot}
+        posed = self._poser.pose(held, standing, state.last.q, self._guide.at(here))
+        self._lifted[key] = state.last, posed
+        return posed
 
     def _failed(self, what: str) -> Extension:
         reached = self._farthest / self._guide.length if self._guide.length > 0.0 else 0.0
