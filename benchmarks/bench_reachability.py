@@ -3,6 +3,8 @@
 The reach of the limbs is that of the body, from 10,000 samples each.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -11,8 +13,10 @@ from manikin.body import human, limbs_of, reach_volume
 from manikin.reachability import (
     Condition,
     GuideTask,
+    LimbRule,
     ReachabilityChecker,
     SamplingRegion,
+    UsableSurface,
     World,
     abstraction_of,
     offline_roadmap,
@@ -23,6 +27,7 @@ from manikin.reachability import (
 from manikin.reachability.steering import LocalPlanner
 from manikin.scene import Box, Mesh, Obstacle, Scene
 
+TRUCK = Path(__file__).parents[2] / "shared/data/scenes/hpp_environments/truck.stl"
 LEGS = ("left_leg", "right_leg")
 HOLDS = (
     (0.27, -0.11, 0.45), (0.21, 0.22, 0.61), (0.22, -0.2, 0.77), (0.1, 0.2, 0.93), (0.22, -0.24, 1.16),
@@ -86,7 +91,32 @@ def cabin(creature):
     return World(scene, creature, region, Condition.limbs(at_least=2)), task
 
 
-WORLDS = {"crouch": crouch, "climb": climb, "cabin": cabin}
+def truck(creature):
+    """Out of the truck of the thesis through its windscreen; its mesh is not part of this repository."""
+    if not TRUCK.exists():
+        pytest.skip(f"{TRUCK} is not there")
+    scene = Scene([Obstacle.from_file("truck", TRUCK)], floor_height=0.0)
+    region = SamplingRegion((-1.8, -1.2, 0.2), (3.2, 1.4, 2.4), (-0.8, 0.8), (-0.5, 1.7), (-0.4, 0.4))
+    task = GuideTask(root_pose((-0.6, -0.22, 1.08)), root_pose((2.9, -0.4, 0.87)))
+    return World(scene, creature, region, Condition.limbs(at_least=2)), task
+
+
+def stairs(creature):
+    """Up four steps of 0.16 m, both legs within reach of them."""
+    steps = ((0.66, 0.08), (0.98, 0.16), (1.30, 0.24))
+    boxes = [
+        Obstacle(f"step{n}", Box((0.32, 1.2, 2.0 * z)), translation=(x, 0.0, z))
+        for n, (x, z) in enumerate(steps)
+    ]
+    boxes.append(Obstacle("landing", Box((1.2, 1.2, 0.64)), translation=(2.06, 0.0, 0.32)))
+    region = SamplingRegion((-0.5, -0.6, 0.5), (2.6, 0.6, 1.7), (-0.6, 0.6), (-0.2, 1.0), (-0.1, 0.1))
+    ground = UsableSurface((0.0, 0.0, 1.0), float(np.deg2rad(35.0)))
+    condition = Condition((LimbRule(LEGS, 2),), dict.fromkeys(LEGS, ground))
+    task = GuideTask(root_pose((0.0, 0.0, 0.87)), root_pose((2.0, 0.0, 1.51)))
+    return World(Scene(boxes, floor_height=0.0), creature, region, condition), task
+
+
+WORLDS = {"crouch": crouch, "climb": climb, "cabin": cabin, "truck": truck, "stairs": stairs}
 
 
 @pytest.fixture(scope="module", params=WORLDS)
