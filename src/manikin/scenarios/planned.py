@@ -28,7 +28,10 @@ PLANNING = {
     "zero_end_accelerations": True,
     "weights": {"margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]},
 }
-"""Options of the centre-of-mass planner where the file leaves the defaults; our choice."""
+"""Options of the centre-of-mass planner for a body on its feet where the file leaves the defaults; our choice.
+
+A body that leaves a seat keeps the defaults: its trunk cannot follow a path that is planned for ease alone.
+"""
 
 
 def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
@@ -76,7 +79,7 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     if scenario.act is not None:
         task["act"] = scenario.act.model_dump(mode="json")
     planning = scenario.planning.model_dump(mode="json", exclude_none=True)
-    if scenario.planning == type(scenario.planning)():
+    if scenario.planning == type(scenario.planning)() and not rises:
         planning = PLANNING
     return scenario.replaced(
         supports=supports,
