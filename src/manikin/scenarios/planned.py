@@ -28,7 +28,7 @@ PLANNING = {
     "zero_end_accelerations": True,
     "weights": {"margin": 1.0, "smoothness": 10.0, "duration": 2.0, "acceleration": [1.0, 1.0, 1.0]},
 }
-"""Options of the centre-of-mass planner for a body on its feet where the file leaves the defaults; our choice.
+"""Options of the planner of a body on its feet, where the file keeps the defaults; our choice.
 
 A body that leaves a seat keeps the defaults: its trunk cannot follow a path that is planned for ease alone.
 """
