@@ -115,6 +115,19 @@ def test_a_person_rises_from_a_sofa_in_the_physics_engine(tmp_path):
     assert len(kept["supports"]["phases"]) == result.summary["contacts"]["phases"]
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "rise"), [("stairs", 0.64), ("crouch", 0.0)])
+def test_a_person_walks_from_start_to_goal_in_the_physics_engine(name, rise):
+    result = pipeline.run(name)
+    assert result.succeeded, result.summary["failure"]
+    executed, planned = result.executed, result.planned
+    assert not result.summary["execution"]["fell"]
+    assert executed.com[-1, 2] - executed.com[0, 2] == pytest.approx(rise, abs=0.03)
+    assert executed.margin.min() > 0.0
+    # Below a slab at 1.25 m a body of 1.75 m stoops: its centre of mass is 0.25 m lower than before it.
+    assert (planned.com[0, 2] - planned.com[:, 2].min() > 0.2) == (name == "crouch")
+
+
 def test_refinement_makes_a_contact_plan_a_motion():
     """Against the postures joined by straight lines, at the same timing."""
     found, body, scene = search("crouch")
