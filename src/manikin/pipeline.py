@@ -468,6 +468,8 @@ class _Run:
         return result
 
     def _refine(self, keyed: KeyedContacts) -> RefineResult:
+        keyed = keyed.at_pace(self._scenario.pace)
+        keyed = keyed.with_lifted_feet(self._body, self._scene, self._scenario.padded)
         result = refine_motion(
             self._body, self._scene, keyed.time, keyed.q, keyed.schedule,
             padded=self._scenario.padded, progress=lambda share: self._progress("wholebody", share),

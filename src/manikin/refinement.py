@@ -1,14 +1,19 @@
 """The whole-body stage by refinement: from postures at the changes of contact to a motion and its report."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.contact_planning import ContactPlan
+from manikin.scene import Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody import KeyPostures, RefineResult
+from manikin.wholebody.mid_flights import with_mid_flights
+from manikin.wholebody.refine_input import KeyPath
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +45,16 @@ class KeyedContacts:
     def of_postures(cls, schedule: ContactSchedule, postures: KeyPostures) -> "KeyedContacts":
         """Postures found at the key instants of a planned centre of mass, with its timing."""
         return cls(schedule, schedule.instants, np.array([item.q for item in postures.postures]))
+
+    def at_pace(self, pace: float) -> "KeyedContacts":
+        """The same with everything ``pace`` times as fast."""
+        schedule = ContactSchedule(self.schedule.sequence, self.schedule.instants / pace)
+        return KeyedContacts(schedule, self.time / pace, self.q)
+
+    def with_lifted_feet(self, body: BodyModel, scene: Scene, padded: Sequence[str]) -> "KeyedContacts":
+        """The same with postures between, see :func:`~manikin.wholebody.mid_flights.with_mid_flights`."""
+        path = with_mid_flights(body, scene, self.schedule, KeyPath(self.time, self.q), padded)
+        return KeyedContacts(self.schedule, path.time, path.q)
 
 
 def refined_summary(result: RefineResult) -> dict[str, Any]:

@@ -87,6 +87,11 @@ class ScenarioValues:
         return self.file.wholebody.method == "refine"
 
     @property
+    def pace(self) -> float:
+        """Speed of a refined motion relative to what its contacts come with."""
+        return self.file.wholebody.pace
+
+    @property
     def execution_required(self) -> bool:
         """Whether a fault of the execution is one of the run."""
         return self.file.execution == "required"

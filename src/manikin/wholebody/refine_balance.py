@@ -16,7 +16,7 @@ from manikin.wholebody.refine_physics import WrenchCost, about, centre_of
 FLAT = 1.0
 """Radius of the largest ball in a polytope below which it is flat: it has no inside to stay in [N.m]."""
 
-SHARE = 0.2
+SHARE = 0.4
 """Most of that radius that is wanted as margin."""
 
 

@@ -44,7 +44,7 @@ class RefineScales(MotionScales):
     pelvis_acceleration: float = 3.0
     missing_wrench: float = 10.0
     force: float = 1.0
-    margin: float = 15.0
+    margin: float = 30.0
     margin_violation: float = 1.0
     margin_softness: float = 3.0
     slide: float = 0.1

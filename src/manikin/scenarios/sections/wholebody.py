@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from manikin.scenarios.validation import Section
+from manikin.scenarios.validation import Positive, Section
 
 
 class WholebodySection(Section):
@@ -14,4 +14,9 @@ class WholebodySection(Section):
         default="follow",
         description="follow: contacts, swings and a planned centre of mass; refine: smooth the postures at "
         "the changes of contact into a motion that keeps to physics, with no centre of mass prescribed",
+    )
+    pace: Positive = Field(
+        default=1.0,
+        description="refine: speed relative to that of the contact plan, or of the planned centre of mass; "
+        "below 1 every phase lasts longer",
     )
