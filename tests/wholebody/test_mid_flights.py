@@ -36,7 +36,7 @@ def test_there_the_foot_is_above_both_its_places_and_the_other_one_stands(walked
         posture = Configuration(case.body, lifted.at(np.array([middle]))[0])
         place = posture.effector_placement(swing.effector)[1]
         half = 0.5 * (swing.start.position + swing.end.position)
-        np.testing.assert_allclose(place, half + [0.0, 0.0, LIFT], atol=1e-3)
+        np.testing.assert_allclose(place, half + np.array([0.0, 0.0, LIFT]), atol=1e-3)
         for contact in case.schedule.sequence[int(case.schedule.phase_at(middle))].stance:
             stands = posture.effector_placement(contact.effector)[1]
             np.testing.assert_allclose(stands, contact.position, atol=1e-3)

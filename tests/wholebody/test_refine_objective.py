@@ -25,7 +25,7 @@ SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
 LIMITS = {
     "stages", "max_iterations", "decrease", "iterations_per_round", "multiplier_rounds", "tolerance",
     "turn_tolerance", "joint_buffer", "safe_distance", "softness", "velocity_share", "margin",
-    "margin_softness", "touching",
+    "margin_softness", "touching", "knee_flexion",
 }  # fmt: skip
 OFF = {item.name: 1e9 for item in fields(RefineScales) if item.name not in LIMITS}
 """Scales at which no term matters."""
@@ -78,8 +78,8 @@ def linearise(person, setup, scales, points):
     "term",
     [
         ("missing_wrench", "force"), ("margin_violation",), ("slide",), ("efort",), ("clearance",),
-        ("guide", "guide_position"), ("toes",), ("end_position", "end_angle"), ("position", "approach"),
-        ("rotation",), ("joint_velocity",), ("rest",), ("acceleration", "pelvis_acceleration"),
+        ("guide", "guide_position"), ("toes",), ("straight",), ("end_position", "end_angle"),
+        ("position", "approach"), ("rotation",), ("joint_velocity",), ("rest",), ("acceleration", "pelvis_acceleration"),
     ],
     ids=lambda names: names[0],
 )  # fmt: skip

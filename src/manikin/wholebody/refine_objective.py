@@ -35,6 +35,9 @@ from manikin.wholebody.refine_physics import ContactForces, WrenchCost, WrenchSa
 from manikin.wholebody.refine_scales import RefineScales
 from manikin.wholebody.targets import FitTargets
 
+KNEE = "knee_flexion"
+"""How the names of knees end."""
+
 _LEAST_CURVATURE = 1e-12
 """Added to the curvature of the wrench's cost, relative to its largest element, to factorise it."""
 
@@ -133,6 +136,7 @@ class RefineObjective(MotionObjective):
             )
         ]
         self._load = load_shares(schedule, time, self._names)
+        self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(KNEE)]
         model = body.pinocchio
         moves = moves_by_joint(model)
         self._chains = {
@@ -152,6 +156,16 @@ class RefineObjective(MotionObjective):
     def _wanted_distance(self, found: ProximitySamples, scales: MotionScales) -> FloatArray:
         assert isinstance(scales, RefineScales)
         return self._refine.obstacles.wanted(found, scales.safe_distance, -scales.touching)
+
+    def _add_ranges(self, out: Linearised, raw: FloatArray, scales: MotionScales) -> None:
+        """Joint ranges, and knees that stay bent."""
+        assert isinstance(scales, RefineScales)
+        super()._add_ranges(out, raw, scales)
+        missing = np.minimum(raw[:, self._knees] - scales.knee_flexion, 0.0) / scales.straight
+        weight, residual = np.zeros_like(raw), np.zeros_like(raw)
+        weight[:, self._knees] = (missing != 0.0) / scales.straight
+        residual[:, self._knees] = missing
+        out.add_diagonal(0, weight, residual)
 
     def _com_weight(self, scales: MotionScales) -> FloatArray:
         del scales

@@ -32,6 +32,9 @@ class RefineScales(MotionScales):
             flight [m].
         guide: Deviation of a joint from the input [rad].
         guide_position: Deviation of the pelvis from the input [m].
+        knee_flexion: Least one that is wanted: a leg that is almost straight turns about its own axis in the
+            execution at the slightest cause [rad].
+        straight: What a knee lacks of it [rad].
         toes: Angle of the toes of what stands on soles [rad].
         end_position: Deviation of the pelvis from the input at both ends [m].
         end_angle: Deviation of a joint, or of the pelvis' attitude, there [rad].
@@ -53,6 +56,8 @@ class RefineScales(MotionScales):
     touching: float = 8.0e-3
     guide: float = 0.4
     guide_position: float = 0.03
+    knee_flexion: float = 0.35
+    straight: float = 0.05
     toes: float = 0.02
     end_position: float = 0.01
     end_angle: float = 0.05
