@@ -79,7 +79,8 @@ def linearise(person, setup, scales, points):
     [
         ("missing_wrench", "force"), ("margin_violation",), ("slide",), ("efort",), ("clearance",),
         ("guide", "guide_position"), ("toes",), ("straight",), ("end_position", "end_angle"),
-        ("position", "approach"), ("rotation",), ("joint_velocity",), ("rest",), ("acceleration", "pelvis_acceleration"),
+        ("position", "approach"), ("rotation",), ("joint_velocity",), ("rest",),
+        ("acceleration", "pelvis_acceleration"),
     ],
     ids=lambda names: names[0],
 )  # fmt: skip

@@ -57,7 +57,7 @@ class RefineScales(MotionScales):
     guide: float = 0.4
     guide_position: float = 0.03
     knee_flexion: float = 0.35
-    straight: float = 0.05
+    straight: float = 0.1
     toes: float = 0.02
     end_position: float = 0.01
     end_angle: float = 0.05
