@@ -56,8 +56,8 @@ AROUND = 1.3
 PATCH_WIDTH = 0.7
 """Width of the front of a sole that has to lie on a hold, relative to the sole's."""
 
-TOE_ROOM = 0.01
-"""Distance of that part to the tip of the sole [m]."""
+HINGE_ROOM = 0.005
+"""Distance of that part to the hinge of the toes, which would give way [m]."""
 
 STEEPEST = float(np.deg2rad(50.0))
 """Largest slope on which a limb that cannot hold on counts as within reach; our choice."""
@@ -138,9 +138,9 @@ class _LimbSearch:
     def _rules(self) -> ContactRules:
         options, patch = self._scenario.contacts, None
         if options.forefoot_m is not None and self._body.sole_length and self._body.sole_width:
-            end = 0.5 * self._body.sole_length - TOE_ROOM
+            end = _toe_hinge(self._body) - HINGE_ROOM
             patch = (end - options.forefoot_m, end, PATCH_WIDTH * self._body.sole_width)
-        return ContactRules(options.friction, options.grasp_force_N, patch=patch)
+        return ContactRules(options.friction, options.grasp_force_N, 0.0, patch)
 
     def _settings(self) -> LimbExtendSettings:
         """Lengths by the size of the body, times by how fast a body of that size moves."""
@@ -244,6 +244,14 @@ def _limbs(body: BodyModel, names: tuple[str, ...]) -> tuple[Limb, ...]:
 def _kind(body: BodyModel, limb: Limb) -> ContactKind:
     """A person's hands hold on; all other limbs touch in their own way."""
     return ContactKind.GRASP if body.stature is not None and "hand" in limb.effector else limb.kind
+
+
+def _toe_hinge(body: BodyModel) -> float:
+    """Where the hinge of the toes crosses the sole's x axis; its tip without such a hinge [m]."""
+    foot = body.effector("left_foot")
+    toes = [segment for segment in body.segments if segment.parent == foot.segment and segment.hinges]
+    own = foot.rotation.T @ (toes[0].origin - foot.translation) if toes else None
+    return 0.5 * (body.sole_length or 0.0) if own is None else float(own[0])
 
 
 def _as_climbing(body: BodyModel, manner: str) -> FloatArray:

@@ -29,7 +29,7 @@ def search(name, *overrides, seed=0):
 
 
 SHORT = {
-    "climb-wall": ("task.goal.height_m=0.35",),
+    "climb-wall": ("task.goal.height_m=0.55",),
     "insect-books": ("task.start.at=[-0.25, 0.0]", "task.goal.at=[-0.05, 0.0]", "task.goal.height_m=0.05"),
 }
 """Two rows of holds; and onto the first books."""
@@ -83,11 +83,9 @@ def test_a_flight_passes_a_posture_off_its_contacts(found):
     assert np.all(np.diff(times) > 0.0)
 
 
-def test_the_same_seed_has_the_same_contacts(found):
-    result, body, _ = found
-    name = "insect-books" if body.stature is None else "climb-wall"
-    again, _, _ = search(name, *SHORT[name])
-    np.testing.assert_array_equal(again.plan.postures, result.plan.postures)
+def test_the_same_seed_has_the_same_contacts():
+    first, second = (search("insect-books", *SHORT["insect-books"], seed=3)[0] for _ in range(2))
+    np.testing.assert_array_equal(first.plan.postures, second.plan.postures)
 
 
 @pytest.mark.parametrize(

@@ -147,6 +147,7 @@ class _Run:
         everything = tuple(segment.name for segment in body.segments)
         self._leaning = [(everything, name) for name in padded]
         self._planned_now: tuple[int, ...] | None = None
+        self._leaving = set[str]()
 
     def execute(self, hold: float, progress: Callable[[float], None] | None) -> Execution:
         began = clock.perf_counter()
@@ -188,8 +189,16 @@ class _Run:
             self._planned_now = now
         grasps = [item.interval for item in self.holds if item.interval.contact.kind is ContactKind.GRASP]
         held = {item.contact.effector: item.contact for item in grasps if item.start <= time < item.end}
+        leaving = {
+            item.contact.effector for item in grasps if item.end <= time < item.end + GRASPING
+        } - held.keys()
         for effector in {item.contact.effector for item in grasps} - held.keys():
             self.world.release(effector)
+        for effector in leaving:  # its fingers are still about what it held
+            self.world.open_hand(effector)
+        for effector in self._leaving - leaving - held.keys():
+            self.world.close_hand(effector)
+        self._leaving = leaving
         for contact in held.values():
             self._grip(contact)
         for item in grasps:

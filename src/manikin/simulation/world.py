@@ -241,6 +241,10 @@ class World:
             self._grip_forces.pop(effector, None)
             self._set_scene_contact(effector, True)
 
+    def close_hand(self, effector: str) -> None:
+        """Let the segment of an effector collide with the scene again."""
+        self._set_scene_contact(effector, True)
+
     def _set_scene_contact(self, effector: str, enabled: bool) -> None:
         """Let the segment of an effector collide with obstacles or not; with the body it does."""
         mask = self._mask((self.model.body.effector(effector).segment,), True)
