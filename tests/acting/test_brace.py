@@ -3,9 +3,12 @@ import pytest
 from tests.acting.conftest import FEW
 
 from manikin.acting import Act, BraceSettings, find_brace
+from manikin.acting.footing import Loads
+from manikin.body import Configuration
 from manikin.contact import ContactKind
 from manikin.contact_planning import ClosestDistance
 from manikin.scene import Box, Obstacle, Proximity, Scene
+from manikin.spatial import GRAVITY
 
 
 def test_a_push_is_braced_free_and_within_strength(body, scene, brace):
@@ -74,3 +77,16 @@ def test_a_force_beyond_all_postures_is_explained(body, scene, samples):
 def test_an_object_without_a_face_to_the_body_is_explained(body, scene, samples):
     act = Act("push", "floor", (1.0, 0.0, 0.0), 100.0)
     assert "has no face" in find_brace(body, scene, samples, act, np.zeros(2)).failure
+
+
+def test_feet_slide_where_the_load_is_beyond_their_friction(body, brace, push):
+    """On level ground at ``mu m g``: below it there is a margin somewhere, above it nowhere."""
+    feet = list(brace.feet.values())
+    limit = 0.7 * body.mass * GRAVITY
+    near = Configuration(body, brace.q).com[:2]
+    margins = []
+    for force in (0.2 * limit, 1.01 * limit):
+        low = np.concatenate([push.reaction(force), np.zeros(3)])  # at the height of the ground: no tipping
+        margins.append(Loads(body.mass, low[None]).best_place(feet, near, np.array([0.1, 0.1]))[1])
+    assert margins[0] > 0.0
+    assert margins[1] == -np.inf

@@ -28,9 +28,21 @@ class Loads:
 
     def margins(self, feet: list[Contact], places: FloatArray) -> FloatArray:
         """(n,) least margin of all loads at each place (n, 3) of the centre of mass [N.m]."""
+        if any(self._slides(feet, load) for load in self.wrenches):
+            return np.full(len(places), -np.inf)
         polytope = wrench_polytope(Stance(feet, BODY_WEIGHTS_CAP * self.mass * GRAVITY))
         weight = pseudo_wrench(self.mass, places, np.zeros(3))
         return np.min([polytope.margin(weight - load) for load in self.wrenches], axis=0)
+
+    def _slides(self, feet: list[Contact], load: FloatArray) -> bool:
+        """Whether feet on parallel surfaces slide under a load, wherever the centre of mass is."""
+        normal = feet[0].normal
+        if any(float(foot.normal @ normal) < 1.0 - 1e-9 for foot in feet):
+            return False
+        force = np.array([0.0, 0.0, self.mass * GRAVITY]) - load[:3]
+        pressing = float(force @ normal)
+        sideways = float(np.linalg.norm(force - pressing * normal))
+        return sideways > max(foot.friction for foot in feet) * pressing
 
     def best_place(
         self, feet: list[Contact], near: FloatArray, reach: FloatArray
