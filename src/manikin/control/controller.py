@@ -27,7 +27,7 @@ from manikin.control.contact_forces import (
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.force_wish import ForceWish
 from manikin.control.reference import Reference, ReferenceSample
-from manikin.control.settings import ControlSettings
+from manikin.control.settings import ControlSettings, Impedance
 from manikin.control.solver import QPSolution, make_solver
 from manikin.control.supports import SupportMode, SupportState, SupportSwitch
 from manikin.control.tasks import (
@@ -44,6 +44,9 @@ from manikin.control.tasks import (
 )
 from manikin.motion import Motion
 from manikin.spatial import GRAVITY, FloatArray, frozen_array
+
+YIELDING = 0.2
+"""Stiffness with which a hand that should feel a force is held at its place, relative to a stance's."""
 
 RAISED = 0.006
 """Points this far above the lowest one of a contact that still settles may carry all of its load, twice as
@@ -238,7 +241,7 @@ class Controller:
             if support.mode is SupportMode.LANDING and not grasps:
                 planned = landing_reference(support, planned)
             # A hand that presses yields to what it presses on: stiff, it would take off some of the force.
-            gain = gains.stance if name in self._wishes and grasps else gains.swing
+            gain = _yielding(gains.stance) if name in self._wishes and grasps else gains.swing
             return swing_task(name, frame, planned, gain, weight)
         if support.mode is SupportMode.STANCE:
             return stance_task(name, frame, support, gains.stance, weight)
@@ -325,6 +328,10 @@ class Controller:
         if relaxed.found:
             return relaxed, f"without joint bounds: {solution.status}"
         return None, f"previous torques: {solution.status}, then {relaxed.status}"
+
+
+def _yielding(gain: Impedance) -> Impedance:
+    return replace(gain, stiffness=YIELDING * gain.stiffness)
 
 
 def _geometries(
