@@ -70,3 +70,7 @@ def test_the_force_is_held_in_the_physics_engine(tmp_path):
     assert act["max_torque_share"] <= 1.0
     assert act["equilibrium_residual"] < 1e-6
     assert not result.summary["execution"]["fell"]
+    # The run directory holds the scenario with its supports and the act, ready to run again.
+    again = load_scenario(tmp_path / "push/scenario.yaml")
+    assert again.act.force_N == 200.0
+    assert "left_hand" in again.build_sequence()[-1].stance
