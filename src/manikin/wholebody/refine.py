@@ -81,6 +81,7 @@ class RefineSettings:
         scales: Weights and limits of the fit.
         requirements: What the finished motion must keep.
         retime: Whether the motion may be slowed down.
+        friction_share: Share of the friction with which the margin is wanted; the certificate has all of it.
     """
 
     knot_spacing: float = 0.1
@@ -89,6 +90,7 @@ class RefineSettings:
     scales: RefineScales = field(default_factory=RefineScales)
     requirements: RefineRequirements = field(default_factory=RefineRequirements)
     retime: bool = True
+    friction_share: float = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,6 +218,7 @@ class _Refinement:
         self.settings, self.task, self.padded = settings, task, padded
         self.proximity = Proximity(body, scene)
         self.rooms = rooms_of(schedule)
+        self.wanted_rooms = rooms_of(schedule, self.settings.friction_share)
         self.iterations = 0
 
     def run(self, began: float, progress: Progress) -> RefineResult:
@@ -276,7 +279,7 @@ class _Refinement:
         def make(
             body: BodyModel, proximity: Proximity | None, _: object, basis: SampledBasis
         ) -> MotionObjective:
-            return RefineObjective(body, proximity, targets, basis, self.rooms)
+            return RefineObjective(body, proximity, targets, basis, self.wanted_rooms)
 
         return make
 

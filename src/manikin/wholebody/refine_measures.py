@@ -5,7 +5,7 @@ velocity jumps at its keys, and the refined motion are measured with the same ya
 """
 
 import itertools
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 
 import daqp
 import numpy as np
@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from manikin.balance import pseudo_wrench
 from manikin.body import BodyModel
-from manikin.contact import ContactSchedule
+from manikin.contact import ContactSchedule, Stance
 from manikin.contact_planning.efort import Task
 from manikin.scene import Proximity
 from manikin.scene.distance import moves_by_joint
@@ -129,9 +129,14 @@ def physics_violation(room: BalanceRoom, stance_wrench: FloatArray) -> FloatArra
     return missing
 
 
-def rooms_of(schedule: ContactSchedule) -> tuple[BalanceRoom, ...]:
-    """Wrench polytope of each phase."""
-    return tuple(BalanceRoom(phase.stance) for phase in schedule.sequence)
+def rooms_of(schedule: ContactSchedule, friction_share: float = 1.0) -> tuple[BalanceRoom, ...]:
+    """Wrench polytope of each phase, with a share of the friction."""
+    return tuple(BalanceRoom(_smoother(phase.stance, friction_share)) for phase in schedule.sequence)
+
+
+def _smoother(stance: Stance, share: float) -> Stance:
+    contacts = [replace(contact, friction=share * contact.friction) for contact in stance]
+    return Stance(contacts, stance.normal_force_cap)
 
 
 def balance_of(
