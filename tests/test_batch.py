@@ -106,7 +106,7 @@ def test_jobs_for_another_stature_leave_out_what_has_none():
     """A point mass has no stature; everything else is asked."""
     jobs = built_in_jobs()
     left_out = set(jobs) - set(built_in_jobs(statures=True))
-    assert {job.scenario for job in left_out} == {"walls"}
+    assert {job.scenario for job in left_out} == {"insect-books", "walls"}
 
 
 def test_built_in_jobs_are_every_scenario_with_its_variants():

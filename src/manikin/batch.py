@@ -78,7 +78,7 @@ def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
     """Every built-in scenario followed by its variants, in the order of ``manikin scenarios``.
 
     Args:
-        statures: Whether to leave out bodies without a stature, such as a point mass.
+        statures: Whether to leave out bodies without a stature, such as a point mass or an insect.
 
     Raises:
         ScenarioError: If one of the files is not valid.
@@ -87,7 +87,7 @@ def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
         Job(name, variant, load_scenario(name, variant).file.expect)
         for name in list_scenarios()
         for variant in (None, *list_variants(name))
-        if not (statures and load_scenario(name, variant).is_point_mass)
+        if load_scenario(name, variant).has_stature or not statures
     )
 
 

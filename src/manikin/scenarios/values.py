@@ -77,6 +77,11 @@ class ScenarioValues:
         return self.file.body.model == "point_mass"
 
     @property
+    def has_stature(self) -> bool:
+        """Whether the body is a person, whose stature may be chosen."""
+        return self.file.body.model == "human"
+
+    @property
     def planning(self) -> PlanningSection:
         """Options of the centre-of-mass planner."""
         return self.file.planning
