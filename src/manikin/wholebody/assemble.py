@@ -201,6 +201,7 @@ class _Planner:
         )  # fmt: skip
         self.leaning: Ignored = frozenset()
         self.known: Guide | None = None
+        self.straight_toes = True
         self.waypoints: Guide | None = None
         self._progress = progress
 
@@ -210,6 +211,8 @@ class _Planner:
         result = self._attempt(swings, began)
         if not result.succeeded and self.settings.manner is READY:
             result = _better(result, self._attempt_close(swings, began))
+        if "min_clearance_m" in result.certificate.broken(self.settings.requirements):
+            result = _better(result, self._attempt_with_loose_toes(swings, began))
         searched = self._search_again(swings, result)
         if searched is not None:
             result = _better(result, self._attempt(searched, began))
@@ -222,6 +225,13 @@ class _Planner:
         self.settings = replace(usual, manner=CLOSE)
         result = self._attempt(swings, began)
         self.settings = usual
+        return result
+
+    def _attempt_with_loose_toes(self, swings: tuple[PlannedSwing, ...], began: float) -> WholeBodyResult:
+        """Try again with toes that need not be straight: straight ones may be in the way of a flight."""
+        self.straight_toes = False
+        result = self._attempt(swings, began)
+        self.straight_toes = True
         return result
 
     def _search_again(
@@ -353,7 +363,8 @@ class _Planner:
         toes = toe_angles(self.body, swings, time)
         scale = np.tile(self.settings.manner.scale(self.body), (len(time), 1))
         reference = guide.at(time)
-        for joint, flat in flat_share(self.body, schedule, time).items():
+        straight = flat_share(self.body, schedule, time) if self.straight_toes else {}
+        for joint, flat in straight.items():
             reference[:, 7 + joint] *= 1.0 - flat
             scale[:, 6 + joint] *= (FLAT_TOES / scale[:, 6 + joint]) ** flat
         scale[:, [6 + joint for joint in toes]] = FLAT_TOES
