@@ -14,7 +14,8 @@ from manikin.contact_planning.efort import (
 )
 from manikin.contact_planning.endpoint import Endpoint, Endpoints, Habit
 from manikin.contact_planning.exertable import exertable_force
-from manikin.contact_planning.extend import ExtendSettings, Extension, extend
+from manikin.contact_planning.extend import ExtendSettings, extend
+from manikin.contact_planning.extension import Extension
 from manikin.contact_planning.footholds import Foothold, Footholds, FootholdSettings
 from manikin.contact_planning.generator import (
     ContactGenerator,

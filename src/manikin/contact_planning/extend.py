@@ -7,38 +7,22 @@ one that already holds the new one.  Where there is none, a shorter step, anothe
 limb is tried, and then the change before is taken back.
 """
 
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
+from manikin.contact_planning.depth_first import SearchLog, search_depth_first
+from manikin.contact_planning.extension import Extension, PartialPlan
 from manikin.contact_planning.footholds import Footholds, stature_of
 from manikin.contact_planning.guide_line import GuideLine, heading_of
 from manikin.contact_planning.poser import Posed, Poser
+from manikin.contact_planning.rising import on_feet
 from manikin.contact_planning.stage import ContactPlan, Stage
 from manikin.scene import Scene
 from manikin.spatial import FloatArray, rotation_from_yaw
-
-LEANING = (0.2, 0.4, 0.6, 0.8, 0.92)
-"""Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
-
-LEANING_TIME = 0.3
-"""Shortest time between two of them [s]."""
-
-SEAT_OFF_INSET = 0.015
-"""Distance of the centre of mass to the edge of where it may rest on the feet when a seat is left [m]."""
-
-RISING_TIME = 1.8
-"""Shortest time from there to standing [s]."""
-
-SETTLING_TIME = 0.8
-"""Shortest time that the body stands then [s]."""
-
-SEATED_ROOM = (0.01, 0.01, 0.006)
-"""How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
 
 NEARER = (0.7, 0.4)
 """Shares of the way to its place with which a foot comes nearer when no stride is possible."""
@@ -74,39 +58,18 @@ class ExtendSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Extension:
-    """A contact plan, or why there is none.
+class _Step:
+    """One foot to another place.
 
     Attributes:
-        plan: The plan, or None.
-        searches: Postures looked for.
-        backtracks: Changes taken back.
-        failure: None, or the reason in one line.
-        reached: Share of the guide that the farthest attempt got to.
+        foot: Its effector.
+        contact: Where it goes.
+        along: How far along the guide that is [m].
     """
 
-    plan: ContactPlan | None
-    searches: int
-    backtracks: int
-    failure: str | None = None
-    reached: float = 1.0
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether there is a plan."""
-        return self.plan is not None
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    """Where the search is: stages so far and how far along the guide each foot is."""
-
-    stages: tuple[Stage, ...]
-    along: Mapping[str, float]
-
-    @property
-    def last(self) -> Stage:
-        return self.stages[-1]
+    foot: str
+    contact: Contact
+    along: float
 
 
 def extend(
@@ -131,114 +94,91 @@ def extend(
         settings: How to search.
         reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
     """
-    poser = Poser(body, scene, reference)
-    return _Search(poser, guide, goal, settings or ExtendSettings()).run(start)
+    settings, poser = settings or ExtendSettings(), Poser(body, scene, reference)
+    log = SearchLog(poser, settings.searches)
+    steps = _Steps(poser, guide, goal, settings, log)
+    first = on_feet(poser, start, steps.feet, guide.at(0.0), log)
+    if first is None:
+        return log.failure(f"cannot leave {', '.join(set(start.contacts) - steps.feet)}", guide.length)
+    return search_depth_first(first, steps, log, guide.length)
 
 
-class _Search:
-    """Depth-first search over changes of contact."""
+class _Steps:
+    """Steps of feet, as :class:`~manikin.contact_planning.depth_first.Moves`."""
 
-    def __init__(self, poser: Poser, guide: GuideLine, goal: Stage, settings: ExtendSettings) -> None:
-        self._poser, self._guide, self._goal, self._settings = poser, guide, goal, settings
+    def __init__(
+        self, poser: Poser, guide: GuideLine, goal: Stage, settings: ExtendSettings, log: SearchLog
+    ) -> None:
+        self._poser, self._guide, self._goal, self._settings, self._log = poser, guide, goal, settings, log
         self._body = body = poser.body
         self._footholds = Footholds(body, poser.scene)
-        self._feet = _standing_feet(body)
+        self._below_root = _standing_feet(body)
         self._stride = settings.stride * stature_of(body) / 1.75
-        self._reasons: Counter[str] = Counter()
         self._lifted: dict[tuple[int, str], tuple[Stage, Posed]] = {}  # by identity of the stage
-        self._backtracks = 0
-        self._farthest = 0.0
-
-    def run(self, start: Stage) -> Extension:
-        first = self._without_others(start)
-        if first is None:
-            return self._failed(f"cannot leave {', '.join(set(start.contacts) - set(self._feet))}")
-        states, options = [first], [self._options(first)]
-        while states:
-            ended = self._ended(states[-1])
-            if ended is not None:
-                return Extension(ended, self._poser.searches, self._backtracks)
-            following = None if self._spent else next(options[-1], None)
-            if following is not None:
-                states.append(following)
-                options.append(self._options(following))
-                continue
-            if self._spent:
-                return self._failed(f"no contacts after {self._poser.searches} postures")
-            states.pop()
-            options.pop()
-            self._backtracks += 1
-        return self._failed("no contacts follow the guide")
 
     @property
-    def _spent(self) -> bool:
-        return self._poser.searches >= self._settings.searches
+    def feet(self) -> frozenset[str]:
+        """Effectors that step."""
+        return frozenset(self._below_root)
 
-    def _without_others(self, start: Stage) -> _State | None:
-        """The state after contacts that are no feet have been left, all at once."""
-        feet = {name: contact for name, contact in start.contacts.items() if name in self._feet}
-        along = dict.fromkeys(feet, 0.0)
-        if len(feet) == len(start.contacts):
-            return _State((start,), along)
-        leaving = self._poser.pose(start.contacts, feet, start.q, inset=SEAT_OFF_INSET, restarts=True)
-        if leaving.q is None:
-            self._reasons[leaving.reason] += 1
-            return None
-        over_feet = Configuration(self._body, leaving.q).com[:2]
-        stages = [start]
-        for share in LEANING:
-            place = (1.0 - share) * start.com[:2] + share * over_feet
-            posed = self._poser.pose(start.contacts, start.contacts, stages[-1].q, place=place)
-            if posed.q is not None:
-                stages.append(Stage.of(self._body, start.contacts, posed.q, LEANING_TIME, SEATED_ROOM))
-        rising = RISING_TIME
-        stages.append(Stage.of(self._body, feet, leaving.q, rising, SEATED_ROOM))
-        risen = self._poser.pose(feet, feet, leaving.q, self._guide.at(0.0), restarts=True)
-        if risen.q is None:
-            self._reasons[risen.reason] += 1
-            return None
-        stages.append(Stage.of(self._body, feet, risen.q, SETTLING_TIME))
-        return _State(tuple(stages), along)
-
-    def _ended(self, state: _State) -> ContactPlan | None:
+    def finished(self, partial: PartialPlan) -> ContactPlan | None:
         """The plan, when every foot is where it is at the goal."""
-        self._farthest = max(self._farthest, float(np.mean(list(state.along.values()))))
-        if not all(self._is_at_goal(state, foot) for foot in self._feet):
+        if not all(self._is_at_goal(partial, foot) for foot in self._below_root):
             return None
-        contacts = state.last.contacts
+        contacts = partial.last.contacts
         posed = self._poser.pose(contacts, contacts, self._goal.q, self._goal.q[:7], restarts=True)
         if posed.q is None:
-            self._reasons[f"at the goal: {posed.reason}"] += 1
+            self._log.refuse(f"at the goal: {posed.reason}")
             return None
-        return ContactPlan.of(self._body, state.stages, posed.q)
+        return ContactPlan.of(self._body, partial.stages, posed.q)
 
-    def _is_at_goal(self, state: _State, foot: str) -> bool:
-        held, wanted = state.last.contacts.get(foot), self._goal.contacts[foot]
+    def proposals(self, partial: PartialPlan) -> Iterator[_Step]:
+        """Steps, the longest of the foot that is farthest behind first."""
+        for name in sorted(partial.along, key=lambda foot: partial.along[foot]):
+            if self._is_at_goal(partial, name):
+                continue
+            tried: list[FloatArray] = []
+            for along, contact in self._wanted(partial, name):
+                if any(np.linalg.norm(contact.position - other) < 0.03 for other in tried):
+                    continue
+                tried.append(contact.position)
+                yield _Step(name, contact, along)
+
+    def accepted(self, partial: PartialPlan, change: _Step) -> PartialPlan | None:
+        """The plan with a step more, or None where a posture is missing."""
+        foot, contact, held = change.foot, change.contact, partial.last.contacts
+        standing = {name: other for name, other in held.items() if name != foot}
+        landed = {**standing, foot: contact}
+        along = {**partial.along, foot: change.along}
+        lifting = self._lifting(partial, foot)
+        if lifting.q is None:
+            self._log.refuse(f"{foot} cannot be lifted: {lifting.reason}")
+            return None
+        there = float(np.mean(list(along.values())))
+        landing = self._poser.pose(landed, standing, lifting.q, self._guide.at(there))
+        if landing.q is None:
+            self._log.refuse(f"{foot} cannot be put down: {landing.reason}")
+            return None
+        way = 0.0 if foot not in held else float(np.linalg.norm(contact.position - held[foot].position))
+        flight = max(self._settings.swing_duration, way / self._settings.swing_speed)
+        stages = (
+            *partial.stages,
+            Stage.of(self._body, standing, lifting.q, flight),
+            Stage.of(self._body, landed, landing.q, self._settings.shift_duration),
+        )
+        return PartialPlan(stages, along)
+
+    def _is_at_goal(self, partial: PartialPlan, foot: str) -> bool:
+        held, wanted = partial.last.contacts.get(foot), self._goal.contacts[foot]
         if held is None:
             return False
         away = float(np.linalg.norm(held.position - wanted.position))
         return away <= AT_GOAL and float(np.cos(held.yaw - wanted.yaw)) >= np.cos(AT_GOAL_TURN)
 
-    def _options(self, state: _State) -> Iterator[_State]:
-        """States one step further, the longest step of the foot that is farthest behind first."""
-        for name in sorted(state.along, key=lambda foot: state.along[foot]):
-            if self._is_at_goal(state, name):
-                continue
-            tried: list[FloatArray] = []
-            for along, contact in self._wanted(state, name):
-                if any(np.linalg.norm(contact.position - other) < 0.03 for other in tried):
-                    continue
-                tried.append(contact.position)
-                following = self._step(state, name, contact, along)
-                if following is not None:
-                    yield following
-                if self._spent:
-                    return
-
-    def _wanted(self, state: _State, foot: str) -> Iterator[tuple[float, Contact]]:
+    def _wanted(self, partial: PartialPlan, foot: str) -> Iterator[tuple[float, Contact]]:
         """Contacts to which a foot may go, each with how far along the guide it is."""
-        own = state.along[foot]
-        ahead = max(value for name, value in state.along.items() if name != foot)
+        own = partial.along[foot]
+        ahead = max(value for name, value in partial.along.items() if name != foot)
         strides = [ahead + share * self._stride for share in self._settings.shares]
         # Where no stride leads, the foot comes nearer first, as on a turn.
         nearer = [own + share * (min(strides[0], self._guide.length) - own) for share in NEARER]
@@ -253,60 +193,29 @@ class _Search:
         """Contacts of a foot near where it would be if the body stood below the guide's pose."""
         pose = self._guide.at(along)
         yaw = heading_of(pose)
-        wanted = pose[:3] + rotation_from_yaw(yaw) @ self._feet[foot]
+        wanted = pose[:3] + rotation_from_yaw(yaw) @ self._below_root[foot]
         holds = self._footholds.near(wanted, yaw)
         if not holds:
-            self._reasons[f"no foothold for {foot} near {np.round(wanted, 2).tolist()} m"] += 1
+            self._log.refuse(f"no foothold for {foot} near {np.round(wanted, 2).tolist()} m")
         return [
             hold.contact(foot, self._footholds.length, self._footholds.width, self._settings.friction)
             for hold in holds
         ]
 
-    def _step(self, state: _State, foot: str, contact: Contact, along: float) -> _State | None:
-        """One foot put to another place, or None where a posture is missing."""
-        held = state.last.contacts
-        standing = {name: other for name, other in held.items() if name != foot}
-        landed = {**standing, foot: contact}
-        here = float(np.mean(list(state.along.values())))
-        there = float(np.mean([along, *(value for name, value in state.along.items() if name != foot)]))
-        lifting = self._lifting(state, foot, here)
-        if lifting.q is None:
-            self._reasons[f"{foot} cannot be lifted: {lifting.reason}"] += 1
-            return None
-        landing = self._poser.pose(landed, standing, lifting.q, self._guide.at(there))
-        if landing.q is None:
-            self._reasons[f"{foot} cannot be put down: {landing.reason}"] += 1
-            return None
-        way = 0.0 if foot not in held else float(np.linalg.norm(contact.position - held[foot].position))
-        flight = max(self._settings.swing_duration, way / self._settings.swing_speed)
-        stages = (
-            *state.stages,
-            Stage.of(self._body, standing, lifting.q, flight),
-            Stage.of(self._body, landed, landing.q, self._settings.shift_duration),
-        )
-        return _State(stages, {**state.along, foot: along})
-
-    def _lifting(self, state: _State, foot: str, here: float) -> Posed:
+    def _lifting(self, partial: PartialPlan, foot: str) -> Posed:
         """Posture before a foot is lifted: the same wherever it goes, and looked for once.
 
         It counts every time, so that a foot that cannot be lifted uses up the search.
         """
-        key = id(state.last), foot
+        key = id(partial.last), foot
         if key in self._lifted:
             self._poser.searches += 1
             return self._lifted[key][1]
-        held = state.last.contacts
+        held = partial.last.contacts
         standing = {name: other for name, other in held.items() if name != foot}
-        posed = self._poser.pose(held, standing, state.last.q, self._guide.at(here))
-        self._lifted[key] = state.last, posed
+        posed = self._poser.pose(held, standing, partial.last.q, self._guide.at(partial.here))
+        self._lifted[key] = partial.last, posed
         return posed
-
-    def _failed(self, what: str) -> Extension:
-        reached = self._farthest / self._guide.length if self._guide.length > 0.0 else 0.0
-        most = self._reasons.most_common(1)
-        why = f"; most often: {most[0][0]}" if most else ""
-        text = f"{what} beyond {100.0 * reached:.0f} % of it ({self._farthest:.2f} m){why}"
-        return Extension(None, self._poser.searches, self._backtracks, text, reached)
 
 
 def _standing_feet(body: BodyModel) -> dict[str, FloatArray]:

@@ -8,7 +8,6 @@ contacts that stay.  Where one is missing, another place, a shorter way or anoth
 the change before is taken back.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
@@ -16,7 +15,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manikin.contact import Contact, ContactKind
-from manikin.contact_planning.extend import Extension
+from manikin.contact_planning.depth_first import SearchLog, search_depth_first
+from manikin.contact_planning.extension import Extension, PartialPlan
 from manikin.contact_planning.generator import GeneratedContact
 from manikin.contact_planning.guide_line import GuideLine
 from manikin.contact_planning.limb_places import LimbPlaces
@@ -62,21 +62,22 @@ class LimbExtendSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class _State:
-    """Where the search is: stages so far and how far along the guide the contact of each limb is."""
+class _Move:
+    """One limb to another place, or away for good.
 
-    stages: tuple[Stage, ...]
+    Attributes:
+        limb: Its effector, or that of what makes no contacts, such as a seat.
+        lifting: (nq,) posture that rests on all other contacts.
+        place: What the generator found; None for what is left for good.
+        along: How far along the guide all limbs are then [m].
+        there: How far along it the root is then [m].
+    """
+
+    limb: str
+    lifting: FloatArray
+    place: GeneratedContact | None
     along: Mapping[str, float]
-
-    @property
-    def last(self) -> Stage:
-        return self.stages[-1]
-
-    @property
-    def here(self) -> float:
-        """How far along the guide the root is."""
-        held = [self.along[name] for name in self.last.contacts]
-        return float(np.mean(held)) if held else 0.0
+    there: float
 
 
 def extend_limbs(
@@ -95,96 +96,76 @@ def extend_limbs(
         start: Contacts and posture at the start; limbs without a contact make one where they can.
         settings: How to search.
     """
-    return _Search(poser, places, guide, settings or LimbExtendSettings()).run(start)
+    settings = settings or LimbExtendSettings()
+    log = SearchLog(poser, settings.searches)
+    along = dict.fromkeys(places.limbs, -settings.stride) | dict.fromkeys(start.contacts, 0.0)
+    moves = _LimbMoves(poser, places, guide, settings, log)
+    return search_depth_first(PartialPlan((start,), along), moves, log, guide.length)
 
 
-class _Search:
-    """Depth-first search over changes of contact."""
+class _LimbMoves:
+    """Moves of any limbs, as :class:`~manikin.contact_planning.depth_first.Moves`."""
 
     def __init__(
-        self, poser: Poser, places: LimbPlaces, guide: GuideLine, settings: LimbExtendSettings
+        self,
+        poser: Poser,
+        places: LimbPlaces,
+        guide: GuideLine,
+        settings: LimbExtendSettings,
+        log: SearchLog,
     ) -> None:
         self._poser, self._places, self._guide, self._settings = poser, places, guide, settings
-        self._body = poser.body
-        self._searches = poser.searches
-        self._reasons: Counter[str] = Counter()
-        self._backtracks = 0
-        self._farthest = 0.0
+        self._body, self._log = poser.body, log
 
-    def run(self, start: Stage) -> Extension:
-        free = -self._settings.stride
-        along = {name: 0.0 if name in start.contacts else free for name in self._places.limbs}
-        along.update(dict.fromkeys(start.contacts, 0.0))
-        first = _State((start,), along)
-        states, options = [first], [self._options(first)]
-        while states:
-            self._farthest = max(self._farthest, states[-1].here)
-            ended = self._ended(states[-1])
-            if ended is not None:
-                return Extension(ended, self._spent, self._backtracks)
-            following = None if self._is_spent else next(options[-1], None)
-            if following is not None:
-                states.append(following)
-                options.append(self._options(following))
-                continue
-            if self._is_spent:
-                return self._failed(f"no contacts after {self._spent} postures")
-            states.pop()
-            options.pop()
-            self._backtracks += 1
-        return self._failed("no contacts follow the guide")
-
-    @property
-    def _spent(self) -> int:
-        return self._poser.searches - self._searches
-
-    @property
-    def _is_spent(self) -> bool:
-        return self._spent >= self._settings.searches
-
-    def _ended(self, state: _State) -> ContactPlan | None:
+    def finished(self, partial: PartialPlan) -> ContactPlan | None:
         """The plan, when the root can be where the guide ends."""
-        if state.here < self._guide.length - 0.5 * self._settings.stride:
+        if partial.here < self._guide.length - 0.5 * self._settings.stride:
             return None
-        contacts, goal = state.last.contacts, self._guide.at(self._guide.length)
-        posed = self._poser.pose(contacts, contacts, state.last.q, goal)
+        contacts, goal = partial.last.contacts, self._guide.at(self._guide.length)
+        posed = self._poser.pose(contacts, contacts, partial.last.q, goal)
         if posed.q is None:
             return None
         away = float(np.linalg.norm(posed.q[:3] - goal[:3]))
         turn = Rotation.from_quat(posed.q[3:7]) * Rotation.from_quat(goal[3:]).inv()
         if away > self._settings.goal_distance or turn.magnitude() > self._settings.goal_turn:
-            self._reasons[f"the root stays {away:.2f} m from its goal"] += 1
+            self._log.refuse(f"the root stays {away:.2f} m from its goal")
             return None
-        return ContactPlan.of(self._body, state.stages, posed.q, self._settings.hinge_pace)
+        return ContactPlan.of(self._body, partial.stages, posed.q, self._settings.hinge_pace)
 
-    def _options(self, state: _State) -> Iterator[_State]:
-        """States one change further, of the limb that is farthest behind first."""
-        for name in sorted(state.along, key=lambda limb: state.along[limb]):
-            lifting = self._lifted(state, name)
+    def proposals(self, partial: PartialPlan) -> Iterator[_Move]:
+        """Moves of the limb that is farthest behind first."""
+        for name in sorted(partial.along, key=lambda limb: partial.along[limb]):
+            lifting = self._lifted(partial, name)
             if lifting.q is None:
-                self._reasons[f"{name} cannot leave its contact: {lifting.reason}"] += 1
+                self._log.refuse(f"{name} cannot leave its contact: {lifting.reason}")
                 continue
             if name not in self._places.limbs:
-                yield self._left(state, name, lifting.q)
+                left = {other: value for other, value in partial.along.items() if other != name}
+                yield _Move(name, lifting.q, None, left, partial.here)
                 continue
-            for along in self._aims(state, name):
-                yield from self._moves(state, name, lifting.q, along)
-                if self._is_spent:
+            for along in self._aims(partial, name):
+                yield from self._ahead(partial, name, lifting.q, along)
+                if self._log.is_spent:
                     return
 
-    def _left(self, state: _State, name: str, lifting: FloatArray) -> _State:
-        """A contact that no limb makes, such as a seat, left for good."""
-        staying = {other: contact for other, contact in state.last.contacts.items() if other != name}
-        stage = Stage.of(self._body, staying, lifting, self._settings.swing_duration)
-        along = {other: value for other, value in state.along.items() if other != name}
-        return _State((*state.stages, stage), along)
+    def accepted(self, partial: PartialPlan, change: _Move) -> PartialPlan | None:
+        """The plan with a move more, or None where a posture is missing."""
+        if change.place is None:
+            return self._left(partial, change)
+        return self._landed(partial, change, change.place)
 
-    def _aims(self, state: _State, name: str) -> Iterator[float]:
+    def _left(self, partial: PartialPlan, move: _Move) -> PartialPlan:
+        """A contact that no limb makes, such as a seat, left for good."""
+        staying = _without(move.limb, partial.last.contacts)
+        stage = Stage.of(self._body, staying, move.lifting, self._settings.swing_duration)
+        return PartialPlan((*partial.stages, stage), move.along)
+
+    def _aims(self, partial: PartialPlan, name: str) -> Iterator[float]:
         """How far along the guide the limb may go next."""
-        held = [state.along[other] for other in state.last.contacts if other != name]
-        ahead, own = max(held, default=0.0), state.along[name]
+        held = [partial.along[other] for other in partial.last.contacts if other != name]
+        ahead, own = max(held, default=0.0), partial.along[name]
         step = self._settings.stride / max(1, len(self._places.limbs) - 1)
-        if name not in state.last.contacts:
+        if name not in partial.last.contacts:
             step = 0.0
         tried: list[float] = []
         for share in self._settings.shares:
@@ -193,74 +174,60 @@ class _Search:
                 tried.append(along)
                 yield along
 
-    def _lifted(self, state: _State, name: str) -> Posed:
+    def _lifted(self, partial: PartialPlan, name: str) -> Posed:
         """Posture that holds all contacts and rests on all but one."""
-        held = state.last.contacts
+        held = partial.last.contacts
         if name not in held:
-            return Posed(state.last.q)
-        carrying = {other: contact for other, contact in held.items() if other != name}
-        return self._pose(held, carrying, state.last.q, self._guide.at(state.here))
+            return Posed(partial.last.q)
+        return self._pose(held, _without(name, held), partial.last.q, self._guide.at(partial.here))
 
-    def _moves(self, state: _State, name: str, lifting: FloatArray, along: float) -> Iterator[_State]:
-        """States in which one limb has moved to a place ahead."""
-        held = state.last.contacts
-        staying = {other: contact for other, contact in held.items() if other != name}
-        progress = {**state.along, name: along}
+    def _ahead(self, partial: PartialPlan, name: str, lifting: FloatArray, along: float) -> Iterator[_Move]:
+        """Places ahead to which one limb may move."""
+        staying = _without(name, partial.last.contacts)
+        progress = {**partial.along, name: along}
         there = float(np.mean([progress[other] for other in (*staying, name)]))
         ahead = self._pose(staying, staying, lifting, self._guide.at(there))
         if ahead.q is None:
-            self._reasons[f"the root cannot go on without {name}: {ahead.reason}"] += 1
+            self._log.refuse(f"the root cannot go on without {name}: {ahead.reason}")
             return
         direction = self._direction(there)
         found = self._places.find(name, ahead.q, self._guide.at(along), direction, self._settings.places)
         for place in found:
-            following = self._landed(state, name, lifting, place, progress, there)
-            if following is not None:
-                yield following
-            if self._is_spent:
-                return
+            yield _Move(name, lifting, place, progress, there)
 
-    def _landed(
-        self,
-        state: _State,
-        name: str,
-        lifting: FloatArray,
-        place: GeneratedContact,
-        along: Mapping[str, float],
-        there: float,
-    ) -> _State | None:
+    def _landed(self, partial: PartialPlan, move: _Move, place: GeneratedContact) -> PartialPlan | None:
         """The limb put to a place, or None where a posture is missing."""
+        name = move.limb
         if place.contact is None or place.q is None:
-            self._reasons[place.message] += 1
+            self._log.refuse(place.message)
             return None
         contact = replace(place.contact, oriented=False)
-        held = state.last.contacts
-        before = held.get(name)
+        before = partial.last.contacts.get(name)
         if (
             before is not None
             and np.linalg.norm(before.position - contact.position) < self._settings.same_place
         ):
-            return replace(state, along=along)
-        staying = {other: item for other, item in held.items() if other != name}
+            return replace(partial, along=move.along)
+        staying = _without(name, partial.last.contacts)
         landed = {**staying, name: contact}
-        landing = self._pose(landed, staying, place.q, self._guide.at(there))
+        landing = self._pose(landed, staying, place.q, self._guide.at(move.there))
         if landing.q is None:
-            self._reasons[f"{name} cannot be put down: {landing.reason}"] += 1
+            self._log.refuse(f"{name} cannot be put down: {landing.reason}")
             return None
         way = 0.0 if before is None else float(np.linalg.norm(contact.position - before.position))
         flight = max(self._settings.swing_duration, way / self._settings.swing_speed)
-        stages = state.stages
+        stages = partial.stages
         if before is None:
             # The limb is free already: it reaches its contact while the phase before lasts.
             stages = (*stages[:-1], replace(stages[-1], min_duration=max(stages[-1].min_duration, flight)))
         else:
-            via = self._between(staying, lifting, landing.q, before, contact)
+            via = self._between(staying, move.lifting, landing.q, before, contact)
             if via is None:
-                self._reasons[f"{name} finds no way around"] += 1
+                self._log.refuse(f"{name} finds no way around")
                 return None
-            stages = (*stages, Stage.of(self._body, staying, lifting, flight, via=via))
+            stages = (*stages, Stage.of(self._body, staying, move.lifting, flight, via=via))
         stages = (*stages, Stage.of(self._body, landed, landing.q, self._settings.shift_duration))
-        return _State(stages, along)
+        return PartialPlan(stages, move.along)
 
     def _between(
         self,
@@ -309,9 +276,7 @@ class _Search:
         direction = UP + (onward / length if length > 1e-9 else 0.0)
         return direction if np.linalg.norm(direction) > 0.1 else UP
 
-    def _failed(self, what: str) -> Extension:
-        reached = self._farthest / self._guide.length if self._guide.length > 0.0 else 0.0
-        most = self._reasons.most_common(1)
-        why = f"; most often: {most[0][0]}" if most else ""
-        text = f"{what} beyond {100.0 * reached:.0f} % of it ({self._farthest:.2f} m){why}"
-        return Extension(None, self._spent, self._backtracks, text, reached)
+
+def _without(name: str, contacts: Mapping[str, Contact]) -> dict[str, Contact]:
+    """All contacts but one."""
+    return {other: contact for other, contact in contacts.items() if other != name}
