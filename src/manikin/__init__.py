@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 from manikin.version import __version__
 
 if TYPE_CHECKING:
-    from manikin.pipeline import RunResult
+    from manikin.stages import RunResult
 
 __all__ = ["__version__", "run"]
 

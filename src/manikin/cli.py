@@ -220,7 +220,7 @@ def view(
         typer.echo(f"viewer at {url} (Ctrl-C ends it)", err=True)
 
     if contacts:
-        from manikin.live_contacts import LiveContacts
+        from manikin.contact_planning.live_contacts import LiveContacts
         from manikin.scenarios import load_scenario
         from manikin.scenarios.start import start_posture
         from manikin.viewer import serve_contacts
@@ -293,9 +293,9 @@ def contact(
     json: JsonOption = False,
 ) -> int:
     """Find the contact of one limb that serves a task best."""
+    from manikin.contact_planning.single_contact import ContactQuestion, find_contact
     from manikin.scenarios import load_scenario
     from manikin.scenarios.start import start_posture
-    from manikin.single_contact import ContactQuestion, find_contact
 
     job = load_scenario(scenario)
     with _stdout_kept_clean():

@@ -8,6 +8,7 @@ import numpy as np
 from manikin.atomic import write_text
 from manikin.body import BodyModel
 from manikin.comparison import RunComparison
+from manikin.contact_planning.single_contact import ContactAnswer
 from manikin.errors import MotionFileError
 from manikin.export import export_motion
 from manikin.figures import ChoicePanel, contact_choice_figure, write_comparison, write_figures
@@ -16,7 +17,6 @@ from manikin.figures.write import save_figure
 from manikin.output import FIGURES, to_json
 from manikin.record import read_run
 from manikin.scene import Scene
-from manikin.single_contact import ContactAnswer
 
 COMPARISON = "comparison.json"
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from manikin import pipeline
-from manikin.contact_search import find_supports
 from manikin.errors import ScenarioError
 from manikin.scenarios import load_scenario
 from manikin.scenarios.planned import PLANNING, with_supports
+from manikin.stages.contacts import find_supports
 
 
 def search(name, variant=None, overrides=()):

@@ -7,9 +7,9 @@ import yaml
 from manikin import pipeline
 from manikin.balance import signed_distance, support_polygon
 from manikin.contact import ContactSchedule, Stance
-from manikin.contact_search import find_supports
 from manikin.scenarios import load_scenario
 from manikin.scene.distance import Proximity
+from manikin.stages.contacts import find_supports
 from manikin.wholebody import refine_motion
 
 FOUND = ("crouch", "stairs", "stand-up-chair", "stand-up-sofa", "platform@found")

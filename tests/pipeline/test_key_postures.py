@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from manikin import pipeline
 from manikin.pipeline import run
 from manikin.scenarios import load_scenario
+from manikin.stages import Report, RunContext, key_postures
+from manikin.stages.centroidal import plan_centre_of_mass
 from manikin.wholebody import Eligibility
 
 STRIDE = """
@@ -112,41 +113,46 @@ def test_constraints_that_forbid_the_postures_are_named(tmp_path):
     assert result.summary["centroidal"]["replans"] == 1
 
 
-def test_a_seated_part_that_fits_no_replanned_com_is_tried_without_room_in_the_ranges(monkeypatch):
+@pytest.fixture
+def ramp():
+    """Context, report and planned centre of mass of a motion that ends on a seat."""
+    context = RunContext.of(load_scenario("ramp"))
+    report = Report(context, None, None, 0.0)
+    return context, report, plan_centre_of_mass(context, report)
+
+
+def test_a_seated_part_that_fits_no_replanned_com_is_tried_without_room_in_the_ranges(ramp, monkeypatch):
     """The first search plans again and finds no seated part; the second one counts, with its result."""
-    search, calls = pipeline.find_eligible_plan, []
-    job = pipeline._Run(load_scenario("ramp"), None, None, pipeline.ExecutionRequirements(), None)
+    context, report, planned = ramp
+    search, calls = key_postures.find_eligible_plan, []
 
     def first_fails(first, realise, look, *, replan):
         calls.append(look)
         if len(calls) == 1:
-            job._fail("wholebody", "no final sitting posture", 0.0, "phase 6")
+            report.fail("wholebody", "no final sitting posture", 0.0, "phase 6")
             return Eligibility(first, None, None, 1, None)
         return search(first, realise, look, replan=replan)
 
-    monkeypatch.setattr(pipeline, "find_eligible_plan", first_fails)
-    planned = job._plan_com()
-    found = job._test_key_postures(planned, pipeline.KEY_TOLERANCES[0])
+    monkeypatch.setattr(key_postures, "find_eligible_plan", first_fails)
+    found = key_postures.with_key_postures(context, report, planned)
     assert len(calls) == 2
-    _, trajectory = job._take(planned, found)
-    assert trajectory is not None
-    assert job._summary["failure"] is None
+    assert found.trajectory is not None
+    assert report.failure is None
 
 
-def test_a_stricter_search_counts_only_where_it_leads_to_another_plan(monkeypatch):
+def test_a_stricter_search_counts_only_where_it_leads_to_another_plan(ramp, monkeypatch):
     """With the same plan as before nothing changes, the failure of the whole body included."""
-    job = pipeline._Run(load_scenario("ramp"), None, None, pipeline.ExecutionRequirements(), None)
-    planned = job._plan_com()
-    found = job._test_key_postures(planned, pipeline.KEY_TOLERANCES[0])
-    job._fail("wholebody", "nothing found", 1.0, "phase 2")
-    assert job._stricter_plan(planned, found) is None
-    assert job._summary["failure"]["reason"] == "nothing found"
+    context, report, planned = ramp
+    found = key_postures.with_key_postures(context, report, planned)
+    report.fail("wholebody", "nothing found", 1.0, "phase 2")
+    assert key_postures.with_stricter_key_postures(context, report, planned, found) is None
+    assert report.failure.reason == "nothing found"
 
     def another(first, realise, *_, **__):
         return Eligibility(first, realise(first.trajectory), None, found.replans + 1, None)
 
-    monkeypatch.setattr(pipeline, "find_eligible_plan", another)
-    other = job._stricter_plan(planned, found)
+    monkeypatch.setattr(key_postures, "find_eligible_plan", another)
+    other = key_postures.with_stricter_key_postures(context, report, planned, found)
     assert other is not None
     assert other.replans == found.replans + 1
-    assert job._summary["failure"] is None
+    assert report.failure is None

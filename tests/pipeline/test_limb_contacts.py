@@ -12,11 +12,11 @@ import yaml
 from manikin import pipeline
 from manikin.contact import ContactKind
 from manikin.contact_planning import certify_plan
-from manikin.contact_search import find_supports
 from manikin.errors import ScenarioError
 from manikin.scenarios import load_scenario
 from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
 from manikin.spatial import GRAVITY
+from manikin.stages.contacts import find_supports
 from manikin.wholebody import refine_motion
 
 DOG = Path(__file__).parents[1] / "body" / "data" / "dog.urdf"

@@ -9,10 +9,10 @@ from manikin import pipeline
 from manikin.errors import ScenarioError
 from manikin.figures.flights import flights_figure
 from manikin.motion.file import read_motions
-from manikin.pipeline import ExecutionRequirements
 from manikin.record import read_run
 from manikin.results import result
 from manikin.scenarios import load_scenario
+from manikin.stages import ExecutionRequirements
 from manikin.wholebody.contact_slack import contact_slack
 from manikin.wholebody.refine_measures import whole_body_wrench
 

@@ -7,8 +7,9 @@ import pytest
 
 import manikin
 from manikin.motion.file import read_motions
-from manikin.pipeline import ExecutionRequirements, run
+from manikin.pipeline import run
 from manikin.scenarios import load_scenario
+from manikin.stages import ExecutionRequirements
 
 BEAMS = ("H1C1", "H2C1", "H3C1", "H2C2", "H2C3")
 

@@ -9,10 +9,10 @@ import pytest
 
 from manikin.body import Configuration, human, point_mass
 from manikin.cli import BAD_INPUT, DONE, main
+from manikin.contact_planning.live_contacts import LiveContacts
+from manikin.contact_planning.single_contact import Role
 from manikin.errors import BodyError
-from manikin.live_contacts import LiveContacts
 from manikin.scene import Box, Obstacle, Scene
-from manikin.single_contact import Role
 
 pytest.importorskip("viser")
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from manikin.errors import InputError
 
 if TYPE_CHECKING:
-    from manikin.live_contacts import LiveContacts
+    from manikin.contact_planning.live_contacts import LiveContacts
     from manikin.motion.file import MotionFile
 
 __all__ = ["serve", "serve_contacts"]

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from manikin.contact_planning import HEURISTICS
-from manikin.live_contacts import LiveAnswer, LiveContacts
-from manikin.single_contact import Role
+from manikin.contact_planning.live_contacts import LiveAnswer, LiveContacts
+from manikin.contact_planning.single_contact import Role
 from manikin.spatial import FloatArray
 from manikin.viewer.stage import HOST, BodyShapes, add_scene, side_colour, start_server, stop_server
 

@@ -17,6 +17,9 @@ from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.scenarios import Scenario
+from manikin.stages.context import RunContext
+from manikin.stages.planned_motion import PlannedMotion
+from manikin.stages.report import Failure, Report
 
 FORCE_ERROR = 0.05
 """Largest error of the mean force that was exerted, as a share of what is wanted."""
@@ -81,6 +84,47 @@ class ActStage:
         wrong = abs(measured.mean_force - act.force) > FORCE_ERROR * act.force
         reason = f"the mean force was {measured.mean_force:.0f} N; wanted {act.force:g} N"
         return ActOutcome(measured.summary(), failure=reason if wrong else None)
+
+
+def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> PlannedMotion:
+    """A motion with the scenario's act at its end; as it is without one, or where it cannot be done.
+
+    Args:
+        context: Of the run.
+        report: Takes the ``act`` block.
+        planned: The motion to the place of the act.
+    """
+    act = act_of(context.scenario)
+    if act is None:
+        return planned
+    found = ActStage(context.scenario, context.body, act).plan(planned.motion, planned.schedule)
+    report.finish("act", found.summary)
+    if found.planned is None:
+        report.fail("wholebody", found.failure or "", planned.end, act.obstacle)
+        return planned
+    report.keep_motions(found.planned.schedule, found.planned.motion)
+    return PlannedMotion(found.planned.schedule, found.planned.motion, found.planned)
+
+
+def measured_act_failure(
+    context: RunContext, report: Report, planned: PlannedMotion, executed: Motion
+) -> Failure | None:
+    """Add what was exerted to the report; a failure where it is too little or too much.
+
+    Args:
+        context: Of the run.
+        report: Has the ``act`` block.
+        planned: The motion, with its act or without one.
+        executed: What the physics engine made of it.
+    """
+    act = act_of(context.scenario)
+    if act is None or planned.act is None:
+        return None
+    found = ActStage(context.scenario, context.body, act).measure(executed, planned.act)
+    report.finish("act", report.summary["act"] | found.summary)
+    if found.failure is None:
+        return None
+    return Failure("execution", found.failure, planned.act.timing.end, act.obstacle)
 
 
 def _summary(act: Act, largest: BracedForces | None, forces: BracedForces | None) -> dict[str, Any]:

@@ -1,7 +1,4 @@
-"""From start and goal to contacts of any limbs: guide, then algorithm 7 ([Tonneau2015]_ chapters 6 and 7)."""
-
-import time as clock
-from typing import Any
+"""Contacts of any limbs from start and goal: guide, then algorithm 7 ([Tonneau2015]_ chapters 6 and 7)."""
 
 import numpy as np
 
@@ -10,8 +7,6 @@ from manikin.contact import Contact, ContactKind
 from manikin.contact_planning import (
     ContactRules,
     Endpoints,
-    GuideLine,
-    Habit,
     LimbExtendSettings,
     LimbPlaces,
     Poser,
@@ -21,24 +16,22 @@ from manikin.contact_planning import (
     heading_of,
     sample_limbs,
 )
-from manikin.found_contacts import ContactSearch
 from manikin.reachability import (
     Abstraction,
     Condition,
-    GuideTask,
     LimbRule,
-    LocalPlanner,
     SamplingRegion,
     UsableSurface,
     World,
     abstraction_of,
-    nearest_fit,
-    plan_guide,
-    relax,
 )
 from manikin.scenarios import Scenario
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
+from manikin.stages.along_guides import SearchTally
+from manikin.stages.ends import stage_at
+from manikin.stages.found_contacts import ContactSearch
+from manikin.stages.root_guide import RootGuide, guide_root
 from manikin.wholebody.manner import manner_of
 
 STANDING_HEIGHT = 0.92
@@ -68,9 +61,6 @@ LEAN = 0.35
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
-GUIDE_POSES = 200
-"""Poses by which the contact planner knows a guide."""
-
 
 def find_limb_contacts(
     scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
@@ -91,7 +81,7 @@ def find_limb_contacts(
 
 class _LimbSearch:
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
-        self._began = clock.perf_counter()
+        self._tally = SearchTally()
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
         self._limbs = _limbs(body, scenario.contact_limbs or ())
         self._kinds = {limb.name: _kind(body, limb) for limb in self._limbs}
@@ -105,31 +95,19 @@ class _LimbSearch:
         )
         volumes = [samples[limb.name].reach for limb in self._limbs]
         self._abstraction: Abstraction = abstraction_of(body, volumes)
-        self._summary: dict[str, Any] = {
-            "attempts": 0, "steps": None, "phases": None, "guide_length_m": None, "guide_samples": 0,
-            "postures": 0, "backtracks": 0, "guide_wall_s": 0.0, "wall_s": 0.0,
-        }  # fmt: skip
 
     def run(self) -> ContactSearch:
         start, goal = self._start(), self._goal()
         if isinstance(start, str):
-            return self._failed(start, "start")
+            return self._tally.failed(start, "start")
         if isinstance(goal, str):
-            return self._failed(goal, "goal")
-        reason = ""
-        for _ in range(self._scenario.contacts.attempts):
-            self._summary["attempts"] += 1
-            line, reason = self._guide(start.q[:7], goal)
-            if line is None:
-                return self._failed(reason, "guide")
-            found = extend_limbs(self._poser, self._places, line, start, self._settings())
-            self._summary["postures"] += found.searches
-            self._summary["backtracks"] += found.backtracks
-            if found.plan is not None:
-                self._summary.update(steps=found.plan.steps, phases=len(found.plan.stages))
-                return ContactSearch(None, found.plan, line, self._done())
-            reason = found.failure or ""
-        return self._failed(reason, "contacts")
+            return self._tally.failed(goal, "goal")
+        settings = self._settings()
+        return self._tally.along_guides(
+            self._scenario.contacts.attempts,
+            lambda: self._guide(start.q[:7], goal),
+            lambda line, _: extend_limbs(self._poser, self._places, line, start, settings),
+        )
 
     @property
     def _climbs(self) -> bool:
@@ -160,12 +138,10 @@ class _LimbSearch:
 
     def _start(self) -> Stage | str:
         """Where the body is at the start, or why it cannot be there."""
+        if self._body.stature is not None:
+            return stage_at(self._endpoints(), self._scenario, "start")
         state = self._scenario.file.task.start
         at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
-        if self._body.stature is not None:
-            ends = Endpoints(self._body, self._scene, self._scenario.contacts.friction)
-            found = ends.find(at, yaw, Habit(state.posture or "standing"), state.height_m)
-            return found.stage or f"the start: {found.failure}"
         q = self._standing(at, yaw, state.height_m)
         contacts: dict[str, Contact] = {}
         for name, limb in self._places.limbs.items():
@@ -180,13 +156,15 @@ class _LimbSearch:
 
     def _goal(self) -> FloatArray | str:
         """(7,) pose of the root at the goal, or why there is none."""
+        if self._body.stature is not None and not self._climbs:
+            found = stage_at(self._endpoints(), self._scenario, "goal")
+            return found if isinstance(found, str) else found.q[:7]
         state = self._scenario.file.task.goal
-        at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
-        if self._body.stature is None or self._climbs:
-            return self._standing(at, yaw, state.height_m)[:7]
-        ends = Endpoints(self._body, self._scene, self._scenario.contacts.friction)
-        found = ends.find(at, yaw, Habit(state.posture or "standing"), state.height_m)
-        return found.stage.q[:7] if found.stage is not None else f"the goal: {found.failure}"
+        yaw = float(np.deg2rad(state.heading_deg or 0.0))
+        return self._standing(np.array(state.at), yaw, state.height_m)[:7]
+
+    def _endpoints(self) -> Endpoints:
+        return Endpoints(self._body, self._scene, self._scenario.contacts.friction)
 
     def _standing(self, at: FloatArray, yaw: float, height: float | None) -> FloatArray:
         """(nq,) reference posture at a place, as high as if it stood there."""
@@ -196,22 +174,10 @@ class _LimbSearch:
         q[3:7] = [0.0, 0.0, np.sin(0.5 * yaw), np.cos(0.5 * yaw)]
         return q
 
-    def _guide(self, start: FloatArray, goal: FloatArray) -> tuple[GuideLine | None, str]:
-        began = clock.perf_counter()
+    def _guide(self, start: FloatArray, goal: FloatArray) -> RootGuide:
         ends = np.array([start, goal])
         world = World(self._scene, self._abstraction, self._region(ends), self._condition())
-        checker = world.checker()
-        fits = [nearest_fit(pose, checker) for pose in ends]
-        ends = np.array([pose if fit is None else fit for pose, fit in zip(ends, fits, strict=True)])
-        result = plan_guide(world, GuideTask(*ends), self._rng)
-        self._summary["guide_samples"] += result.statistics.samples
-        if result.path is None:
-            return None, result.failure or "no guide"
-        poses = result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES))
-        line = GuideLine.through(relax(poses, LocalPlanner(checker, tuple(ends)), self._rng))
-        self._summary["guide_length_m"] = line.length
-        self._summary["guide_wall_s"] += clock.perf_counter() - began
-        return line, ""
+        return guide_root(world, ends, self._rng)
 
     def _region(self, ends: FloatArray) -> SamplingRegion:
         """Box around start and goal; headings between theirs, and a little beyond."""
@@ -229,12 +195,6 @@ class _LimbSearch:
         least = len(bearing) if len(bearing) <= 4 else len(bearing) - 2
         rule = LimbRule(tuple(bearing) if least == len(bearing) else (), least)
         return Condition((rule,), dict.fromkeys(bearing, UsableSurface((0.0, 0.0, 1.0), STEEPEST)))
-
-    def _failed(self, reason: str, where: str) -> ContactSearch:
-        return ContactSearch(None, None, None, self._done(), reason, where)
-
-    def _done(self) -> dict[str, Any]:
-        return self._summary | {"wall_s": clock.perf_counter() - self._began}
 
 
 def _limbs(body: BodyModel, names: tuple[str, ...]) -> tuple[Limb, ...]:

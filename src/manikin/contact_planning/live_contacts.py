@@ -9,10 +9,12 @@ from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel
 from manikin.contact import ContactKind
-from manikin.contact_planning import ContactGenerator, GeneratedContact, Task, heuristic_named, sample_limbs
-from manikin.errors import BodyError
+from manikin.contact_planning.efort import Task
+from manikin.contact_planning.generator import ContactGenerator, GeneratedContact
+from manikin.contact_planning.heuristics import heuristic_named
+from manikin.contact_planning.samples import sample_limbs
+from manikin.contact_planning.single_contact import SOME_EFORT, Role, check_limbs, reached_efort
 from manikin.scene import Scene
-from manikin.single_contact import SOME_EFORT, Role, reached_efort
 from manikin.spatial import FloatArray, frozen_array
 
 
@@ -63,8 +65,7 @@ class LiveContacts:
         Raises:
             BodyError: If the body has no limbs.
         """
-        if not body.limbs:
-            raise BodyError(f"body {body.name!r} has no limbs; valid: a body with limbs, such as a human")
+        check_limbs(body)
         self.body, self.scene = body, scene
         self.q = np.array(q, dtype=np.float64)
         self.azimuth_deg, self.elevation_deg = 0.0, 90.0

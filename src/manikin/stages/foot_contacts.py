@@ -1,48 +1,44 @@
-"""From start and goal to supports: guide, contacts, and the scenario with what was found.
+"""Contacts of feet from start and goal: guide, contacts, and the scenario with what was found.
 
-The first stage of the pipeline for a scenario that lists no supports ([Tonneau2015]_ chapters 6 and 7).
+For a scenario without supports whose body goes on its feet ([Tonneau2015]_ chapters 6 and 7); the hands
+join in where it ends with an act.
 """
 
-import time as clock
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from manikin.act_stage import act_of
 from manikin.acting import Brace, BraceSettings, arrival, find_brace, with_hands
 from manikin.body import BodyModel, limbs_of, reach_volume
 from manikin.contact_planning import (
     ContactPlan,
     Endpoints,
     ExtendSettings,
+    Extension,
     GuideLine,
-    Habit,
     Stage,
     extend,
     heading_of,
     sample_limbs,
 )
-from manikin.found_contacts import ContactSearch
-from manikin.limb_contact_search import find_limb_contacts
 from manikin.reachability import (
     Abstraction,
     Condition,
-    GuideTask,
     LimbRule,
-    LocalPlanner,
     SamplingRegion,
     UsableSurface,
     World,
     abstraction_of,
-    nearest_fit,
-    plan_guide,
-    relax,
 )
 from manikin.scenarios import Scenario
 from manikin.scenarios.planned import with_supports
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
+from manikin.stages.act import act_of
+from manikin.stages.along_guides import SearchTally
+from manikin.stages.ends import stage_at
+from manikin.stages.found_contacts import ContactSearch
+from manikin.stages.root_guide import RootGuide, guide_root
 from manikin.wholebody.manner import manner_of
 
 LEGS = ("left_leg", "right_leg")
@@ -60,62 +56,54 @@ TURN = float(np.deg2rad(75.0))
 SEARCHES_AGAIN = 60
 """Postures that are looked for along every guide after the first."""
 
-GUIDE_POSES = 200
-"""Poses by which the contact planner knows a guide."""
 
-
-def find_supports(
+def find_foot_contacts(
     scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
 ) -> ContactSearch:
-    """Plan the contacts of a scenario that gives start and goal alone.
+    """Plan the supports of a body that goes on its feet.
 
     Args:
         scenario: Without supports.
-        body: Its body.
+        body: A human.
         scene: Its scene.
         rng: Source of all randomness.
     """
-    if scenario.contact_limbs is not None:
-        return find_limb_contacts(scenario, body, scene, rng)
-    return _Search(scenario, body, scene, rng).run()
+    return _FootSearch(scenario, body, scene, rng).run()
 
 
-class _Search:
+class _FootSearch:
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
-        self._began = clock.perf_counter()
+        self._tally = SearchTally()
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
         self._reference = manner_of(scenario.manner).posture(body)
         self._endpoints = Endpoints(body, scene, scenario.contacts.friction, self._reference)
         self._brace: Brace | None = None
-        self._summary: dict[str, Any] = {
-            "attempts": 0, "steps": None, "phases": None, "guide_length_m": None, "guide_samples": 0,
-            "postures": 0, "backtracks": 0, "guide_wall_s": 0.0, "wall_s": 0.0,
-        }  # fmt: skip
 
     def run(self) -> ContactSearch:
-        start = self._end("start")
+        start = stage_at(self._endpoints, self._scenario, "start")
         if isinstance(start, str):
-            return self._failed(start, "start")
-        goal = self._end("goal") if self._scenario.act is None else self._place_to_act(start)
+            return self._tally.failed(start, "start")
+        goal = self._goal(start)
         if isinstance(goal, str):
-            return self._failed(goal, "goal")
+            return self._tally.failed(goal, "goal")
         standing = self._endpoints.risen(start) if "buttocks" in start.contacts else None
         if standing is not None and standing.stage is None:
-            return self._failed(standing.failure or "", "start")
+            return self._tally.failed(standing.failure or "", "start")
         first = start if standing is None or standing.stage is None else standing.stage
-        for number in range(self._scenario.contacts.attempts):
-            self._summary["attempts"] += 1
-            line, reason = self._guide(first, goal)
-            if line is None:
-                return self._failed(reason, "guide")
-            settings = self._settings(again=number > 0)
-            extension = extend(self._body, self._scene, line, start, goal, settings, self._reference)
-            self._summary["postures"] += extension.searches
-            self._summary["backtracks"] += extension.backtracks
-            if extension.plan is not None:
-                return self._found(self._acting(extension.plan), line)
-            reason = extension.failure or ""
-        return self._failed(reason, "contacts")
+        found = self._tally.along_guides(
+            self._scenario.contacts.attempts,
+            lambda: self._guide(first, goal),
+            lambda line, number: self._follow(line, start, goal, again=number > 0),
+        )
+        if found.plan is None:
+            return found
+        return replace(found, scenario=with_supports(self._scenario, found.plan))
+
+    def _follow(self, line: GuideLine, start: Stage, goal: Stage, *, again: bool) -> Extension:
+        """Contacts along a guide, with the hands on the object where there is an act."""
+        settings = self._settings(again=again)
+        found = extend(self._body, self._scene, line, start, goal, settings, self._reference)
+        return found if found.plan is None else replace(found, plan=self._acting(found.plan))
 
     def _settings(self, *, again: bool) -> ExtendSettings:
         """How contacts are looked for; along another guide, which is much like the first, not as long."""
@@ -123,20 +111,11 @@ class _Search:
         settings = ExtendSettings(stride=options.stride_m, friction=options.friction)
         return replace(settings, searches=SEARCHES_AGAIN) if again else settings
 
-    def _end(self, end: str) -> Stage | str:
-        """Start or goal, or why there is none."""
-        state = getattr(self._scenario.file.task, end)
-        found = self._endpoints.find(
-            np.array(state.at), np.deg2rad(state.heading_deg or 0.0), Habit(state.posture or "standing"),
-            state.height_m,
-        )  # fmt: skip
-        return found.stage or f"the {end}: {found.failure}"
-
-    def _place_to_act(self, start: Stage) -> Stage | str:
-        """Where to stand for the act, on the level of the start, or why it cannot be done."""
+    def _goal(self, start: Stage) -> Stage | str:
+        """Where to go, or why there is no such place; for an act, on the level of the start."""
         act = act_of(self._scenario)
         if act is None:
-            return "there is no act"
+            return stage_at(self._endpoints, self._scenario, "goal")
         samples = sample_limbs(self._body, self._rng)
         friction = self._scenario.contacts.friction
         found = find_brace(
@@ -144,7 +123,7 @@ class _Search:
             level=min(contact.position[2] for contact in start.contacts.values()),
             settings=BraceSettings(friction=friction), reference=self._reference,
         )  # fmt: skip
-        self._summary["act_places"] = found.tried
+        self._tally.summary["act_places"] = found.tried
         if found.brace is None:
             return found.failure or ""
         self._brace = found.brace
@@ -154,23 +133,10 @@ class _Search:
         """The way, and the hands on the object where there is an act."""
         return way if self._brace is None else with_hands(self._body, way, self._brace)
 
-    def _guide(self, start: Stage, goal: Stage) -> tuple[GuideLine | None, str]:
-        began = clock.perf_counter()
+    def _guide(self, start: Stage, goal: Stage) -> RootGuide:
         ends = np.array([start.q[:7], goal.q[:7]])
         world = World(self._scene, self._abstraction(), _region(ends), _condition())
-        checker = world.checker()
-        fits = [nearest_fit(pose, checker) for pose in ends]
-        ends = np.array([pose if fit is None else fit for pose, fit in zip(ends, fits, strict=True)])
-        result = plan_guide(world, GuideTask(*ends), self._rng)
-        self._summary["guide_samples"] += result.statistics.samples
-        if result.path is None:
-            return None, result.failure or "no guide"
-        planner = LocalPlanner(checker, tuple(ends))
-        poses = relax(result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES)), planner, self._rng)
-        line = GuideLine.through(poses)
-        self._summary["guide_length_m"] = line.length
-        self._summary["guide_wall_s"] += clock.perf_counter() - began
-        return line, ""
+        return guide_root(world, ends, self._rng)
 
     def _abstraction(self) -> Abstraction:
         volumes = [
@@ -179,16 +145,6 @@ class _Search:
             if limb.name in LEGS
         ]
         return abstraction_of(self._body, volumes)
-
-    def _found(self, plan: ContactPlan, line: GuideLine) -> ContactSearch:
-        self._summary.update(steps=plan.steps, phases=len(plan.stages))
-        return ContactSearch(with_supports(self._scenario, plan), plan, line, self._done())
-
-    def _failed(self, reason: str, where: str) -> ContactSearch:
-        return ContactSearch(None, None, None, self._done(), reason, where)
-
-    def _done(self) -> dict[str, Any]:
-        return self._summary | {"wall_s": clock.perf_counter() - self._began}
 
 
 def _region(ends: FloatArray) -> SamplingRegion:

@@ -10,15 +10,10 @@ import numpy as np
 from manikin.body import BodyModel, Configuration, LimbKinematics, limb_named
 from manikin.body.limbs import parent_segment
 from manikin.contact import ContactKind
-from manikin.contact_planning import (
-    ContactGenerator,
-    GeneratedContact,
-    Heuristic,
-    Task,
-    efort,
-    heuristic_named,
-    sample_limb,
-)
+from manikin.contact_planning.efort import Task, efort
+from manikin.contact_planning.generator import ContactGenerator, GeneratedContact
+from manikin.contact_planning.heuristics import Heuristic, heuristic_named
+from manikin.contact_planning.samples import sample_limb
 from manikin.errors import BodyError, InputError
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
@@ -147,8 +142,7 @@ def find_contact(body: BodyModel, scene: Scene, q: FloatArray, question: Contact
         InputError: If the limb or the heuristic is not known, the direction is zero, or the limb has
             no such contact.
     """
-    if not body.limbs:
-        raise BodyError(f"body {body.name!r} has no limbs; valid: a body with limbs, such as a human")
+    check_limbs(body)
     limb = limb_named(body, question.limb)
     roles = _roles(question, limb.kind)
     tasks = [_task(question, role) for role in roles]
@@ -161,6 +155,16 @@ def find_contact(body: BodyModel, scene: Scene, q: FloatArray, question: Contact
     found, wall = _ask(generator, q, question, heuristic, roles, tasks)
     role, result, score = max(found, key=lambda item: -np.inf if item[2] is None else item[2])
     return ContactAnswer(question, np.array(q), result, role, score, prepared - started, wall)
+
+
+def check_limbs(body: BodyModel) -> None:
+    """Check that a body has limbs that can make contacts.
+
+    Raises:
+        BodyError: If it has none.
+    """
+    if not body.limbs:
+        raise BodyError(f"body {body.name!r} has no limbs; valid: a body with limbs, such as a human")
 
 
 def _ask(

@@ -1,0 +1,78 @@
+"""The centroidal stage: a balanced trajectory of the centre of mass, and its report."""
+
+from typing import Any
+
+from manikin.balance import pseudo_wrench
+from manikin.centroidal import (
+    CentroidalResult,
+    KeyframeProblem,
+    KeyframeResult,
+    plan_com,
+    plan_com_through_key_frames,
+)
+from manikin.stages.context import RunContext
+from manikin.stages.report import Report, place
+
+
+def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult:
+    """Plan the centre of mass on the supports, freely timed or through the key frames of a recording.
+
+    Args:
+        context: With supports.
+        report: Takes the ``centroidal`` block.
+    """
+    report.progress("centroidal", 0.0)
+    problem = context.posed_problem()
+    recorded = isinstance(problem, KeyframeProblem)
+    result = plan_com_through_key_frames(problem) if recorded else plan_com(problem)
+    report_centre_of_mass(report, result, centroidal_summary(result))
+    if result.failure is not None:
+        failure = result.failure
+        where = place(failure.phase, failure.where)
+        report.fail("centroidal", failure.reason, failure.time or 0.0, where)
+    report.progress("centroidal", 1.0)
+    return result
+
+
+def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[str, Any]) -> None:
+    """Take a plan into the report, with its trajectory.
+
+    Args:
+        report: Of the run.
+        result: The plan.
+        block: Its ``centroidal`` block.
+    """
+    report.finish("centroidal", block)
+    if result.trajectory is not None:
+        report.keep("com_trajectory", result.trajectory.to_dict())
+
+
+def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
+    """Return the ``centroidal`` block of the summary."""
+    trajectory = result.trajectory
+    recorded = isinstance(result, KeyframeResult)
+    return {
+        "method": "keyframes" if recorded else "timing-free",
+        "added_key_frames_s": sorted(result.added_times) if recorded else None,
+        "duration_s": None if trajectory is None else trajectory.duration,
+        "phase_durations_s": None if trajectory is None else trajectory.schedule.durations.tolist(),
+        "min_margin": result.d_min,
+        "margin_unit": result.problem.margin_unit,
+        "limiting_phase": result.limiting_phase,
+        "limiting_contact": limiting_contact(result),
+        "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
+        "feasibility_radius": result.feasibility_radius,
+        "replans": 0,
+        "key_postures": None,
+        "wall_s": result.wall_time,
+    }
+
+
+def limiting_contact(result: CentroidalResult) -> str | None:
+    """Contact and limit behind the smallest margin, such as ``"left_foot: tipping over ..."``."""
+    certificate, trajectory = result.certificate, result.trajectory
+    if certificate is None or trajectory is None:
+        return None
+    time = certificate.limiting_time
+    wrench = pseudo_wrench(result.problem.mass, trajectory.position(time), trajectory.acceleration(time))
+    return result.polytopes[certificate.limiting_phase].limiting(wrench).description

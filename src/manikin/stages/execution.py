@@ -1,0 +1,83 @@
+"""The execution stage: the planned motion under control in the physics engine, and its report."""
+
+import numpy as np
+
+from manikin.contact import ContactSchedule
+from manikin.control import ControlSettings, SupportSettings
+from manikin.motion import Motion
+from manikin.scenarios import Scenario
+from manikin.simulation import Execution, Push, execute
+from manikin.spatial import rotation_from_yaw
+from manikin.stages.act import measured_act_failure
+from manikin.stages.context import RunContext
+from manikin.stages.planned_motion import PlannedMotion
+from manikin.stages.report import Failure, Report, place
+from manikin.stages.requirements import ExecutionRequirements
+from manikin.wholebody.configuration_spline import rotation_from_quaternion
+
+PUSHED_SEGMENT = "thorax"
+"""Segment on whose centre of mass the scenario's push acts."""
+
+
+def execute_motion(
+    context: RunContext, report: Report, planned: PlannedMotion, requirements: ExecutionRequirements
+) -> Execution:
+    """Execute a motion, with the scenario's push and its act, and measure what became of it.
+
+    Args:
+        context: Of the run.
+        report: Takes the ``execution`` block, and the failure where the scenario requires a success.
+        planned: What is executed.
+        requirements: What the execution must keep.
+    """
+    scenario, act = context.scenario, planned.act
+    # The share of the friction that planning keeps to, where it has its own, holds in control too.
+    settings = ControlSettings(supports=SupportSettings(friction_share=scenario.friction_share))
+    result = execute(
+        context.body, context.scene, planned.motion, planned.schedule,
+        pushes=_pushes(scenario, planned.motion), padded=context.padded, settings=settings,
+        wishes=() if act is None else act.wishes,
+        progress=lambda share: report.progress("execution", share),
+    )  # fmt: skip
+    fallen = _failure(scenario, planned.schedule, result, requirements)
+    exerted = measured_act_failure(context, report, planned, result.motion)
+    failure = exerted if fallen is None else fallen
+    block = {
+        "required": scenario.execution_required,
+        "failure": None if failure is None else failure.as_dict(),
+        **result.summary(),
+        **context.passage(planned.schedule, result.motion).summary(),
+    }
+    report.finish("execution", block)
+    if failure is not None and scenario.execution_required:
+        report.failure = failure
+    report.keep_motions(planned.schedule, planned.motion, result.motion)
+    return result
+
+
+def _failure(
+    scenario: Scenario, schedule: ContactSchedule, result: Execution, requirements: ExecutionRequirements
+) -> Failure | None:
+    """What the execution itself did not keep, or None."""
+    broken = requirements.violation(result, scenario.seated_from is not None)
+    if result.failure:
+        broken = result.failure, float(result.failure_time_s or 0.0)
+    if broken is None:
+        return None
+    reason, time = broken
+    phase = int(schedule.phase_at(time))
+    held = ", ".join(schedule.sequence[phase].stance.effectors)
+    return Failure("execution", reason, time, place(phase, held))
+
+
+def _pushes(scenario: Scenario, motion: Motion) -> tuple[Push, ...]:
+    """The push that a scenario asks for, its direction seen from where the body faces then."""
+    push = scenario.push
+    if push is None:
+        return ()
+    scenario.check_push(float(motion.time[-1]))
+    sample = min(int(np.searchsorted(motion.time, push.at_s)), len(motion.time) - 1)
+    forward = rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]
+    heading = float(np.arctan2(forward[1], forward[0]))
+    direction = rotation_from_yaw(heading + np.deg2rad(push.direction_deg))[:, 0]
+    return (Push(PUSHED_SEGMENT, push.force_N * direction, push.at_s, push.duration_s),)

@@ -1,0 +1,73 @@
+"""The whole-body stage by refinement: from postures at the changes of contact to a motion and its report."""
+
+from typing import Any
+
+from manikin.stages.context import RunContext
+from manikin.stages.keyed_contacts import KeyedContacts
+from manikin.stages.report import Report
+from manikin.wholebody import RefineResult, refine_motion
+
+
+def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -> RefineResult:
+    """Refine the motion through key postures, at the scenario's pace.
+
+    Args:
+        context: Of the run.
+        report: Takes the ``wholebody`` block.
+        keyed: Contacts with a posture at each change.
+    """
+    body, scene, padded = context.body, context.scene, context.padded
+    keyed = keyed.at_pace(context.scenario.pace).with_lifted_feet(body, scene, padded)
+    result = refine_motion(
+        body, scene, keyed.time, keyed.q, keyed.schedule,
+        padded=padded, progress=lambda share: report.progress("wholebody", share),
+    )  # fmt: skip
+    passage = context.passage(result.schedule, result.motion).summary()
+    block = refined_summary(result) | passage | {"seed_matters": context.plan is not None}
+    report.finish("wholebody", block)
+    if result.failure is not None:
+        report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
+    report.keep_motions(result.schedule, result.motion)
+    return result
+
+
+def refined_summary(result: RefineResult) -> dict[str, Any]:
+    """Return the ``wholebody`` block of the summary of a refined motion."""
+    certificate = result.certificate
+    return {
+        "method": "refine",
+        "duration_s": result.after.duration_s,
+        "max_support_error_m": certificate.max_support_error_m,
+        "max_meeting_error_m": None,
+        "max_com_error_m": None,
+        "min_clearance_m": certificate.min_clearance_m,
+        "closest_pair": list(certificate.closest_pair),
+        "max_scuff_m": certificate.max_penetration_m,
+        "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
+        "max_velocity_share": certificate.max_velocity_share,
+        "max_torque_share": certificate.max_torque_share,
+        "min_margin": certificate.min_margin,
+        "min_zmp_distance_m": None,
+        "swings": None,
+        "refinement": {
+            "min_contact_slack": result.contact_slack,
+            "max_physics_violation_N": certificate.max_physics_violation,
+            "physics_violation_falls": _fall(
+                result.before.physics_violation, result.after.physics_violation
+            ),
+            "squared_accelerations_fall": _fall(
+                result.before.squared_accelerations, result.after.squared_accelerations
+            ),
+            "before": result.before.as_dict(),
+            "smoothed": result.smoothed.as_dict(),
+            "after": result.after.as_dict(),
+            "stretch": result.stretch,
+            "iterations": result.iterations,
+        },
+        "wall_s": result.wall_time,
+    }  # fmt: skip
+
+
+def _fall(before: float, after: float) -> float | None:
+    """How many times less there is after; None where nothing is left."""
+    return before / after if after > 0.0 else None

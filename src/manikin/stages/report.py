@@ -1,0 +1,135 @@
+"""What a run tells as it goes: its summary, the files of its directory, its progress."""
+
+import time as clock
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from manikin.contact import ContactSchedule
+from manikin.motion import Motion
+from manikin.motion.file import MotionFile, write_motions
+from manikin.output import MOTION, RunDirectory
+from manikin.scenarios import Scenario
+from manikin.stages.context import RunContext
+
+Progress = Callable[[str, float], None]
+"""Told the stage and the share of it that is done, in [0, 1]."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a run ended without success.
+
+    Attributes:
+        stage: ``"contacts"``, ``"centroidal"``, ``"wholebody"`` or ``"execution"``.
+        reason: In one line.
+        time_s: When in the motion [s].
+        where: Phase, contact, limb or pair.
+    """
+
+    stage: str
+    reason: str
+    time_s: float
+    where: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the ``failure`` block of the summary."""
+        return {"stage": self.stage, "reason": self.reason, "time_s": self.time_s, "where": self.where}
+
+
+class Report:
+    """Summary and files of one run; each is written as soon as it is known.
+
+    Attributes:
+        summary: As printed by ``manikin run --json``.
+        progress: Called with the stage and the share of it that is done.
+        failure: Why the run is no success so far, or None.
+    """
+
+    def __init__(
+        self, context: RunContext, out: str | Path | None, progress: Progress | None, began: float
+    ) -> None:
+        """Open the run directory.
+
+        Args:
+            context: What is run.
+            out: Run directory; nothing is written when None.
+            progress: Told how far the run is, or None.
+            began: Reading of ``time.perf_counter`` when the run began [s].
+
+        Raises:
+            MotionFileError: If the directory cannot be made, or holds something that is not a run.
+        """
+        self._context, self._began = context, began
+        self.progress = progress or _silent
+        self.failure: Failure | None = None
+        self._directory = None if out is None else RunDirectory(out)
+        scenario = context.scenario
+        self.keep_scenario(scenario)
+        stature = None if scenario.is_point_mass else context.body.stature
+        self.summary: dict[str, Any] = {
+            "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
+            "succeeded": False, "failure": None,
+            "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None,
+            "wall_s": 0.0,
+        }  # fmt: skip
+
+    @property
+    def path(self) -> Path | None:
+        """The run directory, or None."""
+        return None if self._directory is None else self._directory.path
+
+    def fail(self, stage: str, reason: str, time: float = 0.0, where: str = "") -> None:
+        """Say why the run is no success.
+
+        Args:
+            stage: Stage that failed.
+            reason: In one line.
+            time: When in the motion [s].
+            where: Phase, contact, limb or pair.
+        """
+        self.failure = Failure(stage, reason, float(time), where)
+
+    def finish(self, stage: str, block: Mapping[str, Any]) -> None:
+        """Take a stage's block into the summary, and keep it."""
+        self.summary[stage] = dict(block)
+        self.keep(stage, block)
+
+    def keep(self, name: str, result: Mapping[str, Any]) -> None:
+        """Keep what a stage found among the files of the run."""
+        if self._directory is not None:
+            self._directory.write_stage(name, result)
+
+    def keep_scenario(self, scenario: Scenario) -> None:
+        """Keep the scenario, resolved or with the supports that were found."""
+        if self._directory is not None:
+            self._directory.write_scenario(scenario.to_yaml())
+
+    def keep_motions(
+        self, schedule: ContactSchedule, planned: Motion, executed: Motion | None = None
+    ) -> None:
+        """Keep the motions that there are so far."""
+        if self._directory is not None:
+            body, scene = self._context.body, self._context.scene
+            content = MotionFile(planned, executed, body, scene, schedule)
+            write_motions(self._directory.path / MOTION, content)
+
+    def close(self) -> dict[str, Any]:
+        """Complete the summary, write it and return it."""
+        failure = self.failure
+        self.summary["succeeded"] = failure is None
+        self.summary["failure"] = None if failure is None else failure.as_dict()
+        self.summary["wall_s"] = clock.perf_counter() - self._began
+        if self._directory is not None:
+            self._directory.write_summary(self.summary)
+        return self.summary
+
+
+def place(phase: int | None, where: str) -> str:
+    """Where something failed, in words: a phase with its contacts, or what there is of both."""
+    return where if phase is None else f"phase {phase}" + (f" on {where}" if where else "")
+
+
+def _silent(stage: str, share: float) -> None:
+    """Report progress to nobody."""

@@ -1,0 +1,73 @@
+"""The outcome of one run."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from manikin.centroidal import CentroidalResult
+from manikin.motion import Motion
+from manikin.simulation import Execution
+from manikin.stages.report import Report
+from manikin.wholebody import RefineResult, WholeBodyResult
+
+
+@dataclass(frozen=True, eq=False)
+class RunResult:
+    """Outcome of one run.
+
+    Attributes:
+        summary: As printed by ``manikin run --json``.
+        planned: Planned whole-body motion, or that of a point mass; None when there is none.
+        executed: Executed motion, or None.
+        centroidal: Result of the centre-of-mass stage, or None where there was none.
+        wholebody: Result of the whole-body stage, or None.
+        execution: Result of the execution, or None.
+        directory: Where the files are, or None.
+    """
+
+    summary: dict[str, Any]
+    planned: Motion | None
+    executed: Motion | None
+    centroidal: CentroidalResult | None
+    wholebody: WholeBodyResult | RefineResult | None
+    execution: Execution | None
+    directory: Path | None
+
+    @classmethod
+    def of(
+        cls,
+        report: Report,
+        centroidal: CentroidalResult | None = None,
+        wholebody: WholeBodyResult | RefineResult | None = None,
+        execution: Execution | None = None,
+        *,
+        planned: Motion | None = None,
+    ) -> "RunResult":
+        """Close the report of a run and gather what its stages returned.
+
+        Args:
+            report: Of the run.
+            centroidal: Of the centre of mass.
+            wholebody: Of the whole body.
+            execution: Of the physics engine.
+            planned: The planned motion, where no whole body was planned.
+        """
+        return cls(
+            report.close(),
+            planned if wholebody is None else wholebody.motion,
+            None if execution is None else execution.motion,
+            centroidal,
+            wholebody,
+            execution,
+            report.path,
+        )
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether every stage met its requirements; an execution only where the scenario requires it."""
+        return bool(self.summary["succeeded"])
+
+    @property
+    def motion(self) -> Motion | None:
+        """The executed motion, or else the planned one."""
+        return self.executed if self.executed is not None else self.planned
