@@ -6,8 +6,8 @@ import numpy as np
 
 from manikin.balance import pseudo_wrench, wrench_polytope
 from manikin.contact import Contact, Stance
-from manikin.contact_planning import Candidates, ContactRules, Situation, make_contact
-from manikin.contact_planning.touch import onto_normal
+from manikin.contact_planning import Candidates, ContactRules, Situation
+from manikin.contact_planning.by_place import contact_at, score_by_place
 from manikin.spatial import GRAVITY, FloatArray
 
 BODY_WEIGHTS_CAP = 3.0
@@ -134,15 +134,10 @@ class Footing:
 
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
         """See :class:`manikin.contact_planning.Heuristic`."""
-        keys = np.column_stack([candidates.surfaces, np.round(candidates.points / self.spacing)])
-        _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        found = np.array([self._stands(situation, candidates, int(row)) for row in first])
-        return found[group.ravel()].astype(np.float64)
+        return score_by_place(candidates, self.spacing, lambda row: self._stands(situation, candidates, row))
 
     def _stands(self, situation: Situation, candidates: Candidates, row: int) -> bool:
-        body, limb = situation.state.body, situation.limb
-        turn = onto_normal(situation.rotation @ candidates.rotations[row], candidates.normals[row])
-        contact = make_contact(body, limb, limb.kind, candidates.points[row], turn, self.rules)
+        contact = contact_at(situation, candidates, row, situation.limb.kind, self.rules)
         near = situation.state.com[:2]
         _, margin = self.loads.best_place([self.other, contact], near, np.array(self.reach))
         return margin >= self.margin

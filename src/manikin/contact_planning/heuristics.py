@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.balance import pseudo_wrench, stability_margins, wrench_polytope
 from manikin.body import BodyModel, LimbKinematics, ReachVolume
 from manikin.body.natural_range import NaturalRange
-from manikin.contact import Contact, ContactKind, Stance
+from manikin.contact import ContactKind, Stance
+from manikin.contact_planning.by_place import contact_at, score_by_place
 from manikin.contact_planning.candidates import Candidates, Situation
 from manikin.contact_planning.efort import efort
 from manikin.contact_planning.samples import LimbSamples
-from manikin.contact_planning.touch import ContactRules, make_contact, onto_normal
+from manikin.contact_planning.touch import ContactRules
 from manikin.errors import InputError
 from manikin.spatial import FloatArray
 
@@ -215,17 +216,14 @@ class Balance:
 
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
         """See :class:`Heuristic`."""
-        keys = np.column_stack([candidates.surfaces, np.round(candidates.points / self.spacing)])
-        _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        margins = np.array([self._margin(situation, candidates, int(row)) for row in first])
-        values = margins[group.ravel()] if len(margins) else margins
+        values = score_by_place(
+            candidates, self.spacing, lambda row: self._margin(situation, candidates, row)
+        )
         return (values >= 0.0).astype(np.float64) if self.binary else values
 
     def _margin(self, situation: Situation, candidates: Candidates, row: int) -> float:
         body, limb = situation.state.body, situation.limb
-        turn = onto_normal(situation.rotation @ candidates.rotations[row], candidates.normals[row])
-        kind = self.kind or limb.kind
-        contact: Contact = make_contact(body, limb, kind, candidates.points[row], turn, self.rules)
+        contact = contact_at(situation, candidates, row, self.kind or limb.kind, self.rules)
         others = [item for item in self.held if item.effector != limb.effector]
         W = wrench_polytope(Stance([*others, contact], self.held.normal_force_cap))
         com = situation.state.com

@@ -1,16 +1,13 @@
 """The postures of two runs at the key instants they share."""
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from manikin.comparison import RunComparison
 from manikin.figures.compare_timing import RUN_COLOURS
-from manikin.figures.postures import GAP, chosen_instants
+from manikin.figures.postures import GAP, chosen_instants, draw_moment, frame_panels
 from manikin.figures.style import COLOURS, dress, need, new_grid, readable
-from manikin.figures.views import ALONG_X, ALONG_Y, View, draw_body, draw_obstacles, panel_ticks
-from manikin.record import RunRecord
-from manikin.spatial import FloatArray
+from manikin.figures.views import ALONG_X, ALONG_Y
 
 REACH = np.array([0.65, 0.65, 1.0])
 """Drawn around the centres of mass [m]."""
@@ -48,7 +45,9 @@ def compare_postures_figure(comparison: RunComparison) -> Figure:
         axes = figure.add_subplot(grid[row, 0])
         for offset, posture in zip(offsets, postures, strict=True):
             time = posture.second_s if row else posture.first_s
-            _draw(axes, run, which, time, view.moved(offset, 0.0), (low, high))
+            motion = run.motions[which]
+            sample = int(np.argmin(np.abs(motion.time - time)))
+            draw_moment(axes, run, motion, sample, view.moved(offset, 0.0), (low, high))
             axes.annotate(f"{time:.2f} s", (offset + (left + right) / 2, high[2]), (0, 3),
                           textcoords="offset points", ha="center", fontsize=8.5, color=colour)  # fmt: skip
             if row:
@@ -57,22 +56,7 @@ def compare_postures_figure(comparison: RunComparison) -> Figure:
                 axes.annotate(text, (offset + (left + right) / 2, low[2]), (0, -44), ha="center", va="bottom",
                               textcoords="offset points", fontsize=6.5, color="#5A5F69")  # fmt: skip
         dress(axes, f"{name}\n{view.labels[1]}", "")
-        axes.grid(False, axis="x")
-        axes.set_xticks(*panel_ticks(left, right, offsets))
-        axes.set(xlim=(left, right + offsets[-1]), ylim=(low[2], high[2]))
-        axes.set_aspect("equal", adjustable="box", anchor="W")
+        frame_panels(axes, (left, right), (low[2], high[2]), offsets)
     note = f"numbers along the axes: {view.labels[0]}; below: largest differences, second less first"
     figure.text(0.01, 0.01, note, fontsize=7.5, color=COLOURS["soft"])
     return figure
-
-
-def _draw(
-    axes: Axes, run: RunRecord, which: str, time: float, view: View, box: tuple[FloatArray, FloatArray]
-) -> None:
-    motion = run.motions[which]
-    sample = int(np.argmin(np.abs(motion.time - time)))
-    if run.scene is not None:
-        draw_obstacles(axes, run.scene, view, *box)
-    if run.body is not None:
-        draw_body(axes, run.body, motion.q[sample], view)
-    axes.plot(*view(motion.com[sample]), "o", color=COLOURS["ink"], markersize=4, zorder=5)

@@ -1,5 +1,7 @@
 """The postures at the key instants, side by side."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,6 +17,7 @@ from manikin.figures.views import (
     panel_ticks,
     side_colour,
 )
+from manikin.motion import Motion
 from manikin.record import RunRecord
 from manikin.spatial import FloatArray
 
@@ -62,10 +65,7 @@ def postures_figure(record: RunRecord) -> Figure:
                               textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
         horizontal, vertical = view.labels
         dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
-        axes.grid(False, axis="x")
-        axes.set_xticks(*panel_ticks(left, right, offsets))
-        axes.set(xlim=(left, right + offsets[-1]), ylim=(low[2], high[2]))
-        axes.set_aspect("equal", adjustable="box", anchor="W")
+        frame_panels(axes, (left, right), (low[2], high[2]), offsets)
     return figure
 
 
@@ -73,16 +73,50 @@ def _draw_posture(
     axes: Axes, record: RunRecord, view: View, name: str, sample: int, box: tuple[FloatArray, FloatArray]
 ) -> None:
     motion = record.motions[name]
-    if record.scene is not None:
-        draw_obstacles(axes, record.scene, view, *box)
-    if record.body is not None:
-        draw_body(axes, record.body, motion.q[sample], view)
+    draw_moment(axes, record, motion, sample, view, box)
     if record.schedule is not None:
         end = float(record.schedule.instants[-1])
         for contact in record.schedule.stance_at(min(float(motion.time[sample]), end)):
             draw_contact(axes, contact, view, side_colour(contact.effector))
     axes.plot(*view(motion.com).T, color=COLOURS["soft"], linewidth=0.8, zorder=4)
+
+
+def draw_moment(
+    axes: Axes, record: RunRecord, motion: Motion, sample: int, view: View, box: tuple[FloatArray, FloatArray]
+) -> None:
+    """Draw the body among the obstacles at one sample of a motion, with its CoM.
+
+    Args:
+        axes: Where to draw.
+        record: Of the run.
+        motion: One of its motions.
+        sample: Index of the sample.
+        view: The plane that is seen, moved to the panel.
+        box: Lower and upper corner of what is shown [m].
+    """
+    if record.scene is not None:
+        draw_obstacles(axes, record.scene, view, *box)
+    if record.body is not None:
+        draw_body(axes, record.body, motion.q[sample], view)
     axes.plot(*view(motion.com[sample]), "o", color=COLOURS["ink"], markersize=4, zorder=5)
+
+
+def frame_panels(
+    axes: Axes, across: tuple[float, float], upwards: tuple[float, float], offsets: Sequence[float]
+) -> None:
+    """Set ticks and limits of panels side by side in one pair of axes, to one scale.
+
+    Args:
+        axes: With the panels.
+        across: Both ends of the first panel [m].
+        upwards: Both ends of all [m].
+        offsets: Where the zero of each panel is drawn [m].
+    """
+    left, right = across
+    axes.grid(False, axis="x")
+    axes.set_xticks(*panel_ticks(left, right, offsets))
+    axes.set(xlim=(left, right + offsets[-1]), ylim=upwards)
+    axes.set_aspect("equal", adjustable="box", anchor="W")
 
 
 def chosen_instants(instants: FloatArray) -> FloatArray:

@@ -9,7 +9,8 @@ from manikin.contact_planning import HEURISTICS
 from manikin.contact_planning.live_contacts import LiveAnswer, LiveContacts
 from manikin.contact_planning.single_contact import Role
 from manikin.spatial import FloatArray
-from manikin.viewer.stage import HOST, BodyShapes, add_scene, side_colour, start_server, stop_server
+from manikin.viewer.page import Page
+from manikin.viewer.stage import BodyShapes, add_scene, side_colour
 
 FRAME_RATE = 60.0
 """Largest number of updates per second; a change that comes while one is made waits for the next."""
@@ -19,14 +20,13 @@ TASK = 0.6
 """Length of the task's arrow [m]."""
 
 
-class ContactViewer:
+class ContactViewer(Page):
     """Serves one body in its scene; every change goes through its methods.
 
     Callbacks of the page only note what is wanted; :meth:`update` makes the newest of it, so that a
     fast hand never waits for old poses.
 
     Attributes:
-        server: The viser server.
         live: The body, the task and what follows.
         latest: The last answer shown.
         updates: Number of answers so far.
@@ -42,12 +42,10 @@ class ContactViewer:
         Raises:
             InputError: If the port is taken.
         """
+        super().__init__(port, FRAME_RATE)
         self.live = live
         self.updates = 0
-        self._lock = threading.RLock()
         self._wanted = threading.Event()
-        self._closed = threading.Event()
-        self.server = start_server(port)
         add_scene(self.server, live.scene)
         self._shapes = BodyShapes(self.server, live.body)
         self._build_handles()
@@ -55,11 +53,6 @@ class ContactViewer:
         self._look_at(live.q[:3])
         self._wanted.set()
         self.latest: LiveAnswer = self.update() or live.answer()
-
-    @property
-    def url(self) -> str:
-        """Address of the page."""
-        return f"http://{HOST}:{self.server.get_port()}"
 
     def move(self, position: Sequence[float] | FloatArray, wxyz: Sequence[float] | FloatArray) -> None:
         """Put the root elsewhere, as the gizmo does.
@@ -98,21 +91,9 @@ class ContactViewer:
             self.updates += 1
             return answer
 
-    def run(self) -> None:
-        """Serve until :meth:`close` is called or Ctrl-C is pressed."""
-        try:
-            while not self._closed.wait(1.0 / FRAME_RATE):
-                self.update()
-        except KeyboardInterrupt:
-            pass
-        finally:
-            self.close()
-
-    def close(self) -> None:
-        """Stop the server; a second call does nothing."""
-        if not self._closed.is_set():
-            self._closed.set()
-            stop_server(self.server)
+    def advance(self, seconds: float) -> None:  # noqa: ARG002
+        """Show the newest contacts, if anything has changed."""
+        self.update()
 
     def _build_handles(self) -> None:
         scene, (x, y, z, w) = self.server.scene, self.live.q[3:7]

@@ -1,7 +1,5 @@
 """One viewer in the browser: the scene, the body, the controls and their state."""
 
-import threading
-import time as clock
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,8 @@ from manikin.motion import Motion
 from manikin.motion.derived import effector_positions
 from manikin.motion.file import MotionFile
 from manikin.spatial import FloatArray
-from manikin.viewer.stage import COLOURS, HOST, BodyShapes, add_scene, side_colour, start_server, stop_server
+from manikin.viewer.page import Page
+from manikin.viewer.stage import COLOURS, BodyShapes, add_scene, side_colour
 
 FRAME_RATE = 30.0
 """Pictures per second while playing."""
@@ -23,11 +22,10 @@ PLOT_POINTS = 400
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
 
 
-class ViewerSession:
+class ViewerSession(Page):
     """Serves one motion file; every change of state goes through its methods.
 
     Attributes:
-        server: The viser server.
         chosen: Name of the motion shown.
         time: Instant shown [s].
         playing: Whether time runs.
@@ -56,9 +54,7 @@ class ViewerSession:
             self._feet = effector_positions(
                 content.body, self.motion, self.motion.contact_names, content.schedule
             )
-        self._lock = threading.RLock()
-        self._closed = threading.Event()
-        self.server = start_server(port)
+        super().__init__(port, FRAME_RATE)
         self.time = float(self.motion.time[0])
         self._build_scene()
         self._build_body()
@@ -69,11 +65,6 @@ class ViewerSession:
     def motion(self) -> Motion:
         """The motion shown."""
         return self.content.motions[self.chosen]
-
-    @property
-    def url(self) -> str:
-        """Address of the page."""
-        return f"http://{HOST}:{self.server.get_port()}"
 
     def show(self, time: float) -> None:
         """Show the instant ``time`` [s], held inside the motion."""
@@ -122,25 +113,6 @@ class ViewerSession:
             self.show(self.time + seconds * self.speed)
             if self.time >= self.motion.time[-1]:
                 self.pause()
-
-    def run(self) -> None:
-        """Serve until :meth:`close` is called or Ctrl-C is pressed."""
-        before = clock.monotonic()
-        try:
-            while not self._closed.wait(1.0 / FRAME_RATE):
-                now = clock.monotonic()
-                self.advance(now - before)
-                before = now
-        except KeyboardInterrupt:
-            pass
-        finally:
-            self.close()
-
-    def close(self) -> None:
-        """Stop the server; a second call does nothing."""
-        if not self._closed.is_set():
-            self._closed.set()
-            stop_server(self.server)
 
     # --- what stands still ---------------------------------------------------------------
 
