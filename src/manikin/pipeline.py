@@ -66,7 +66,7 @@ def run(
         began = clock.perf_counter()
         context = RunContext.of(job, settings)
         report = Report(context, out, progress, began)
-        return _from_contacts_on(context, report, requirements or ExecutionRequirements())
+        return _follow_the_road(context, report, requirements or ExecutionRequirements())
 
 
 def _job(scenario: str | Path | Scenario, variant: str | None, overrides: Sequence[str]) -> Scenario:
@@ -79,7 +79,7 @@ def _job(scenario: str | Path | Scenario, variant: str | None, overrides: Sequen
     return scenario.with_overrides(overrides)
 
 
-def _from_contacts_on(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
+def _follow_the_road(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
     """The whole road; contacts are planned where the scenario lists none."""
     with_contacts = context if context.has_supports else plan_contacts(context, report)
     if with_contacts is None:
