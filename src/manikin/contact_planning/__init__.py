@@ -41,6 +41,7 @@ from manikin.contact_planning.heuristics import (
 )
 from manikin.contact_planning.limb_extend import LimbExtendSettings, extend_limbs
 from manikin.contact_planning.limb_places import LimbPlaces, Near
+from manikin.contact_planning.limb_start import LimbStart, starts_on_limbs
 from manikin.contact_planning.plan_certificate import PlanCertificate, certify_plan
 from manikin.contact_planning.poser import Posed, Poser, PoserSettings
 from manikin.contact_planning.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
@@ -81,6 +82,7 @@ __all__ = [
     "LimbExtendSettings",
     "LimbPlaces",
     "LimbSamples",
+    "LimbStart",
     "Manipulability",
     "Near",
     "PlanCertificate",
@@ -115,6 +117,7 @@ __all__ = [
     "sample_limbs",
     "samples_for",
     "save_samples",
+    "starts_on_limbs",
     "static_room",
     "static_torque_share",
     "velocity_ellipsoid",

@@ -152,12 +152,10 @@ class ScenarioFile(Section):
                         f"task.{end}.{key}",
                         "has no meaning without explicit supports; valid: at, heading_deg, height_m, posture",
                     )
-        if self.task.start.posture == "climbing":
-            raise refuse("task.start.posture", "is climbing; valid: standing, seated or crouched")
-        if self.task.goal.posture == "climbing" and (self.contacts is None or self.contacts.limbs is None):
-            raise refuse(
-                "task.goal.posture", "is climbing; valid: beside contacts.limbs, the limbs that hold on"
-            )
+            if state.posture == "climbing" and (self.contacts is None or self.contacts.limbs is None):
+                raise refuse(
+                    f"task.{end}.posture", "is climbing; valid: beside contacts.limbs, the limbs that hold on"
+                )
         if self.task.goal.posture == "seated":
             raise refuse("task.goal.posture", "is seated; valid: standing or crouched, or explicit supports")
 

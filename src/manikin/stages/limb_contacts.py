@@ -1,20 +1,24 @@
 """Contacts of any limbs from start and goal: guide, then algorithm 7 ([Tonneau2015]_ chapters 6 and 7)."""
 
+from collections.abc import Iterator
+from itertools import islice
+
 import numpy as np
 
 from manikin.body import BodyModel, Limb, limb_named
-from manikin.contact import Contact, ContactKind
+from manikin.contact import ContactKind
 from manikin.contact_planning import (
     ContactRules,
     Endpoints,
     LimbExtendSettings,
     LimbPlaces,
+    LimbStart,
     Poser,
     PoserSettings,
-    Stage,
     extend_limbs,
     heading_of,
     sample_limbs,
+    starts_on_limbs,
 )
 from manikin.reachability import (
     Abstraction,
@@ -61,6 +65,9 @@ LEAN = 0.35
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
+CLIMBING = "climbing"
+"""Name of the posture that stands for where the root is, with whatever contacts are there."""
+
 
 def find_limb_contacts(
     scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
@@ -97,21 +104,31 @@ class _LimbSearch:
         self._abstraction: Abstraction = abstraction_of(body, volumes)
 
     def run(self) -> ContactSearch:
-        start, goal = self._start(), self._goal()
-        if isinstance(start, str):
-            return self._tally.failed(start, "start")
+        goal, starts = self._goal(), self._starts()
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
+        first = next(starts)
+        if first.stage is None:
+            return self._tally.failed(first.reason, "start")
+        # Another guide begins at another start, as long as there are some.
+        stages = [first.stage]
+        others = (item.stage for item in starts if item.stage is not None)
+
+        def lead() -> RootGuide:
+            if self._tally.summary["attempts"] > 0:
+                stages.extend(islice(others, 1))
+            return self._guide(stages[-1].q[:7], goal)
+
         settings = self._settings()
         return self._tally.along_guides(
             self._scenario.contacts.attempts,
-            lambda: self._guide(start.q[:7], goal),
-            lambda line, _: extend_limbs(self._poser, self._places, line, start, settings),
+            lead,
+            lambda line, _: extend_limbs(self._poser, self._places, line, stages[-1], settings),
         )
 
     @property
     def _climbs(self) -> bool:
-        return self._scenario.file.task.goal.posture == "climbing"
+        return self._scenario.file.task.goal.posture == CLIMBING
 
     def _rules(self) -> ContactRules:
         options, patch = self._scenario.contacts, None
@@ -136,23 +153,18 @@ class _LimbSearch:
             goal_distance=plain.goal_distance * max(size, SMALLEST) if not self._climbs else NEAR_GOAL,
         )
 
-    def _start(self) -> Stage | str:
-        """Where the body is at the start, or why it cannot be there."""
-        if self._body.stature is not None:
-            return stage_at(self._endpoints(), self._scenario, "start")
+    def _starts(self) -> Iterator[LimbStart]:
+        """Where the body is at the start, the best first, or why it cannot be there."""
         state = self._scenario.file.task.start
+        if self._body.stature is not None and state.posture != CLIMBING:
+            found = stage_at(self._endpoints(), self._scenario, "start")
+            yield LimbStart(None, found) if isinstance(found, str) else LimbStart(found)
+            return
         at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
         q = self._standing(at, yaw, state.height_m)
-        contacts: dict[str, Contact] = {}
-        for name, limb in self._places.limbs.items():
-            place = self._places.find(name, q, q[:7], np.array([0.0, 0.0, 1.0]), 1)[0]
-            if place.contact is not None:
-                contacts[limb.effector] = place.contact
-        posed = self._poser.pose(contacts, contacts, q, q[:7]) if contacts else None
-        if posed is None or posed.q is None:
-            why = "no limb has a contact" if posed is None else posed.reason
-            return f"the start: no posture at {at.round(3).tolist()} m: {why}"
-        return Stage.of(self._body, contacts, posed.q, self._settings().shift_duration)
+        for found in starts_on_limbs(self._poser, self._places, q, self._settings().shift_duration):
+            where = f"the start: no posture at {at.round(3).tolist()} m: "
+            yield found if found.stage is not None else LimbStart(None, where + found.reason)
 
     def _goal(self) -> FloatArray | str:
         """(7,) pose of the root at the goal, or why there is none."""

@@ -240,7 +240,7 @@ class _Refinement:
                 continue
             scales = _reweighed(scales, broken)
             slower = number > 0 and self.settings.retime and bool(broken & _SLOWED)
-            finer = number > 0 and fine < FINEST and bool(broken & _EXACT)
+            finer = fine < FINEST and bool(broken & _EXACT)
             if slower or finer:
                 fine += finer
                 near = self._slow_down(last, broken) if slower else last.spline

@@ -33,8 +33,8 @@ class StateSection(Section):
     )
     posture: Literal["standing", "seated", "crouched", "climbing"] | None = Field(
         default=None,
-        description="how the body is at rest there (default: standing); climbing, of a goal only: on what "
-        "its limbs hold, as high as if it stood on that height",
+        description="how the body is at rest there (default: standing); climbing: on what its limbs "
+        "hold, as high as if it stood on that height",
     )
 
     @model_validator(mode="after")
