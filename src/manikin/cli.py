@@ -222,13 +222,15 @@ def view(
     if contacts:
         from manikin.contact_planning.live_contacts import LiveContacts
         from manikin.scenarios import load_scenario
+        from manikin.scenarios.contact_rules import contact_rules
         from manikin.scenarios.start import start_posture
         from manikin.viewer import serve_contacts
 
         job = load_scenario(source)
         body, scene = job.build_body(), job.build_scene()
         q = start_posture(job, body, scene)
-        live = LiveContacts(body, scene, q, samples=samples or 10_000, seed=job.seed)
+        rules = contact_rules(job, body)
+        live = LiveContacts(body, scene, q, samples=samples or 10_000, seed=job.seed, rules=rules)
         serve_contacts(live, port, announce)
         return
     if samples is not None:
@@ -295,6 +297,7 @@ def contact(
     """Find the contact of one limb that serves a task best."""
     from manikin.contact_planning.single_contact import ContactQuestion, find_contact
     from manikin.scenarios import load_scenario
+    from manikin.scenarios.contact_rules import contact_rules
     from manikin.scenarios.start import start_posture
 
     job = load_scenario(scenario)
@@ -304,7 +307,7 @@ def contact(
         question = ContactQuestion.of(
             limb, task, role, pull, heuristic, kind, samples, job.seed if seed is None else seed
         )
-        answer = find_contact(body, scene, q, question)
+        answer = find_contact(body, scene, q, question, contact_rules(job, body))
         if figure is not None:
             from manikin.products import write_contact_figure
 

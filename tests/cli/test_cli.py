@@ -9,6 +9,7 @@ import sys
 import time
 import types
 
+import numpy as np
 import pytest
 import yaml
 
@@ -522,6 +523,23 @@ def test_built_in_scenarios_are_asked_at_the_place_of_their_feet(capfd):
 )
 def test_wrong_questions_about_a_contact_are_refused_in_one_line(capfd, cupboard, changed, says):
     assert_refused(capfd, ["contact", cupboard, *changed], says)
+
+
+def test_a_climber_stands_on_the_front_of_the_feet_and_grips_by_the_task(capfd):
+    """The rules of the file's contacts count here as well; another direction has another hand hold."""
+
+    def asked(limb, *task):
+        assert main(["contact", "climb", "--limb", limb, "--task", *task, "--json"]) == DONE
+        return json.loads(capfd.readouterr().out)
+
+    foot, up, aside = (
+        asked("right_leg", "0", "0", "1"),
+        asked("left_arm", "0", "0", "1"),
+        asked("left_arm", "0", "1", "0"),
+    )
+    assert all(answer["obstacle"].startswith("hold") for answer in (foot, up, aside))
+    assert foot["normal"] == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
+    assert np.linalg.norm(np.subtract(up["position"], aside["position"])) > 0.05
 
 
 def test_a_seated_body_gets_up_with_its_hands_on_what_is_level(capfd, tmp_path):

@@ -17,6 +17,7 @@ from manikin.scenarios import load_scenario
 from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
 from manikin.spatial import GRAVITY
 from manikin.stages.contacts import find_supports
+from manikin.stages.keyed_contacts import KeyedContacts
 from manikin.wholebody import refine_motion
 
 DOG = Path(__file__).parents[1] / "body" / "data" / "dog.urdf"
@@ -31,8 +32,13 @@ def search(name, *overrides, seed=0):
 SHORT = {
     "climb-wall": ("task.goal.height_m=0.55",),
     "insect-books": ("task.start.at=[-0.25, 0.0]", "task.goal.at=[-0.05, 0.0]", "task.goal.height_m=0.05"),
+    "climb@left": (),
+    "climb@down": ("task.goal.height_m=0.9",),
 }
-"""Two rows of holds; and onto the first books."""
+"""Two rows of holds; onto the first books; and along a wall from where the climber already hangs on it."""
+
+WHOLE = ("climb-wall", "insect-books", "climb@aslant")
+"""Those that go all the way and are refined."""
 
 
 @pytest.fixture(scope="module", params=SHORT)
@@ -59,6 +65,16 @@ def test_the_root_gets_to_its_goal(found):
     result, body, _ = found
     room = 0.03 if body.stature is None else 0.2
     assert np.linalg.norm(result.plan.goal[:3] - result.guide.poses[-1, :3]) <= room
+
+
+def test_a_climber_who_begins_on_the_wall_holds_on_with_hands_and_feet(found):
+    """Near where the scenario says, which leaves a posture the room of half a row of holds."""
+    result, _, scene = found
+    first = result.plan.stages[0]
+    if "floor" in {scene.touched_obstacle(contact) for contact in first.contacts.values()}:
+        pytest.skip("begins on the floor")
+    assert set(first.contacts) == {"left_hand", "right_hand", "left_foot", "right_foot"}
+    np.testing.assert_allclose(first.q[:3], result.guide.poses[0, :3], atol=0.2)
 
 
 def test_contacts_lie_on_surfaces_and_hands_on_holds(found):
@@ -103,13 +119,14 @@ def test_what_no_limb_can_reach_is_explained(name, where, reason):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", list(SHORT))
+@pytest.mark.parametrize("name", WHOLE)
 def test_all_the_way_and_refined(name):
     """Margin at every sample of 5 ms, no penetration, contacts kept: the refinement's own certificate."""
     result, body, scene = search(name, seed=load_scenario(name).seed)
     assert result.failure is None
-    schedule = result.plan.schedule(BODY_WEIGHTS_CAP * body.mass * GRAVITY)
-    refined = refine_motion(body, scene, *result.plan.keys(schedule.instants), schedule)
+    keyed = KeyedContacts.of_plan(result.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    keyed = keyed.with_lifted_feet(body, scene, ())
+    refined = refine_motion(body, scene, keyed.time, keyed.q, keyed.schedule)
     assert refined.failure is None, refined.failure
     assert refined.certificate.min_margin > 0.0
     assert refined.certificate.max_penetration_m < 1e-3

@@ -48,7 +48,7 @@ def starts_on_limbs(poser: Poser, places: LimbPlaces, q: FloatArray, duration: f
         yield LimbStart(None, "no limb has a contact")
         return
     reason, found = "", False
-    for contacts in islice(_combinations(offered), TRIES):
+    for contacts in islice(best_first(offered), TRIES):
         posed = poser.pose(contacts, contacts, q, q[:7])
         reason = reason or posed.reason
         if posed.q is not None:
@@ -65,7 +65,7 @@ def _contacts(found: list[GeneratedContact]) -> list[tuple[float, Contact]]:
     return sorted(((best - score, contact) for score, contact in places), key=lambda item: item[0])
 
 
-def _combinations(offered: Mapping[str, list[tuple[float, Contact]]]) -> Iterator[dict[str, Contact]]:
+def best_first(offered: Mapping[str, list[tuple[float, Contact]]]) -> Iterator[dict[str, Contact]]:
     """One contact for each limb, the least loss of score in all first."""
     items = list(offered.values())
     known = {(0,) * len(items)}

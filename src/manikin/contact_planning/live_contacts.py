@@ -14,6 +14,7 @@ from manikin.contact_planning.generator import ContactGenerator, GeneratedContac
 from manikin.contact_planning.heuristics import heuristic_named
 from manikin.contact_planning.samples import sample_limbs
 from manikin.contact_planning.single_contact import SOME_EFORT, Role, check_limbs, reached_efort
+from manikin.contact_planning.touch import ContactRules
 from manikin.scene import Scene
 from manikin.spatial import FloatArray, frozen_array
 
@@ -51,7 +52,14 @@ class LiveContacts:
     """
 
     def __init__(
-        self, body: BodyModel, scene: Scene, q: ArrayLike, *, samples: int = 10_000, seed: int = 0
+        self,
+        body: BodyModel,
+        scene: Scene,
+        q: ArrayLike,
+        *,
+        samples: int = 10_000,
+        seed: int = 0,
+        rules: ContactRules | None = None,
     ) -> None:
         """Sample the limbs and prepare the scene.
 
@@ -61,6 +69,7 @@ class LiveContacts:
             q: (nq,) where it begins.
             samples: Number of samples of each limb.
             seed: Of the samples.
+            rules: What contacts can carry.
 
         Raises:
             BodyError: If the body has no limbs.
@@ -74,7 +83,7 @@ class LiveContacts:
         self.role = Role.AUTO
         self.pulling = False
         self._generator = ContactGenerator(
-            body, scene, sample_limbs(body, np.random.default_rng(seed), samples)
+            body, scene, sample_limbs(body, np.random.default_rng(seed), samples), rules=rules
         )
 
     def move(self, position: ArrayLike, quaternion: ArrayLike) -> None:

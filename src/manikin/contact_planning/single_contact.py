@@ -14,6 +14,7 @@ from manikin.contact_planning.efort import Task, efort
 from manikin.contact_planning.generator import ContactGenerator, GeneratedContact
 from manikin.contact_planning.heuristics import Heuristic, heuristic_named
 from manikin.contact_planning.samples import sample_limb
+from manikin.contact_planning.touch import ContactRules
 from manikin.errors import BodyError, InputError
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
@@ -129,7 +130,13 @@ class ContactAnswer:
         }
 
 
-def find_contact(body: BodyModel, scene: Scene, q: FloatArray, question: ContactQuestion) -> ContactAnswer:
+def find_contact(
+    body: BodyModel,
+    scene: Scene,
+    q: FloatArray,
+    question: ContactQuestion,
+    rules: ContactRules | None = None,
+) -> ContactAnswer:
     """Answer one question about a body in a scene.
 
     Args:
@@ -137,6 +144,7 @@ def find_contact(body: BodyModel, scene: Scene, q: FloatArray, question: Contact
         scene: Its surroundings.
         q: (nq,) the body; all but the limb stays as it is.
         question: What is asked.
+        rules: What contacts can carry.
 
     Raises:
         InputError: If the limb or the heuristic is not known, the direction is zero, or the limb has
@@ -149,7 +157,7 @@ def find_contact(body: BodyModel, scene: Scene, q: FloatArray, question: Contact
     heuristic = heuristic_named(question.heuristic, question.seed, pulling=question.pulling)
     started = time.perf_counter()
     samples = sample_limb(body, limb, np.random.default_rng(question.seed), question.samples)
-    generator = ContactGenerator(body, scene, {limb.name: samples})
+    generator = ContactGenerator(body, scene, {limb.name: samples}, rules=rules)
     _ask(generator, q, question, heuristic, roles, tasks)  # as in a dialogue, where caches are filled
     prepared = time.perf_counter()
     found, wall = _ask(generator, q, question, heuristic, roles, tasks)

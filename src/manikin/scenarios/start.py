@@ -1,13 +1,19 @@
 """Where the body is at the start of a scenario, before anything is planned."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact_planning import Endpoints, Habit
 from manikin.errors import ScenarioError
+from manikin.scenarios.contact_rules import friction_of
 from manikin.scenarios.values import ScenarioValues
 from manikin.scene import Scene
 from manikin.spatial import FloatArray, finite_number
+from manikin.wholebody.manner import manner_of
+
+CLIMBING = "climbing"
+"""Name of the posture of one who hangs on holds: where the root is, with whatever contacts are there."""
 
 
 def start_posture(
@@ -23,7 +29,8 @@ def start_posture(
 
     A standing body is the standing posture as it is: its root at the place, or its centre of mass over
     the file's, its soles at the height of the supports or of the floor. A seated or crouched one is what
-    planning would start from (:class:`manikin.contact_planning.Endpoints`).
+    planning would start from (:class:`manikin.contact_planning.Endpoints`); a climbing one is the reference
+    near which planning would seek holds.
 
     Args:
         values: The scenario's values.
@@ -40,15 +47,19 @@ def start_posture(
     """
     start = values.file.task.start
     name = posture or start.posture or Habit.STANDING
-    if name not in list(Habit):
-        raise ScenarioError(f"posture is {name!r}; valid: {', '.join(Habit)}")
+    if name not in (*Habit, CLIMBING):
+        raise ScenarioError(f"posture is {name!r}; valid: {', '.join((*Habit, CLIMBING))}")
     heading_deg = None if heading_deg is None else finite_number(heading_deg, "heading [deg]")
     at = None if at is None else (finite_number(at[0], "at x [m]"), finite_number(at[1], "at y [m]"))
     yaw = float(np.deg2rad(_heading(values) if heading_deg is None else heading_deg))
     place = at or start.at
+    if name == CLIMBING:
+        spot = values.start_com[:2] if place is None else place
+        level = values.start_level if start.height_m is None else start.height_m
+        return carried_to(manner_of(CLIMBING).posture(body), spot, yaw, level)
     if name != Habit.STANDING:
         spot = np.array(values.start_com[:2] if place is None else place)
-        found = Endpoints(body, scene, _friction(values)).find(spot, yaw, Habit(name), start.height_m)
+        found = Endpoints(body, scene, friction_of(values)).find(spot, yaw, Habit(name), start.height_m)
         if found.stage is None:
             raise ScenarioError(f"{values.source}: {found.failure}; valid: another place or posture")
         return np.array(found.stage.q)
@@ -56,6 +67,14 @@ def start_posture(
     q[2] += values.start_level
     q[:2] = place if place is not None else q[:2] + values.start_com[:2] - Configuration(body, q).com[:2]
     return q
+
+
+def carried_to(q: FloatArray, at: ArrayLike, yaw: float, level: float) -> FloatArray:
+    """(nq,) a posture made for the ground at the origin, at a place x and y and a level [m], turned [rad]."""
+    found = turned(q, yaw)
+    found[:2] = at
+    found[2] += level
+    return found
 
 
 def turned(q: FloatArray, yaw: float) -> FloatArray:
@@ -80,8 +99,3 @@ def _heading(values: ScenarioValues) -> float:
     contacts = values.explicit_supports().resolved_phases()[0]
     yaws = np.deg2rad([item.yaw_deg for name, item in contacts.items() if "foot" in name] or [0.0])
     return float(np.rad2deg(np.arctan2(np.sin(yaws).sum(), np.cos(yaws).sum())))
-
-
-def _friction(values: ScenarioValues) -> float:
-    supports = values.file.supports
-    return values.contacts.friction if supports is None else supports.friction

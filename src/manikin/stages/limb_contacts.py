@@ -8,7 +8,6 @@ import numpy as np
 from manikin.body import BodyModel, Limb, limb_named
 from manikin.contact import ContactKind
 from manikin.contact_planning import (
-    ContactRules,
     Endpoints,
     LimbExtendSettings,
     LimbPlaces,
@@ -30,6 +29,8 @@ from manikin.reachability import (
     abstraction_of,
 )
 from manikin.scenarios import Scenario
+from manikin.scenarios.contact_rules import contact_rules
+from manikin.scenarios.start import CLIMBING, carried_to
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 from manikin.stages.along_guides import SearchTally
@@ -50,12 +51,6 @@ STRIDE = 0.4
 AROUND = 1.3
 """Room around start and goal in which the root is led, in heights of a standing root."""
 
-PATCH_WIDTH = 0.7
-"""Width of the front of a sole that has to lie on a hold, relative to the sole's."""
-
-HINGE_ROOM = 0.005
-"""Distance of that part to the hinge of the toes, which would give way [m]."""
-
 STEEPEST = float(np.deg2rad(50.0))
 """Largest slope on which a limb that cannot hold on counts as within reach; our choice."""
 
@@ -64,9 +59,6 @@ LEAN = 0.35
 
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
-
-CLIMBING = "climbing"
-"""Name of the posture that stands for where the root is, with whatever contacts are there."""
 
 
 def find_limb_contacts(
@@ -98,7 +90,7 @@ class _LimbSearch:
         self._poser = Poser(body, scene, self._reference, PoserSettings().scaled(safe))
         samples = sample_limbs(body, np.random.default_rng(0))
         self._places = LimbPlaces(
-            body, scene, self._limbs, self._kinds, self._rules(), self._reference, samples
+            body, scene, self._limbs, self._kinds, contact_rules(scenario, body), self._reference, samples
         )
         volumes = [samples[limb.name].reach for limb in self._limbs]
         self._abstraction: Abstraction = abstraction_of(body, volumes)
@@ -129,13 +121,6 @@ class _LimbSearch:
     @property
     def _climbs(self) -> bool:
         return self._scenario.file.task.goal.posture == CLIMBING
-
-    def _rules(self) -> ContactRules:
-        options, patch = self._scenario.contacts, None
-        if options.forefoot_m is not None and self._body.sole_length and self._body.sole_width:
-            end = _toe_hinge(self._body) - HINGE_ROOM
-            patch = (end - options.forefoot_m, end, PATCH_WIDTH * self._body.sole_width)
-        return ContactRules(options.friction, options.grasp_force_N, 0.0, patch)
 
     def _settings(self) -> LimbExtendSettings:
         """Lengths by the size of the body, times by how fast a body of that size moves."""
@@ -180,11 +165,8 @@ class _LimbSearch:
 
     def _standing(self, at: FloatArray, yaw: float, height: float | None) -> FloatArray:
         """(nq,) reference posture at a place, as high as if it stood there."""
-        q = np.array(self._reference)
-        q[:2] = at
-        q[2] += height if height is not None else self._scenario.start_level
-        q[3:7] = [0.0, 0.0, np.sin(0.5 * yaw), np.cos(0.5 * yaw)]
-        return q
+        level = height if height is not None else self._scenario.start_level
+        return carried_to(self._reference, at, yaw, level)
 
     def _guide(self, start: FloatArray, goal: FloatArray) -> RootGuide:
         ends = np.array([start, goal])
@@ -216,14 +198,6 @@ def _limbs(body: BodyModel, names: tuple[str, ...]) -> tuple[Limb, ...]:
 def _kind(body: BodyModel, limb: Limb) -> ContactKind:
     """A person's hands hold on; all other limbs touch in their own way."""
     return ContactKind.GRASP if body.stature is not None and "hand" in limb.effector else limb.kind
-
-
-def _toe_hinge(body: BodyModel) -> float:
-    """Where the hinge of the toes crosses the sole's x axis; its tip without such a hinge [m]."""
-    foot = body.effector("left_foot")
-    toes = [segment for segment in body.segments if segment.parent == foot.segment and segment.hinges]
-    own = foot.rotation.T @ (toes[0].origin - foot.translation) if toes else None
-    return 0.5 * (body.sole_length or 0.0) if own is None else float(own[0])
 
 
 def _as_climbing(body: BodyModel, manner: str) -> FloatArray:
