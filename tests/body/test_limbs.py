@@ -19,15 +19,20 @@ from manikin.body import (
     limbs_of,
     random_configuration,
     reach_volume,
+    with_further_contacts,
     with_knees_and_elbows,
 )
-from manikin.body.limbs import limb_slots, parent_segment
+from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
+from manikin.body.limbs import is_further, limb_slots, parent_segment
+from manikin.body.natural_range import NaturalRange
 from manikin.body.reach_volume import hull_of
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
 
 BODIES = {"human": with_knees_and_elbows(human()), "insect": insect()}
 LIMBS = [pytest.param(body, limb, id=limb.name) for body in BODIES.values() for limb in limbs_of(body)]
+SITTER = with_further_contacts(human())
+PELVIS = limb_named(SITTER, "pelvis")
 
 
 def test_a_human_has_arms_and_legs_and_with_knees_and_elbows_eight_limbs():
@@ -58,7 +63,47 @@ def test_an_insect_stands_on_six_tips_under_a_lifted_trunk():
     assert tips[:, :2].min(axis=0)[1] < state.com[1] < tips[:, :2].max(axis=0)[1]
 
 
-@pytest.mark.parametrize(("body", "limb"), LIMBS)
+def test_further_contacts_are_those_asked_for():
+    assert SITTER.limbs == (*BODIES["human"].limbs, PELVIS)
+    assert [limb.name for limb in with_further_contacts(human(), ["pelvis"]).limbs[4:]] == ["pelvis"]
+    assert with_further_contacts(human(), ()).limbs == human().limbs
+    further = [limb.name for limb in SITTER.limbs if is_further(SITTER, limb)]
+    assert further == ["left_knee", "right_knee", "left_elbow", "right_elbow", "pelvis"]
+    with pytest.raises(BodyError, match=r"^further contact is 'nose'; valid: knees, elbows, pelvis$"):
+        with_further_contacts(human(), ("nose",))
+    with pytest.raises(BodyError, match="valid: a human"):
+        with_further_contacts(insect(), ("pelvis",))
+
+
+def test_a_pelvis_is_a_limb_without_joints_that_touches_with_what_a_human_sits_on():
+    """Its frame is the root's, and its patch the rectangle that presses on a seat."""
+    assert (PELVIS.effector, PELVIS.kind, PELVIS.mirror) == ("buttocks", ContactKind.SOLE, None)
+    assert PELVIS.patch == pytest.approx((SEAT_LENGTH * 1.75, SEAT_WIDTH * 1.75))
+    assert len(limb_slots(SITTER, PELVIS)) == 0
+    assert parent_segment(SITTER, PELVIS) == "pelvis"
+    with pytest.raises(BodyError, match="patch is"):
+        replace(SITTER, limbs=(replace(PELVIS, patch=(0.1, 0.0)),))
+
+
+def test_the_reach_of_a_pelvis_is_a_small_cube_that_goes_with_the_root():
+    volume = reach_volume(SITTER, PELVIS, np.random.default_rng(0))
+    place = SITTER.effector("buttocks").translation
+    centre, radius = volume.inscribed_sphere
+    assert np.allclose(centre, place, atol=1e-9)
+    assert radius == pytest.approx(0.03)
+    assert volume.residual(place + np.array([0.0, 0.0, 0.04])) == pytest.approx(-0.01)
+
+
+def test_nothing_in_a_limb_without_joints_can_be_violated():
+    chain = LimbKinematics(SITTER, PELVIS)
+    angles = chain.random_angles(np.random.default_rng(0), 5)
+    assert angles.shape == (5, 0)
+    natural = NaturalRange(SITTER, PELVIS)
+    assert (natural.normalised(angles) == 1.0).all()
+    assert natural.contains(angles).all()
+
+
+@pytest.mark.parametrize(("body", "limb"), [*LIMBS, pytest.param(SITTER, PELVIS, id="pelvis")])
 def test_forward_kinematics_of_a_limb_are_those_of_the_whole_body(body, limb):
     """Placement and Jacobian against Pinocchio, wherever the root is."""
     rng = np.random.default_rng(1)
@@ -72,7 +117,7 @@ def test_forward_kinematics_of_a_limb_are_those_of_the_whole_body(body, limb):
         assert np.abs(origin + rotation @ found.positions[number] - place).max() < 1e-9
         assert np.abs(rotation @ found.rotations[number] - turn).max() < 1e-9
         jacobian = state.effector_jacobian(limb.effector)[:3, columns]
-        assert np.abs(rotation @ found.jacobians[number] - jacobian).max() < 1e-9
+        assert np.abs(rotation @ found.jacobians[number] - jacobian).max(initial=0.0) < 1e-9
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7))

@@ -9,7 +9,7 @@ from manikin.body.configuration import (
     random_configuration,
 )
 from manikin.body.creature import LimbSpec, creature_from_urdf
-from manikin.body.further_contacts import with_knees_and_elbows
+from manikin.body.further_contacts import with_further_contacts, with_knees_and_elbows
 from manikin.body.human import body_from_signature, human
 from manikin.body.human_volumes import human_volumes
 from manikin.body.insect import insect
@@ -56,6 +56,7 @@ __all__ = [
     "random_configuration",
     "reach_volume",
     "volume_of",
+    "with_further_contacts",
     "with_knees_and_elbows",
     "with_root",
 ]

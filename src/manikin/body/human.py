@@ -79,8 +79,8 @@ def human(
     ``head`` (vertex), ``pelvis`` (its segment frame) and ``buttocks`` (middle of what presses on
     a seat, axes as the pelvis).
 
-    Limbs: ``left_arm``, ``right_arm``, ``left_leg``, ``right_leg``; knees and elbows too with
-    :func:`manikin.body.further_contacts.with_knees_and_elbows`.
+    Limbs: ``left_arm``, ``right_arm``, ``left_leg``, ``right_leg``; knees, elbows and the pelvis too with
+    :func:`manikin.body.further_contacts.with_further_contacts`.
 
     Collision shapes are the flesh made slim: the breadth over the hips is Winter's 0.191 H, all
     other breadths and girths are our choice. They scale with stature and (within 12 %) with the

@@ -44,7 +44,7 @@ class LimbKinematics:
         torque_limit: (k,) largest torques [N.m].
         axes: (k, 3) unit axes of the hinges, each in the axes of the one before it.
         offsets: (k, 3) translations before each hinge [m].
-        tip: (3,) translation from the last hinge to the effector [m].
+        tip: (3,) translation from the last hinge to the effector [m]; from the limb's origin without any.
         tip_rotation: (3, 3) from the effector's axes to those of the last hinge.
     """
 
@@ -55,7 +55,7 @@ class LimbKinematics:
         self.lower = frozen_array([hinge.lower for hinge in hinges], "lower")
         self.upper = frozen_array([hinge.upper for hinge in hinges], "upper")
         self.torque_limit = frozen_array([hinge.torque_limit for hinge in hinges], "torque_limit")
-        self.axes = frozen_array([hinge.axis for hinge in hinges], "axes")
+        self.axes = frozen_array(np.reshape([hinge.axis for hinge in hinges], (-1, 3)), "axes")
         offsets, tip = _offsets(body, limb)
         self.offsets, self.tip = frozen_array(offsets, "offsets"), frozen_array(tip, "tip")
         self.tip_rotation = frozen_array(body.effector(limb.effector).rotation, "tip_rotation")
@@ -109,7 +109,9 @@ class LimbKinematics:
         frames, places = self._frames(q)
         turn, before = frames[:, -1], frames[:, :-1]
         axes = (before @ self.axes[..., None])[..., 0]
-        point = places[:, -1] + turn @ self.tip
+        point = turn @ self.tip
+        if len(self):
+            point += places[:, -1]
         out.positions[rows] = point
         out.rotations[rows] = turn @ self.tip_rotation
         out.axes[rows] = axes.transpose(0, 2, 1)
@@ -127,7 +129,7 @@ def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:
         for _ in segment.hinges:
             found.append(offset)
             offset = np.zeros(3)
-    return np.array(found), offset + body.effector(limb.effector).translation
+    return np.reshape(found, (-1, 3)), offset + body.effector(limb.effector).translation
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

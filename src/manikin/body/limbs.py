@@ -17,6 +17,7 @@ __all__ = [
     "are_mirrored",
     "limb_hinges",
     "limb_named",
+    "limb_origin",
     "limb_placement",
     "limb_slots",
     "limbs_of",
@@ -42,11 +43,22 @@ def limb_named(body: BodyModel, name: str) -> Limb:
 
 
 def parent_segment(body: BodyModel, limb: Limb) -> str:
-    """Name of the segment to which the limb is fixed."""
-    parent = body.segment(limb.segments[0]).parent
-    if parent is None:
-        raise BodyError(f"limb {limb.name!r} begins at the root; valid: a segment with a parent")
-    return parent
+    """Name of the segment to which the limb is fixed; of one on the trunk that is the root itself."""
+    return body.segment(limb.segments[0]).parent or limb.segments[0]
+
+
+def limb_origin(body: BodyModel, limb: Limb) -> FloatArray:
+    """(3,) origin of the limb's frame in the segment to which it is fixed [m]."""
+    first = body.segment(limb.segments[0])
+    return np.zeros(3) if first.parent is None else np.array(first.origin)
+
+
+def is_further(body: BodyModel, limb: Limb) -> bool:
+    """Whether a limb is a contact beside those that end the body: on the trunk, or on the way of another."""
+    return body.segment(limb.segments[0]).parent is None or any(
+        len(other.segments) > len(limb.segments) and other.segments[: len(limb.segments)] == limb.segments
+        for other in body.limbs
+    )
 
 
 def limb_hinges(body: BodyModel, limb: Limb) -> tuple[Hinge, ...]:
@@ -56,14 +68,14 @@ def limb_hinges(body: BodyModel, limb: Limb) -> tuple[Hinge, ...]:
 
 def limb_slots(body: BodyModel, limb: Limb) -> np.ndarray:
     """(k,) places of the limb's hinges in the configuration vector ``q``."""
-    return np.array([7 + body.joint_index(hinge.name) for hinge in limb_hinges(body, limb)])
+    return np.array([7 + body.joint_index(hinge.name) for hinge in limb_hinges(body, limb)], dtype=np.int64)
 
 
 def limb_placement(state: Configuration, limb: Limb) -> tuple[FloatArray, FloatArray]:
     """Rotation (3, 3) from the limb's frame to the world's, and its origin (3,) [m]."""
     parent = parent_segment(state.body, limb)
     rotation, _ = state.segment_placement(parent)
-    return rotation, state.point(parent, state.body.segment(limb.segments[0]).origin)
+    return rotation, state.point(parent, limb_origin(state.body, limb))
 
 
 def are_mirrored(body: BodyModel, first: Limb, second: Limb, tolerance: float = 1e-12) -> bool:

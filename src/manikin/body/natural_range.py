@@ -52,9 +52,9 @@ class NaturalRange:
     the volume or to the end of a hinge's interval, whichever is nearer, divided by the radius of the
     largest ball inside. Of a hinge without one it is the distance to the nearer end of its interval,
     divided by half the interval. Of a limb it is the least of its joints. So it is 0 at a violation,
-    negative beyond, and 1 only where every joint is as far from its limits as it can be; 0.1 rad in one
-    angle change it by no more than 0.1 rad over that radius (over half the interval), times the square
-    root of 3 at worst where the grid of the volume is coarse.
+    negative beyond, and 1 only where every joint is as far from its limits as it can be, always where
+    there is none; 0.1 rad in one angle change it by no more than 0.1 rad over that radius
+    (over half the interval), times the square root of 3 at worst where the grid of the volume is coarse.
 
     Attributes:
         limb: The limb.
@@ -114,7 +114,7 @@ class NaturalRange:
 
     def _of_hinges(self, q: FloatArray) -> FloatArray:
         if not len(self.columns):
-            return np.full(len(q), np.inf)
+            return np.ones(len(q))
         lower, upper = self.lower[self.columns], self.upper[self.columns]
         part = q[:, self.columns]
         return np.min(np.minimum(part - lower, upper - part) / (0.5 * (upper - lower)), axis=1)

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 from manikin.body.limb_kinematics import LimbKinematics
-from manikin.body.limbs import parent_segment
+from manikin.body.limbs import limb_origin, parent_segment
 from manikin.body.model import BodyModel
 from manikin.body.segments import Limb
 from manikin.errors import BodyError
@@ -17,6 +17,11 @@ from manikin.spatial import FloatArray, frozen_array
 
 MIN_COUNT = 100
 """Fewest samples from which a hull is made; 10,000 are a fair picture ([Tonneau2015]_ 4.3.4)."""
+
+GIVE = 0.03
+"""Distance from what no joint moves at which a surface is still within its reach [m]; our choice."""
+
+_CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +92,20 @@ def hull_of(limb: Limb, segment: str, points: FloatArray) -> ReachVolume:
     )
 
 
+def rigid_reach(limb: Limb, segment: str, place: FloatArray, rotation: FloatArray) -> ReachVolume:
+    """Reach of a limb without joints: a cube of :data:`GIVE` on each side of its effector.
+
+    The effector moves with the trunk alone; a surface that meets the cube is near enough to be touched.
+
+    Args:
+        limb: The limb.
+        segment: Name of the segment that carries it.
+        place: (3,) of the effector in that segment [m].
+        rotation: (3, 3) from the effector's axes to the segment's.
+    """
+    return hull_of(limb, segment, place + GIVE * _CORNERS @ rotation.T)
+
+
 def reach_volume(body: BodyModel, limb: Limb, rng: np.random.Generator, count: int = 10_000) -> ReachVolume:
     """Sample the reach of a limb within its joint ranges ([Tonneau2015]_ 4.3.4).
 
@@ -94,7 +113,7 @@ def reach_volume(body: BodyModel, limb: Limb, rng: np.random.Generator, count: i
         body: The body.
         limb: One of its limbs.
         rng: Source of randomness.
-        count: Number of samples, at least :data:`MIN_COUNT`.
+        count: Number of samples, at least :data:`MIN_COUNT`; a limb without joints needs none.
 
     Raises:
         BodyError: If the count is too small or the effector moves in a plane only.
@@ -102,5 +121,8 @@ def reach_volume(body: BodyModel, limb: Limb, rng: np.random.Generator, count: i
     if count < MIN_COUNT:
         raise BodyError(f"reach volume count is {count}; valid: at least {MIN_COUNT}")
     chain = LimbKinematics(body, limb)
+    segment = parent_segment(body, limb)
+    if not len(chain):
+        return rigid_reach(limb, segment, limb_origin(body, limb) + chain.tip, chain.tip_rotation)
     places = chain.place(chain.random_angles(rng, count)).positions
-    return hull_of(limb, parent_segment(body, limb), places + body.segment(limb.segments[0]).origin)
+    return hull_of(limb, segment, places + limb_origin(body, limb))

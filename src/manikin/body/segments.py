@@ -191,12 +191,17 @@ class Limb:
     and the axes of that segment's parent. The effector's z axis is the normal of the contact, from
     the scene into the body.
 
+    A contact of the trunk, as of a pelvis on a seat, is a limb without joints: its one segment is the
+    root, whose frame is the limb's own, and the effector goes where the root goes.
+
     Attributes:
         name: Unique among the limbs.
         effector: Name of the effector.
         segments: Names from the limb's root segment to the effector's own, each the parent of the next.
         kind: How the effector touches when nothing else is said.
         mirror: Name of the limb that is its reflection in the sagittal plane, or None.
+        patch: Length and width of the flat rectangle with which it touches as a sole does [m]; None where
+            that is a sole of the body's size.
     """
 
     name: str
@@ -204,6 +209,7 @@ class Limb:
     segments: tuple[str, ...]
     kind: ContactKind
     mirror: str | None = None
+    patch: tuple[float, float] | None = None
 
 
 def check_limbs(
@@ -232,12 +238,16 @@ def _check_chain(limb: Limb, segments: Mapping[str, Segment]) -> None:
     if not limb.segments or unknown:
         wrong = repr(unknown[0]) if unknown else "none"
         raise BodyError(f"limb {limb.name!r} has segment {wrong}; valid: one of {list(segments)}")
+    if limb.patch is not None and not all(np.isfinite(side) and side > 0.0 for side in limb.patch):
+        raise BodyError(f"limb {limb.name!r} patch is {limb.patch} m; valid: a length and a width above 0")
+    if len(limb.segments) == 1 and segments[limb.segments[0]].parent is None:
+        return  # on the trunk, which no joint moves
     for parent, child in zip((None, *limb.segments), limb.segments, strict=False):
         actual = segments[child].parent
         if actual is None or parent not in (None, actual):
             raise BodyError(
                 f"limb {limb.name!r} goes from {parent!r} to {child!r}, whose parent is {actual!r}; "
-                "valid: segments that follow each other, the root not among them"
+                "valid: segments that follow each other, the root not among them, or the root alone"
             )
     if not any(segments[name].hinges for name in limb.segments):
         raise BodyError(f"limb {limb.name!r} has no hinge; valid: at least one")

@@ -33,9 +33,9 @@ class Alignment:
     error: float
     tilt: float
 
-    def lies(self, max_tilt: float) -> bool:
-        """Whether the effector is at its point and tilted by at most ``max_tilt`` [rad]."""
-        return self.error <= POSITION_TOLERANCE and self.tilt <= max_tilt
+    def lies(self, max_tilt: float, max_error: float = POSITION_TOLERANCE) -> bool:
+        """Whether the effector is at its point, to ``max_error`` [m] and upright, to ``max_tilt`` [rad]."""
+        return self.error <= max_error and self.tilt <= max_tilt
 
 
 class Aligner:

@@ -64,11 +64,12 @@ def _step(chain: LimbKinematics, *, level: bool) -> ca.Function:
     place, turn, axes, hinges = _forward(chain, q)
     gap = point - place
     tilt = _tilt(turn[:, 2], turn[:, 0], normal)
-    jacobian = ca.horzcat(*[ca.cross(a, place - h) for a, h in zip(axes, hinges, strict=True)])
+    none = ca.SX(3, 0)  # the columns of a limb without joints
+    jacobian = ca.horzcat(none, *[ca.cross(a, place - h) for a, h in zip(axes, hinges, strict=True)])
     missing = gap
     if level:
         z = turn[:, 2]
-        across = ca.horzcat(*[a - z * ca.dot(z, a) for a in axes])
+        across = ca.horzcat(none, *[a - z * ca.dot(z, a) for a in axes])
         jacobian, missing = ca.vertcat(jacobian, LEVER * across), ca.vertcat(gap, LEVER * tilt)
     moved = _moved(chain, q, jacobian, missing)
     lengths = ca.vertcat(ca.sqrt(ca.sumsqr(gap)), ca.sqrt(ca.sumsqr(tilt)))

@@ -169,7 +169,7 @@ class SurfaceTable:
             places = (sides @ points[..., None]) + (sides @ turns) @ footprint.T
             inside = places >= self.side_low[numbers][..., None]
             inside &= places <= self.side_high[numbers][..., None]
-            return np.logical_and.reduce(inside.reshape(len(points), -1), axis=1)
+            return np.logical_and.reduce(inside.reshape(len(points), 2 * len(footprint)), axis=1)
         corners = points[:, None] + footprint @ turns.transpose(0, 2, 1)
         each = self.over(corners.reshape(-1, 3), np.repeat(numbers, len(footprint)))
         return np.logical_and.reduce(each.reshape(len(points), len(footprint)), axis=1)

@@ -188,8 +188,10 @@ def _radius(item: pin.GeometryObject) -> float:
 
 
 def _moving_segments(body: BodyModel, limb: Limb) -> set[str]:
-    """Segments of the limb and what hangs on them."""
+    """Segments of the limb and what hangs on them; of one on the trunk, the root alone."""
     moving = set(limb.segments)
+    if body.segments[0].name in moving:
+        return moving
     for segment in body.segments:
         if segment.parent in moving:
             moving.add(segment.name)

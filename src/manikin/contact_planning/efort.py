@@ -13,6 +13,9 @@ from numpy.typing import ArrayLike
 from manikin.errors import InputError
 from manikin.spatial import FloatArray, frozen_array
 
+MOST_RATIO = 1e6
+"""Ratio at which EFORT takes a limb that needs no torque, which has an infinite one [N per N.m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
@@ -75,15 +78,21 @@ def force_transmission_ratio(products: FloatArray, direction: ArrayLike) -> Floa
 def efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> FloatArray:
     """EFORT: ``alpha = f_T (v . n)`` (5.12).
 
+    The ratio is infinite where the limb carries the direction without torque, above all where it has no
+    joints, as a pelvis on a seat: nothing but the surface bounds such a force.  It then counts as
+    :data:`MOST_RATIO`, more than any limb that has to work, and what is left is to order contacts by
+    how much the surface faces the direction, ``v . n``.
+
     Args:
         products: (n, 3, 3) ``J J^T`` [m^2].
         direction: (3,) ``v``: where the scene shall push this limb, see :class:`Task`.
         normals: (n, 3) unit normals of the surfaces, out of the scene, in the same frame.
 
     Returns:
-        (n,) negative where the surface would have to pull.
+        (n,) finite, negative where the surface would have to pull.
     """
-    return force_transmission_ratio(products, direction) * (normals @ unit_direction(direction))
+    ratio = np.minimum(force_transmission_ratio(products, direction), MOST_RATIO)
+    return ratio * (normals @ unit_direction(direction))
 
 
 def pulling_efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.body import BodyModel, Configuration, Limb, LimbKinematics, limb_named
 from manikin.body.natural_range import NaturalRange
 from manikin.contact import Contact, ContactKind
-from manikin.contact_planning.alignment import TILT_TOLERANCE, Aligner
+from manikin.contact_planning.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Aligner
 from manikin.contact_planning.candidates import Candidates, Situation, SurfaceTable, find_candidates
 from manikin.contact_planning.collisions import LimbCollisions
 from manikin.contact_planning.efort import Task
@@ -48,9 +48,10 @@ class GeneratorSettings:
     """How a request searches.
 
     Attributes:
-        tolerance: Largest distance of a sample's effector to a surface, closed by inverse kinematics [m].
+        tolerance: Largest distance of a sample's effector to a surface, closed by inverse kinematics; of a
+            limb without joints it stays [m].
         max_tilt: Largest angle between the effector's z axis and the normal before the alignment [rad].
-        point_tilt: The same after it, for points and grasps; soles lie flat [rad].
+        point_tilt: The same after it, for points, grasps and limbs without joints; soles lie flat [rad].
         tries: Candidates that are aligned and tested before giving up.
     """
 
@@ -74,6 +75,9 @@ class GeneratedContact:
         tried: How many of them were tried.
         failure: What kept the limb from a contact, or None.
         message: The failure in words, or an empty text.
+        gap: Distance of the effector from its contact in ``q`` [m]: none where joints close it.  A limb
+            without joints touches where the root puts it, at most the settings' tolerance away; it is for
+            whoever places the root to close the rest.
     """
 
     limb: str
@@ -85,6 +89,7 @@ class GeneratedContact:
     tried: int
     failure: Hindrance | None = None
     message: str = ""
+    gap: float = 0.0
 
     @property
     def found(self) -> bool:
@@ -195,7 +200,7 @@ class ContactGenerator:
             return [_failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")]
         candidates = find_candidates(
             self._table, near, situation, tools.samples, tolerance=self.settings.tolerance,
-            max_tilt=self.settings.max_tilt, footprint=footprint(self.body, touch, self.rules),
+            max_tilt=self.settings.max_tilt, footprint=footprint(self.body, tools.limb, touch, self.rules),
         )  # fmt: skip
         if not len(candidates):
             names = sorted({self._table.surfaces[number].obstacle for number in near})
@@ -223,8 +228,8 @@ class ContactGenerator:
         faults: Counter[tuple[str, str]] = Counter()
         order = _tried(scores, self.settings.tries)
         flat = kind is ContactKind.SOLE
-        allowed = TILT_TOLERANCE if flat else self.settings.point_tilt
-        sole = footprint(self.body, kind, self.rules)
+        gap, allowed = tools.allowed(self.settings, flat=flat)
+        sole = footprint(self.body, tools.limb, kind, self.rules)
         goals = tools.goals(situation, candidates, order)
         surfaces = candidates.surfaces[order].tolist()
         tools.collisions.begin(situation)
@@ -234,7 +239,7 @@ class ContactGenerator:
             if _is_near(candidates.points[row], found, apart):
                 continue
             aligned = tools.aligner.align(*goal, allowed)
-            if not aligned.lies(allowed):
+            if not aligned.lies(allowed, gap):
                 faults[_TILTED] += 1
                 continue
             if not tools.natural(aligned.angles):
@@ -249,7 +254,8 @@ class ContactGenerator:
             if flat and not self._table.carries_one(candidates.points[row] + sole @ turn.T, surfaces[number]):
                 faults[_TILTED] += 1
                 continue
-            found.append(self._found(tools.limb, kind, candidates, row, turn, q.copy(), scores, number + 1))
+            made = self._found(tools.limb, kind, candidates, row, turn, q.copy(), scores, number + 1)
+            found.append(made if len(tools.chain) else replace(made, gap=aligned.error))
             if len(found) == most:
                 break
         return found or [_none_fits(tools.limb.name, faults, len(candidates), len(order))]
@@ -283,6 +289,12 @@ class _LimbTools:
         self.collisions = LimbCollisions(body, limb, scene)
         self._range = NaturalRange(body, limb) if samples.natural else None
         _ = samples.upward, samples.manipulability, samples.hull  # made now, not during a request
+
+    def allowed(self, settings: GeneratorSettings, *, flat: bool) -> tuple[float, float]:
+        """Distance [m] and tilt [rad] that the alignment may leave; what no joint moves is taken as it is."""
+        if not len(self.chain):
+            return settings.tolerance, settings.point_tilt
+        return POSITION_TOLERANCE, TILT_TOLERANCE if flat else settings.point_tilt
 
     def natural(self, angles: FloatArray) -> bool:
         """Whether a limb at angles (k,) is hardly beyond a learnt range of motion; so where none counts."""

@@ -8,6 +8,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Configuration, Limb
+from manikin.body.limbs import is_further
 from manikin.contact import ContactKind
 from manikin.contact_planning.candidates import Candidates, Situation
 from manikin.contact_planning.efort import Task
@@ -153,7 +154,8 @@ class LimbPlaces:
         self._wanted = {
             name: np.asarray(root.actInv(state.effector_placement(name)[1])) for name in self.limbs
         }
-        self.reach = float(np.mean([known[limb.name].hull[1] for limb in limbs]))
+        ends = [limb for limb in limbs if not is_further(body, limb)] or limbs
+        self.reach = float(np.mean([known[limb.name].hull[1] for limb in ends]))
         steps = np.linspace(-2.0, 2.0, 33) * ROOM * self.reach
         grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
         self._grid = grid[np.argsort(np.linalg.norm(grid, axis=1), kind="stable")]
@@ -203,8 +205,8 @@ class LimbPlaces:
 
         The generator moves the limb alone; the whole body can often reach what it cannot.
         """
-        points = footprint(self._body, kind, self._rules)
-        if kind is ContactKind.SOLE and self._rules.patch is not None:
+        points = footprint(self._body, limb, kind, self._rules)
+        if kind is ContactKind.SOLE and self._rules.patch is not None and limb.patch is None:
             # The tip of the toes keeps off what stands behind the hold.
             toes = 0.5 * (self._body.sole_length or 0.0) + TOE_ROOM
             points = np.column_stack(

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel, Limb, LimbKinematics, ReachVolume, are_mirrored
-from manikin.body.limbs import REFLECTION, parent_segment
+from manikin.body.limbs import REFLECTION, limb_origin, limb_slots, parent_segment
 from manikin.body.natural_range import NaturalRange
-from manikin.body.reach_volume import hull_of
+from manikin.body.reach_volume import hull_of, rigid_reach
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, finite_number
 
@@ -70,7 +70,9 @@ class LimbSamples:
 
     @cached_property
     def reach(self) -> ReachVolume:
-        """Convex hull of the positions, in the frame of the carrying segment."""
+        """Convex hull of the positions in the frame of the carrying segment; without joints a small cube."""
+        if not self.angles.shape[1]:
+            return rigid_reach(self.limb, self.segment, self.positions[0] + self.origin, self.rotations[0])
         return hull_of(self.limb, self.segment, self.positions + self.origin)
 
 
@@ -97,7 +99,7 @@ def sample_limb(
     """Draw configurations of a limb within its range of motion and keep those far from singular.
 
     The ratio that EFORT builds on grows without bound towards singular configurations, so those with
-    little manipulability are dropped (5.4.1).
+    little manipulability are dropped (5.4.1).  A limb without joints has one configuration, which is kept.
 
     Args:
         body: The body.
@@ -116,6 +118,7 @@ def sample_limb(
     if count < 4:
         raise BodyError(f"limb samples count is {count}; valid: at least 4")
     share = finite_number(threshold, "limb samples threshold", at_least=0.0, error=BodyError)
+    count = samples_of(body, limb, count)
     chain = LimbKinematics(body, limb)
     angles_of = _source(body, limb, chain, rng, natural)
     parts: list[tuple[FloatArray, ...]] = []
@@ -132,10 +135,15 @@ def sample_limb(
                 "largest; valid: a smaller threshold"
             )
     joined = [np.concatenate(arrays)[:count] for arrays in zip(*parts, strict=True)]
-    origin = np.array(body.segment(limb.segments[0]).origin)
+    origin = limb_origin(body, limb)
     return LimbSamples(
         limb, parent_segment(body, limb), origin, *joined, threshold=float(least or 0.0), natural=natural
     )
+
+
+def samples_of(body: BodyModel, limb: Limb, count: int) -> int:
+    """Number of samples that there are of a limb where ``count`` are asked for: without joints, one."""
+    return count if len(limb_slots(body, limb)) else 1
 
 
 def _source(

@@ -122,6 +122,7 @@ class ContactAnswer:
             "role": str(self.role),
             "heuristic": self.question.heuristic,
             "score": found.score if found.found else None,
+            "gap_m": found.gap if found.found else None,
             "tried": found.tried,
             "samples": self.question.samples,
             "seed": self.question.seed,

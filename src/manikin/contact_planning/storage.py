@@ -11,7 +11,7 @@ import numpy as np
 from manikin.atomic import atomic_path
 from manikin.body import BodyModel, limb_named
 from manikin.body.limbs import limb_slots, parent_segment
-from manikin.contact_planning.samples import THRESHOLD, LimbSamples, mirrored, sample_limbs
+from manikin.contact_planning.samples import THRESHOLD, LimbSamples, mirrored, sample_limbs, samples_of
 from manikin.errors import BodyError
 from manikin.motion.description import body_key
 
@@ -99,7 +99,7 @@ def samples_for(
         save_samples(path, made, body)
         return made
     found = load_samples(path, body)
-    wanted = {limb.name: (count, natural) for limb in body.limbs}
+    wanted = {limb.name: (samples_of(body, limb, count), natural) for limb in body.limbs}
     held = {name: (len(item), item.natural) for name, item in found.items()}
     if held != wanted:
         raise BodyError(f"samples file '{path}' holds {_words(held)}; valid: {_words(wanted)}, or a new file")

@@ -10,6 +10,8 @@ from manikin.contact import Contact, ContactKind, grasp, point, sole
 from manikin.errors import ContactError
 from manikin.spatial import FloatArray, frozen_array, skew
 
+_RECTANGLE = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
+
 
 @dataclass(frozen=True)
 class ContactRules:
@@ -19,7 +21,7 @@ class ContactRules:
         friction: Coulomb coefficient of soles and points.
         grasp_force: Largest force of a grasp along each world axis [N].
         grasp_moment: Largest moment of a grasp along each world axis [N.m].
-        patch: Part of a sole that has to touch, as its start and end along the sole's x axis and its
+        patch: Part of a foot's sole that has to touch, as its start and end along the sole's x axis and its
             width [m]; the whole sole when None. A climber stands on the front of the feet.
     """
 
@@ -29,11 +31,14 @@ class ContactRules:
     patch: tuple[float, float, float] | None = None
 
 
-def footprint(body: BodyModel, kind: ContactKind, rules: ContactRules | None = None) -> FloatArray:
+def footprint(
+    body: BodyModel, limb: Limb, kind: ContactKind, rules: ContactRules | None = None
+) -> FloatArray:
     """(c, 3) points of the effector's frame that must lie on the surface [m].
 
     Args:
         body: The body.
+        limb: Its limb, whose own patch goes before the body's soles.
         kind: How it touches.
         rules: Which part of a sole has to touch; all of it when omitted.
 
@@ -42,14 +47,15 @@ def footprint(body: BodyModel, kind: ContactKind, rules: ContactRules | None = N
     """
     if kind is not ContactKind.SOLE:
         return np.zeros((1, 3))
+    if limb.patch is not None:
+        return _RECTANGLE * 0.5 * np.array([*limb.patch, 0.0])
     if body.sole_length is None or body.sole_width is None:
         raise ContactError(f"body {body.name!r} has no soles; valid: a contact of kind point or grasp")
     if rules is not None and rules.patch is not None:
         start, end, width = rules.patch
         side = 0.5 * width
         return np.array([[end, side, 0.0], [end, -side, 0.0], [start, -side, 0.0], [start, side, 0.0]])
-    half = 0.5 * np.array([body.sole_length, body.sole_width, 0.0])
-    return np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]]) * half
+    return _RECTANGLE * 0.5 * np.array([body.sole_length, body.sole_width, 0.0])
 
 
 def make_contact(
@@ -80,13 +86,13 @@ def make_contact(
         )  # fmt: skip
     if kind is ContactKind.POINT:
         return point(limb.effector, position, friction=rules.friction, rotation=rotation)
-    length, width = 2.0 * footprint(body, kind)[0, :2]
+    length, width = 2.0 * footprint(body, limb, kind)[0, :2]
     whole = sole(
         limb.effector, position, length=length, width=width, friction=rules.friction, rotation=rotation
     )
-    if rules.patch is None:
+    if rules.patch is None or limb.patch is not None:
         return whole
-    return replace(whole, points=frozen_array(footprint(body, kind, rules), "sole's patch [m]", (4, 3)))
+    return replace(whole, points=frozen_array(footprint(body, limb, kind, rules), "sole's patch [m]", (4, 3)))
 
 
 def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:

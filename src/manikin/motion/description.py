@@ -40,6 +40,7 @@ def describe_body(body: BodyModel) -> Json:
         "limbs": [
             {"name": limb.name, "effector": limb.effector, "segments": list(limb.segments),
              "kind": str(limb.kind), "mirror": limb.mirror}
+            | ({} if limb.patch is None else {"patch_m": list(limb.patch)})
             for limb in body.limbs
         ],
     }  # fmt: skip
@@ -77,7 +78,11 @@ def body_key(body: BodyModel) -> str:
 
 def _limb_from(data: Mapping[str, Any]) -> Limb:
     kind = ContactKind(data["kind"])
-    return Limb(data["name"], data["effector"], tuple(data["segments"]), kind, data["mirror"])
+    patch = data.get("patch_m")
+    return Limb(
+        data["name"], data["effector"], tuple(data["segments"]), kind, data["mirror"],
+        None if patch is None else (patch[0], patch[1]),
+    )  # fmt: skip
 
 
 def _describe_segment(segment: Segment) -> Json:

@@ -261,8 +261,8 @@ def _segment_frames(body: BodyModel, angles: Mapping[str, float] | None) -> dict
 
 
 def _outside_limbs(body: BodyModel, volumes: Sequence[LimbVolume]) -> list[str]:
-    """Names of the segments that belong to no limb and hang on none, as toes do."""
-    in_limbs = {name for volume in volumes for name in volume.limb.segments}
+    """Names of the segments that belong to no limb and hang on none, as toes do; the root always."""
+    in_limbs = {name for volume in volumes for name in volume.limb.segments} - {body.segments[0].name}
     for segment in body.segments:
         if segment.parent in in_limbs:
             in_limbs.add(segment.name)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from manikin.body import BodyModel, creature_from_urdf, human, insect, point_mass
+from manikin.body import BodyModel, creature_from_urdf, human, insect, point_mass, with_further_contacts
 from manikin.errors import InputError
 from manikin.scenarios.obstacles import build_obstacle
 from manikin.scenarios.validation import Path as KeyPath
@@ -23,7 +23,8 @@ def build_body(values: ScenarioValues) -> BodyModel:
     data, sole = values.file.body, values.sole
     soles = {} if sole is None else {"sole_length": sole.length_m, "sole_width": sole.width_m}
     try:
-        return human(data.stature_m, data.mass_kg, data.sex, **soles)
+        body = human(data.stature_m, data.mass_kg, data.sex, **soles)
+        return with_further_contacts(body, data.further_contacts) if data.further_contacts else body
     except InputError as error:
         path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)
         raise values.refused(path, error) from None

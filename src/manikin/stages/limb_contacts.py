@@ -6,6 +6,7 @@ from itertools import islice
 import numpy as np
 
 from manikin.body import BodyModel, Limb, limb_named
+from manikin.body.limbs import is_further
 from manikin.contact import ContactKind
 from manikin.contact_planning import (
     Endpoints,
@@ -185,7 +186,10 @@ class _LimbSearch:
 
     def _condition(self) -> Condition:
         """What cannot hold on reaches something to stand on: all but two of more than four such limbs."""
-        bearing = [name for name, kind in self._kinds.items() if kind is not ContactKind.GRASP]
+        bearing = [
+            limb.name for limb in self._limbs
+            if self._kinds[limb.name] is not ContactKind.GRASP and not is_further(self._body, limb)
+        ]  # fmt: skip
         least = len(bearing) if len(bearing) <= 4 else len(bearing) - 2
         rule = LimbRule(tuple(bearing) if least == len(bearing) else (), least)
         return Condition((rule,), dict.fromkeys(bearing, UsableSurface((0.0, 0.0, 1.0), STEEPEST)))

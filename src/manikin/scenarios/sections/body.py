@@ -9,7 +9,7 @@ from manikin.scenarios.sections.contact import SoleSection
 from manikin.scenarios.validation import Number, Positive, Section, Text, Vector3, refuse
 
 _KEYS = {
-    "human": ("stature_m", "mass_kg", "sex"),
+    "human": ("stature_m", "mass_kg", "sex", "further_contacts"),
     "point_mass": ("mass_kg",),
     "insect": ("length_m", "mass_kg"),
     "urdf": ("urdf", "limbs", "standing_deg", "sole"),
@@ -58,6 +58,11 @@ class BodySection(Section):
     )
     sex: Literal["male", "female"] = Field(
         default="male", description="which anthropometric table, of a human only"
+    )
+    further_contacts: list[Literal["knees", "elbows", "pelvis"]] = Field(
+        default_factory=list,
+        description="what of a human may touch beside hands and feet, as limbs left_knee, right_knee, "
+        "left_elbow, right_elbow, pelvis",
     )
     length_m: Positive = Field(default=0.4, description="length of the trunk [m], of an insect only")
     urdf: Text | None = Field(
