@@ -89,6 +89,24 @@ def test_gradient_is_the_derivative(round_volume, place):
     np.testing.assert_allclose(round_volume.gradient(middle), difference, atol=1e-8)
 
 
+@SOME
+@given(arrays(float, 3, elements=st.floats(-4.0, 4.0)))
+def test_gradient_is_the_derivative_off_the_grid_too(round_volume, place):
+    """Along one axis, two or three beyond the grid; away from the planes between cells."""
+    shape = np.array(round_volume.distances.shape)
+    cell = np.floor((place - round_volume.origin) / round_volume.step)
+    middle = round_volume.origin + (cell + 0.37) * round_volume.step
+    outside = (cell < 0) | (cell > shape - 2)
+    step = 1e-5
+    difference = [
+        (round_volume.distance(middle + e) - round_volume.distance(middle - e)) / (2 * step)
+        for e in step * np.eye(3)
+    ]
+    np.testing.assert_allclose(round_volume.gradient(middle), difference, atol=1e-6)
+    if outside.all():
+        assert np.linalg.norm(round_volume.gradient(middle)) == pytest.approx(1.0)
+
+
 def test_a_file_of_volumes_comes_back(round_volume, tmp_path):
     """Distances to half of 1e-4 rad."""
     save_volumes(tmp_path / "v.npz", {"thigh": round_volume}, "nobody")

@@ -171,7 +171,7 @@ class _Search:
         self._body, self._scene, self._act, self._settings = body, scene, act, settings
         self._rules = ContactRules(friction=settings.friction)
         self._generator = ContactGenerator(body, scene, samples, rules=self._rules)
-        self._poser = PoserSettings()
+        self._poser = PoserSettings(natural=any(item.natural for item in samples.values()))
         self._proximity = Proximity(body, scene)
         self._reference = body.standing_posture() if reference is None else reference
         self._reasons: dict[int, Counter[str]] = {step: Counter() for step in _STEPS}
@@ -256,6 +256,7 @@ class _Search:
             self_clearance=settings.clearance,
             ignore=touching_pairs(self._body, touching),
             range_margin=settings.range_margin,
+            learnt_margin=settings.learnt_margin,
             reference=self._reference,
             preferences=Preferences(grasp=FLAT_PALMS),
         )

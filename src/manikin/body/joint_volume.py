@@ -33,6 +33,7 @@ everyday movement and not, as those of the thesis, of the largest that the subje
 FEWEST = 2
 """Frames with which a cell of the fine grid counts as seen; our choice, against single wrong frames."""
 
+_ROUNDING = 1e-12
 _FINER = 2
 _MOST_CELLS = 40_000_000
 
@@ -82,8 +83,8 @@ class JointVolume:
         return total - beyond
 
     def gradient(self, angles: ArrayLike) -> FloatArray:
-        """(..., 3) derivative of :meth:`distance`; off the grid that of the nearest place on it."""
-        x, _ = self._on_grid(angles)
+        """(..., 3) derivative of :meth:`distance`."""
+        x, beyond = self._on_grid(angles)
         cell, share = self._cell(x)
         slope = np.zeros(x.shape)
         for corner in np.ndindex(2, 2, 2):
@@ -92,7 +93,11 @@ class JointVolume:
             for axis in range(3):
                 others = np.prod(np.delete(factors, axis, axis=-1), axis=-1)
                 slope[..., axis] += (1.0 if corner[axis] else -1.0) * others * value
-        return slope / self.step
+        # Off the grid, what is beyond it counts and no longer what is along it.
+        over = np.asarray(angles, dtype=np.float64) - (self.origin + self.step * x)
+        over[np.abs(over) <= _ROUNDING] = 0.0
+        along = np.where(over == 0.0, slope / self.step, 0.0)
+        return along - over / np.maximum(beyond, _ROUNDING)[..., None]
 
     def contains(self, angles: ArrayLike) -> NDArray[np.bool_]:
         """(...) whether (..., 3) angles are inside or on the surface."""

@@ -128,6 +128,47 @@ class NaturalRange:
         return q
 
 
+@dataclass(frozen=True, eq=False)
+class LearntJoint:
+    """A ball joint of a body that has a learnt volume.
+
+    Attributes:
+        segment: Name of the segment that it moves.
+        hinges: Places of its three angles among those of all hinges.
+        range: Its range.
+    """
+
+    segment: str
+    hinges: slice
+    range: BallRange
+
+
+def learnt_joints(body: BodyModel) -> tuple[LearntJoint, ...]:
+    """Hips and shoulders of a body with the human's hinges; none of other bodies."""
+    found: list[LearntJoint] = []
+    for segment in body.segments:
+        part = _learnt_part(segment)
+        if part is not None:
+            first = body.joint_index(segment.hinges[0].name)
+            ends = tuple((hinge.lower, hinge.upper) for hinge in segment.hinges)
+            found.append(LearntJoint(segment.name, slice(first, first + 3), _learnt_range(part, ends)))
+    return tuple(found)
+
+
+def learnt_distance(body: BodyModel, q: ArrayLike) -> FloatArray:
+    """(n,) distance of the worst hip or shoulder to the surface of its learnt volume, negative outside [rad].
+
+    Args:
+        body: The body; infinite where it has no learnt joint.
+        q: (n, nq) configurations.
+    """
+    angles = np.asarray(q, dtype=np.float64)[:, 7:]
+    found = np.full(len(angles), np.inf)
+    for joint in learnt_joints(body):
+        found = np.minimum(found, joint.range.volume.distance(angles[:, joint.hinges]))
+    return found
+
+
 def _balls(body: BodyModel, limb: Limb) -> list[tuple[slice, BallRange]]:
     """Columns and ranges of the limb's ball joints that have a volume."""
     found, start = [], 0

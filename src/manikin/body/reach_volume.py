@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull
 from manikin.body.limb_kinematics import LimbKinematics
 from manikin.body.limbs import limb_origin, parent_segment
 from manikin.body.model import BodyModel
+from manikin.body.natural_range import NaturalRange
 from manikin.body.segments import Limb
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, frozen_array
@@ -106,7 +107,9 @@ def rigid_reach(limb: Limb, segment: str, place: FloatArray, rotation: FloatArra
     return hull_of(limb, segment, place + GIVE * _CORNERS @ rotation.T)
 
 
-def reach_volume(body: BodyModel, limb: Limb, rng: np.random.Generator, count: int = 10_000) -> ReachVolume:
+def reach_volume(
+    body: BodyModel, limb: Limb, rng: np.random.Generator, count: int = 10_000, *, natural: bool = False
+) -> ReachVolume:
     """Sample the reach of a limb within its joint ranges ([Tonneau2015]_ 4.3.4).
 
     Args:
@@ -114,6 +117,7 @@ def reach_volume(body: BodyModel, limb: Limb, rng: np.random.Generator, count: i
         limb: One of its limbs.
         rng: Source of randomness.
         count: Number of samples, at least :data:`MIN_COUNT`; a limb without joints needs none.
+        natural: Whether hips and shoulders of the human keep to their learnt volumes (4.3.3).
 
     Raises:
         BodyError: If the count is too small or the effector moves in a plane only.
@@ -124,5 +128,6 @@ def reach_volume(body: BodyModel, limb: Limb, rng: np.random.Generator, count: i
     segment = parent_segment(body, limb)
     if not len(chain):
         return rigid_reach(limb, segment, limb_origin(body, limb) + chain.tip, chain.tip_rotation)
-    places = chain.place(chain.random_angles(rng, count)).positions
+    source = NaturalRange(body, limb) if natural else chain
+    places = chain.place(source.random_angles(rng, count)).positions
     return hull_of(limb, segment, places + limb_origin(body, limb))

@@ -10,7 +10,7 @@ from manikin.body import BodyModel, Configuration
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, sole
 from manikin.contact_planning.footholds import Footholds, stature_of
-from manikin.contact_planning.poser import Poser
+from manikin.contact_planning.poser import Poser, PoserSettings
 from manikin.contact_planning.stage import Stage
 from manikin.scene import Scene, Surface
 from manikin.spatial import FloatArray, rotation_from_yaw
@@ -53,7 +53,13 @@ class Endpoints:
     """Finds starts and goals in one scene."""
 
     def __init__(
-        self, body: BodyModel, scene: Scene, friction: float, reference: FloatArray | None = None
+        self,
+        body: BodyModel,
+        scene: Scene,
+        friction: float,
+        reference: FloatArray | None = None,
+        *,
+        natural: bool = False,
     ) -> None:
         """Prepare a scene.
 
@@ -62,10 +68,11 @@ class Endpoints:
             scene: Its surroundings.
             friction: Coulomb coefficient of the soles.
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
+            natural: Whether hips and shoulders keep to their learnt ranges.
         """
         self._body, self._scene, self._friction = body, scene, friction
         self._stature = stature_of(body)
-        self._poser = Poser(body, scene, reference)
+        self._poser = Poser(body, scene, reference, PoserSettings(natural=natural))
         self._footholds = Footholds(body, scene)
 
     def find(self, at: FloatArray, heading: float, habit: Habit, height: float | None = None) -> Endpoint:

@@ -18,7 +18,7 @@ from manikin.contact_planning.depth_first import SearchLog, search_depth_first
 from manikin.contact_planning.extension import Extension, PartialPlan
 from manikin.contact_planning.footholds import Footholds, stature_of
 from manikin.contact_planning.guide_line import GuideLine, heading_of
-from manikin.contact_planning.poser import Posed, Poser
+from manikin.contact_planning.poser import Posed, Poser, PoserSettings
 from manikin.contact_planning.rising import on_feet
 from manikin.contact_planning.stage import ContactPlan, Stage
 from manikin.scene import Scene
@@ -46,6 +46,7 @@ class ExtendSettings:
         swing_speed: Its mean speed on longer ways [m/s].
         shift_duration: Shortest time between two flights [s].
         friction: Coulomb coefficient of the soles.
+        natural: Whether hips and shoulders keep to their learnt ranges.
     """
 
     stride: float = 0.36
@@ -55,6 +56,7 @@ class ExtendSettings:
     swing_speed: float = 0.7
     shift_duration: float = 0.35
     friction: float = 0.7
+    natural: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +96,8 @@ def extend(
         settings: How to search.
         reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
     """
-    settings, poser = settings or ExtendSettings(), Poser(body, scene, reference)
+    settings = settings or ExtendSettings()
+    poser = Poser(body, scene, reference, PoserSettings(natural=settings.natural))
     log = SearchLog(poser, settings.searches)
     steps = _Steps(poser, guide, goal, settings, log)
     first = on_feet(poser, start, steps.feet, guide.at(0.0), log)

@@ -13,6 +13,9 @@ from manikin.posture import Placement, PostureProblem, SolverSettings, generate_
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 
+LEARNT_MARGIN = 0.01
+"""Angle that such postures keep to the surface of a learnt volume [rad]; our choice."""
+
 
 @dataclass(frozen=True)
 class PoserSettings:
@@ -21,6 +24,7 @@ class PoserSettings:
     Attributes:
         clearance: Distance to obstacles and between body parts [m].
         range_margin: Angle to the ends of the joint ranges [rad].
+        natural: Whether hips and shoulders of a human keep to their learnt volumes as well.
         inset: Distance of the centre of mass to the edges of the region where it may rest [m].
         root_weight: Of the distance between the root and the guide [1/m^2].
         turn_weight: Of the angle between the root and the guide [1/rad^2].
@@ -30,11 +34,17 @@ class PoserSettings:
 
     clearance: float = 0.014
     range_margin: float = 0.05
+    natural: bool = False
     inset: float = 0.045
     root_weight: float = 2.0
     turn_weight: float = 2.0
     tolerance: float = 2e-4
     iterations: int = 40
+
+    @property
+    def learnt_margin(self) -> float | None:
+        """Angle to the learnt ranges [rad]; None where they do not count."""
+        return LEARNT_MARGIN if self.natural else None
 
     def scaled(self, factor: float) -> "PoserSettings":
         """The same for a body of another size: lengths times a factor."""
@@ -131,6 +141,7 @@ class Poser:
             self_clearance=self.settings.clearance,
             ignore=self._touching(held),
             range_margin=self.settings.range_margin,
+            learnt_margin=self.settings.learnt_margin,
             reference=self._reference,
         )
         once = SolverSettings(

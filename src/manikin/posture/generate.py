@@ -364,7 +364,7 @@ class PostureSolver:
         found: list[tuple[float, str]] = []
         for term, part in zip(self.requirements, iterate.parts, strict=True):
             residual = iterate.requirement.residual[part]
-            size = float(np.abs(residual).max())
+            size = float(np.abs(residual).max(initial=0.0))
             if size > self.settings.tolerance:
                 found.append((size, term.describe(residual)))
         if self._clearances is not None and iterate.intrusion > self.settings.clearance_tolerance:
@@ -455,6 +455,8 @@ def _without_one(problem: PostureProblem) -> Iterator[tuple[str, PostureProblem]
         yield "the centre-of-mass requirement", replace(problem, com=None)
     if problem.proximity is not None:
         yield "the clearances", replace(problem, proximity=None)
+    if problem.learnt_margin is not None:
+        yield "the learnt ranges of motion", replace(problem, learnt_margin=None)
     for contact in problem.contacts:
         rest = tuple(other for other in problem.contacts if other is not contact)
         yield f"contact '{contact.effector}'", replace(problem, contacts=rest)

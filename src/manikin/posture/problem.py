@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from manikin.body.model import BodyModel
 from manikin.contact import Contact, ContactKind
 from manikin.errors import BodyError, InputError
+from manikin.posture.learnt import LearntRangeTerm
 from manikin.posture.terms import (
     UP,
     ClearanceTerm,
@@ -101,6 +102,8 @@ class PostureProblem:
         self_clearance: Distance to keep between body parts [m].
         ignore: Pairs (segment, obstacle) or (segment, segment) that may touch.
         range_margin: Angle to keep from the ends of the hinge ranges [rad].
+        learnt_margin: Angle to keep to the surface of the learnt volumes of hips and shoulders, inside [rad];
+            None where the ranges of their hinges are all that counts.
         reference: (nq,) posture to stay near, with its root ignored; standing when omitted.
         preferences: Weights of what is not required.
         upright: Whether pelvis, trunk, head and arms should be upright (a human habit).
@@ -116,6 +119,7 @@ class PostureProblem:
     self_clearance: float = 0.005
     ignore: Ignored = NOTHING
     range_margin: float = 0.0
+    learnt_margin: float | None = None
     reference: FloatArray | None = None
     preferences: Preferences = field(default_factory=Preferences)
     upright: bool = True
@@ -140,6 +144,8 @@ class PostureProblem:
         finite_number(self.clearance, "posture clearance [m]")
         finite_number(self.self_clearance, "posture self_clearance [m]")
         finite_number(self.range_margin, "posture range_margin [rad]", at_least=0.0)
+        if self.learnt_margin is not None:
+            finite_number(self.learnt_margin, "posture learnt_margin [rad]", at_least=0.0)
 
     def requirements(self) -> tuple[Term, ...]:
         """Terms that must be zero."""
@@ -155,6 +161,8 @@ class PostureProblem:
                 terms.append(RotationTerm(name, placement.rotation))
         if self.com is not None and self.com_weight is None and np.any(np.isfinite(self.com)):
             terms.append(ComTerm(self.com))
+        if self.learnt_margin is not None:
+            terms.append(LearntRangeTerm(self.body, self.learnt_margin))
         return tuple(terms)
 
     def wishes(self) -> tuple[tuple[FloatArray, Term], ...]:

@@ -76,7 +76,10 @@ class _FootSearch:
         self._tally = SearchTally()
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
         self._reference = manner_of(scenario.manner).posture(body)
-        self._endpoints = Endpoints(body, scene, scenario.contacts.friction, self._reference)
+        self._natural = scenario.contacts.ranges == "learnt"
+        self._endpoints = Endpoints(
+            body, scene, scenario.contacts.friction, self._reference, natural=self._natural
+        )
         self._brace: Brace | None = None
 
     def run(self) -> ContactSearch:
@@ -108,7 +111,7 @@ class _FootSearch:
     def _settings(self, *, again: bool) -> ExtendSettings:
         """How contacts are looked for; along another guide, which is much like the first, not as long."""
         options = self._scenario.contacts
-        settings = ExtendSettings(stride=options.stride_m, friction=options.friction)
+        settings = ExtendSettings(stride=options.stride_m, friction=options.friction, natural=self._natural)
         return replace(settings, searches=SEARCHES_AGAIN) if again else settings
 
     def _goal(self, start: Stage) -> Stage | str:
@@ -116,7 +119,7 @@ class _FootSearch:
         act = act_of(self._scenario)
         if act is None:
             return stage_at(self._endpoints, self._scenario, "goal")
-        samples = sample_limbs(self._body, self._rng)
+        samples = sample_limbs(self._body, self._rng, natural=self._natural)
         friction = self._scenario.contacts.friction
         found = find_brace(
             self._body, self._scene, samples, act, start.com[:2],
@@ -140,7 +143,7 @@ class _FootSearch:
 
     def _abstraction(self) -> Abstraction:
         volumes = [
-            reach_volume(self._body, limb, np.random.default_rng(0))
+            reach_volume(self._body, limb, np.random.default_rng(0), natural=self._natural)
             for limb in limbs_of(self._body)
             if limb.name in LEGS
         ]

@@ -88,8 +88,9 @@ class _LimbSearch:
         self._size = float(body.standing_posture()[2]) / STANDING_HEIGHT
         safe = max(self._size, SMALLEST)
         self._reference = _as_climbing(body, scenario.manner)
-        self._poser = Poser(body, scene, self._reference, PoserSettings().scaled(safe))
-        samples = sample_limbs(body, np.random.default_rng(0))
+        self._natural = scenario.contacts.ranges == "learnt"
+        self._poser = Poser(body, scene, self._reference, PoserSettings(natural=self._natural).scaled(safe))
+        samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
         self._places = LimbPlaces(
             body, scene, self._limbs, self._kinds, contact_rules(scenario, body), self._reference, samples
         )
@@ -152,6 +153,10 @@ class _LimbSearch:
             where = f"the start: no posture at {at.round(3).tolist()} m: "
             yield found if found.stage is not None else LimbStart(None, where + found.reason)
 
+    def _endpoints(self) -> Endpoints:
+        friction = self._scenario.contacts.friction
+        return Endpoints(self._body, self._scene, friction, natural=self._natural)
+
     def _goal(self) -> FloatArray | str:
         """(7,) pose of the root at the goal, or why there is none."""
         if self._body.stature is not None and not self._climbs:
@@ -160,9 +165,6 @@ class _LimbSearch:
         state = self._scenario.file.task.goal
         yaw = float(np.deg2rad(state.heading_deg or 0.0))
         return self._standing(np.array(state.at), yaw, state.height_m)[:7]
-
-    def _endpoints(self) -> Endpoints:
-        return Endpoints(self._body, self._scene, self._scenario.contacts.friction)
 
     def _standing(self, at: FloatArray, yaw: float, height: float | None) -> FloatArray:
         """(nq,) reference posture at a place, as high as if it stood there."""

@@ -1,6 +1,6 @@
 """Section of a scenario file: how contacts are planned where no supports are given."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -27,6 +27,11 @@ class ContactsSection(Section):
     forefoot_m: Positive | None = Field(
         default=None,
         description="length of the front of the soles that has to lie on a hold [m] (default: whole soles)",
+    )
+    ranges: Literal["limits", "learnt"] = Field(
+        default="limits",
+        description="what bounds a human's hips and shoulders: the intervals of their hinges alone, or the "
+        "volumes learnt from recorded motion as well",
     )
     attempts: Annotated[int, Field(strict=True, ge=1, le=20)] = Field(
         default=3, description="guides that are tried before giving up"
