@@ -5,9 +5,9 @@ import pytest
 
 from manikin.body import human, limb_named, reach_volume
 from manikin.body.natural_range import learnt_distance
-from manikin.contact_search import find_supports
 from manikin.errors import ScenarioError
 from manikin.scenarios import load_scenario
+from manikin.stages.contacts import find_supports
 
 SLACK = 2e-4
 """Tolerance of the postures' requirements [rad]."""

@@ -106,7 +106,7 @@ def test_forces_solve_their_program(stance):
     variables = rng.uniform(0.05, 1.0, (20, 3))
     found = forces.share(wrench, variables, tolerance=10.0, force=775.0)
     for k in range(20):
-        gain = 775.0 * variables[k][forces._column]
+        gain = 775.0 * variables[k][forces.columns]
         stacked = np.vstack([forces._matrix / 10.0, np.diag(1.0 / gain)])
         wanted = np.concatenate([forces._to_local @ wrench[k] / 10.0, np.zeros(len(gain))])
         other = lsq_linear(stacked, wanted, (0.0, forces._limit), method="bvls", tol=1e-14)

@@ -5,7 +5,7 @@ from typing import Any
 from manikin.stages.context import RunContext
 from manikin.stages.keyed_contacts import KeyedContacts
 from manikin.stages.report import Report
-from manikin.wholebody import RefineResult, refine_motion
+from manikin.wholebody import RefineResult, RefineScales, RefineSettings, refine_motion
 
 
 def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -> RefineResult:
@@ -18,8 +18,10 @@ def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -
     """
     body, scene, padded = context.body, context.scene, context.padded
     keyed = keyed.at_pace(context.scenario.pace).with_lifted_feet(body, scene, padded)
+    options = context.scenario.file.wholebody
+    settings = RefineSettings(scales=RefineScales.of(body), contact_variables=options.contact_variables)
     result = refine_motion(
-        body, scene, keyed.time, keyed.q, keyed.schedule,
+        body, scene, keyed.time, keyed.q, keyed.schedule, settings=settings,
         padded=padded, progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     passage = context.passage(result.schedule, result.motion).summary()
@@ -61,6 +63,10 @@ def refined_summary(result: RefineResult) -> dict[str, Any]:
             "before": result.before.as_dict(),
             "smoothed": result.smoothed.as_dict(),
             "after": result.after.as_dict(),
+            "least_contact_variable": min(
+                (value for phase in result.variables for value in phase.values()), default=None
+            ),
+            "released_contacts": [{"phase": phase, "effector": name} for phase, name in result.released],
             "stretch": result.stretch,
             "iterations": result.iterations,
         },

@@ -9,6 +9,7 @@ multipliers.
 import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -29,6 +30,7 @@ from manikin.wholebody.fit import FitResult, MotionFit, spline_through
 from manikin.wholebody.forces import plan_forces
 from manikin.wholebody.knots import phase_knots, refined, sample_times
 from manikin.wholebody.objective import MotionObjective
+from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_certificate import RefineRequirements, RefineResiduals, certify_refined
 from manikin.wholebody.refine_input import KeyPath, check_input, stretched_around, stretched_for_speed
 from manikin.wholebody.refine_measures import (
@@ -43,6 +45,7 @@ from manikin.wholebody.refine_measures import (
 from manikin.wholebody.refine_objective import RefineObjective, RefineTargets, refine_targets
 from manikin.wholebody.refine_obstacles import RefineObstacles
 from manikin.wholebody.refine_scales import RefineScales
+from manikin.wholebody.refine_variables import VariableChoice, Variables, VariableSamples, released
 from manikin.wholebody.reweigh import stronger
 
 DEGREE = 5
@@ -63,6 +66,9 @@ CAUGHT = -0.02
 LEAST_SLACK = -1e-6
 """Slack of the contacts' limits below which no contact forces balance the body: 0 but for rounding."""
 
+SPARSE = 0.03
+"""Spacing of the samples for which the contact variables are chosen [s]."""
+
 PATIENT = 0.004
 """Relative decrease of the objective below which a repair stops."""
 
@@ -82,6 +88,8 @@ class RefineSettings:
         requirements: What the finished motion must keep.
         retime: Whether the motion may be slowed down.
         friction_share: Share of the friction with which the margin is wanted; the certificate has all of it.
+        contact_variables: Whether contacts that the motion does not need, and whose effectors are not there,
+            are let go; else all contacts of the sequence are held.
     """
 
     knot_spacing: float = 0.1
@@ -91,6 +99,7 @@ class RefineSettings:
     requirements: RefineRequirements = field(default_factory=RefineRequirements)
     retime: bool = True
     friction_share: float = 0.8
+    contact_variables: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +109,7 @@ class RefineResult:
     Attributes:
         motion: Densely sampled; its time begins where the input's does.
         spline: The motion in closed form.
-        schedule: The contacts in the motion's own time.
+        schedule: The contacts in the motion's own time, without those that were let go.
         before: The input at the motion's own timing, joined by interpolation.
         smoothed: The spline through the input from which the optimisation begins.
         after: The refined motion.
@@ -108,6 +117,8 @@ class RefineResult:
         contact_slack: Room that all limits of the contacts have in common, the least at samples 10 ms
             apart, by linear programs, see :mod:`manikin.wholebody.contact_slack` [N, N.m].
         failure: Why it is no success, or None.
+        variables: Of each phase, the contact variable of each contact of the input's sequence, in [0, 1].
+        released: Phases and effectors of the contacts that were let go.
         stretch: Duration of the motion relative to the input's.
         iterations: Gauss-Newton steps.
         wall_time: [s].
@@ -122,6 +133,8 @@ class RefineResult:
     certificate: RefineResiduals
     contact_slack: float
     failure: WholeBodyFailure | None
+    variables: Variables
+    released: tuple[tuple[int, str], ...]
     stretch: float
     iterations: int
     wall_time: float
@@ -217,8 +230,10 @@ class _Refinement:
         self.body, self.scene, self.path, self.schedule = body, scene, path, schedule
         self.settings, self.task, self.padded = settings, task, padded
         self.proximity = Proximity(body, scene)
-        self.rooms = rooms_of(schedule)
-        self.wanted_rooms = rooms_of(schedule, self.settings.friction_share)
+        self.given = schedule
+        self.variables: Variables = tuple(
+            dict.fromkeys(phase.stance.effectors, 1.0) for phase in schedule.sequence
+        )
         self.iterations = 0
 
     def run(self, began: float, progress: Progress) -> RefineResult:
@@ -226,6 +241,8 @@ class _Refinement:
         if self.settings.retime:
             share = self.settings.scales.velocity_share
             self.path, self.schedule = stretched_for_speed(self.body, self.path, self.schedule, share)
+        if self.settings.contact_variables:
+            self._choose(self._at_rest())
         scales, fine = self.settings.scales, 0
         best = last = self._attempt(scales, fine)
         for number in range(REPAIRS):
@@ -233,6 +250,10 @@ class _Refinement:
             broken = last.certificate.broken(self.settings.requirements)
             if not broken:
                 break
+            if self.settings.contact_variables and self._choose(self._moving(last), self._at_rest()):
+                last = self._attempt(scales, fine)
+                best = self._better(best, last)
+                continue
             if last.certificate.min_clearance_m < CAUGHT:
                 scales = _reweighed(scales, broken & {"min_clearance_m"})
                 last = self._attempt(scales, fine)
@@ -257,7 +278,15 @@ class _Refinement:
             knots = refined(knots, self.schedule.instants, DEGREE)
         time = sample_times(knots, self.settings.samples_per_span)
         targets = refine_targets(
-            self.body, self.scene, self.path, self.schedule, time, scales, self.task, self.padded
+            self.body,
+            self.scene,
+            self.path,
+            self.schedule,
+            time,
+            scales,
+            self.task,
+            self.padded,
+            self.variables,
         )
         fit = MotionFit(
             self.body, self.proximity, targets.fit, knots, DEGREE, scales, self._objective(targets)
@@ -282,6 +311,46 @@ class _Refinement:
             return RefineObjective(body, proximity, targets, basis, self.wanted_rooms)
 
         return make
+
+    @cached_property
+    def rooms(self) -> tuple[BalanceRoom, ...]:
+        """Wrench polytope of each phase."""
+        return rooms_of(self.schedule)
+
+    @cached_property
+    def wanted_rooms(self) -> tuple[BalanceRoom, ...]:
+        """The same with the share of the friction with which the margin is wanted."""
+        return rooms_of(self.schedule, self.settings.friction_share)
+
+    @cached_property
+    def _choice(self) -> VariableChoice:
+        tolerance = self.settings.requirements.support_error
+        return VariableChoice(
+            self.body, self.scene, self.settings.scales, tolerance, self.settings.friction_share
+        )
+
+    def _at_rest(self) -> VariableSamples:
+        """What the keys say about the contacts, before there is a motion."""
+        path, names = self.path, self.schedule.sequence.effectors
+        time = sample_uniformly(self.schedule, SPARSE)
+        return VariableSamples.at_rest(self.body, names, (path.time, path.q), (time, path.at(time)))
+
+    def _moving(self, attempt: _Attempt) -> VariableSamples:
+        """What a motion says about them."""
+        time = sample_uniformly(attempt.schedule, SPARSE)
+        names = attempt.schedule.sequence.effectors
+        return VariableSamples.of_motion(self.body, names, time, attempt.spline.evaluate(time))
+
+    def _choose(self, samples: VariableSamples, resting: VariableSamples | None = None) -> bool:
+        """Choose the contact variables for a motion; whether a contact was let go."""
+        chosen, kept = self._choice.choose(self.schedule, samples, resting)
+        self.variables = tuple({**old, **new} for old, new in zip(self.variables, chosen, strict=True))
+        if kept is self.schedule:
+            return False
+        self.schedule = kept
+        for name in ("rooms", "wanted_rooms"):
+            self.__dict__.pop(name, None)
+        return True
 
     def _slow_down(self, last: _Attempt, broken: frozenset[str]) -> ConfigurationSpline:
         """Give the worst phase more time; the last spline at the new timing."""
@@ -338,7 +407,7 @@ class _Refinement:
         return first if fewer else second
 
     def _result(self, found: _Attempt, given: float, began: float) -> RefineResult:
-        schedule, path = found.schedule, found.path
+        schedule, path, rooms = found.schedule, found.path, rooms_of(found.schedule)
         time = sample_uniformly(schedule, STEP)
         obstacles = RefineObstacles(self.body, self.scene, schedule, time, self.padded)
         knots = phase_knots(schedule.instants, self.settings.knot_spacing, DEGREE)
@@ -347,9 +416,7 @@ class _Refinement:
         basis = SampledBasis.at(fitted, knots, DEGREE)
         smoothed = spline_through(path.at(fitted), basis, knots, DEGREE).evaluate(time).q
         before, start, after = (
-            measure(
-                self.body, self.proximity, obstacles, path, schedule, self.rooms, time, samples, self.task
-            )
+            measure(self.body, self.proximity, obstacles, path, schedule, rooms, time, samples, self.task)
             for samples in (input_samples, smoothed, found.spline.evaluate(time).q)
         )
         slack, when = self._slack(found, time)
@@ -362,7 +429,8 @@ class _Refinement:
             failure = WholeBodyFailure.at(schedule, when, reason)
         return RefineResult(
             found.motion, found.spline, schedule, before, start, after, found.certificate, slack, failure,
-            path.duration / given, self.iterations, clock.perf_counter() - began,
+            self.variables, tuple(released(self.given, schedule)), path.duration / given, self.iterations,
+            clock.perf_counter() - began,
         )  # fmt: skip
 
     def _slack(self, found: _Attempt, time: FloatArray) -> tuple[float, float]:

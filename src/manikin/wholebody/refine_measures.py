@@ -131,12 +131,13 @@ def physics_violation(room: BalanceRoom, stance_wrench: FloatArray) -> FloatArra
 
 def rooms_of(schedule: ContactSchedule, friction_share: float = 1.0) -> tuple[BalanceRoom, ...]:
     """Wrench polytope of each phase, with a share of the friction."""
-    return tuple(BalanceRoom(_smoother(phase.stance, friction_share)) for phase in schedule.sequence)
+    return tuple(room_of(phase.stance, friction_share) for phase in schedule.sequence)
 
 
-def _smoother(stance: Stance, share: float) -> Stance:
-    contacts = [replace(contact, friction=share * contact.friction) for contact in stance]
-    return Stance(contacts, stance.normal_force_cap)
+def room_of(stance: Stance, friction_share: float = 1.0) -> BalanceRoom:
+    """Wrench polytope of a stance, with a share of the friction."""
+    contacts = [replace(contact, friction=friction_share * contact.friction) for contact in stance]
+    return BalanceRoom(Stance(contacts, stance.normal_force_cap))
 
 
 def balance_of(

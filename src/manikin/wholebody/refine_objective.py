@@ -33,6 +33,7 @@ from manikin.wholebody.refine_input import KeyPath
 from manikin.wholebody.refine_obstacles import RefineObstacles
 from manikin.wholebody.refine_physics import ContactForces, WrenchCost, WrenchSamples
 from manikin.wholebody.refine_scales import RefineScales
+from manikin.wholebody.refine_variables import Variables
 from manikin.wholebody.targets import FitTargets
 
 KNEE = "knee_flexion"
@@ -49,6 +50,7 @@ class RefineTargets:
     Attributes:
         fit: Contacts, reference and obstacles as the whole-body fit knows them.
         variables: (n,) contact variable of each effector of the sequence.
+        load: (n, effectors) readiness of each to carry load, in the order of ``fit.effectors``.
         limbs: Directions of EFORT of the limbs, by effector.
         obstacles: What may touch, and how far flights keep off.
         schedule: Contacts in time.
@@ -56,6 +58,7 @@ class RefineTargets:
 
     fit: FitTargets
     variables: dict[str, FloatArray]
+    load: FloatArray
     limbs: dict[str, LimbDirections]
     obstacles: RefineObstacles
     schedule: ContactSchedule
@@ -70,9 +73,21 @@ def refine_targets(
     scales: RefineScales,
     task: Task | None,
     padded: tuple[str, ...] = (),
+    chosen: Variables | None = None,
 ) -> RefineTargets:
-    """Lay out what is to be done at ``time`` (n,) [s]; see :func:`.refine_motion`."""
+    """Lay out what is to be done at ``time`` (n,) [s]; see :func:`.refine_motion`.
+
+    Variables that were chosen for the phases take the place of the sequence's own, 1 while in contact: a
+    force then costs ``f^2 / c``, see :mod:`~manikin.wholebody.refine_variables`.
+    """
     variables = contact_variables(schedule, time)
+    load = load_shares(schedule, time, schedule.sequence.effectors)
+    phases = schedule.phase_at(time)
+    for number, own in enumerate(chosen or ()):
+        for column, name in enumerate(schedule.sequence.effectors):
+            if name in schedule.sequence[number].stance:
+                variables[name][phases == number] *= own[name]
+                load[phases == number, column] *= np.sqrt(own[name])
     obstacles = RefineObstacles(body, scene, schedule, time, padded)
     n = len(time)
     reference, guide = path.at(time), np.full(body.nv, scales.guide)
@@ -91,7 +106,7 @@ def refine_targets(
         ignored=obstacles.ignored,
     )
     limbs = limb_directions(body, path, schedule, time, task)
-    return RefineTargets(fit, variables, limbs, obstacles, schedule)
+    return RefineTargets(fit, variables, load, limbs, obstacles, schedule)
 
 
 def sole_toes(body: BodyModel, schedule: ContactSchedule) -> tuple[int, ...]:
@@ -135,7 +150,7 @@ class RefineObjective(MotionObjective):
                 schedule.sequence, rooms, itertools.pairwise(schedule.instants), strict=True
             )
         ]
-        self._load = load_shares(schedule, time, self._names)
+        self._load = targets.load
         self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(KNEE)]
         model = body.pinocchio
         moves = moves_by_joint(model)

@@ -114,6 +114,9 @@ class ContactForces:
     Args:
         stance: The contacts.
         names: Effectors in the order of the contact variables' columns.
+
+    Attributes:
+        columns: (g,) column of each generator of forces.
     """
 
     def __init__(self, stance: Stance, names: tuple[str, ...]) -> None:
@@ -135,7 +138,7 @@ class ContactForces:
         scale = np.repeat([1.0, 1.0 / ARM], 3)
         self._to_local = scale[:, None] * about(self.centre)
         self._matrix = (np.vstack(wrenches) * scale).T
-        self._limit, self._column = np.concatenate(limits), np.concatenate(columns)
+        self._limit, self.columns = np.concatenate(limits), np.concatenate(columns)
 
     def share(
         self, wrench: FloatArray, variables: FloatArray, *, tolerance: float, force: float
@@ -154,7 +157,7 @@ class ContactForces:
             force: ``1 / k``, force that costs one unit [N].
         """
         target = wrench @ self._to_local.T
-        gain = (force * np.maximum(variables, LEAST_VARIABLE)[:, self._column]) ** 2
+        gain = (force * np.maximum(variables, LEAST_VARIABLE)[:, self.columns]) ** 2
         multiplier, magnitude, system = self._solve(target, gain, tolerance)
         value = 0.5 * tolerance**2 * np.sum(multiplier**2, axis=1)
         value += 0.5 * np.sum(magnitude**2 / gain, axis=1)

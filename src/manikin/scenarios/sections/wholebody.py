@@ -1,6 +1,6 @@
 """Section of a scenario file: how the whole body's motion is found."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -19,4 +19,9 @@ class WholebodySection(Section):
         default=1.0,
         description="refine: speed relative to that of the contact plan, or of the planned centre of mass; "
         "below 1 every phase lasts longer",
+    )
+    contact_variables: Annotated[bool, Field(strict=True)] = Field(
+        default=True,
+        description="refine: whether contacts are let go that the motion does not need and that are not "
+        "made, else all of the sequence are held",
     )
