@@ -19,7 +19,11 @@ def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -
     body, scene, padded = context.body, context.scene, context.padded
     keyed = keyed.at_pace(context.scenario.pace).with_lifted_feet(body, scene, padded)
     options = context.scenario.file.wholebody
-    settings = RefineSettings(scales=RefineScales.of(body), contact_variables=options.contact_variables)
+    settings = RefineSettings(
+        scales=RefineScales.of(body),
+        contact_variables=options.contact_variables,
+        speed_share=options.speed_share,
+    )
     result = refine_motion(
         body, scene, keyed.time, keyed.q, keyed.schedule, settings=settings,
         padded=padded, progress=lambda share: report.progress("wholebody", share),

@@ -19,9 +19,10 @@ from numpy.typing import ArrayLike
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.contact_planning.efort import Task
+from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.scene import Proximity, Scene
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, finite_number
 from manikin.wholebody.banded import SampledBasis
 from manikin.wholebody.configuration_spline import ConfigurationSpline
 from manikin.wholebody.contact_slack import contact_slack
@@ -45,6 +46,7 @@ from manikin.wholebody.refine_measures import (
 from manikin.wholebody.refine_objective import RefineObjective, RefineTargets, refine_targets
 from manikin.wholebody.refine_obstacles import RefineObstacles
 from manikin.wholebody.refine_scales import RefineScales
+from manikin.wholebody.refine_timing import ROUNDS, around, shortened, shortening
 from manikin.wholebody.refine_variables import VariableChoice, Variables, VariableSamples, released
 from manikin.wholebody.reweigh import stronger
 
@@ -90,6 +92,9 @@ class RefineSettings:
         friction_share: Share of the friction with which the margin is wanted; the certificate has all of it.
         contact_variables: Whether contacts that the motion does not need, and whose effectors are not there,
             are let go; else all contacts of the sequence are held.
+        speed_share: Share of the velocity limits up to which phases are shortened, as far as every
+            requirement is kept and no joint needs more than its strength, or than before; None leaves them as
+            they are.
     """
 
     knot_spacing: float = 0.1
@@ -100,6 +105,13 @@ class RefineSettings:
     retime: bool = True
     friction_share: float = 0.8
     contact_variables: bool = True
+    speed_share: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.speed_share is not None:
+            share = finite_number(self.speed_share, "refinement speed_share", above=0.0)
+            if share > 1.0:
+                raise InputError(f"refinement speed_share is {share:g}; valid: at most 1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,8 +281,40 @@ class _Refinement:
             else:
                 last = self._improved(last, scales)
             best = self._better(best, last)
+        if self.settings.speed_share is not None and not best.certificate.broken(self.settings.requirements):
+            best = self._hurried(best, scales, fine, self.settings.speed_share)
         progress(1.0)
         return self._result(best, given, began)
+
+    def _hurried(self, best: _Attempt, scales: RefineScales, fine: int, share: float) -> _Attempt:
+        """Shorten phases round by round; what breaks a requirement is taken back where it does."""
+        settled = frozenset[int]()
+        for _ in range(ROUNDS):
+            factors = shortening(self.body, best.motion, best.schedule, share, settled)
+            if np.all(factors == 1.0):
+                break
+            self.path, self.schedule = shortened(best.path, best.schedule, factors)
+            trial = self._attempt(scales, fine, self._retimed(best.spline, best.schedule))
+            required = self._strong(best)
+            broken = trial.certificate.broken(required)
+            if broken:
+                blamed = (around(trial.schedule, trial.certificate.worst_times_s[name]) for name in broken)
+                settled = settled.union(*blamed)
+                self.path, self.schedule = best.path, best.schedule
+            else:
+                best = trial
+        return best
+
+    def _strong(self, attempt: _Attempt) -> RefineRequirements:
+        """The requirements, with no more of the joints' strength than an attempt needs, or all of it."""
+        required = self.settings.requirements
+        share = max(1.0, attempt.certificate.max_torque_share)
+        return replace(required, torque_share=min(share, required.torque_share or share))
+
+    def _retimed(self, spline: ConfigurationSpline, before: ContactSchedule) -> ConfigurationSpline:
+        """A spline in the time of the present schedule."""
+        knots = np.interp(spline.knots, before.instants, self.schedule.instants)
+        return ConfigurationSpline(knots, spline.control_points, DEGREE)
 
     def _attempt(self, scales: RefineScales, fine: int, near: ConfigurationSpline | None = None) -> _Attempt:
         knots = phase_knots(self.schedule.instants, self.settings.knot_spacing, DEGREE)
@@ -354,13 +398,12 @@ class _Refinement:
 
     def _slow_down(self, last: _Attempt, broken: frozenset[str]) -> ConfigurationSpline:
         """Give the worst phase more time; the last spline at the new timing."""
-        before = self.schedule.instants
+        before = self.schedule
         for name in sorted(broken & _SLOWED):
             when = last.certificate.worst_times_s[name]
-            when = float(np.interp(when, before, self.schedule.instants))
+            when = float(np.interp(when, before.instants, self.schedule.instants))
             self.path, self.schedule = stretched_around(self.path, self.schedule, when, SLOWER)
-        knots = np.interp(last.spline.knots, before, self.schedule.instants)
-        return ConfigurationSpline(knots, last.spline.control_points, DEGREE)
+        return self._retimed(last.spline, before)
 
     def _certified(self, spline: ConfigurationSpline) -> tuple[Motion, RefineResiduals]:
         """Sample a spline and measure it."""

@@ -20,6 +20,11 @@ class WholebodySection(Section):
         description="refine: speed relative to that of the contact plan, or of the planned centre of mass; "
         "below 1 every phase lasts longer",
     )
+    speed_share: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = Field(
+        default=None,
+        description="refine: share of the joints' velocity limits up to which phases are shortened, as far "
+        "as balance, clearance and strength allow (default: phases last as long as they are given)",
+    )
     contact_variables: Annotated[bool, Field(strict=True)] = Field(
         default=True,
         description="refine: whether contacts are let go that the motion does not need and that are not "
