@@ -27,8 +27,10 @@ from manikin.contact_planning import (
 )
 from manikin.contact_planning.efort import MOST_RATIO
 from manikin.contact_planning.touch import footprint
+from manikin.errors import ScenarioError
 from manikin.motion.description import body_from, body_key, describe_body
 from manikin.reachability import NO_MARGINS, Condition, ReachabilityChecker, abstraction_of
+from manikin.scenarios import load_scenario
 from manikin.scene import Box, Obstacle, Scene
 from manikin.spatial import rotation_from_rpy
 
@@ -158,3 +160,15 @@ def test_a_description_of_a_body_keeps_the_patch_and_those_without_stay_what_the
     assert again.limbs == BODY.limbs
     assert body_key(again) == body_key(BODY)
     assert all("patch_m" not in limb for limb in describe_body(human())["limbs"])
+
+
+def test_a_scenario_names_the_further_contacts_of_its_person(tmp_path):
+    chair = load_scenario("stand-up-chair", overrides=["body.further_contacts=[pelvis, knees]"])
+    names = [limb.name for limb in chair.build_body().limbs]
+    assert names[4:] == ["left_knee", "right_knee", "pelvis"]
+    assert len(load_scenario("stand-up-chair").build_body().limbs) == 4
+    with pytest.raises(ScenarioError, match="further_contacts"):
+        load_scenario("stand-up-chair", overrides=["body.further_contacts=[nose]"])
+    (tmp_path / "again.yaml").write_text(chair.to_yaml())
+    again = load_scenario(tmp_path / "again.yaml").build_body()
+    assert body_key(again) == body_key(chair.build_body())

@@ -59,8 +59,8 @@ class BodySection(Section):
     sex: Literal["male", "female"] = Field(
         default="male", description="which anthropometric table, of a human only"
     )
-    further_contacts: list[Literal["knees", "elbows", "pelvis"]] = Field(
-        default_factory=list,
+    further_contacts: list[Literal["knees", "elbows", "pelvis"]] | None = Field(
+        default=None,
         description="what of a human may touch beside hands and feet, as limbs left_knee, right_knee, "
         "left_elbow, right_elbow, pelvis",
     )
