@@ -12,6 +12,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+import manikin.steady_boxes  # noqa: F401  (before the first distance)
 from manikin.body.segments import (
     Effector,
     Hinge,

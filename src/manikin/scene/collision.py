@@ -7,6 +7,7 @@ import coal
 import numpy as np
 import trimesh
 
+import manikin.steady_boxes  # noqa: F401  (before the first distance)
 from manikin.scene.mesh import IntArray, Mesh, MeshPiece
 from manikin.scene.obstacle import Obstacle
 from manikin.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere, local_bounds
