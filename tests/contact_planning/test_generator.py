@@ -1,5 +1,6 @@
 """Requests for a contact: what is found is true, best first, and failures say why."""
 
+import coal
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -27,9 +28,11 @@ from manikin.contact_planning import (
 )
 from manikin.contact_planning.alignment_step import DAMPING, LARGEST_STEP, LEVER, AlignmentStep
 from manikin.contact_planning.collisions import TOUCH, yielding
-from manikin.contact_planning.generator import NATURAL_SLACK, _tried
+from manikin.contact_planning.deep_samples import DeepSamples
+from manikin.contact_planning.generator import NATURAL_SLACK, _order
 from manikin.errors import BodyError, ContactError
-from manikin.scene import Box, Capsule, Mesh, Obstacle, Proximity, Scene, Surface
+from manikin.scene import Box, Capsule, Mesh, Obstacle, Proximity, Scene, Sphere, Surface
+from manikin.scene.pair import pair_meter
 from manikin.spatial import rotation_from_rpy
 
 UP = Task((0.0, 0.0, 1.0))
@@ -380,16 +383,112 @@ def test_what_a_limb_cannot_reach_is_left_out_and_nothing_else(person):
     assert 30 < hits < 290
 
 
-@given(st.integers(1, 3000), st.integers(1, 150))
-def test_tries_are_distinct_and_go_down_the_order_in_longer_steps(count, tries):
+@given(st.integers(1, 3000))
+def test_tries_are_distinct_and_go_down_the_order_in_longer_steps(count):
+    """Down the scores in steps that never get shorter; then what was left out, best first."""
     scores = np.random.default_rng(count).random(count)
-    order = np.argsort(-scores)
-    rows = _tried(scores, tries)
-    assert len(rows) == len(set(rows.tolist())) == min(count, tries)
-    ranks = np.argsort(order)[rows]
+    rows = _order(scores)
+    assert sorted(rows.tolist()) == list(range(count))
+    ranks = np.argsort(np.argsort(-scores))[rows]
     assert ranks[0] == 0
     turns = np.flatnonzero(np.diff(ranks) < 0)
-    first = ranks[: turns[0] + 1] if len(turns) else ranks
     assert len(turns) <= 1
-    if not len(turns):
-        assert (np.diff(first, 2) >= 0).all() or len(rows) == count
+    first = ranks[: turns[0] + 1] if len(turns) else ranks
+    assert (np.diff(first, 2) >= 0).all()
+    assert (np.diff(ranks[len(first) :]) > 0).all()
+
+
+# --- samples deep in something -------------------------------------------------------------------
+
+
+SEAT = Obstacle("seat", Box((0.45, 0.5, 0.05)), translation=(-0.05, 0.0, 0.42))
+
+
+def chair_scene():
+    """A seat between the legs of who sits on it and the floor."""
+    return Scene(
+        [
+            SEAT,
+            Obstacle("ball", Sphere(0.1), translation=(0.35, 0.25, 0.6)),
+            Obstacle("post", Capsule(0.04, 0.5), translation=(0.3, -0.1, 0.3)),
+        ]
+    )
+
+
+def sitting(body):
+    bent = {"hip_flexion": 1.4, "knee_flexion": 1.5, "elbow_flexion": 0.5}
+    q = body.posture({f"{side}_{name}": bent[name] for side in ("left", "right") for name in bent})
+    q[2] = 0.58
+    return q
+
+
+def test_a_sample_is_deep_where_a_ball_along_its_limb_is(person, person_samples):
+    """Against Coal's distance of each ball to everything that the limb is tested with.
+
+    What is named is a pair in which the whole capsule is as deep as well: a ball is within it.
+    """
+    scene, q, depth = chair_scene(), sitting(person), 0.03
+    proximity, samples = Proximity(person, scene), person_samples["left_leg"]
+    collisions = LimbCollisions(person, samples.limb, scene)
+    deep = DeepSamples(person, LimbKinematics(person, samples.limb), samples, collisions)
+    situation = Situation.of(Configuration(person, q), samples.limb, np.array([0.0, 0.0, 1.0]))
+    collisions.begin(situation)
+    rows = np.arange(150)
+    found = deep.pairs(deep.around(situation), rows, depth)
+    others = {collisions.names(pair)[1] for pair in found[found >= 0].tolist()}
+    assert others >= {"seat", "ball", "post"}
+    assert any("/" in name for name in others)
+    shapes = {shape.name: shape for shape in collisions.shapes}
+    slots = limb_slots(person, samples.limb)
+    for row, pair in zip(rows.tolist(), found.tolist(), strict=True):
+        q[slots] = samples.angles[row]
+        state, depths = Configuration(person, q), []
+        for name, other in (collisions.names(number) for number in np.flatnonzero(collisions.active)):
+            if name not in deep.shapes or other in (*deep.shapes, "floor"):
+                continue
+            capsule = next(s for s in person.segment(name.split("/")[0]).shapes if name.endswith(s.name))
+            turn, place = state.segment_placement(name.split("/")[0])
+            thing = next(s for label, s in shapes.items() if label.split("#")[0] == other)
+            if "/" in other:
+                own = person.segment(other.split("/")[0])
+                frame, origin = state.segment_placement(own.name)
+                shape = next(s for s in own.shapes if other.endswith(s.name))
+                there = coal.Transform3s(frame @ shape.rotation, origin + frame @ shape.translation)
+            else:
+                there = coal.Transform3s(
+                    np.array(thing.placement.rotation), np.array(thing.placement.translation)
+                )
+            measure = pair_meter(coal.Sphere(capsule.size[0]), thing.geometry)
+            for share in (0.0, 0.5):
+                centre = capsule.translation + share * capsule.size[1] * capsule.rotation[:, 2]
+                ball = coal.Transform3s(np.eye(3), place + turn @ centre)
+                depths.append(-measure(ball, there)[0])
+        if abs(max(depths) - depth) > 1e-5:
+            assert (pair >= 0) == (max(depths) > depth)
+        if pair >= 0:
+            exact = proximity.evaluate(q, activation=0.0)
+            same = [set(names) == set(collisions.names(pair)) for names in exact.pairs]
+            assert exact.distance[same].min() < -depth + 1e-6
+
+
+def test_leaving_deep_samples_out_changes_no_answer(person, person_samples, monkeypatch):
+    """Who sits finds the same places for the feet, with and without, but tries fewer."""
+    rng = np.random.default_rng(3)
+    generator = ContactGenerator(person, Scene([SEAT]), person_samples)
+    places = [sitting(person) for _ in range(8)]
+    for q in places:
+        q[:2] += rng.uniform(-0.1, 0.1, 2)
+
+    def answers():
+        return [generator.request(q, f"{side}_leg", UP) for q in places for side in ("left", "right")]
+
+    quick = answers()
+    for tools in generator._tools.values():
+        monkeypatch.setattr(tools.deep, "shapes", frozenset())
+    slow = answers()
+    both = [(a, b) for a, b in zip(quick, slow, strict=True) if b.found]
+    assert len(both) > len(slow) // 2
+    for a, b in both:
+        assert a.score == b.score
+        assert np.array_equal(a.q, b.q)
+    assert np.mean([a.tried for a, _ in both]) < 0.5 * np.mean([b.tried for _, b in both])

@@ -52,6 +52,7 @@ class LimbKinematics:
         self.limb = limb
         self.slots = limb_slots(body, limb)
         hinges = limb_hinges(body, limb)
+        self._hinges = [(name, len(body.segment(name).hinges)) for name in limb.segments]
         self.lower = frozen_array([hinge.lower for hinge in hinges], "lower")
         self.upper = frozen_array([hinge.upper for hinge in hinges], "upper")
         self.torque_limit = frozen_array([hinge.torque_limit for hinge in hinges], "torque_limit")
@@ -90,6 +91,14 @@ class LimbKinematics:
         for rows in _blocks(count):
             self._place_block(q[rows], found, rows)
         return found
+
+    def segment_placements(self, angles: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+        """Name, axes (n, 3, 3) and origin (n, 3) of each segment in the limb's frame, at angles (n, k)."""
+        frames, places = self._frames(np.asarray(angles, dtype=np.float64))
+        last = 0
+        for name, count in self._hinges:
+            yield name, frames[:, last + count], places[:, last]
+            last += count
 
     def _frames(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Axes before each hinge and after the last (n, k + 1, 3, 3), and places of the hinges (n, k, 3).

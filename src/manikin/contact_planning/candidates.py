@@ -77,6 +77,9 @@ class SurfaceTable:
         offsets: (m,) of their planes along the normals [m].
         group: (m,) number of the direction that a surface has for its normal.
         frames: (g, 3, 3) of each direction the normal and two axes in its planes.
+        lines: (l, 3) the axes of all frames, those along one line once; upright boxes have three together.
+        line: (g, 3) number of the line of each axis.
+        sign: (g, 3) +1 where the axis is along the line's direction, -1 where it is against it.
         side_low: (m, 2) smallest coordinates of the polygons along these axes [m].
         side_high: (m, 2) largest ones.
         filled: (m,) whether a polygon is all of the rectangle between them, as the faces of boxes are.
@@ -100,6 +103,7 @@ class SurfaceTable:
         self.group: IntArray = group.ravel()
         sides = np.array([self.surfaces[number].rotation[:, :2].T for number in first]).reshape(-1, 2, 3)
         self.frames = np.concatenate([self.normals[first][:, None], sides], axis=1)
+        self.lines, self.line, self.sign = _lines(self.frames)
         shadows = [
             item.polygon @ sides[number].T for item, number in zip(self.surfaces, self.group, strict=True)
         ]
@@ -208,25 +212,27 @@ def find_candidates(
         footprint: (c, 3) points of the effector's frame that must lie over the polygon [m].
     """
     rows, owner, gap = _near_planes(table, numbers, situation, samples, tolerance, float(np.cos(max_tilt)))
-    normals = table.normals[numbers] @ situation.rotation
-    points = situation.to_world(samples.positions[rows] - gap[:, None] * normals[owner])
+    order = np.argsort(rows * len(numbers) + owner)  # no two are the same
+    rows, owner, gap = rows.take(order), owner.take(order), gap.take(order)
+    normals = (table.normals[numbers] @ situation.rotation).take(owner, axis=0)
+    normals *= gap[:, None]
+    points = situation.to_world(samples.positions.take(rows, axis=0) - normals)
     if not table.filled[numbers].all():
-        inside = table.over(points, numbers[owner])
-        rows, owner, points = rows[inside], owner[inside], points[inside]
+        inside = table.over(points, numbers[owner]).nonzero()[0]
+        rows, owner, points = rows.take(inside), owner.take(inside), points.take(inside, axis=0)
     if len(footprint) > 1:
-        turns = situation.rotation @ samples.rotations[rows]
-        inside = table.carries(points, turns, numbers[owner], footprint)
-        rows, owner, points = rows[inside], owner[inside], points[inside]
-    order = np.lexsort((owner, rows))
-    rows, owner = rows[order], owner[order]
+        turns = situation.rotation @ samples.rotations.take(rows, axis=0)
+        inside = table.carries(points, turns, numbers[owner], footprint).nonzero()[0]
+        rows, owner, points = rows.take(inside), owner.take(inside), points.take(inside, axis=0)
+    surfaces = numbers.take(owner)
     return Candidates(
         rows,
-        numbers[owner],
-        points[order],
-        table.normals[numbers[owner]],
-        samples.products[rows],
-        samples.manipulability[rows],
-        samples.rotations[rows],
+        surfaces,
+        points,
+        table.normals.take(surfaces, axis=0),
+        samples.products.take(rows, axis=0),
+        samples.manipulability.take(rows),
+        samples.rotations.take(rows, axis=0),
     )
 
 
@@ -243,40 +249,42 @@ def _near_planes(
     Returns:
         Rows of the samples, positions of their surfaces in ``numbers``, heights over the planes [m].
     """
+    lines = table.lines @ situation.rotation
+    upward, places = lines @ samples.upward.T, lines @ samples.positions.T
+    shift = (table.lines @ situation.origin).tolist()
     own_group = table.group[numbers]
-    groups = np.unique(own_group)
-    frames = table.frames[groups] @ situation.rotation
-    upright = frames[:, 0] @ samples.upward.T >= least
-    places = (frames.reshape(-1, 3) @ samples.positions.T).reshape(len(groups), 3, -1)
-    shifts = table.frames[groups] @ situation.origin
     found: list[tuple[IntArray, IntArray, FloatArray]] = []
-    for column, group in enumerate(groups.tolist()):
-        own = np.flatnonzero(own_group == group)
+    for group in set(own_group.tolist()):
+        own = (own_group == group).nonzero()[0]
         surfaces = numbers[own]
-        offsets = table.offsets[surfaces] - shifts[column, 0]
-        low, high = (
-            table.side_low[surfaces] - shifts[column, 1:],
-            table.side_high[surfaces] - shifts[column, 1:],
-        )
-        rows = np.flatnonzero(upright[column])
-        height = places[column, 0].take(rows)
-        level = (height >= offsets.min() - tolerance) & (height <= offsets.max() + tolerance)
-        rows, height = rows[level], height[level]
-        if not len(rows):
-            continue
-        gaps = height - offsets[:, None]
-        inside = np.abs(gaps) <= tolerance
-        for axis in (0, 1):
-            place = places[column, 1 + axis].take(rows)
-            inside &= place >= low[:, axis, None]
-            inside &= place <= high[:, axis, None]
-        which, near = np.nonzero(inside)
-        found.append((rows[near], own[which], gaps[which, near]))
-    if not found:
-        none = np.zeros(0, dtype=np.int64)
-        return none, none, np.zeros(0)
+        (along, *sides), (sign, *signs) = table.line[group].tolist(), table.sign[group].tolist()
+        planes = sign * table.offsets[surfaces] - shift[along]
+        low, high = planes - tolerance, planes + tolerance
+        rows = (upward[along] >= least if sign > 0.0 else upward[along] <= -least).nonzero()[0]
+        height = places[along].take(rows)
+        level = ((height >= low.min()) & (height <= high.max())).nonzero()[0]
+        rows, height = rows.take(level), height.take(level)
+        inside = (height >= low[:, None]) & (height <= high[:, None])
+        ends = table.side_low[surfaces], table.side_high[surfaces]
+        for axis, (line, side) in enumerate(zip(sides, signs, strict=True)):
+            place = side * (places[line].take(rows) + shift[line])
+            inside &= place >= ends[0][:, axis, None]
+            inside &= place <= ends[1][:, axis, None]
+        which, near = np.divmod(inside.ravel().nonzero()[0], len(rows) or 1)
+        found.append((rows.take(near), own.take(which), sign * (height.take(near) - planes.take(which))))
     rows, owner, gap = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return rows, owner, gap
+
+
+def _lines(frames: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Lines (l, 3) along which the axes of frames (g, 3, 3) are; of each its line and its sign (g, 3)."""
+    axes = frames.reshape(-1, 3)
+    rounded = np.round(axes, 9)
+    leading = np.take_along_axis(rounded, np.argmax(rounded != 0.0, axis=1)[:, None], axis=1)
+    sign = np.where(leading < 0.0, -1.0, 1.0)
+    _, first, line = np.unique(sign * rounded + 0.0, axis=0, return_index=True, return_inverse=True)
+    shape = frames.shape[:2]
+    return (sign * axes)[first].reshape(-1, 3), line.reshape(shape), sign.reshape(shape)
 
 
 def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:

@@ -30,6 +30,12 @@ class LimbCollisions:
     :class:`manikin.scene.Proximity`. A limb wholly inside a mesh that is not convex is not noticed: it
     would have to pass the mesh's surface to get there, where the limb is held. One instance works on
     buffers of its own: use one per thread.
+
+    Attributes:
+        shapes: All geometries, those of the body first.
+        pairs: (p, 2) numbers of the limb's shape and of the other one of each pair.
+        active: (p,) which pairs may touch in the situation that was begun.
+        soft: Segments that give way in what the limb touches.
     """
 
     def __init__(self, body: BodyModel, limb: Limb, scene: Scene) -> None:
@@ -51,16 +57,19 @@ class LimbCollisions:
         self._placed = pin.GeometryData(self._shapes)
         self._results = list(self._placed.collisionResults)  # references: making one takes longer
         self._names = [(names[a], names[b].rsplit("#", 1)[0]) for a, b in outer]
-        soft, self._depth = yielding(body, limb)
+        self.soft, self._depth = yielding(body, limb)
         self._yielding: dict[str, list[int]] = {}
         for number, (shape, obstacle) in enumerate(self._names):
             self._placed.collisionRequests[number].security_margin = -TOUCH
-            if segment_of(shape) in soft:
+            if segment_of(shape) in self.soft:
                 self._yielding.setdefault(obstacle, []).append(number)
         self._names += [(names[a], names[b]) for a, b in inner]
         self._touched: str | None = None
         self._far = FarPairs(body, limb, parts, self._shapes, self._placed, outer + inner)
-        self._active = np.ones(len(self._names), dtype=bool)
+        self.active: NDArray[np.bool_] = np.ones(len(self._names), dtype=bool)
+        self.pairs = np.array(outer + inner, dtype=np.int64).reshape(-1, 2)
+        self.shapes = list(self._shapes.geometryObjects)
+        self._places = list(self._placed.oMg)
         self._tested = list(zip(self._names, self._results, strict=True))
 
     def begin(self, situation: Situation) -> None:
@@ -69,12 +78,22 @@ class LimbCollisions:
             self._model, self._data, self._shapes, self._placed, np.asarray(situation.state.q)
         )
         near = self._far.near(situation.origin)
-        for number in np.flatnonzero(near & ~self._active).tolist():
+        for number in np.flatnonzero(near & ~self.active).tolist():
             self._placed.activateCollisionPair(number)
-        for number in np.flatnonzero(self._active & ~near).tolist():
+        for number in np.flatnonzero(self.active & ~near).tolist():
             self._placed.deactivateCollisionPair(number)
-        self._active = near
+        self.active = near
         self._tested = [(self._names[number], self._results[number]) for number in np.flatnonzero(near)]
+
+    def placements(self, numbers: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+        """Axes (n, 3, 3) and origins (n, 3) of some shapes in the world, as the situation began [m]."""
+        frames = [self._places[number] for number in numbers.tolist()]
+        turns = np.array([item.rotation for item in frames]).reshape(-1, 3, 3)
+        return turns, np.array([item.translation for item in frames]).reshape(-1, 3)
+
+    def names(self, number: int) -> tuple[str, str]:
+        """What the shapes of a pair are called: that of the body, and the obstacle or other shape."""
+        return self._names[number]
 
     def first(self, q: FloatArray, touched: str | None = None) -> tuple[str, str] | None:
         """Names of the first pair that collides at a configuration (nq,), or None.

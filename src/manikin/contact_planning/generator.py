@@ -1,7 +1,7 @@
 """The request for one contact: reach, samples in contact, order, choice ([Tonneau2015]_ 5.3.2)."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -14,6 +14,7 @@ from manikin.contact import Contact, ContactKind
 from manikin.contact_planning.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Aligner
 from manikin.contact_planning.candidates import Candidates, Situation, SurfaceTable, find_candidates
 from manikin.contact_planning.collisions import LimbCollisions
+from manikin.contact_planning.deep_samples import DeepSamples
 from manikin.contact_planning.efort import Task
 from manikin.contact_planning.heuristics import Efort, Heuristic
 from manikin.contact_planning.samples import LimbSamples
@@ -25,6 +26,8 @@ from manikin.spatial import FloatArray
 _GROWTH = 0.15
 """How much longer each step down the order is than the one before."""
 _STEPS = np.cumsum(1 + (_GROWTH * np.arange(1000)).astype(np.int64)) - 1
+_FEW, _SOME, _BLOCK = 4, 16, 64  # candidates looked at together: first, later, and where many collide
+_LOOKED_AT = 8  # candidates for each that may be tried
 _TILTED, _UNNATURAL = ("", "tilted"), ("", "unnatural")
 NATURAL_SLACK = 0.1
 """Normalised distance by which the alignment may take a limb of natural samples out of its learnt range."""
@@ -72,7 +75,7 @@ class GeneratedContact:
         obstacle: Name of the obstacle touched, or None.
         score: Score of the candidate; minus infinity without one.
         candidates: Number of samples in contact (Table 8.2).
-        tried: How many of them were tried.
+        tried: How many of them were tried, or, without a contact, were found impossible.
         failure: What kept the limb from a contact, or None.
         message: The failure in words, or an empty text.
         gap: Distance of the effector from its contact in ``q`` [m]: none where joints close it.  A limb
@@ -145,8 +148,11 @@ class ContactGenerator:
     ) -> GeneratedContact:
         """Find the best contact of one limb ([Tonneau2015]_ algorithm 2).
 
-        Each candidate, best first, is aligned with its surface and then tested for collision: the print
-        tests before the alignment, after which the posture is another one.
+        Each candidate is aligned with its surface and then tested for collision: the print tests before
+        the alignment, after which the posture is another one. They are tried down their order in ever
+        longer steps, then those left out, best first; the first that is free is the answer. Where the
+        limb itself collides several times, samples with its inside deeper in something than the
+        alignment moves an effector (``tolerance``) are left out untried.
 
         Args:
             q: (nq,) the body; all but the limb stays as it is.
@@ -226,18 +232,19 @@ class ContactGenerator:
         """Steps 3 and 4: best first, the first that can be aligned and are free."""
         found: list[GeneratedContact] = []
         faults: Counter[tuple[str, str]] = Counter()
-        order = _tried(scores, self.settings.tries)
         flat = kind is ContactKind.SOLE
         gap, allowed = tools.allowed(self.settings, flat=flat)
         sole = footprint(self.body, tools.limb, kind, self.rules)
-        goals = tools.goals(situation, candidates, order)
-        surfaces = candidates.surfaces[order].tolist()
         tools.collisions.begin(situation)
         q = np.array(situation.state.q)
-        for number, goal in enumerate(zip(*goals, strict=True)):
-            row = int(order[number])
-            if _is_near(candidates.points[row], found, apart):
+        tried = 0
+        order = _order(scores)[: _LOOKED_AT * self.settings.tries]
+        for row, goal in self._worth_trying(tools, situation, candidates, order, faults):
+            if tried == self.settings.tries:
+                break
+            if found and _is_near(candidates.points[row], found, apart):
                 continue
+            tried += 1
             aligned = tools.aligner.align(*goal, allowed)
             if not aligned.lies(allowed, gap):
                 faults[_TILTED] += 1
@@ -246,19 +253,46 @@ class ContactGenerator:
                 faults[_UNNATURAL] += 1
                 continue
             q[tools.chain.slots] = aligned.angles
-            hit = tools.collisions.first(q, self._table.surfaces[surfaces[number]].obstacle)
+            surface = int(candidates.surfaces[row])
+            hit = tools.collisions.first(q, self._table.surfaces[surface].obstacle)
             if hit is not None:
                 faults[hit] += 1
                 continue
             turn = situation.rotation @ aligned.rotation
-            if flat and not self._table.carries_one(candidates.points[row] + sole @ turn.T, surfaces[number]):
+            if flat and not self._table.carries_one(candidates.points[row] + sole @ turn.T, surface):
                 faults[_TILTED] += 1
                 continue
-            made = self._found(tools.limb, kind, candidates, row, turn, q.copy(), scores, number + 1)
+            made = self._found(tools.limb, kind, candidates, row, turn, q.copy(), scores, tried)
             found.append(made if len(tools.chain) else replace(made, gap=aligned.error))
             if len(found) == most:
                 break
-        return found or [_none_fits(tools.limb.name, faults, len(candidates), len(order))]
+        return found or [_none_fits(tools.limb.name, faults, len(candidates))]
+
+    def _worth_trying(
+        self,
+        tools: "_LimbTools",
+        situation: Situation,
+        candidates: Candidates,
+        order: NDArray[np.int64],
+        faults: Counter[tuple[str, str]],
+    ) -> Iterator[tuple[int, tuple[FloatArray, FloatArray, FloatArray]]]:
+        """Rows in order with what to align there.
+
+        As soon as the limb itself, not its end, has collided a few times, candidates that are deep in
+        something are left out; they count as collisions.
+        """
+        start, size, around = 0, _FEW, None
+        while start < len(order):
+            rows = order[start : start + size]
+            start += size
+            if sum(count for hit, count in faults.items() if hit[0] in tools.deep.shapes) >= _FEW // 2:
+                around = around or tools.deep.around(situation)
+                deep = tools.deep.pairs(around, candidates.samples[rows], self.settings.tolerance)
+                faults.update(tools.collisions.names(pair) for pair in deep[deep >= 0].tolist())
+                rows, size = rows[deep < 0], _BLOCK
+            goals = tools.goals(situation, candidates, rows)
+            yield from zip(rows.tolist(), zip(*goals, strict=True), strict=True)
+            size = max(size, _SOME)
 
     def _found(
         self,
@@ -287,6 +321,7 @@ class _LimbTools:
         self.chain = LimbKinematics(body, limb)
         self.aligner = Aligner(self.chain)
         self.collisions = LimbCollisions(body, limb, scene)
+        self.deep = DeepSamples(body, self.chain, samples, self.collisions)
         self._range = NaturalRange(body, limb) if samples.natural else None
         _ = samples.upward, samples.manipulability, samples.hull  # made now, not during a request
 
@@ -307,24 +342,22 @@ class _LimbTools:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Angles to begin with, points and normals in the limb's frame of some candidates."""
         return (
-            self.samples.angles[candidates.samples[rows]],
-            (candidates.points[rows] - situation.origin) @ situation.rotation,
-            candidates.normals[rows] @ situation.rotation,
+            self.samples.angles.take(candidates.samples[rows], axis=0),
+            (candidates.points.take(rows, axis=0) - situation.origin) @ situation.rotation,
+            candidates.normals.take(rows, axis=0) @ situation.rotation,
         )
 
 
-def _tried(scores: FloatArray, tries: int) -> NDArray[np.int64]:
-    """Candidates to try: down the order in ever longer steps, then those left out, best first.
+def _order(scores: FloatArray) -> NDArray[np.int64]:
+    """Candidates in the order of their trial: down the scores in ever longer steps, then those left out.
 
     Neighbours in the order are often neighbours in space and collide with the same thing.
     """
     order = np.argsort(-scores, kind="stable")
-    steps = _STEPS[: int(np.searchsorted(_STEPS, len(order)))][:tries]
-    if len(steps) == min(tries, len(order)):
-        return order[steps]
+    steps = _STEPS[: int(np.searchsorted(_STEPS, len(order)))]
     left = np.ones(len(order), dtype=bool)
     left[steps] = False
-    return order[np.concatenate([steps, np.flatnonzero(left)])][:tries]
+    return order[np.concatenate([steps, np.flatnonzero(left)])]
 
 
 def _is_near(point: FloatArray, found: list[GeneratedContact], apart: float) -> bool:
@@ -339,7 +372,8 @@ def _failure(
     return GeneratedContact(limb, None, None, None, -np.inf, candidates, tried, kind, message)
 
 
-def _none_fits(limb: str, faults: Counter[tuple[str, str]], candidates: int, tried: int) -> GeneratedContact:
+def _none_fits(limb: str, faults: Counter[tuple[str, str]], candidates: int) -> GeneratedContact:
+    tried = sum(faults.values())
     tilted, unnatural = faults.pop(_TILTED, 0), faults.pop(_UNNATURAL, 0)
     collided = sum(faults.values())
     kind = Hindrance.COLLISION if collided > tilted else Hindrance.ALIGNMENT
