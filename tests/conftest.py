@@ -13,6 +13,15 @@ from manikin.motion.file import MotionFile
 FEET = ("left_foot", "right_foot")
 
 
+def pytest_collection_modifyitems(items):
+    """Modules with slow tests come first, so that no worker is left alone with a long one at the end.
+
+    Modules stay together, because their tests share results.
+    """
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 def carried(scenario, body, schedule, time, offset=0.0):
     """A standing body carried along the straight line from start to goal: no motion, but complete data."""
     share = np.clip(time / schedule.instants[-1], 0.0, 1.0)[:, None]
