@@ -18,6 +18,7 @@ from manikin.wholebody import (
     flights,
     plan_whole_body,
 )
+from manikin.wholebody.failure import WholeBodyFailure
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.knots import CLOSEST_KNOTS, phase_knots, refined, sample_times
 from manikin.wholebody.reweigh import reweighed
@@ -134,6 +135,57 @@ def test_a_caught_fit_is_led_by_the_key_postures_unless_that_is_caught_too(
         middle = slice(len(result.motion.q) // 3, -len(result.motion.q) // 3)
         assert np.abs(result.motion.q[middle, arm] - 1.4).max() < 0.1
         assert np.abs(step_motion.motion.q[middle, arm] - 1.4).min() > 0.2
+
+
+def blocked(result, name, value):
+    """The motion as if it broke one requirement."""
+    certificate = replace(result.certificate, **{name: value})
+    return replace(result, certificate=certificate, failure=WholeBodyFailure(name, 0.6, "phase 1"))
+
+
+def test_where_straight_toes_are_in_the_way_they_may_bend(
+    step_motion, person, flat_ground, step_com, monkeypatch
+):
+    """What is too near something with straight toes, the arms close or not, is fitted without them.
+
+    The other requirements are kept with and without; the fit that counts differs in the toes.
+    """
+    attempt, straight = assemble._Planner._attempt, []
+
+    def nothing_with_straight_toes(planner, swings, began):
+        straight.append(planner.straight_toes)
+        if planner.straight_toes:
+            return blocked(step_motion, "min_clearance_m", -0.004)
+        return attempt(planner, swings, began)
+
+    monkeypatch.setattr(assemble._Planner, "_attempt", nothing_with_straight_toes)
+    result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
+    assert straight == [True, True, False]
+    assert result.succeeded, result.failure
+    toes = [7 + k for k, name in enumerate(person.joint_names) if name.endswith("toe_extension")]
+    held, loose = (np.abs(motion.q[:, toes]).max() for motion in (step_motion.motion, result.motion))
+    assert loose > 2.0 * held
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "tried"),
+    [("max_support_error_m", 0.01, [True, True]), ("min_clearance_m", -0.004, [True, True, False])],
+)
+def test_toes_stay_straight_where_something_else_breaks(
+    name, value, tried, step_motion, person, flat_ground, step_com, monkeypatch
+):
+    """A contact that is missed has nothing to do with toes; they are loosened for clearance alone."""
+    straight = []
+
+    def misses(planner, *_):
+        straight.append(planner.straight_toes)
+        return blocked(step_motion, name, value)
+
+    monkeypatch.setattr(assemble._Planner, "_attempt", misses)
+    monkeypatch.setattr(assemble._Planner, "_search_again", lambda *_: None)
+    result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
+    assert straight == tried
+    assert not result.succeeded
 
 
 @pytest.mark.slow
