@@ -93,7 +93,9 @@ class LimbKinematics:
         return found
 
     def segment_placements(self, angles: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
-        """Name, axes (n, 3, 3) and origin (n, 3) of each segment in the limb's frame, at angles (n, k)."""
+        """Name, axes (n, 3, 3), origin (n, 3) of each moving segment in the limb's frame, at angles (n, k)."""
+        if not len(self):
+            return
         frames, places = self._frames(np.asarray(angles, dtype=np.float64))
         last = 0
         for name, count in self._hinges:
