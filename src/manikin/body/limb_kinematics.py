@@ -93,7 +93,7 @@ class LimbKinematics:
         return found
 
     def segment_placements(self, angles: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
-        """Name, axes (n, 3, 3), origin (n, 3) of each moving segment in the limb's frame, at angles (n, k)."""
+        """Name, axes (n, 3, 3), origin (n, 3) of each moving segment in the limb's frame, at (n, k) angles."""
         if not len(self):
             return
         frames, places = self._frames(np.asarray(angles, dtype=np.float64))
