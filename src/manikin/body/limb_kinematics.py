@@ -93,7 +93,7 @@ class LimbKinematics:
         return found
 
     def segment_placements(self, angles: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
-        """Name, axes (n, 3, 3), origin (n, 3) of each moving segment in the limb's frame, at (n, k) angles."""
+        """Name, axes (n, 3, 3) and origin (n, 3) of moving segments in the frame of the limb."""
         if not len(self):
             return
         frames, places = self._frames(np.asarray(angles, dtype=np.float64))
