@@ -14,8 +14,7 @@ from manikin.errors import ContactError, InputError
 from manikin.posture import PostureProblem, generate_posture
 from manikin.scene import Proximity, Scene
 from manikin.spatial import GRAVITY_VECTOR
-from manikin.wholebody import RefineSettings, refine_motion
-from manikin.wholebody.refine import _Refinement
+from manikin.wholebody import refine_motion
 from manikin.wholebody.refine_certificate import RefineRequirements, certify_refined
 from manikin.wholebody.refine_contacts import contact_variables
 from manikin.wholebody.refine_input import KeyPath, stretched_around, stretched_for_speed
@@ -187,9 +186,7 @@ def test_a_longer_phase_leaves_the_others_as_long(cases):
 def test_the_certificate_catches_a_bad_motion(crouching):
     """The input itself, sampled: it penetrates, slides, is out of balance and says when."""
     case, result = crouching
-    job = _Refinement(
-        case.body, case.scene, KeyPath(case.time, case.q), case.schedule, RefineSettings(), None, ()
-    )
+    proximity = Proximity(case.body, case.scene)
     good, bad = result.motion, case.q[np.searchsorted(case.time, result.motion.time, side="right") - 1]
     shifted = np.array(bad)
     shifted[:, 2] -= 0.03
@@ -197,7 +194,7 @@ def test_the_certificate_catches_a_bad_motion(crouching):
     obstacles = RefineObstacles(case.body, case.scene, result.schedule, good.time)
     flat = (False,) * len(result.schedule.sequence)
     found = certify_refined(
-        case.body, job.proximity, result.schedule, obstacles, motion, np.full(len(bad), 7.0), flat
+        case.body, proximity, result.schedule, obstacles, motion, np.full(len(bad), 7.0), flat
     )
     broken = found.broken(RefineRequirements())
     assert broken >= {

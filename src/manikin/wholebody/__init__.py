@@ -9,9 +9,10 @@ from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import PlannedSwing
 from manikin.wholebody.key_postures import KeyPosture, KeyPostures, find_key_postures
 from manikin.wholebody.passage import Passage, head_segments, measure_passage
-from manikin.wholebody.refine import RefineResult, RefineSettings, refine_motion
+from manikin.wholebody.refine import refine_motion
 from manikin.wholebody.refine_certificate import RefineRequirements, RefineResiduals
 from manikin.wholebody.refine_measures import RefineMeasures
+from manikin.wholebody.refine_result import RefineResult, RefineSettings
 from manikin.wholebody.refine_scales import RefineScales
 from manikin.wholebody.seated import SeatedContinuation, continue_seated
 
