@@ -86,10 +86,16 @@ class MotionFit:
         self.objective = objective(body, proximity, targets, self._basis)
         self._damping = np.ones(self._basis.size)
         self._multiplier = np.zeros((len(targets.time), self.objective.task_rows))
+        self._unit = self._final.position
 
     def initial_spline(self, configurations: FloatArray) -> ConfigurationSpline:
         """Least-squares spline through configurations (n, nq) at the targets' times."""
         return spline_through(configurations, self._basis, self._knots, self._degree)
+
+    def rescale(self, scales: MotionScales) -> None:
+        """Keep the forces of the multipliers at other scales, which loosen or tighten all tasks alike."""
+        self._multiplier = scales.position / self._unit * self._multiplier
+        self._unit = scales.position
 
     def solve(self, start: ConfigurationSpline) -> FitResult:
         """Solve from ``start``: first with loose tasks, so that the posture stays natural, then exactly.

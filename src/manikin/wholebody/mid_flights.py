@@ -15,8 +15,9 @@ from manikin.contact import ContactSchedule, Swing
 from manikin.posture import Placement, PostureProblem, SolverSettings, generate_posture
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
+from manikin.wholebody.birrt import Feasible
 from manikin.wholebody.effector_clearance import EffectorClearance
-from manikin.wholebody.flight_search import ClearFlight
+from manikin.wholebody.flight_search import ClearFlight, search_swing
 from manikin.wholebody.flights import hangs, standing_during, touch_pairs
 from manikin.wholebody.path import Pose
 from manikin.wholebody.refine_input import KeyPath
@@ -39,6 +40,12 @@ LOOKS = 13
 TIME_STEP = 0.02
 """Spacing of the instants at which a curve is checked [s]: it is a beginning, not the motion."""
 
+SEARCHES = 600
+"""Most random poses of a search for a way around."""
+
+ROOM = 0.01
+"""Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
+
 REFINEMENTS = 20
 """Most steps by which a curve is improved."""
 
@@ -48,8 +55,8 @@ TURN_WEIGHT = 0.3
 COM_WEIGHT = 30.0
 """Weight of a centre of mass between those at both ends [1/m^2]."""
 
-SETTINGS = SolverSettings(explain=False)
-"""A flight without such a posture needs no reason."""
+SETTINGS = SolverSettings(tolerance=1e-3, explain=False)
+"""A flight without such a posture needs no reason, and a guess no exact contacts."""
 
 POSTURE_SHARE = 0.75
 """Share of the wanted distance that such a posture keeps from everything that is not touched."""
@@ -130,7 +137,26 @@ def _curve(
         first, last, start, end, clearance, limits=limits,
         start_normal=swing.start.normal, end_normal=swing.end.normal, refine=REFINEMENTS,
     )  # fmt: skip
-    return plan.curve if plan.succeeded else None
+    return plan.curve if plan.succeeded else _searched(clearance, first, last, (start, end), limits)
+
+
+def _searched(
+    clearance: EffectorClearance, first: Pose, last: Pose, interval: tuple[float, float], limits: SwingLimits
+) -> SwingCurve | None:
+    """A curve found by the Bi-RRT, which asks for a clear effector only; its draws are always the same."""
+
+    def check(extra: float) -> Feasible:
+        is_clear = ClearFlight(clearance, first, last, *interval, limits, extra)
+
+        def feasible(pose: Pose, time: float, _hint: object) -> FloatArray | None:
+            return np.zeros(0) if is_clear(time, pose) else None
+
+        return feasible
+
+    found = search_swing(
+        first, last, *interval, check(0.0), np.random.default_rng(0), roomy=check(ROOM), iterations=SEARCHES
+    )
+    return found.curve
 
 
 def _pose(body: BodyModel, q: FloatArray, swing: Swing) -> Pose:

@@ -58,6 +58,9 @@ LEAST_SLACK = -1e-6
 SPARSE = 0.03
 """Spacing of the samples for which the contact variables are chosen [s]."""
 
+NEARLY = 0.02
+"""An effector this near its contact is meant to be there: that it is so exactly is for the repairs [m]."""
+
 PATIENT = 0.004
 """Relative decrease of the objective below which a repair stops."""
 
@@ -69,8 +72,8 @@ _EXACT = frozenset({"max_support_error_m", "max_support_turn_rad"})
 
 _SCALES = MappingProxyType(
     {
-        "max_support_error_m": ("tolerance",),
-        "max_support_turn_rad": ("turn_tolerance",),
+        "max_support_error_m": ("tolerance", "position", "rotation"),
+        "max_support_turn_rad": ("turn_tolerance", "position", "rotation"),
         "min_clearance_m": ("clearance",),
         "max_penetration_m": ("clearance", "touching"),
         "max_joint_limit_violation_rad": ("joint_limit",),
@@ -164,6 +167,8 @@ class Refinement:
             else:
                 last = self._improved(last, scales)
             best = self._better(best, last)
+            if best is not last and best.schedule.sequence is last.schedule.sequence:
+                last, self.path, self.schedule = best, best.path, best.schedule
         if self.settings.speed_share is not None and not best.certificate.broken(self.settings.requirements):
             best = self._hurried(best, scales, fine, self.settings.speed_share)
         progress(1.0)
@@ -224,6 +229,7 @@ class Refinement:
 
     def _improved(self, last: _Attempt, scales: RefineScales) -> _Attempt:
         """Go on with other weights."""
+        last.fit.rescale(scales)
         return self._judged(last.fit, last.fit.improve(last.spline, scales))
 
     def _judged(self, fit: MotionFit, found: FitResult) -> _Attempt:
@@ -254,7 +260,7 @@ class Refinement:
 
     @cached_property
     def _choice(self) -> VariableChoice:
-        tolerance = self.settings.requirements.support_error
+        tolerance = max(self.settings.requirements.support_error, NEARLY)
         return VariableChoice(
             self.body, self.scene, self.settings.scales, tolerance, self.settings.friction_share
         )
