@@ -14,6 +14,7 @@ from manikin.body.human import body_from_signature, human
 from manikin.body.human_volumes import human_volumes
 from manikin.body.insect import insect
 from manikin.body.joint_volume import JointVolume, volume_of
+from manikin.body.kudoh import kudoh
 from manikin.body.limb_kinematics import EffectorPlacements, LimbKinematics
 from manikin.body.limbs import are_mirrored, limb_named, limb_placement, limbs_of
 from manikin.body.model import BodyModel
@@ -49,6 +50,7 @@ __all__ = [
     "insect",
     "integrate",
     "interpolate",
+    "kudoh",
     "limb_named",
     "limb_placement",
     "limbs_of",

@@ -18,16 +18,19 @@ from manikin.body.anthropometry import (
     Anthropometry,
 )
 from manikin.body.model import BodyModel
+from manikin.body.parts import (
+    ALONG_X,
+    across,
+    cuboid_inertia,
+    cylinder_inertia,
+    palm_rotation,
+    upright_capsule,
+)
 from manikin.body.range_of_motion import HUMAN_HINGES, human_hinges
 from manikin.body.segments import Effector, Limb, Segment, Shape, ShapeKind
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, skew
-
-_ALONG_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""Turns a capsule's own z axis into the segment's y axis."""
-_ALONG_X = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-"""Turns a capsule's own z axis into the segment's x axis."""
 
 _SOFT_PAIRS = (
     # One short link apart: the shapes overlap in ordinary postures.
@@ -102,7 +105,7 @@ def human(
         name="human",
         segments=builder.segments(),
         effectors={effector.name: effector for effector in builder.effectors()},
-        standing_angles=_standing_angles(),
+        standing_angles=standing_angles(),
         soft_pairs=_soft_pairs(),
         stature=size.stature,
         sex=str(size.sex),
@@ -130,7 +133,7 @@ def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
     return human(**values)
 
 
-def _standing_angles() -> dict[str, float]:
+def standing_angles() -> dict[str, float]:
     """Angles [rad]; the arms hang 14 degrees away from the trunk, straight to the side."""
     angles = {name: float(np.deg2rad(value)) for name, value in _STANDING_DEG.items()}
     # Direction of the arm on the oblique shoulder axes of range_of_motion.
@@ -212,15 +215,15 @@ class _HumanBuilder:
             sole = np.array([(0.5 - ANKLE_FROM_HEEL) * size.sole_length, 0.0, -size.ankle_height])
             found.append(Effector(f"{side}_foot", f"{side}_foot", sole))
             palm = np.array([0.0, -sign * 0.5 * self._hand_thickness, -0.8 * size.knuckle_distance])
-            found.append(Effector(f"{side}_hand", f"{side}_hand", palm, _palm_rotation(sign)))
+            found.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
         return found
 
     # --- trunk -----------------------------------------------------------------------------
 
     def _pelvis(self) -> Segment:
         length = self.size.length("lower_trunk")
-        across = _across("hips", 0.060 * self.stature, 0.191 * self.stature * self.girth, 0.35 * length)
-        return self._trunk_segment("pelvis", None, "lower_trunk", 0.0, (across, *self._buttocks()))
+        hips = across("hips", 0.060 * self.stature, 0.191 * self.stature * self.girth, 0.35 * length)
+        return self._trunk_segment("pelvis", None, "lower_trunk", 0.0, (hips, *self._buttocks()))
 
     @property
     def _seat_x(self) -> float:
@@ -234,7 +237,7 @@ class _HumanBuilder:
         left, right = (
             Shape(
                 f"{side}_buttock", ShapeKind.CAPSULE, (radius, 2 * half),
-                (self._seat_x, sign * aside, height), _ALONG_X,
+                (self._seat_x, sign * aside, height), ALONG_X,
             )
             for side, sign in (("left", 1.0), ("right", -1.0))
         )  # fmt: skip
@@ -243,15 +246,15 @@ class _HumanBuilder:
     def _lumbar(self) -> Segment:
         length, border = self.size.length("middle_trunk"), self.size.length("lower_trunk")
         breadth = 0.77 * self.size.shoulder_distance * self.girth
-        across = _across("waist", 0.058 * self.stature, breadth, 0.5 * length)
-        return self._trunk_segment("lumbar", "pelvis", "middle_trunk", border, (across,))
+        waist = across("waist", 0.058 * self.stature, breadth, 0.5 * length)
+        return self._trunk_segment("lumbar", "pelvis", "middle_trunk", border, (waist,))
 
     def _thorax(self) -> Segment:
         size = self.size
         length, border = size.length("upper_trunk"), size.length("middle_trunk")
         breadth = 0.80 * size.shoulder_distance * self.girth
-        chest = _across("chest", 0.062 * self.stature, breadth, 0.4 * length)
-        girdle = _across("shoulders", 0.035 * self.stature, size.shoulder_distance, self._shoulder_in_thorax)
+        chest = across("chest", 0.062 * self.stature, breadth, 0.4 * length)
+        girdle = across("shoulders", 0.035 * self.stature, size.shoulder_distance, self._shoulder_in_thorax)
         return self._trunk_segment("thorax", "lumbar", "upper_trunk", border, (chest, girdle))
 
     @property
@@ -281,14 +284,14 @@ class _HumanBuilder:
             np.diag(size.moments("head_and_neck")),
         )
         neck_mass = NECK_MASS_SHARE * both.mass
-        neck_moments = _cylinder(neck_mass, NECK_RADIUS * self.stature, neck_length)
+        neck_moments = cylinder_inertia(neck_mass, NECK_RADIUS * self.stature, neck_length)
         neck = _Inertia(neck_mass, np.array([0.0, 0.0, 0.5 * neck_length]), neck_moments)
         head = both.without(neck)
         hinges = human_hinges("neck", "", size.mass * size.stature)
         base = np.array([0.0, 0.0, size.length("upper_trunk")])
         top = np.array([0.0, 0.0, neck_length])
         radius = 0.034 * self.stature
-        shape = _capsule("neck", radius, (0.0, 0.0, 0.0), (0.0, 0.0, neck_length))
+        shape = upright_capsule("neck", radius, (0.0, 0.0, 0.0), (0.0, 0.0, neck_length))
         return (
             Segment("neck", "thorax", base, hinges, neck.mass, neck.com, neck.moments, (shape,)),
             Segment(
@@ -301,7 +304,7 @@ class _HumanBuilder:
         """Skull reaching up to the vertex and jaw below it; head breadth and length, bare."""
         radius = 0.044 * self.stature
         half = 0.0125 * self.stature
-        skull = Shape("skull", ShapeKind.CAPSULE, (radius, 2 * half), (half, 0.0, vertex - radius), _ALONG_X)
+        skull = Shape("skull", ShapeKind.CAPSULE, (radius, 2 * half), (half, 0.0, vertex - radius), ALONG_X)
         jaw_radius = 0.036 * self.stature
         jaw = Shape("jaw", ShapeKind.SPHERE, (jaw_radius,), (0.75 * jaw_radius, 0.0, 0.45 * jaw_radius))
         return skull, jaw
@@ -321,11 +324,11 @@ class _HumanBuilder:
         return [
             self._limb(
                 side, "upper_arm", "thorax", "upper_arm", shoulder,
-                (_capsule("arm", radius, (0.0, 0.0, 0.0), (0.0, 0.0, -upper)),),
+                (upright_capsule("arm", radius, (0.0, 0.0, 0.0), (0.0, 0.0, -upper)),),
             ),
             self._limb(
                 side, "forearm", f"{side}_upper_arm", "forearm", (0.0, 0.0, -upper),
-                (_capsule("arm", 0.8 * radius, (0.0, 0.0, 0.0), (0.0, 0.0, -lower)),), sideways=True,
+                (upright_capsule("arm", 0.8 * radius, (0.0, 0.0, 0.0), (0.0, 0.0, -lower)),), sideways=True,
             ),
             self._limb(
                 side, "hand", f"{side}_forearm", "hand", (0.0, 0.0, -lower),
@@ -342,11 +345,11 @@ class _HumanBuilder:
         sign = 1.0 if side == "left" else -1.0
         thigh, shank = size.length("thigh"), size.length("shank")
         hip = (0.0, 0.5 * sign * size.hip_distance, 0.0)
-        thigh_shape = _capsule(
+        thigh_shape = upright_capsule(
             "thigh", 0.038 * self.stature * self.girth, (0.0, 0.0, 0.0), (0.0, 0.0, -thigh)
         )
         ankle_end = 0.012 * self.stature - shank
-        shank_shape = _capsule(
+        shank_shape = upright_capsule(
             "shank", 0.029 * self.stature * self.girth, (0.0, 0.0, 0.0), (0.0, 0.0, ankle_end)
         )
         return [
@@ -372,7 +375,9 @@ class _HumanBuilder:
         toe_mass = TOES_MASS_SHARE * both.mass
         toe_com = np.array([bare_heel + bare_length - 0.5 * bare_toes, 0.0, hinge[2]])
         toes = _Inertia(
-            toe_mass, toe_com, _cuboid(toe_mass, np.array([bare_toes, 0.05 * self.stature, toe_height]))
+            toe_mass,
+            toe_com,
+            cuboid_inertia(toe_mass, np.array([bare_toes, 0.05 * self.stature, toe_height])),
         )
         foot = both.without(toes)
 
@@ -416,33 +421,3 @@ class _HumanBuilder:
             size.segment_mass(row), np.array([0.0, 0.0, -size.com_from_start(row)]),
             np.diag([x, y, longitudinal]), shapes,
         )  # fmt: skip
-
-
-def _palm_rotation(sign: float) -> FloatArray:
-    """Axes of the palm in the hanging hand: x to the fingers, z out of the back of the hand."""
-    x, z = np.array([0.0, 0.0, -1.0]), np.array([0.0, sign, 0.0])
-    return np.column_stack([x, np.cross(z, x), z])
-
-
-def _across(name: str, radius: float, breadth: float, height: float) -> Shape:
-    """Capsule from left to right."""
-    length = max(breadth - 2.0 * radius, 1e-3)
-    return Shape(name, ShapeKind.CAPSULE, (radius, length), (0.0, 0.0, height), _ALONG_Y)
-
-
-def _capsule(name: str, radius: float, start: ArrayLike, end: ArrayLike) -> Shape:
-    """Upright capsule between two points on one vertical."""
-    first, last = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    return Shape(name, ShapeKind.CAPSULE, (radius, abs(last[2] - first[2])), 0.5 * (first + last))
-
-
-def _cylinder(mass: float, radius: float, length: float) -> FloatArray:
-    """Inertia of an upright solid cylinder about its centre."""
-    across = mass * (3.0 * radius**2 + length**2) / 12.0
-    return np.diag([across, across, 0.5 * mass * radius**2])
-
-
-def _cuboid(mass: float, extents: FloatArray) -> FloatArray:
-    """Inertia of a solid cuboid about its centre."""
-    squares = extents**2
-    return np.diag(mass / 12.0 * (squares.sum() - squares))

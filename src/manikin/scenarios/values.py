@@ -65,7 +65,7 @@ class ScenarioValues:
     @property
     def mass(self) -> float:
         """Body mass [kg]."""
-        if self.file.body.model == "urdf":
+        if self.file.body.model in ("urdf", "kudoh"):
             from manikin.scenarios.world import build_body
 
             return build_body(self).mass

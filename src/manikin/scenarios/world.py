@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from manikin.body import BodyModel, creature_from_urdf, human, insect, point_mass, with_further_contacts
+from manikin.body import (
+    BodyModel,
+    creature_from_urdf,
+    human,
+    insect,
+    kudoh,
+    point_mass,
+    with_further_contacts,
+)
 from manikin.errors import InputError
 from manikin.scenarios.obstacles import build_obstacle
 from manikin.scenarios.validation import Path as KeyPath
@@ -18,6 +26,8 @@ def build_body(values: ScenarioValues) -> BodyModel:
     """
     if values.file.body.model in ("insect", "urdf"):
         return _creature(values)
+    if values.file.body.model == "kudoh":
+        return kudoh()
     if values.is_point_mass:
         return point_mass(values.mass)
     data, sole = values.file.body, values.sole

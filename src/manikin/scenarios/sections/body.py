@@ -11,6 +11,7 @@ from manikin.scenarios.validation import Number, Positive, Section, Text, Vector
 _KEYS = {
     "human": ("stature_m", "mass_kg", "sex", "further_contacts"),
     "point_mass": ("mass_kg",),
+    "kudoh": (),
     "insect": ("length_m", "mass_kg"),
     "urdf": ("urdf", "limbs", "standing_deg", "sole"),
 }
@@ -19,6 +20,7 @@ _KEYS = {
 WORDS = {
     "human": "a human",
     "point_mass": "a point mass",
+    "kudoh": "the body of Kudoh, who has his own size",
     "insect": "an insect",
     "urdf": "a creature from URDF",
 }
@@ -47,10 +49,11 @@ class LimbSection(Section):
 class BodySection(Section):
     """Whose motion it is."""
 
-    model: Literal["human", "point_mass", "insect", "urdf"] = Field(
+    model: Literal["human", "kudoh", "point_mass", "insect", "urdf"] = Field(
         default="human",
-        description="built-in body: a person, a point mass on massless feet, planned but not executed, or an "
-        "insect; urdf, which goes without saying beside that key, for a creature from a file",
+        description="built-in body: a person; kudoh, the 15 segments of Kudoh (2002), 1.72 m and 70 kg; "
+        "a point mass on massless feet, planned but not executed; an insect; or urdf, which goes without "
+        "saying beside that key, for a creature from a file",
     )
     stature_m: Positive = Field(default=1.75, description="standing height [m], of a human only")
     mass_kg: Positive = Field(

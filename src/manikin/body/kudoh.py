@@ -1,0 +1,245 @@
+"""The person of 15 rigid segments and 34 joint angles of [Kudoh2002]_ 2.2.
+
+Masses, lengths and the widths of shoulders and hips are printed ([Kudoh2002]_ Table 3.1 and 3.2), and so
+is which joints are pins and which are balls. All else is ours: inertias are those of cylinders of the
+density of water (3.2 says "approximation cylinder" and no radius), the foot stands on a sole as long as
+itself, and axes, ranges, speeds and strengths are those of :mod:`manikin.body.range_of_motion`, carried by
+the joints that this body has: the waist bends as far as lumbar and thorax together and is as strong as the
+lumbar, the wrist turns as the forearm does, and the ankle as the shank.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from manikin.body.anthropometry import ANKLE_FROM_HEEL
+from manikin.body.human import standing_angles
+from manikin.body.model import BodyModel
+from manikin.body.parts import ALONG_X, across, cylinder_inertia, palm_rotation, upright_capsule
+from manikin.body.range_of_motion import human_hinges
+from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKind
+from manikin.contact import ContactKind
+from manikin.spatial import FloatArray
+
+
+@dataclass(frozen=True)
+class PartSize:
+    """One row of [Kudoh2002]_ Table 3.1.
+
+    Attributes:
+        mass: [kg].
+        length: [m].
+    """
+
+    mass: float
+    length: float
+
+    @property
+    def radius(self) -> float:
+        """Radius of the cylinder of the density of water [m]; ours."""
+        return float(np.sqrt(self.mass / (DENSITY * np.pi * self.length)))
+
+    @property
+    def inertia(self) -> FloatArray:
+        """(3, 3) about the centre of the upright cylinder [kg.m^2]."""
+        return cylinder_inertia(self.mass, self.radius, self.length)
+
+
+DENSITY = 1000.0
+"""Of the cylinders [kg/m^3]; ours."""
+
+PARTS: Mapping[str, PartSize] = MappingProxyType({
+    "head": PartSize(4.90, 0.25),
+    "chest": PartSize(18.06, 0.40),
+    "loins": PartSize(12.04, 0.20),
+    "upper_arm": PartSize(2.52, 0.25),
+    "forearm": PartSize(1.54, 0.25),
+    "hand": PartSize(0.49, 0.10),
+    "thigh": PartSize(7.98, 0.40),
+    "shank": PartSize(3.71, 0.40),
+    "foot": PartSize(1.26, 0.25),
+})  # fmt: skip
+"""Mass and length of each rigid part, limbs of one side ([Kudoh2002]_ Table 3.1)."""
+
+SHOULDER_WIDTH, HIP_WIDTH = 0.40, 0.30
+"""Distances between the shoulder joints and between the hip joints [m] ([Kudoh2002]_ 3.2)."""
+
+MASS = 70.0
+"""Of the whole body [kg]."""
+
+ANKLE_HEIGHT, SOLE_WIDTH = 0.07, 0.10
+"""Height of the ankle above the sole and width of the sole [m]; ours, the thesis has neither."""
+
+STATURE = sum(PARTS[name].length for name in ("head", "chest", "loins", "thigh", "shank")) + ANKLE_HEIGHT
+"""Sole to vertex [m]."""
+
+_ARMS = ("upper_arm", "forearm", "hand")
+_LEGS = ("thigh", "shank", "foot")
+_SIDES = (("left", 1.0), ("right", -1.0))
+
+
+def kudoh() -> BodyModel:
+    """Make the body of [Kudoh2002]_: 15 segments, 34 joint angles and the free loins, 70 kg.
+
+    Neck, waist, shoulders, wrists, hips and ankles are balls of three hinges, elbows and knees pins.
+    Frames, postures and effectors are those of :func:`manikin.body.human`: the loins' frame lies midway
+    between the hip joints and every other one in its proximal joint, and effectors are ``left_foot``,
+    ``right_foot``, ``left_hand``, ``right_hand``, ``head`` and ``pelvis`` (the loins).
+    """
+    limbs = [part for make in (_arm, _leg) for side, sign in _SIDES for part in make(side, sign)]
+    return BodyModel(
+        name="kudoh",
+        segments=(*_trunk(), *limbs),
+        effectors={effector.name: effector for effector in _effectors()},
+        standing_angles=standing_angles(),
+        stature=STATURE,
+        sole_length=PARTS["foot"].length,
+        sole_width=SOLE_WIDTH,
+        nominal_mass=MASS,
+        limbs=_limbs(),
+    )
+
+
+def _hinges(segment: str, side: str = "") -> tuple[Hinge, ...]:
+    """Hinges of the human's segment at this body's strength."""
+    return human_hinges(segment, side, MASS * STATURE)
+
+
+def _waist() -> tuple[Hinge, ...]:
+    """One ball for two: ranges of lumbar and thorax added."""
+    return tuple(
+        replace(
+            low, name=low.name.replace("lumbar", "waist"), lower=low.lower + high.lower,
+            upper=low.upper + high.upper,
+        )
+        for low, high in zip(_hinges("lumbar"), _hinges("thorax"), strict=True)
+    )  # fmt: skip
+
+
+def _joint(segment: str, side: str) -> tuple[Hinge, ...]:
+    """Hinges of a limb's segment to its parent: 3, 1 and 3 of an arm or a leg."""
+    elbow, forearm_turn = _hinges("forearm", side)
+    knee, shank_turn = _hinges("leg", side)
+    return {
+        "upper_arm": _hinges("upper_arm", side),
+        "forearm": (elbow,),
+        "hand": (replace(forearm_turn, name=f"{side}_wrist_rotation"), *_hinges("hand", side)),
+        "thigh": _hinges("thigh", side),
+        "shank": (knee,),
+        "foot": (*_hinges("foot", side), replace(shank_turn, name=f"{side}_ankle_rotation")),
+    }[segment]
+
+
+# --- segments ------------------------------------------------------------------------------------
+
+
+def _trunk() -> tuple[Segment, ...]:
+    loins, chest, head = (PARTS[name] for name in ("loins", "chest", "head"))
+    ribs = chest.radius
+    return (
+        _upright("loins", None, 0.0, (), across("hips", 0.10, HIP_WIDTH, 0.5 * loins.length)),
+        _upright("chest", "loins", loins.length, _waist(),
+                 upright_capsule("chest", ribs, (0.0, 0.0, ribs), (0.0, 0.0, chest.length - ribs))),
+        _upright("head", "chest", chest.length, _hinges("neck"),
+                 upright_capsule("head", head.radius, (0.0, 0.0, head.radius),
+                                 (0.0, 0.0, head.length - head.radius))),
+    )  # fmt: skip
+
+
+def _upright(
+    name: str, parent: str | None, height: float, hinges: tuple[Hinge, ...], shape: Shape
+) -> Segment:
+    """Part of the trunk that stands on its joint."""
+    part = PARTS[name]
+    origin, com = np.array([0.0, 0.0, height]), np.array([0.0, 0.0, 0.5 * part.length])
+    return Segment(name, parent, origin, hinges, part.mass, com, part.inertia, (shape,))
+
+
+def _arm(side: str, sign: float) -> list[Segment]:
+    shoulder = np.array([0.0, 0.5 * sign * SHOULDER_WIDTH, PARTS["chest"].length])
+    return [
+        _hanging(side, "upper_arm", "chest", shoulder),
+        _hanging(side, "forearm", f"{side}_upper_arm", _below("upper_arm")),
+        _hanging(side, "hand", f"{side}_forearm", _below("forearm")),
+    ]
+
+
+def _leg(side: str, sign: float) -> list[Segment]:
+    return [
+        _hanging(side, "thigh", "loins", np.array([0.0, 0.5 * sign * HIP_WIDTH, 0.0])),
+        _hanging(side, "shank", f"{side}_thigh", _below("thigh")),
+        _foot(side),
+    ]
+
+
+def _below(name: str) -> FloatArray:
+    """Where the next joint of a hanging part is, in its frame [m]."""
+    return np.array([0.0, 0.0, -PARTS[name].length])
+
+
+def _hanging(side: str, name: str, parent: str, origin: FloatArray) -> Segment:
+    """Part of a limb that hangs on its joint; its shape stops short of what it carries."""
+    part = PARTS[name]
+    radius = min(part.radius, 0.49 * part.length)
+    start = -radius if name == "hand" else 0.0
+    shape = upright_capsule(name, radius, (0.0, 0.0, start), (0.0, 0.0, radius - part.length))
+    return Segment(
+        f"{side}_{name}",
+        parent,
+        origin,
+        _joint(name, side),
+        part.mass,
+        0.5 * _below(name),
+        part.inertia,
+        (shape,),
+    )
+
+
+def _foot(side: str) -> Segment:
+    """A cylinder that lies along the sole, whose middle is that of the sole."""
+    part = PARTS["foot"]
+    middle = np.array([(0.5 - ANKLE_FROM_HEEL) * part.length, 0.0, -0.5 * ANKLE_HEIGHT])
+    box = np.array([part.length, SOLE_WIDTH, 0.75 * ANKLE_HEIGHT])
+    sole = Shape("sole", ShapeKind.BOX, box, (middle[0], 0.0, 0.5 * box[2] - ANKLE_HEIGHT))
+    inertia = ALONG_X @ part.inertia @ ALONG_X.T
+    return Segment(
+        f"{side}_foot",
+        f"{side}_shank",
+        _below("shank"),
+        _joint("foot", side),
+        part.mass,
+        middle,
+        inertia,
+        (sole,),
+    )
+
+
+# --- what it touches with --------------------------------------------------------------------------
+
+
+def _effectors() -> list[Effector]:
+    found = [
+        Effector("pelvis", "loins", np.zeros(3)),
+        Effector("head", "head", np.array([0.0, 0.0, PARTS["head"].length])),
+    ]
+    hand = PARTS["hand"]
+    for side, sign in _SIDES:
+        sole = np.array([(0.5 - ANKLE_FROM_HEEL) * PARTS["foot"].length, 0.0, -ANKLE_HEIGHT])
+        palm = np.array([0.0, -sign * hand.radius, -0.5 * hand.length])
+        found.append(Effector(f"{side}_foot", f"{side}_foot", sole))
+        found.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
+    return found
+
+
+def _limbs() -> tuple[Limb, ...]:
+    chains = (("arm", "hand", _ARMS, ContactKind.POINT), ("leg", "foot", _LEGS, ContactKind.SOLE))
+    return tuple(
+        Limb(
+            f"{side}_{name}", f"{side}_{effector}", tuple(f"{side}_{part}" for part in parts), kind,
+            f"{other}_{name}",
+        )
+        for name, effector, parts, kind in chains
+        for side, other in (("left", "right"), ("right", "left"))
+    )  # fmt: skip
