@@ -14,6 +14,7 @@ world's and ``v = (v_l, w)``, ``a = (a_l, w')`` in the root's axes as in Pinocch
 * its generalised force is ``(R f, m)`` for our ``(f, m)``, so that the power is the same.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -157,7 +158,10 @@ def _turned(rotation: FloatArray, vector: ArrayLike) -> FloatArray:
 
 
 def compile_model(
-    body: BodyModel, scene: Scene | None = None, options: PhysicsOptions | None = None
+    body: BodyModel,
+    scene: Scene | None = None,
+    options: PhysicsOptions | None = None,
+    held: Mapping[str, tuple[FloatArray, FloatArray]] | None = None,
 ) -> SimulationModel:
     """Compile a body and a scene to MuJoCo.
 
@@ -169,6 +173,8 @@ def compile_model(
         body: The body.
         scene: Obstacles and floor; None for an empty world without a floor.
         options: Settings; defaults when None.
+        held: Effectors that are welded to the world, with the rotation (3, 3) and the place (3,) at which
+            they are [m]; their segments pass through the scene.
 
     Raises:
         SceneError: If a mesh is too large to simulate.
@@ -181,6 +187,8 @@ def compile_model(
     _add_excludes(spec, body)
     if scene is not None:
         add_scene(spec, scene, _contact(options, scenery=True))
+    for name, (rotation, position) in (held or {}).items():
+        _hold(spec, body, name, rotation, position)
     return SimulationModel(body, scene, options, spec.compile())
 
 
@@ -278,6 +286,17 @@ def _add_shape(item: Any, segment: Segment, shape: Shape, contact: dict[str, Any
         name=f"{segment.name}/{shape.name}", type=_GEOM_KIND[shape.kind], size=size, mass=0.0,
         pos=shape.translation, quat=quaternion(shape.rotation), **contact,
     )  # fmt: skip
+
+
+def _hold(spec: Any, body: BodyModel, name: str, rotation: FloatArray, position: FloatArray) -> None:
+    """Weld an effector to a place of the world, stiffly, in place of its contacts with the scene."""
+    spec.worldbody.add_site(name=f"held/{name}", pos=position, quat=quaternion(rotation))
+    spec.add_equality(
+        name=f"held/{name}", type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_SITE,
+        name1=f"effector/{name}", name2=f"held/{name}", solref=[2.0 * spec.option.timestep, 1.0],
+        solimp=[0.999, 0.9999, 0.001, 0.5, 2.0],
+    )  # fmt: skip
+    spec.add_exclude(bodyname1=body.effector(name).segment, bodyname2="world")
 
 
 def _add_excludes(spec: Any, body: BodyModel) -> None:

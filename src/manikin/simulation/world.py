@@ -35,23 +35,34 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """A force on the centre of mass of a segment.
+    """A force on a point of a segment, constant or a sine of time.
 
     Attributes:
         segment: Name of the segment.
-        force: (3,) in the world [N].
+        force: (3,) in the world, at its largest [N].
         start: [s].
         duration: [s].
+        point: (3,) where it acts in the segment's frame [m]; None for the segment's centre of mass.
+        frequency: Of the sine that begins with the push [Hz]; 0 for a constant force.
     """
 
     segment: str
     force: FloatArray
     start: float
     duration: float
+    point: FloatArray | None = None
+    frequency: float = 0.0
 
     def active(self, time: float) -> bool:
         """Whether the force acts in the step that begins at ``time``."""
         return self.start - 1e-9 <= time < self.start + self.duration - 1e-9
+
+    def at(self, time: float) -> FloatArray:
+        """(3,) force in the step that begins at ``time`` [N]."""
+        if not self.active(time):
+            return np.zeros(3)
+        wave = np.sin(2.0 * np.pi * self.frequency * (time - self.start)) if self.frequency > 0.0 else 1.0
+        return float(wave) * self.force
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,14 +206,25 @@ class World:
 
     # --- what acts -------------------------------------------------------------------------
 
-    def apply_push(self, segment: str, force: ArrayLike, start: float, duration: float) -> None:
-        """Push a segment at its centre of mass.
+    def apply_push(
+        self,
+        segment: str,
+        force: ArrayLike,
+        start: float,
+        duration: float,
+        *,
+        point: ArrayLike | None = None,
+        frequency: float = 0.0,
+    ) -> None:
+        """Push a segment.
 
         Args:
             segment: Name of the segment.
-            force: (3,) in the world [N].
+            force: (3,) in the world, at its largest [N].
             start: [s] of simulated time.
             duration: [s].
+            point: (3,) where it acts in the segment's frame [m]; its centre of mass when omitted.
+            frequency: Of the sine that begins with the push [Hz]; 0 for a constant force.
 
         Raises:
             BodyError: If there is no such segment.
@@ -215,6 +237,8 @@ class World:
                 frozen_array(force, "push force [N]", (3,)),
                 finite_number(start, "push start [s]", at_least=0.0),
                 finite_number(duration, "push duration [s]", above=0.0),
+                None if point is None else frozen_array(point, "push point [m]", (3,)),
+                finite_number(frequency, "push frequency [Hz]", at_least=0.0),
             )
         )
 
@@ -337,9 +361,17 @@ class World:
         self._data.xfrc_applied[:] = 0.0
         for push in self._pushes:
             if push.active(self.time):
-                self._data.xfrc_applied[self.model.body_id(push.segment), :3] += push.force
+                self._press(push)
         for grip in self._grips.values():
             self._hold(grip)
+
+    def _press(self, push: Push) -> None:
+        number, force = self.model.body_id(push.segment), push.at(self.time)
+        self._data.xfrc_applied[number, :3] += force
+        if push.point is not None:
+            turned = self._data.xmat[number].reshape(3, 3) @ push.point
+            arm = self._data.xpos[number] + turned - self._data.xipos[number]
+            self._data.xfrc_applied[number, 3:] += cross(arm, force)
 
     def _hold(self, grip: Grip) -> None:
         site = self.model.site_id(grip.effector)

@@ -1,0 +1,40 @@
+"""Recovery from pushes on both feet: posture control and a quadratic program ([Kudoh2002]_)."""
+
+from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, LinearMap, close_loop
+from manikin.control.balance_recovery.joint_groups import JointGroups, joint_groups
+from manikin.control.balance_recovery.posture_control import PostureControl, posture_control
+from manikin.control.balance_recovery.problem import (
+    JointBounds,
+    Objective,
+    RecoveryProblem,
+    build_recovery_qp,
+    leg_symmetry,
+)
+from manikin.control.balance_recovery.recovery import BalanceRecovery, RecoveryOutput
+from manikin.control.balance_recovery.settings import RecoverySettings
+from manikin.control.balance_recovery.strategy import Strategy, StrategySwitch
+from manikin.control.balance_recovery.support_area import SupportArea, zmp_of, zmp_rows
+
+__all__ = [
+    "BalanceRecovery",
+    "ClosedLoop",
+    "FeltPush",
+    "JointBounds",
+    "JointGroups",
+    "LinearMap",
+    "Objective",
+    "PostureControl",
+    "RecoveryOutput",
+    "RecoveryProblem",
+    "RecoverySettings",
+    "Strategy",
+    "StrategySwitch",
+    "SupportArea",
+    "build_recovery_qp",
+    "close_loop",
+    "joint_groups",
+    "leg_symmetry",
+    "posture_control",
+    "zmp_of",
+    "zmp_rows",
+]

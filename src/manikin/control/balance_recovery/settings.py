@@ -1,0 +1,73 @@
+"""Weights, gains and limits of the recovery from pushes."""
+
+from dataclasses import dataclass
+
+from manikin.control.settings import Impedance
+from manikin.errors import InputError
+from manikin.spatial import finite_number
+
+
+@dataclass(frozen=True)
+class RecoverySettings:
+    """Everything about the recovery that can be tuned; the thesis prints none of it but the delay.
+
+    Attributes:
+        period: Time between two control steps [s]; the thesis has 10 ms ([Kudoh2002]_ 3.2).
+        delay: Time from the beginning of the first push until the control reacts [s] (3.2).
+        com: Gains of the law ``s'' = -stiffness (s - centre) - damping s'`` ([Kudoh2002]_ 2.45-2.48).
+        com_weight: Of the squared error of that law against a squared joint acceleration; it bends where the
+            limits leave no choice, where the thesis' equality would have no solution.
+        upward: Wanted acceleration of the centre of mass upward, as the slope of the objective (2.54).
+        unwinding: Of the objective's joint accelerations: they are measured from those that bring the joints
+            gently back to the posture; the thesis has none, so that swung arms go on to their stops.
+        posture: Largest gains of the posture control (2.65); their ratio is kept where they must be less.
+        stiffness: With these gains muscles hold the posture before they react, and locked joints always.
+        sole_inset: The ZMP is kept this far inside the edge of the soles [m].
+        friction_share: Share of the friction of the soles that is made use of.
+        inner, outer: Half sizes of the region in which posture control begins and of that in which it ends,
+            as shares of the support area's half size about its centre ([Kudoh2002]_ Fig. 2.8). The gap
+            between the two keeps the choice from chattering.
+        lead: What must be in that region is where the centre of mass will be after this time at its present
+            speed [s]; the thesis takes 0, the place itself.
+        locked: Groups of joints that hold the posture whatever happens: ``"arms"``, ``"hips"``.
+        posture_control_only: Whether the quadratic program is never chosen.
+        strength: Torque and speed limits relative to the body's own.
+        joint_limit_horizon: Joint angles and speeds must stay admissible over this time [s].
+        max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
+        solver: ``"daqp"``, ``"proxqp"`` or ``"piqp"``.
+    """
+
+    period: float = 0.005
+    delay: float = 0.2
+    com: Impedance = Impedance(20.0, 9.0)
+    com_weight: float = 1e3
+    upward: float = 1.0
+    unwinding: Impedance = Impedance(4.0, 4.0)
+    posture: Impedance = Impedance(100.0, 20.0)
+    stiffness: Impedance = Impedance(400.0, 40.0)
+    sole_inset: float = 0.005
+    friction_share: float = 0.9
+    inner: float = 0.3
+    outer: float = 0.5
+    lead: float = 0.3
+    locked: tuple[str, ...] = ()
+    posture_control_only: bool = False
+    strength: float = 1.0
+    joint_limit_horizon: float = 0.1
+    max_joint_acceleration: float = 500.0
+    solver: str = "daqp"
+
+    def __post_init__(self) -> None:
+        positive = (
+            "period", "com_weight", "friction_share", "inner", "outer", "strength", "joint_limit_horizon",
+            "max_joint_acceleration",
+        )  # fmt: skip
+        for name in positive:
+            finite_number(getattr(self, name), f"recovery {name}", above=0.0)
+        for name in ("delay", "upward", "sole_inset", "lead"):
+            finite_number(getattr(self, name), f"recovery {name}", at_least=0.0)
+        if self.inner > self.outer:
+            raise InputError(f"recovery inner is {self.inner:g}, outer {self.outer:g}; valid: inner <= outer")
+        for name in self.locked:
+            if name not in ("arms", "hips"):
+                raise InputError(f"recovery locked has {name!r}; valid: arms, hips")

@@ -1,0 +1,100 @@
+"""The area in which the ZMP may be: the hull of the soles, a rectangle for parallel feet."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.balance.polygon import convex_polygon, signed_distance
+from manikin.contact import Contact
+from manikin.control.balance_recovery.closed_loop import ClosedLoop, LinearMap
+from manikin.errors import InputError
+from manikin.spatial import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class SupportArea:
+    """A convex area of the ground.
+
+    Attributes:
+        corners: (k, 2) counter-clockwise [m].
+        height: Of the ground [m].
+    """
+
+    corners: FloatArray
+    height: float
+
+    @classmethod
+    def of(cls, soles: Sequence[Contact]) -> "SupportArea":
+        """Hull of soles that lie on one level plane.
+
+        Raises:
+            InputError: If they do not.
+        """
+        points = np.concatenate([contact.points_in_world for contact in soles])
+        if np.ptp(points[:, 2]) > 1e-6:
+            raise InputError(
+                f"soles lie at heights from {points[:, 2].min():.3g} to {points[:, 2].max():.3g} m; "
+                "valid: both on one level plane"
+            )
+        return cls(convex_polygon(points[:, :2]), float(points[:, 2].mean()))
+
+    @property
+    def centre(self) -> FloatArray:
+        """(2,) mean of the corners [m]."""
+        return self.corners.mean(axis=0)
+
+    def reach(self, point: FloatArray) -> float:
+        """How far out a point (2,) is: 0 in the centre, 1 on the edge, more outside."""
+        normals, offsets = self.half_planes()
+        room = offsets - normals @ self.centre
+        return float(np.max((normals @ (point - self.centre)) / room))
+
+    def inside(self, points: FloatArray) -> FloatArray:
+        """Distance of points (..., 2) to the edge, negative outside [m]."""
+        return signed_distance(points, self.corners)
+
+    def half_planes(self, inset: float = 0.0) -> tuple[FloatArray, FloatArray]:
+        """Unit outward normals (k, 2) and offsets (k,) with ``normals @ p <= offsets`` inside."""
+        along = np.roll(self.corners, -1, axis=0) - self.corners
+        normals = np.column_stack((along[:, 1], -along[:, 0]))
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        return normals, np.sum(normals * self.corners, axis=1) - inset
+
+
+def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float) -> LinearMap:
+    """Rows that are not positive when the ZMP is inside ([Kudoh2002]_ 2.39-2.44, z up).
+
+    With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` on the
+    ground at the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and ``p_y f_z = s_y f_z +
+    (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, which is right where ``f_z > 0``.
+
+    Args:
+        area: Where it may be.
+        loop: Maps of the force and the moment.
+        com: (3,) [m].
+        inset: Kept from the edge [m].
+    """
+    normals, offsets = area.half_planes(inset)
+    moments = _turned(loop.force.matrix, loop.moment.matrix, com, area.height)
+    constant = _turned(loop.force.offset, loop.moment.offset, com, area.height)
+    return LinearMap(
+        normals @ moments - np.outer(offsets, loop.force.matrix[2]),
+        normals @ constant - offsets * loop.force.offset[2],
+    )
+
+
+def zmp_of(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:
+    """(2,) ZMP of a force (3,) and its moment (3,) about the centre of mass [m]; NaN without load."""
+    if force[2] <= 0.0:
+        return np.full(2, np.nan)
+    return _turned(force, moment, com, height) / force[2]
+
+
+def _turned(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:
+    """(2, ...) ``p f_z`` for the ZMP ``p``."""
+    drop = height - com[2]
+    return np.stack((
+        com[0] * force[2] + drop * force[0] - moment[1],
+        com[1] * force[2] + drop * force[1] + moment[0],
+    ))  # fmt: skip

@@ -1,0 +1,217 @@
+"""The outcome of a push: whether the body stands, and by which means it stayed on its feet."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from manikin.body import BodyModel, Configuration
+from manikin.control.balance_recovery import BalanceRecovery, JointGroups, Strategy
+from manikin.simulation.recovery_record import RecoveryTrace
+from manikin.simulation.world import Push, Touch
+from manikin.spatial import FloatArray
+
+STANDS_HEIGHT = 0.95
+"""A standing body has its centre of mass at least at this share of its first height; kneeling, a human has
+some 0.7 of it and lying 0.2."""
+
+STANDS_LEAN = 0.3
+"""Its trunk leans by at most this [rad]."""
+
+STANDS_SPEED = 0.1
+"""The speed of its centre of mass is at most this [m/s]."""
+
+FOOT_MOVED = 0.02
+"""A foot that ends farther than this from where it stood has moved [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recovery:
+    """What became of a push.
+
+    Attributes:
+        trace: Every control step.
+        feet: ``"held"`` or ``"free"``.
+        failure: Why it is no recovery, in one line; empty for one.
+        direction: (2,) unit direction of the first push; zero without one.
+        impulse: Of all pushes, the mean force of a sine's half wave for one half wave [N.s].
+        zmp_excess: Farthest that the ZMP was outside the soles once the control acted [m].
+        time_to_rest: From the first push until the body stands at rest to the end [s]; None if it does not.
+        final_height: Of the centre of mass above the ground at the end [m].
+        capture_point: Farthest reach of the capture point over the support area; 1 is its edge.
+        foot_motion: Farthest that a foot is from its place at the end [m].
+        control_from: When the control acted first after the first push began [s].
+        wall: Wall time [s].
+    """
+
+    trace: RecoveryTrace
+    feet: str
+    failure: str
+    direction: FloatArray
+    impulse: float
+    zmp_excess: float
+    time_to_rest: float | None
+    final_height: float
+    capture_point: float
+    foot_motion: float
+    control_from: float
+    wall: float
+
+    @property
+    def recovered(self) -> bool:
+        """Whether the body stands at the end, at rest and upright, on its own feet where they were."""
+        return not self.failure
+
+    def strategy_share(self, strategy: Strategy) -> float:
+        """Share of the time, from the first reaction on, in which a strategy decided."""
+        chosen = self.trace.strategies[self._reacting]
+        return float(np.mean(chosen == str(strategy))) if len(chosen) else 0.0
+
+    def turned(self, group: str) -> FloatArray:
+        """(n,) angular momentum of a group about the axis of the fall [kg.m^2/s].
+
+        The axis is level and square to the push, so that falling the way of the push is positive.
+        """
+        x, y = self.direction
+        return self.trace.momentum[group] @ np.array([-y, x, 0.0])
+
+    def momentum_shares(self) -> dict[str, float]:
+        """Share of each group in the angular momentum at its largest after the first reaction; their sum is 1."""
+        groups = {group: self.turned(group)[self._reacting] for group in self.trace.momentum}
+        total = sum(groups.values(), np.zeros(int(self._reacting.sum())))
+        if not len(total) or total.max() <= 0.0:
+            return dict.fromkeys(groups, 0.0)
+        peak = int(np.argmax(total))
+        return {group: float(values[peak] / total[peak]) for group, values in groups.items()}
+
+    @property
+    def _reacting(self) -> np.ndarray:
+        return self.trace.motion.time >= self.control_from - 1e-9
+
+    def summary(self) -> dict[str, Any]:
+        """The ``push`` block of a run's summary."""
+        trace = self.trace
+        peak = {group: float(np.abs(self.turned(group)).max()) for group in trace.momentum}
+        return {
+            "recovered": self.recovered, "steps": 0, "feet": self.feet, "impulse_Ns": self.impulse,
+            "direction_deg": float(np.degrees(np.arctan2(self.direction[1], self.direction[0]))),
+            "max_zmp_excess_m": self.zmp_excess, "final_com_height_m": self.final_height,
+            "time_to_rest_s": self.time_to_rest, "max_capture_point_reach": self.capture_point,
+            "max_foot_motion_m": self.foot_motion,
+            "posture_share": self.strategy_share(Strategy.POSTURE),
+            "program_share": self.strategy_share(Strategy.PROGRAM),
+            "angular_momentum_share": self.momentum_shares(), "peak_angular_momentum_Nms": peak,
+            "work_J": {group: sum(trace.work(group)) for group in trace.power},
+            "min_margin": float(trace.motion.margin.min()),
+            "fallbacks": len(trace.fallbacks), "control_step_ms": trace.control_ms, "wall_s": self.wall,
+        }  # fmt: skip
+
+
+def judge(
+    body: BodyModel,
+    controller: BalanceRecovery,
+    trace: RecoveryTrace,
+    pushes: Sequence[Push],
+    feet: str,
+    fallen: str,
+    touches: Sequence[Touch],
+    wall: float,
+) -> Recovery:
+    """Say what became of a push.
+
+    Args:
+        body: The body.
+        controller: What kept it.
+        trace: What happened.
+        pushes: What disturbed it.
+        feet: How its feet were on the ground.
+        fallen: Why the run was ended before its time; empty when it was not.
+        touches: Touches of the ground with anything but the feet.
+        wall: Wall time [s].
+    """
+    motion, area = trace.motion, controller.area
+    start = min((push.start for push in pushes), default=0.0)
+    control_from = start + controller.settings.delay
+    direction = _direction(pushes)
+    rests = _rests(body, controller, trace)
+    excess = -area.inside(trace.zmp)
+    counted = (motion.time >= control_from - 1e-9) & np.isfinite(excess)
+    moved = _foot_motion(body, controller, motion.q[-1])
+    return Recovery(
+        trace=trace,
+        feet=feet,
+        failure=fallen or _fault(rests, moved, touches),
+        direction=direction,
+        impulse=float(sum(_impulse(push) for push in pushes)),
+        zmp_excess=float(np.max(excess[counted], initial=0.0)),
+        time_to_rest=_time_to_rest(rests, motion.time - start),
+        final_height=float(motion.com[-1, 2] - area.height),
+        capture_point=_capture_reach(controller, trace),
+        foot_motion=moved,
+        control_from=control_from,
+        wall=wall,
+    )
+
+
+def trunk_lean(body: BodyModel, groups: JointGroups, q: FloatArray) -> float:
+    """Largest angle of a segment of the trunk, but the head, to the vertical [rad]."""
+    state = Configuration(body, q)
+    names = [name for name in groups.segments["trunk"] if name not in ("head", "neck")]
+    upright = min(float(state.segment_placement(name)[0][2, 2]) for name in names)
+    return float(np.arccos(np.clip(upright, -1.0, 1.0)))
+
+
+def _rests(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -> np.ndarray:
+    """(n,) whether the body stands at rest: high, upright and slow, its centre of mass over its soles."""
+    motion, height = trace.motion, controller.area.height
+    high = motion.com[:, 2] - height >= STANDS_HEIGHT * (controller.com[2] - height)
+    slow = np.linalg.norm(trace.com_velocity, axis=1) <= STANDS_SPEED
+    over = controller.area.inside(motion.com[:, :2]) > 0.0
+    upright = np.array([trunk_lean(body, controller.groups, q) <= STANDS_LEAN for q in motion.q])
+    return high & slow & over & upright
+
+
+def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch]) -> str:
+    if touches:
+        return f"not on its feet alone: {touches[0]}"
+    if not rests[-1]:
+        return "does not stand at rest and upright at the end"
+    if moved > FOOT_MOVED:
+        return f"a foot has moved by {moved:.3f} m"
+    return ""
+
+
+def _time_to_rest(rests: np.ndarray, since: FloatArray) -> float | None:
+    """Time after which the body rests to the end [s]."""
+    if not rests[-1]:
+        return None
+    restless = np.flatnonzero(~rests)
+    return float(max(0.0, since[0 if not len(restless) else restless[-1] + 1]))
+
+
+def _foot_motion(body: BodyModel, controller: BalanceRecovery, q: FloatArray) -> float:
+    state = Configuration(body, q)
+    return max(
+        float(np.linalg.norm(state.effector_placement(c.effector)[1] - c.position)) for c in controller.soles
+    )
+
+
+def _capture_reach(controller: BalanceRecovery, trace: RecoveryTrace) -> float:
+    height = controller.com[2] - controller.area.height
+    ahead = trace.motion.com[:, :2] + trace.com_velocity[:, :2] / np.sqrt(9.81 / height)
+    return max(controller.area.reach(point) for point in ahead)
+
+
+def _direction(pushes: Sequence[Push]) -> FloatArray:
+    for push in pushes:
+        size = float(np.linalg.norm(push.force[:2]))
+        if size > 0.0:
+            return push.force[:2] / size
+    return np.zeros(2)
+
+
+def _impulse(push: Push) -> float:
+    """Of a constant force, or of one half wave of a sine [N.s]."""
+    size = float(np.linalg.norm(push.force))
+    return size / (np.pi * push.frequency) if push.frequency > 0.0 else size * push.duration
