@@ -28,6 +28,12 @@ class LinearMap:
     matrix: FloatArray
     offset: FloatArray
 
+    def joined(self, other: "LinearMap") -> "LinearMap":
+        """Both values, one after the other."""
+        return LinearMap(
+            np.concatenate((self.matrix, other.matrix)), np.concatenate((self.offset, other.offset))
+        )
+
     def __call__(self, phi: FloatArray) -> FloatArray:
         """(m,) value at the accelerations (k,)."""
         return self.matrix @ phi + self.offset

@@ -6,7 +6,7 @@ joint torques cannot be limited, since two feet on the ground share their load i
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -41,20 +41,20 @@ class JointBounds:
 class Objective:
     """What one step minimises.
 
-    ``sum weight (theta'' - wanted)^2 + com_weight |s''_xy - law|^2 - upward s''_z``, half of each square.
+    ``sum weight (theta'' - wanted)^2 + com_weight (s'' - law)^2 - upward s''_z``, half of each square.
 
     Attributes:
         weight: (nv - 6,) diagonal of ``C_theta`` ([Kudoh2002]_ 2.27).
         wanted: (nv - 6,) joint accelerations from which the objective is measured [rad/s^2].
-        law: (2,) wanted acceleration of the centre of mass [m/s^2].
-        com_weight: Of its error; 0 leaves it free.
+        law: (3,) wanted acceleration of the centre of mass [m/s^2].
+        com_weight: (3,) of its squared error; 0 leaves it free.
         upward: Slope of the upward acceleration.
     """
 
     weight: FloatArray
     wanted: FloatArray
     law: FloatArray
-    com_weight: float = 0.0
+    com_weight: FloatArray = field(default_factory=lambda: np.zeros(3))
     upward: float = 0.0
 
 
@@ -167,10 +167,9 @@ def _cost(loop: ClosedLoop, objective: Objective, size: int) -> tuple[FloatArray
     hessian, gradient = np.zeros((size, size)), np.zeros(size)
     hessian[:k, :k] = weighted.T @ loop.joints.matrix
     gradient[:k] = (loop.joints.offset - objective.wanted) @ weighted
-    if objective.com_weight > 0.0:
-        level = loop.com.matrix[:2]
-        hessian[:k, :k] += objective.com_weight * level.T @ level
-        gradient[:k] += objective.com_weight * (loop.com.offset[:2] - objective.law) @ level
+    pulled = loop.com.matrix * objective.com_weight[:, None]
+    hessian[:k, :k] += pulled.T @ loop.com.matrix
+    gradient[:k] += (loop.com.offset - objective.law) @ pulled
     gradient[:k] -= objective.upward * loop.com.matrix[2]
     hessian[np.arange(k, size), np.arange(k, size)] = FORCE_WEIGHT
     return hessian, gradient

@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel
 from manikin.contact import Contact, sole
-from manikin.control.balance_recovery.closed_loop import FeltPush, close_loop
+from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, LinearMap, close_loop
+from manikin.control.balance_recovery.com_law import ComLaw, com_law
 from manikin.control.balance_recovery.joint_groups import joint_groups
 from manikin.control.balance_recovery.posture_control import posture_control
 from manikin.control.balance_recovery.problem import (
@@ -19,7 +20,7 @@ from manikin.control.balance_recovery.problem import (
 )
 from manikin.control.balance_recovery.settings import RecoverySettings
 from manikin.control.balance_recovery.strategy import Strategy, StrategySwitch
-from manikin.control.balance_recovery.support_area import SupportArea, zmp_rows
+from manikin.control.balance_recovery.support_area import SupportArea, load_row, zmp_rows
 from manikin.control.build_qp import joint_acceleration_bounds
 from manikin.control.contact_forces import (
     ContactForceBasis,
@@ -30,7 +31,7 @@ from manikin.control.contact_forces import (
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.settings import Impedance
 from manikin.control.solver import QPSolution, make_solver
-from manikin.spatial import FloatArray, frozen_array
+from manikin.spatial import GRAVITY, FloatArray, frozen_array
 
 FIRM = 100.0
 """Weight of joints that hold an angle, against 1 of those that need not."""
@@ -134,15 +135,16 @@ class BalanceRecovery:
         state = self._dynamics.evaluate(q, v)
         felt = push if push is not None and reacting else FeltPush.none(self.body.nv)
         loop = close_loop(state, self.groups.feet, felt, settling=SETTLING)
-        velocity = state.momentum[:3] / state.mass
-        strategy = self._switch.choose(state.com, velocity, self.area) if reacting else Strategy.STIFF
+        law = com_law(state, self.com, self.area, self.settings)
+        strategy = self._switch.choose(state.com, law.settled, self.area) if reacting else Strategy.STIFF
         rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
         share = 0.0
         objective: Objective | None = None
         if strategy is Strategy.STIFF:
             objective = self._stiff(state)
         elif strategy is Strategy.POSTURE:
-            found = posture_control(loop, rows, self._pull(self.settings.posture, state))
+            calm = zmp_rows(self.area.shrunk(self.settings.posture_area), loop, state.com, 0.0)
+            found = posture_control(loop, calm, self._pull(self.settings.posture, state))
             if found is not None:
                 objective, share = self._held(state, found.joints), found.share
             elif self.settings.posture_control_only:
@@ -150,11 +152,11 @@ class BalanceRecovery:
             else:
                 strategy = Strategy.PROGRAM
         if objective is None:
-            objective = self._balancing(state)
+            objective = self._balancing(state, law)
         contacts = self._contacts(state)
         problem = build_recovery_qp(
             state, loop, contacts, felt, self._bounds(state, strategy), rows,
-            leg_symmetry(loop, state.q[7:], self._pairs, ALIKE), objective,
+            self._wished(state, loop), objective,
         )  # fmt: skip
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else self._torque(problem, solution, state)
@@ -173,22 +175,25 @@ class BalanceRecovery:
     def _held(self, state: DynamicsState, wanted: FloatArray) -> Objective:
         """Joint accelerations as wanted, and of locked joints what holds them."""
         weight = np.full(len(wanted), FIRM)
-        return Objective(weight, self._with_locked(state, wanted, weight), np.zeros(2))
+        return Objective(weight, self._with_locked(state, wanted, weight), np.zeros(3))
 
     def _stiff(self, state: DynamicsState) -> Objective:
         """Every joint but the ankles is held; these keep their torques, see :meth:`_bounds`."""
         weight = np.full(len(self.posture), FIRM)
         weight[self.groups.joints["ankle"]] = LOOSE
-        return Objective(weight, self._pull(self.settings.stiffness, state), np.zeros(2))
+        return Objective(weight, self._pull(self.settings.stiffness, state), np.zeros(3))
 
-    def _balancing(self, state: DynamicsState) -> Objective:
+    def _balancing(self, state: DynamicsState, law: ComLaw) -> Objective:
         """The objective of the quadratic program (2.54) with the law of the centre of mass."""
         settings = self.settings
-        velocity = state.momentum[:3] / state.mass
-        law = settings.com.stiffness * (self.com - state.com) - settings.com.damping * velocity
         weight = np.ones(len(self.posture))
-        wanted = self._with_locked(state, self._pull(settings.unwinding, state), weight)
-        return Objective(weight, wanted, law[:2], settings.com_weight, settings.upward)
+        weight[self.groups.joints["arm"]] = settings.arm_weight
+        gains = settings.unwinding
+        damping = gains.damping + (1.0 - law.need) * settings.stopping
+        wanted = self._pull(Impedance(gains.stiffness, damping), state)
+        wanted = self._with_locked(state, wanted, weight)
+        pull = np.array([settings.com_weight, settings.com_weight, settings.height_weight])
+        return Objective(weight, wanted, law.acceleration, pull, settings.upward)
 
     def _with_locked(self, state: DynamicsState, wanted: FloatArray, weight: FloatArray) -> FloatArray:
         """Wanted accelerations with those that hold the locked joints; their weights are set."""
@@ -196,6 +201,11 @@ class BalanceRecovery:
         result[self._locked] = self._pull(self.settings.stiffness, state)[self._locked]
         weight[self._locked] = FIRM * 10.0
         return result
+
+    def _wished(self, state: DynamicsState, loop: ClosedLoop) -> LinearMap:
+        """Rows that hold where they can: alike legs and a loaded ground."""
+        alike = leg_symmetry(loop, state.q[7:], self._pairs, ALIKE)
+        return alike.joined(load_row(loop, self.settings.least_load * state.mass * GRAVITY))
 
     # --- limits ------------------------------------------------------------------------------
 

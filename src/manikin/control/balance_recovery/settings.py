@@ -14,9 +14,19 @@ class RecoverySettings:
     Attributes:
         period: Time between two control steps [s]; the thesis has 10 ms ([Kudoh2002]_ 3.2).
         delay: Time from the beginning of the first push until the control reacts [s] (3.2).
-        com: Gains of the law ``s'' = -stiffness (s - centre) - damping s'`` ([Kudoh2002]_ 2.45-2.48).
         com_weight: Of the squared error of that law against a squared joint acceleration; it bends where the
             limits leave no choice, where the thesis' equality would have no solution.
+        calm: Rate at which the law of the centre of mass brings the capture point back [1/s]
+            ([Kudoh2002]_ 2.45-2.48, see :mod:`manikin.control.balance_recovery.com_law`).
+        turning: Moment with which arms and trunk turn where the ZMP is not enough, and are stopped again, in
+            body weights [m].
+        least_load: The ground carries at least this share of the weight where that is possible: a body that
+            lets itself drop has nothing to push against.
+        stopping: Damping of all joints while the turning is stopped [1/s].
+        height: Gains of the same law for the height.
+        height_weight: Of the squared error of that law; 0, as in the thesis, leaves the height to ``upward``.
+        arm_weight: Of a squared acceleration of an arm's joint, against 1 of any other: the diagonal of
+            ``C_theta`` (2.27).
         upward: Wanted acceleration of the centre of mass upward, as the slope of the objective (2.54).
         unwinding: Of the objective's joint accelerations: they are measured from those that bring the joints
             gently back to the posture; the thesis has none, so that swung arms go on to their stops.
@@ -27,8 +37,8 @@ class RecoverySettings:
         inner, outer: Half sizes of the region in which posture control begins and of that in which it ends,
             as shares of the support area's half size about its centre ([Kudoh2002]_ Fig. 2.8). The gap
             between the two keeps the choice from chattering.
-        lead: What must be in that region is where the centre of mass will be after this time at its present
-            speed [s]; the thesis takes 0, the place itself.
+        posture_area: Posture control keeps the ZMP in this share of the support area about its centre, so
+            that its own motion does not carry the body away.
         locked: Groups of joints that hold the posture whatever happens: ``"arms"``, ``"hips"``.
         posture_control_only: Whether the quadratic program is never chosen.
         strength: Torque and speed limits relative to the body's own.
@@ -39,8 +49,14 @@ class RecoverySettings:
 
     period: float = 0.005
     delay: float = 0.2
-    com: Impedance = Impedance(20.0, 9.0)
-    com_weight: float = 1e3
+    com_weight: float = 1e4
+    calm: float = 2.0
+    turning: float = 0.4
+    least_load: float = 0.6
+    stopping: float = 10.0
+    height: Impedance = Impedance(20.0, 9.0)
+    height_weight: float = 1e3
+    arm_weight: float = 0.03
     upward: float = 1.0
     unwinding: Impedance = Impedance(4.0, 4.0)
     posture: Impedance = Impedance(100.0, 20.0)
@@ -49,7 +65,7 @@ class RecoverySettings:
     friction_share: float = 0.9
     inner: float = 0.3
     outer: float = 0.5
-    lead: float = 0.3
+    posture_area: float = 0.7
     locked: tuple[str, ...] = ()
     posture_control_only: bool = False
     strength: float = 1.0
@@ -59,12 +75,12 @@ class RecoverySettings:
 
     def __post_init__(self) -> None:
         positive = (
-            "period", "com_weight", "friction_share", "inner", "outer", "strength", "joint_limit_horizon",
+            "period", "com_weight", "friction_share", "inner", "outer", "posture_area", "strength", "joint_limit_horizon",
             "max_joint_acceleration",
         )  # fmt: skip
         for name in positive:
             finite_number(getattr(self, name), f"recovery {name}", above=0.0)
-        for name in ("delay", "upward", "sole_inset", "lead"):
+        for name in ("delay", "upward", "sole_inset"):
             finite_number(getattr(self, name), f"recovery {name}", at_least=0.0)
         if self.inner > self.outer:
             raise InputError(f"recovery inner is {self.inner:g}, outer {self.outer:g}; valid: inner <= outer")

@@ -26,12 +26,15 @@ class StrategySwitch:
         self._settings = settings
         self._near = True
 
-    def choose(self, com: FloatArray, velocity: FloatArray, area: SupportArea) -> Strategy:
-        """Choose for a centre of mass (3,) [m] of a velocity (3,) [m/s]."""
+    def choose(self, com: FloatArray, settled: FloatArray, area: SupportArea) -> Strategy:
+        """Choose for a centre of mass (3,) and where the capture point settles (2,) [m].
+
+        The thesis looks at the centre of mass alone, and would hold the posture while a fast body passes the
+        centre; both must be near it here.
+        """
         settings = self._settings
         if settings.posture_control_only:
             return Strategy.POSTURE
-        soon = com[:2] + settings.lead * velocity[:2]
-        reach = max(area.reach(com[:2]), area.reach(soon))
+        reach = max(area.reach(com[:2]), area.reach(settled))
         self._near = reach < (settings.outer if self._near else settings.inner)
         return Strategy.POSTURE if self._near else Strategy.PROGRAM

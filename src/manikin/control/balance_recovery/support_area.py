@@ -54,6 +54,17 @@ class SupportArea:
         """Distance of points (..., 2) to the edge, negative outside [m]."""
         return signed_distance(points, self.corners)
 
+    def shrunk(self, share: float) -> "SupportArea":
+        """Share of the area about its centre."""
+        return SupportArea(self.centre + share * (self.corners - self.centre), self.height)
+
+    def nearest(self, point: FloatArray, inset: float) -> FloatArray:
+        """Point (2,) drawn towards the centre until it is inside by ``inset`` [m]."""
+        normals, offsets = self.half_planes(inset)
+        along = normals @ (point - self.centre)
+        room = offsets - normals @ self.centre
+        return self.centre + (point - self.centre) / max(1.0, float(np.max(along / room)))
+
     def half_planes(self, inset: float = 0.0) -> tuple[FloatArray, FloatArray]:
         """Unit outward normals (k, 2) and offsets (k,) with ``normals @ p <= offsets`` inside."""
         along = np.roll(self.corners, -1, axis=0) - self.corners
@@ -82,6 +93,16 @@ def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float)
         normals @ moments - np.outer(offsets, loop.force.matrix[2]),
         normals @ constant - offsets * loop.force.offset[2],
     )
+
+
+def load_row(loop: ClosedLoop, least: float) -> LinearMap:
+    """Row that is not positive when the ground carries at least a force; the thesis has no such limit.
+
+    Args:
+        loop: Maps of the force.
+        least: Vertical force [N].
+    """
+    return LinearMap(-loop.force.matrix[2:], least - loop.force.offset[2:])
 
 
 def zmp_of(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:
