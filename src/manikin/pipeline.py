@@ -24,6 +24,7 @@ from manikin.stages.execution import execute_motion
 from manikin.stages.key_postures import with_key_postures, with_stricter_key_postures
 from manikin.stages.keyed_contacts import KeyedContacts
 from manikin.stages.planned_motion import PlannedMotion
+from manikin.stages.recovery import recover_from_push
 from manikin.stages.refined import refine_contacts
 from manikin.stages.wholebody import follow_centre_of_mass, move_point_mass
 from manikin.wholebody import WholeBodySettings
@@ -80,7 +81,9 @@ def _job(scenario: str | Path | Scenario, variant: str | None, overrides: Sequen
 
 
 def _follow_the_road(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
-    """The whole road; contacts are planned where the scenario lists none."""
+    """The whole road; contacts are planned where the scenario lists none, and none for a body that stays."""
+    if context.scenario.recovery is not None:
+        return RunResult.of(report, recovery=recover_from_push(context, report))
     with_contacts = context if context.has_supports else plan_contacts(context, report)
     if with_contacts is None:
         return RunResult.of(report)

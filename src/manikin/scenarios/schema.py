@@ -14,7 +14,7 @@ from manikin.scenarios.sections.contacts import ContactsSection
 from manikin.scenarios.sections.obstacle import ObstacleSection
 from manikin.scenarios.sections.phase import EFFECTORS, MASSLESS_FEET
 from manikin.scenarios.sections.planning import PlanningSection
-from manikin.scenarios.sections.push import PushSection
+from manikin.scenarios.sections.push import PushSection, RecoverySection
 from manikin.scenarios.sections.supports import SupportsSection
 from manikin.scenarios.sections.task import TaskSection
 from manikin.scenarios.sections.wholebody import WholebodySection
@@ -72,6 +72,11 @@ class ScenarioFile(Section):
         "to the body; hanging, arms that hang; climbing, arms raised and legs bent and spread",
     )
     push: PushSection | None = Field(default=None, description="disturbance during the execution")
+    recovery: RecoverySection | None = Field(
+        default=None,
+        description="instead of a way to go: the body stands where it is, is pushed and keeps its balance; task "
+        "may be left out then",
+    )
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
         default=0, description="seed of every random choice"
     )
@@ -83,6 +88,14 @@ class ScenarioFile(Section):
     variants: dict[str, dict[str, Any]] | None = Field(
         default=None, exclude=True, description="named changes of this scenario: what each lays over it"
     )  # fmt: skip
+
+    @model_validator(mode="before")
+    @classmethod
+    def _stay(cls, data: Any) -> Any:
+        """A body that recovers from a push ends where it starts."""
+        if isinstance(data, dict) and data.get("recovery") is not None and "task" not in data:
+            return {**data, "task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}
+        return data
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -106,6 +119,7 @@ class ScenarioFile(Section):
             )  # fmt: skip
         if self.task.act is not None and self.contacts is not None and self.contacts.limbs:
             raise refuse("contacts.limbs", "are given beside task.act; valid: one of them")
+        self._check_recovery()
         self._check_body()
         self._check_wholebody()
         if self.supports is None:
@@ -128,6 +142,33 @@ class ScenarioFile(Section):
                         "has no meaning beside explicit supports; valid: only com, [x, y, z]",
                     )
         return self
+
+    def _check_recovery(self) -> None:
+        """Refuse a recovery without a push, or with what belongs to a way."""
+        if self.recovery is None:
+            if self.body.model == "kudoh":
+                raise refuse("recovery", "is missing; valid: a recovery, for the body of Kudoh")
+            return
+        if self.push is None:
+            raise refuse("push", "is missing; valid: force_N, direction_deg, duration_s, at_s")
+        if self.body.model not in ("human", "kudoh"):
+            raise refuse("recovery", f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
+        for key in ("supports", "contacts"):
+            if getattr(self, key) is not None:
+                raise refuse(key, "is given beside recovery; valid: one of them")
+        for key in ("at", "heading_deg", "posture", "height_m"):
+            value = getattr(self.task.start, key)
+            if value not in (None, (0.0, 0.0), 0.0, "standing"):
+                raise refuse(f"task.start.{key}", f"is {value}; valid in a recovery: leave it out")
+        if self.task.act is not None:
+            raise refuse("task.act", "is given beside recovery; valid: one of them")
+        if self.floor_height_m != 0.0:
+            raise refuse("floor_height_m", f"is {self.floor_height_m}; valid in a recovery: 0")
+        if self.push.at_s >= self.recovery.duration_s:
+            raise refuse(
+                "push.at_s",
+                f"is {self.push.at_s:g}; valid: before the run ends at {self.recovery.duration_s:g} s",
+            )
 
     def _check_wholebody(self) -> None:
         """Refuse what cannot be refined."""
@@ -172,7 +213,7 @@ class ScenarioFile(Section):
         if self.task.act is not None:
             raise refuse("task.act", f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
         for key in ("reference_stature_m", "push"):
-            if getattr(self, key) is not None:
+            if getattr(self, key) is not None and not (key == "push" and self.recovery is not None):
                 raise refuse(key, f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
         if self.body.model != "point_mass" and self.supports is not None:
             raise refuse("supports", f"do not apply to {WORDS[self.body.model]} yet; valid: leave them out")
@@ -182,5 +223,7 @@ def json_schema() -> dict[str, Any]:
     """JSON schema of a scenario file, for editors and the documentation."""
     schema = ScenarioFile.model_json_schema(by_alias=True)
     # A file that extends another one may leave out what that one gives.
-    schema["anyOf"] = [{"required": ["extends"]}, {"required": schema.pop("required")}]
+    wanted = schema.pop("required")
+    standing = [key for key in wanted if key != "task"] + ["recovery"]
+    schema["anyOf"] = [{"required": keys} for keys in (["extends"], wanted, standing)]
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

@@ -20,6 +20,7 @@ from manikin.scenarios.sections import (
     ContactsSection,
     PlanningSection,
     PushSection,
+    RecoverySection,
     SoleSection,
     SupportsSection,
 )
@@ -110,6 +111,11 @@ class ScenarioValues:
     def push(self) -> PushSection | None:
         """Disturbance during the execution, or None."""
         return self.file.push
+
+    @property
+    def recovery(self) -> RecoverySection | None:
+        """How a standing body recovers from its push, or None."""
+        return self.file.recovery
 
     @property
     def act(self) -> ActSection | None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
+from manikin.contact import Contact
 from manikin.control.balance_recovery import BalanceRecovery, JointGroups, Strategy
 from manikin.simulation.recovery_record import RecoveryTrace
 from manikin.simulation.world import Push, Touch
@@ -42,6 +43,7 @@ class Recovery:
         capture_point: Farthest reach of the capture point over the support area; 1 is its edge.
         foot_motion: Farthest that a foot is from its place at the end [m].
         control_from: When the control acted first after the first push began [s].
+        soles: Where the feet stood.
         wall: Wall time [s].
     """
 
@@ -56,6 +58,7 @@ class Recovery:
     capture_point: float
     foot_motion: float
     control_from: float
+    soles: tuple[Contact, ...]
     wall: float
 
     @property
@@ -127,7 +130,7 @@ def judge(
         pushes: What disturbed it.
         feet: How its feet were on the ground.
         fallen: Why the run was ended before its time; empty when it was not.
-        touches: Touches of the ground with anything but the feet.
+        touches: Unplanned touches; those of the body with itself, as hand and thigh, are no support.
         wall: Wall time [s].
     """
     motion, area = trace.motion, controller.area
@@ -138,10 +141,12 @@ def judge(
     excess = -area.inside(trace.zmp)
     counted = (motion.time >= control_from - 1e-9) & np.isfinite(excess)
     moved = _foot_motion(body, controller, motion.q[-1])
+    segments = {segment.name for segment in body.segments}
+    propped = [touch for touch in touches if touch.other not in segments]
     return Recovery(
         trace=trace,
         feet=feet,
-        failure=fallen or _fault(rests, moved, touches),
+        failure=fallen or _fault(rests, moved, propped),
         direction=direction,
         impulse=float(sum(_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),
@@ -150,6 +155,7 @@ def judge(
         capture_point=_capture_reach(controller, trace),
         foot_motion=moved,
         control_from=control_from,
+        soles=controller.soles,
         wall=wall,
     )
 
@@ -174,7 +180,7 @@ def _rests(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -
 
 def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch]) -> str:
     if touches:
-        return f"not on its feet alone: {touches[0]}"
+        return f"does not stand on its feet alone: {touches[0]}"
     if not rests[-1]:
         return "does not stand at rest and upright at the end"
     if moved > FOOT_MOVED:

@@ -80,4 +80,9 @@ def _pushes(scenario: Scenario, motion: Motion) -> tuple[Push, ...]:
     forward = rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]
     heading = float(np.arctan2(forward[1], forward[0]))
     direction = rotation_from_yaw(heading + np.deg2rad(push.direction_deg))[:, 0]
-    return (Push(PUSHED_SEGMENT, push.force_N * direction, push.at_s, push.duration_s),)
+    return (
+        Push(
+            PUSHED_SEGMENT, push.force_N * direction, push.at_s, push.duration_s,
+            frequency=push.frequency_hz or 0.0,
+        ),
+    )  # fmt: skip

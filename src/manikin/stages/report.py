@@ -22,7 +22,7 @@ class Failure:
     """Why a run ended without success.
 
     Attributes:
-        stage: ``"contacts"``, ``"centroidal"``, ``"wholebody"`` or ``"execution"``.
+        stage: ``"contacts"``, ``"centroidal"``, ``"wholebody"``, ``"execution"`` or ``"push"``.
         reason: In one line.
         time_s: When in the motion [s].
         where: Phase, contact, limb or pair.
@@ -71,7 +71,7 @@ class Report:
         self.summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "succeeded": False, "failure": None,
-            "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None,
+            "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None, "push": None,
             "wall_s": 0.0,
         }  # fmt: skip
 
@@ -107,7 +107,7 @@ class Report:
             self._directory.write_scenario(scenario.to_yaml())
 
     def keep_motions(
-        self, schedule: ContactSchedule, planned: Motion, executed: Motion | None = None
+        self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None
     ) -> None:
         """Keep the motions that there are so far."""
         if self._directory is not None:

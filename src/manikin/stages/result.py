@@ -6,7 +6,7 @@ from typing import Any
 
 from manikin.centroidal import CentroidalResult
 from manikin.motion import Motion
-from manikin.simulation import Execution
+from manikin.simulation import Execution, Recovery
 from manikin.stages.report import Report
 from manikin.wholebody import RefineResult, WholeBodyResult
 
@@ -23,6 +23,7 @@ class RunResult:
         wholebody: Result of the whole-body stage, or None.
         execution: Result of the execution, or None.
         directory: Where the files are, or None.
+        recovery: Result of a recovery from a push, or None.
     """
 
     summary: dict[str, Any]
@@ -32,6 +33,7 @@ class RunResult:
     wholebody: WholeBodyResult | RefineResult | None
     execution: Execution | None
     directory: Path | None
+    recovery: Recovery | None = None
 
     @classmethod
     def of(
@@ -42,6 +44,7 @@ class RunResult:
         execution: Execution | None = None,
         *,
         planned: Motion | None = None,
+        recovery: Recovery | None = None,
     ) -> "RunResult":
         """Close the report of a run and gather what its stages returned.
 
@@ -51,15 +54,20 @@ class RunResult:
             wholebody: Of the whole body.
             execution: Of the physics engine.
             planned: The planned motion, where no whole body was planned.
+            recovery: Of a recovery from a push.
         """
+        executed = execution.motion if execution is not None else None
+        if recovery is not None:
+            executed = recovery.trace.motion
         return cls(
             report.close(),
             planned if wholebody is None else wholebody.motion,
-            None if execution is None else execution.motion,
+            executed,
             centroidal,
             wholebody,
             execution,
             report.path,
+            recovery,
         )
 
     @property

@@ -50,9 +50,7 @@ class ComLaw:
     need: float
 
 
-def com_law(
-    state: DynamicsState, home: FloatArray, area: SupportArea, settings: RecoverySettings
-) -> ComLaw:
+def com_law(state: DynamicsState, home: FloatArray, area: SupportArea, settings: RecoverySettings) -> ComLaw:
     """Find the wanted acceleration of the centre of mass.
 
     Args:

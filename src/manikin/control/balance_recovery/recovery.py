@@ -227,7 +227,12 @@ class BalanceRecovery:
         if strategy is Strategy.STIFF:
             ankles = self.groups.joints["ankle"]
             most, least = most.copy(), least.copy()
-            least[ankles], most[ankles] = self._resting[ankles] - NEARLY, self._resting[ankles] + NEARLY
+            height = self.com[2] - self.area.height
+            spring = 0.5 * settings.ankle_stiffness * state.mass * GRAVITY * height
+            torque = self._resting[ankles] + spring * (self.posture - state.q[7:])[ankles]
+            limit = most[ankles] - NEARLY
+            torque = np.clip(torque, -limit, limit)
+            least[ankles], most[ankles] = torque - NEARLY, torque + NEARLY
         return JointBounds(least, most, lower, upper)
 
     # --- solution ----------------------------------------------------------------------------

@@ -32,6 +32,9 @@ class RecoverySettings:
             gently back to the posture; the thesis has none, so that swung arms go on to their stops.
         posture: Largest gains of the posture control (2.65); their ratio is kept where they must be less.
         stiffness: With these gains muscles hold the posture before they react, and locked joints always.
+        ankle_stiffness: Share of ``m g h`` per radian that both ankles have together before they react:
+            the stiffness of calf muscles at rest, 0.64 to 0.91 of it (Casadio et al. 2005; Loram and Lakie
+            2002), too little to stand without control.
         sole_inset: The ZMP is kept this far inside the edge of the soles [m].
         friction_share: Share of the friction of the soles that is made use of.
         inner, outer: Half sizes of the region in which posture control begins and of that in which it ends,
@@ -51,7 +54,7 @@ class RecoverySettings:
     delay: float = 0.2
     com_weight: float = 1e4
     calm: float = 2.0
-    turning: float = 0.4
+    turning: float = 0.3
     least_load: float = 0.6
     stopping: float = 10.0
     height: Impedance = Impedance(20.0, 9.0)
@@ -61,10 +64,11 @@ class RecoverySettings:
     unwinding: Impedance = Impedance(4.0, 4.0)
     posture: Impedance = Impedance(100.0, 20.0)
     stiffness: Impedance = Impedance(400.0, 40.0)
+    ankle_stiffness: float = 0.64
     sole_inset: float = 0.005
     friction_share: float = 0.9
-    inner: float = 0.3
-    outer: float = 0.5
+    inner: float = 0.5
+    outer: float = 0.7
     posture_area: float = 0.7
     locked: tuple[str, ...] = ()
     posture_control_only: bool = False
@@ -80,7 +84,7 @@ class RecoverySettings:
         )  # fmt: skip
         for name in positive:
             finite_number(getattr(self, name), f"recovery {name}", above=0.0)
-        for name in ("delay", "upward", "sole_inset"):
+        for name in ("delay", "upward", "sole_inset", "ankle_stiffness"):
             finite_number(getattr(self, name), f"recovery {name}", at_least=0.0)
         if self.inner > self.outer:
             raise InputError(f"recovery inner is {self.inner:g}, outer {self.outer:g}; valid: inner <= outer")

@@ -7,7 +7,7 @@ from manikin.scenarios.sections.contacts import ContactsSection
 from manikin.scenarios.sections.obstacle import ObstacleSection, RoundSection, SphereSection
 from manikin.scenarios.sections.phase import PhaseSection
 from manikin.scenarios.sections.planning import PlanningSection, WeightsSection
-from manikin.scenarios.sections.push import PushSection
+from manikin.scenarios.sections.push import PushSection, RecoverySection
 from manikin.scenarios.sections.supports import SupportsSection
 from manikin.scenarios.sections.task import ActSection, StateSection, TaskSection
 from manikin.scenarios.sections.wholebody import WholebodySection
@@ -24,6 +24,7 @@ __all__ = [
     "PhaseSection",
     "PlanningSection",
     "PushSection",
+    "RecoverySection",
     "RoundSection",
     "SoleSection",
     "SphereSection",

@@ -1,16 +1,44 @@
 """Section of a scenario file: a disturbance."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from manikin.scenarios.validation import Duration, NonNegative, Number, Positive, Section
 
 
 class PushSection(Section):
-    """A push on the trunk during the execution."""
+    """A push on the trunk: of the thorax during an execution, near the centre of mass in a recovery."""
 
-    force_N: Positive = Field(description="size [N]")
+    force_N: Positive = Field(description="size [N]; of a sine its amplitude")
     direction_deg: Number = Field(
         description="of the force, counter-clockwise from the body's forward axis [deg]"
     )
     duration_s: Duration = Field(description="how long [s]")
     at_s: NonNegative = Field(description="when it begins [s]")
+    frequency_hz: Positive | None = Field(
+        default=None, description="of a sine that begins with the push [Hz] (default: a constant force)"
+    )
+
+
+class RecoverySection(Section):
+    """A body that stands on both feet, is pushed, and keeps its balance without a motion given beforehand."""
+
+    feet: Literal["held", "free"] = Field(
+        default="held",
+        description="held: welded to the ground, as in Kudoh (2002); free: in contact with friction",
+    )
+    delay_s: NonNegative = Field(
+        default=0.2, description="from the beginning of the push until the body reacts [s]"
+    )
+    duration_s: Duration = Field(default=3.5, description="of the run [s]")
+    friction: Positive = Field(default=0.7, description="of the soles")
+    locked: list[Literal["arms", "hips"]] = Field(
+        default_factory=list, description="joints that hold the posture: arms; hips, with the trunk"
+    )
+    posture_control_only: bool = Field(
+        default=False, description="whether the quadratic program is left out, for comparison"
+    )
+    strength: Positive = Field(
+        default=1.0, description="torque and speed limits relative to those of the body"
+    )
