@@ -6,6 +6,9 @@ from manikin.control.settings import Impedance
 from manikin.errors import InputError
 from manikin.spatial import finite_number
 
+_HEIGHT, _UNWINDING = Impedance(20.0, 9.0), Impedance(4.0, 4.0)
+_POSTURE, _STIFFNESS = Impedance(100.0, 20.0), Impedance(400.0, 40.0)
+
 
 @dataclass(frozen=True)
 class RecoverySettings:
@@ -57,13 +60,13 @@ class RecoverySettings:
     turning: float = 0.3
     least_load: float = 0.6
     stopping: float = 10.0
-    height: Impedance = Impedance(20.0, 9.0)
+    height: Impedance = _HEIGHT
     height_weight: float = 1e3
     arm_weight: float = 0.03
     upward: float = 1.0
-    unwinding: Impedance = Impedance(4.0, 4.0)
-    posture: Impedance = Impedance(100.0, 20.0)
-    stiffness: Impedance = Impedance(400.0, 40.0)
+    unwinding: Impedance = _UNWINDING
+    posture: Impedance = _POSTURE
+    stiffness: Impedance = _STIFFNESS
     ankle_stiffness: float = 0.64
     sole_inset: float = 0.005
     friction_share: float = 0.9
