@@ -194,7 +194,9 @@ def test_a_step_keeps_its_limits_with_every_solver(body, solver):
     controller = BalanceRecovery(body, body.standing_posture(), RecoverySettings(solver=solver))
     still = controller._dynamics.evaluate(body.standing_posture(), np.zeros(body.nv))
     loop = close_loop(still, controller.groups.feet, FeltPush.none(body.nv))
-    phi = np.linalg.lstsq(still.centroidal_map[:3] @ loop.acceleration.matrix / body.mass, [0.35, 0.0, 0.0])[0]
+    phi = np.linalg.lstsq(still.centroidal_map[:3] @ loop.acceleration.matrix / body.mass, [0.35, 0.0, 0.0])[
+        0
+    ]
     output = controller.step(still.q, loop.acceleration.matrix @ phi)
     assert output.strategy is Strategy.PROGRAM
     assert not output.fallback

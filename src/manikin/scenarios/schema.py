@@ -74,8 +74,8 @@ class ScenarioFile(Section):
     push: PushSection | None = Field(default=None, description="disturbance during the execution")
     recovery: RecoverySection | None = Field(
         default=None,
-        description="instead of a way to go: the body stands where it is, is pushed and keeps its balance; task "
-        "may be left out then",
+        description="instead of a way to go: the body stands where it is, is pushed and keeps its balance; "
+        "task may be left out then",
     )
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
         default=0, description="seed of every random choice"

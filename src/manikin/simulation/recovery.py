@@ -8,7 +8,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
-from manikin.control.balance_recovery import BalanceRecovery, JointGroups, Strategy
+from manikin.control.balance_recovery import BalanceRecovery, JointGroups, Strategy, capture_point
 from manikin.simulation.recovery_record import RecoveryTrace
 from manikin.simulation.world import Push, Touch
 from manikin.spatial import FloatArray
@@ -80,12 +80,12 @@ class Recovery:
         return self.trace.momentum[group] @ np.array([-y, x, 0.0])
 
     def momentum_shares(self) -> dict[str, float]:
-        """Share of each group in the angular momentum at its largest after the first reaction; their sum is 1."""
+        """Share of each group in the largest angular momentum after the first reaction; their sum is 1."""
         groups = {group: self.turned(group)[self._reacting] for group in self.trace.momentum}
         total = sum(groups.values(), np.zeros(int(self._reacting.sum())))
-        if not len(total) or total.max() <= 0.0:
+        if not len(total) or not np.any(total):
             return dict.fromkeys(groups, 0.0)
-        peak = int(np.argmax(total))
+        peak = int(np.argmax(np.abs(total)))
         return {group: float(values[peak] / total[peak]) for group, values in groups.items()}
 
     @property
@@ -146,7 +146,7 @@ def judge(
     return Recovery(
         trace=trace,
         feet=feet,
-        failure=fallen or _fault(rests, moved, propped),
+        failure=_explained(fallen or _fault(rests, moved, propped), controller, trace, control_from),
         direction=direction,
         impulse=float(sum(_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),
@@ -188,6 +188,19 @@ def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch]) -> str:
     return ""
 
 
+def _explained(fault: str, controller: BalanceRecovery, trace: RecoveryTrace, control_from: float) -> str:
+    """The fault with where the capture point was when the control began, if that was outside."""
+    if not fault:
+        return ""
+    height = controller.com[2] - controller.area.height
+    first = min(int(np.searchsorted(trace.motion.time, control_from - 1e-9)), len(trace.motion.time) - 1)
+    point = capture_point(trace.motion.com[first], trace.com_velocity[first], height)
+    outside = -float(controller.area.inside(point))
+    if outside <= 0.0:
+        return fault
+    return f"{fault}; the capture point was {outside:.3f} m beyond the soles when the control began"
+
+
 def _time_to_rest(rests: np.ndarray, since: FloatArray) -> float | None:
     """Time after which the body rests to the end [s]."""
     if not rests[-1]:
@@ -205,7 +218,7 @@ def _foot_motion(body: BodyModel, controller: BalanceRecovery, q: FloatArray) ->
 
 def _capture_reach(controller: BalanceRecovery, trace: RecoveryTrace) -> float:
     height = controller.com[2] - controller.area.height
-    ahead = trace.motion.com[:, :2] + trace.com_velocity[:, :2] / np.sqrt(9.81 / height)
+    ahead = capture_point(trace.motion.com, trace.com_velocity, height)
     return max(controller.area.reach(point) for point in ahead)
 
 

@@ -139,7 +139,7 @@ class SegmentMomenta:
             com: (3,) centre of mass [m].
         """
         pin.forwardKinematics(self._model, self._data, q, v)
-        velocity = self._mean_velocity(v)
+        velocity = self._mean_velocity()
         found: dict[str, FloatArray] = {}
         for group, members in self._groups.items():
             total = np.zeros(3)
@@ -154,7 +154,7 @@ class SegmentMomenta:
             found[group] = total
         return found
 
-    def _mean_velocity(self, v: FloatArray) -> FloatArray:
+    def _mean_velocity(self) -> FloatArray:
         """(3,) of the centre of mass; taken off, so that each group's share does not depend on it."""
         return np.array(pin.computeCentroidalMomentum(self._model, self._data).linear) / float(
             pin.computeTotalMass(self._model)

@@ -71,7 +71,8 @@ class Report:
         self.summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "succeeded": False, "failure": None,
-            "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None, "push": None,
+            "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None,
+            "push": None,
             "wall_s": 0.0,
         }  # fmt: skip
 

@@ -1,6 +1,7 @@
 """Recovery from pushes on both feet: posture control and a quadratic program ([Kudoh2002]_)."""
 
 from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, LinearMap, close_loop
+from manikin.control.balance_recovery.com_law import ComLaw, capture_point, com_law
 from manikin.control.balance_recovery.joint_groups import JointGroups, joint_groups
 from manikin.control.balance_recovery.posture_control import PostureControl, posture_control
 from manikin.control.balance_recovery.problem import (
@@ -18,6 +19,7 @@ from manikin.control.balance_recovery.support_area import SupportArea, zmp_of, z
 __all__ = [
     "BalanceRecovery",
     "ClosedLoop",
+    "ComLaw",
     "FeltPush",
     "JointBounds",
     "JointGroups",
@@ -31,7 +33,9 @@ __all__ = [
     "StrategySwitch",
     "SupportArea",
     "build_recovery_qp",
+    "capture_point",
     "close_loop",
+    "com_law",
     "joint_groups",
     "leg_symmetry",
     "posture_control",

@@ -70,9 +70,9 @@ class RecoverySettings:
     ankle_stiffness: float = 0.64
     sole_inset: float = 0.005
     friction_share: float = 0.9
-    inner: float = 0.5
-    outer: float = 0.7
-    posture_area: float = 0.7
+    inner: float = 0.7
+    outer: float = 0.9
+    posture_area: float = 0.9
     locked: tuple[str, ...] = ()
     posture_control_only: bool = False
     strength: float = 1.0
@@ -82,8 +82,8 @@ class RecoverySettings:
 
     def __post_init__(self) -> None:
         positive = (
-            "period", "com_weight", "friction_share", "inner", "outer", "posture_area", "strength", "joint_limit_horizon",
-            "max_joint_acceleration",
+            "period", "com_weight", "friction_share", "inner", "outer", "posture_area", "strength",
+            "joint_limit_horizon", "max_joint_acceleration", "turning", "arm_weight",
         )  # fmt: skip
         for name in positive:
             finite_number(getattr(self, name), f"recovery {name}", above=0.0)

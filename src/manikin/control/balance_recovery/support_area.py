@@ -76,9 +76,9 @@ class SupportArea:
 def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float) -> LinearMap:
     """Rows that are not positive when the ZMP is inside ([Kudoh2002]_ 2.39-2.44, z up).
 
-    With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` on the
-    ground at the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and ``p_y f_z = s_y f_z +
-    (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, which is right where ``f_z > 0``.
+    With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` on
+    the ground at the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and
+    ``p_y f_z = s_y f_z + (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, which is right where ``f_z > 0``.
 
     Args:
         area: Where it may be.

@@ -1,0 +1,184 @@
+"""Pushed bodies in the physics engine: who stands, by which means, and what is no recovery."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from manikin.body import Configuration, human, kudoh
+from manikin.control.balance_recovery import RecoverySettings, Strategy, joint_groups
+from manikin.errors import InputError
+from manikin.simulation import Feet, RecoveryTask, push_near_com, recover
+from manikin.simulation.recovery_record import SegmentMomenta
+
+KUDOH, HUMAN = kudoh(), human()
+
+
+def pushed(force, *, body=KUDOH, delay=0.2, feet=Feet.HELD, lasting=0.1, frequency=0.0, until=3.5, **options):
+    push = push_near_com(body, force, 0.2, lasting, frequency=frequency)
+    return recover(body, RecoveryTask((push,), feet, until), RecoverySettings(delay=delay, **options))
+
+
+@pytest.fixture(scope="module")
+def from_back():
+    """Experiment 1 without the delay of reaction."""
+    return pushed((500.0, 0.0, 0.0), delay=0.0)
+
+
+@pytest.fixture(scope="module")
+def from_front():
+    """Experiment 2 with half the delay."""
+    return pushed((-300.0, 0.0, 0.0), delay=0.1)
+
+
+@pytest.fixture(scope="module")
+def swayed():
+    """Experiment 3 ([Kudoh2002]_ 3.2)."""
+    return pushed((-100.0, 0.0, 0.0), lasting=5.0, frequency=1.0, until=5.2)
+
+
+def angle(found, name):
+    """(n,) of a joint from its posture [rad]."""
+    angles = found.trace.motion.q[:, 7 + KUDOH.joint_index(name)]
+    return angles - angles[0]
+
+
+def test_a_push_near_the_centre_of_mass_does_not_turn_the_body():
+    """It acts on the loins, at the centre of mass."""
+    push = push_near_com(KUDOH, (100.0, 0.0, 0.0), 0.0, 0.1)
+    state = Configuration(KUDOH, KUDOH.standing_posture())
+    assert push.segment == "loins"
+    np.testing.assert_allclose(state.point(push.segment, push.point), state.com, atol=1e-12)
+
+
+def test_a_sine_is_one_of_time_since_the_push_began():
+    push = push_near_com(KUDOH, (0.0, 80.0, 0.0), 0.5, 2.0, frequency=1.0)
+    for time, share in ((0.5, 0.0), (0.75, 1.0), (1.25, -1.0), (0.4, 0.0), (2.6, 0.0)):
+        np.testing.assert_allclose(push.at(time), [0.0, 80.0 * share, 0.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("body", [KUDOH, HUMAN], ids=["kudoh", "human"])
+def test_momenta_of_the_groups_add_up_to_that_of_the_body(body):
+    rng = np.random.default_rng(0)
+    q, v = body.standing_posture(), rng.normal(size=body.nv)
+    state = Configuration(body, q, v)
+    groups = SegmentMomenta(body, joint_groups(body).segments).at(q, v, state.com)
+    np.testing.assert_allclose(sum(groups.values()), state.angular_momentum, atol=1e-9)
+
+
+def test_from_the_back_arms_and_trunk_turn_the_way_of_the_fall(from_back):
+    """Experiment 1: forward, the same way as the fall; the trunk bends down and the body stands again (3.3)."""
+    assert from_back.recovered, from_back.failure
+    peaks = {group: from_back.turned(group)[np.argmax(np.abs(from_back.turned(group)))]
+             for group in ("arms", "trunk")}  # fmt: skip
+    assert peaks["arms"] > 3.0
+    assert peaks["trunk"] > 5.0
+    assert np.degrees(angle(from_back, "waist_flexion")).max() > 30.0
+    assert from_back.final_height > 0.95 * 0.944
+
+
+def test_from_the_front_the_arms_rotate_the_other_way(from_back, from_front):
+    """Experiment 2: forward and up, farther than the trunk bends back (3.3)."""
+    assert from_front.recovered, from_front.failure
+    assert from_front.time_to_rest < 3.0
+    assert from_front.zmp_excess < 1e-3
+    arms = from_front.turned("arms")  # positive towards the fall, which is backward here
+    assert arms[np.argmax(np.abs(arms))] > 3.0
+    assert np.degrees(angle(from_front, "left_shoulder_flexion")).max() > 60.0
+    bent_back = -np.degrees(angle(from_front, "waist_flexion")).min()
+    assert bent_back < np.degrees(angle(from_back, "waist_flexion")).max()
+
+
+def test_a_sine_is_mostly_met_by_posture_control(swayed):
+    """Experiment 3: the program steps in at the peaks, and the arms move then (3.3)."""
+    assert swayed.recovered, swayed.failure
+    assert swayed.zmp_excess < 1e-3
+    assert swayed.strategy_share(Strategy.POSTURE) > 0.5
+    assert swayed.strategy_share(Strategy.PROGRAM) > 0.1
+    program = swayed.trace.strategies == str(Strategy.PROGRAM)
+    arms = np.abs(swayed.turned("arms"))
+    assert arms[program].max() > 2.0
+    assert swayed.trace.motion.com[:, 2].min() > 0.85 * swayed.trace.motion.com[0, 2]
+
+
+@pytest.mark.parametrize("feet", list(Feet))
+def test_a_push_from_the_side_is_held_with_the_delay_of_the_thesis(feet):
+    """Experiment 4, feet held and free: within 3 s, the ZMP inside as soon as the control acts."""
+    found = pushed((0.0, 200.0, 0.0), feet=feet)
+    assert found.recovered, found.failure
+    assert found.time_to_rest < 3.0
+    assert found.zmp_excess < 1e-3
+    assert found.foot_motion < 0.005
+    assert not found.trace.fallbacks
+
+
+def test_free_feet_hold_a_push_as_held_ones_do():
+    """The forces asked of held feet are those that unilateral contact with friction can give."""
+    force = (0.0, 0.0, 0.0) + np.array([250.0, 0.0, 0.0])
+    held, free = (pushed(force, feet=feet, until=2.0) for feet in Feet)
+    assert held.recovered, held.failure
+    assert free.recovered, free.failure
+    assert free.foot_motion < 0.005
+    sway = [found.trace.motion.com[:, 0] for found in (held, free)]
+    assert np.abs(sway[0] - sway[1]).max() < 0.01
+
+
+def test_the_program_recovers_what_posture_control_alone_does_not():
+    """250 N from the back with the delay of the thesis."""
+    force = (250.0, 0.0, 0.0)
+    assert pushed(force, until=2.7).recovered
+    assert not pushed(force, posture_control_only=True, until=2.7).recovered
+
+
+def test_locked_arms_stay_where_they_are():
+    found = pushed((200.0, 0.0, 0.0), locked=("arms",), until=2.5)
+    assert found.recovered, found.failure
+    for name in ("left_shoulder_flexion", "right_shoulder_abduction", "left_elbow_flexion"):
+        assert np.abs(np.degrees(angle(found, name))).max() < 6.0
+
+
+def test_another_standing_body_recovers_as_well():
+    found = pushed((200.0, 0.0, 0.0), body=HUMAN, until=2.2)
+    assert found.recovered, found.failure
+    assert found.time_to_rest < 3.0
+    assert found.zmp_excess < 1e-3
+
+
+def test_a_fallen_body_is_no_recovery():
+    """500 N from the back after 0.2 s: the capture point is far beyond the soles when control begins."""
+    found = pushed((500.0, 0.0, 0.0))
+    assert not found.recovered
+    assert "fell" in found.failure
+    assert found.summary()["recovered"] is False
+    assert found.time_to_rest is None
+    assert found.capture_point > 1.5
+
+
+@pytest.mark.parametrize(
+    ("force", "lasting", "text"),
+    [
+        ((np.nan, 0.0, 0.0), 0.1, "finite"),
+        ((1e6, 0.0, 0.0), 0.1, "at most 5000 N"),
+        ((100.0, 0.0, 0.0), -0.1, "duration"),
+        ((100.0, 0.0, 0.0), np.inf, "duration"),
+    ],
+)
+def test_absurd_pushes_are_refused(force, lasting, text):
+    with pytest.raises(InputError, match=text):
+        push_near_com(KUDOH, force, 0.2, lasting)
+
+
+def test_a_body_that_lies_is_not_pushed():
+    q = KUDOH.standing_posture()
+    q[3:7] = [0.0, np.sin(np.pi / 4), 0.0, np.cos(np.pi / 4)]
+    task = RecoveryTask((push_near_com(KUDOH, (100.0, 0.0, 0.0), 0.2, 0.1),), q=q)
+    with pytest.raises(InputError, match="stand|level"):
+        recover(KUDOH, task)
+
+
+def test_a_body_that_leans_too_far_is_not_pushed():
+    q = KUDOH.posture({**KUDOH.standing_angles, "waist_flexion": 1.2, "left_hip_flexion": 0.0})
+    q[:3] = KUDOH.standing_posture()[:3]
+    task = RecoveryTask((push_near_com(KUDOH, (100.0, 0.0, 0.0), 0.2, 0.1),), q=q)
+    with pytest.raises(InputError, match="stand|level"):
+        recover(KUDOH, replace(task, duration=1.0))
