@@ -1,5 +1,7 @@
 """Recovery from pushes: the closed loops, the ZMP, posture control, the choice and the program."""
 
+import itertools
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -181,7 +183,7 @@ def test_the_choice_does_not_chatter():
     switch, rng = StrategySwitch(chosen_settings), np.random.default_rng(0)
     places = 0.09 * np.sin(np.linspace(0.0, np.pi, 1000)) + rng.uniform(-0.009, 0.009, 1000)
     chosen = [switch.choose(np.array([x, 0.0, 0.9]), np.array([x, 0.0]), area) for x in places]
-    changes = sum(a is not b for a, b in zip(chosen[:-1], chosen[1:], strict=True))
+    changes = sum(a is not b for a, b in itertools.pairwise(chosen))
     assert chosen[0] is Strategy.POSTURE
     assert chosen[500] is Strategy.PROGRAM
     assert chosen[-1] is Strategy.POSTURE
@@ -190,13 +192,12 @@ def test_the_choice_does_not_chatter():
 
 @pytest.mark.parametrize("solver", ["daqp", "proxqp", "piqp"])
 def test_a_step_keeps_its_limits_with_every_solver(body, solver):
-    """Unilateral feet, friction, torques and ZMP of a body pushed to 0.35 m/s forward."""
+    """Unilateral feet, friction, torques and ZMP of a body pushed to 0.55 m/s forward."""
     controller = BalanceRecovery(body, body.standing_posture(), RecoverySettings(solver=solver))
     still = controller._dynamics.evaluate(body.standing_posture(), np.zeros(body.nv))
     loop = close_loop(still, controller.groups.feet, FeltPush.none(body.nv))
-    phi = np.linalg.lstsq(still.centroidal_map[:3] @ loop.acceleration.matrix / body.mass, [0.35, 0.0, 0.0])[
-        0
-    ]
+    com = still.centroidal_map[:3] @ loop.acceleration.matrix / body.mass
+    phi = np.linalg.lstsq(com, [0.55, 0.0, 0.0], rcond=None)[0]
     output = controller.step(still.q, loop.acceleration.matrix @ phi)
     assert output.strategy is Strategy.PROGRAM
     assert not output.fallback

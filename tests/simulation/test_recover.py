@@ -67,7 +67,7 @@ def test_momenta_of_the_groups_add_up_to_that_of_the_body(body):
 
 
 def test_from_the_back_arms_and_trunk_turn_the_way_of_the_fall(from_back):
-    """Experiment 1: forward, the same way as the fall; the trunk bends down and the body stands again (3.3)."""
+    """Experiment 1: forward, as the fall; the trunk bends down and the body stands again (3.3)."""
     assert from_back.recovered, from_back.failure
     peaks = {group: from_back.turned(group)[np.argmax(np.abs(from_back.turned(group)))]
              for group in ("arms", "trunk")}  # fmt: skip
@@ -114,7 +114,7 @@ def test_a_push_from_the_side_is_held_with_the_delay_of_the_thesis(feet):
 
 def test_free_feet_hold_a_push_as_held_ones_do():
     """The forces asked of held feet are those that unilateral contact with friction can give."""
-    force = (0.0, 0.0, 0.0) + np.array([250.0, 0.0, 0.0])
+    force = (250.0, 0.0, 0.0)
     held, free = (pushed(force, feet=feet, until=2.0) for feet in Feet)
     assert held.recovered, held.failure
     assert free.recovered, free.failure
@@ -172,7 +172,7 @@ def test_a_body_that_lies_is_not_pushed():
     q = KUDOH.standing_posture()
     q[3:7] = [0.0, np.sin(np.pi / 4), 0.0, np.cos(np.pi / 4)]
     task = RecoveryTask((push_near_com(KUDOH, (100.0, 0.0, 0.0), 0.2, 0.1),), q=q)
-    with pytest.raises(InputError, match="stand|level"):
+    with pytest.raises(InputError, match=r"stand|level"):
         recover(KUDOH, task)
 
 
@@ -180,5 +180,5 @@ def test_a_body_that_leans_too_far_is_not_pushed():
     q = KUDOH.posture({**KUDOH.standing_angles, "waist_flexion": 1.2, "left_hip_flexion": 0.0})
     q[:3] = KUDOH.standing_posture()[:3]
     task = RecoveryTask((push_near_com(KUDOH, (100.0, 0.0, 0.0), 0.2, 0.1),), q=q)
-    with pytest.raises(InputError, match="stand|level"):
+    with pytest.raises(InputError, match=r"stand|level"):
         recover(KUDOH, replace(task, duration=1.0))

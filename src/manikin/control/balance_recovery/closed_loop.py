@@ -97,7 +97,9 @@ def close_loop(
         [-state.frames[name].drift - settling * state.frames[name].twist for name in feet]
     )
     held = len(wanted)
-    full, upper = np.linalg.qr(jacobian.T, mode="complete")
+    factors = np.linalg.qr(jacobian.T, mode="complete")
+    full: FloatArray = factors.Q
+    upper: FloatArray = factors.R
     drift = full[:, :held] @ np.linalg.solve(upper[:held].T, wanted)
     basis = full[:, held:]
     momentum_rate = state.centroidal_map @ basis

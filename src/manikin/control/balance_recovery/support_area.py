@@ -78,7 +78,8 @@ def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float)
 
     With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` on
     the ground at the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and
-    ``p_y f_z = s_y f_z + (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, which is right where ``f_z > 0``.
+    ``p_y f_z = s_y f_z + (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, which is right
+    where ``f_z > 0``.
 
     Args:
         area: Where it may be.
@@ -90,7 +91,7 @@ def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float)
     moments = _turned(loop.force.matrix, loop.moment.matrix, com, area.height)
     constant = _turned(loop.force.offset, loop.moment.offset, com, area.height)
     return LinearMap(
-        normals @ moments - np.outer(offsets, loop.force.matrix[2]),
+        normals @ moments - offsets[:, None] * loop.force.matrix[2],
         normals @ constant - offsets * loop.force.offset[2],
     )
 
@@ -115,7 +116,8 @@ def zmp_of(force: FloatArray, moment: FloatArray, com: FloatArray, height: float
 def _turned(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:
     """(2, ...) ``p f_z`` for the ZMP ``p``."""
     drop = height - com[2]
-    return np.stack((
+    turned: FloatArray = np.stack((
         com[0] * force[2] + drop * force[0] - moment[1],
         com[1] * force[2] + drop * force[1] + moment[0],
     ))  # fmt: skip
+    return turned
