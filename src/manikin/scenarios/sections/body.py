@@ -92,7 +92,8 @@ class BodySection(Section):
         valid = _KEYS[self.model]
         for key in self.model_fields_set - {"model"}:
             if key not in valid and getattr(self, key) is not None:
-                raise refuse(key, f"does not apply to {WORDS[self.model]}; valid: model, {', '.join(valid)}")
+                keys = ", ".join(("model", *valid))
+                raise refuse(key, f"does not apply to {WORDS[self.model]}; valid: {keys}")
         if self.model == "urdf":
             for key in ("urdf", "limbs"):
                 if not getattr(self, key):
