@@ -22,7 +22,7 @@ def body():
 
 @pytest.fixture(scope="module")
 def printed():
-    """What the thesis prints, where this workplace has it."""
+    """What the thesis prints, where it is at hand."""
     file = Path(__file__).resolve().parents[2].parent / "shared" / "reference" / "kudoh.json"
     if not file.exists():
         pytest.skip(f"{file} is not here")
