@@ -8,7 +8,13 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
-from manikin.control.balance_recovery import BalanceRecovery, JointGroups, Strategy, capture_point
+from manikin.control.balance_recovery import (
+    BalanceRecovery,
+    JointGroups,
+    StepTaken,
+    Strategy,
+    capture_point,
+)
 from manikin.simulation.recovery_record import RecoveryTrace
 from manikin.simulation.world import Push, Touch
 from manikin.spatial import FloatArray
@@ -43,7 +49,8 @@ class Recovery:
         capture_point: Farthest reach of the capture point over the support area; 1 is its edge.
         foot_motion: Farthest that a foot is from its place at the end [m].
         control_from: When the control acted first after the first push began [s].
-        soles: Where the feet stood.
+        soles: Where the feet that carry stand in the end.
+        steps: Steps that were taken.
         wall: Wall time [s].
     """
 
@@ -59,6 +66,7 @@ class Recovery:
     foot_motion: float
     control_from: float
     soles: tuple[Contact, ...]
+    steps: tuple[StepTaken, ...]
     wall: float
 
     @property
@@ -97,7 +105,7 @@ class Recovery:
         trace = self.trace
         peak = {group: float(np.abs(self.turned(group)).max()) for group in trace.momentum}
         return {
-            "recovered": self.recovered, "steps": 0, "feet": self.feet, "impulse_Ns": self.impulse,
+            "recovered": self.recovered, "steps": len(self.steps), "feet": self.feet, "impulse_Ns": self.impulse,
             "direction_deg": float(np.degrees(np.arctan2(self.direction[1], self.direction[0]))),
             "max_zmp_excess_m": self.zmp_excess, "final_com_height_m": self.final_height,
             "time_to_rest_s": self.time_to_rest, "max_capture_point_reach": self.capture_point,
@@ -120,6 +128,8 @@ def judge(
     fallen: str,
     touches: Sequence[Touch],
     wall: float,
+    steps: tuple[StepTaken, ...] = (),
+    refused: str = "",
 ) -> Recovery:
     """Say what became of a push.
 
@@ -132,13 +142,15 @@ def judge(
         fallen: Why the run was ended before its time; empty when it was not.
         touches: Unplanned touches; those of the body with itself, as hand and thigh, are no support.
         wall: Wall time [s].
+        steps: Steps that were taken.
+        refused: Why a step that was needed was not taken.
     """
     motion, area = trace.motion, controller.area
     start = min((push.start for push in pushes), default=0.0)
     control_from = start + controller.settings.delay
     direction = _direction(pushes)
     rests = _rests(body, controller, trace)
-    excess = -area.inside(trace.zmp)
+    excess = -trace.zmp_inside
     counted = (motion.time >= control_from - 1e-9) & np.isfinite(excess)
     moved = _foot_motion(body, controller, motion.q[-1])
     segments = {segment.name for segment in body.segments}
@@ -146,7 +158,9 @@ def judge(
     return Recovery(
         trace=trace,
         feet=feet,
-        failure=_explained(fallen or _fault(rests, moved, propped), controller, trace, control_from),
+        failure=_explained(
+            fallen or _fault(rests, moved, propped), controller, trace, control_from, refused
+        ),
         direction=direction,
         impulse=float(sum(_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),
@@ -156,6 +170,7 @@ def judge(
         foot_motion=moved,
         control_from=control_from,
         soles=controller.soles,
+        steps=steps,
         wall=wall,
     )
 
@@ -188,14 +203,18 @@ def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch]) -> str:
     return ""
 
 
-def _explained(fault: str, controller: BalanceRecovery, trace: RecoveryTrace, control_from: float) -> str:
+def _explained(
+    fault: str, controller: BalanceRecovery, trace: RecoveryTrace, control_from: float, refused: str
+) -> str:
     """The fault with where the capture point was when the control began, if that was outside."""
     if not fault:
         return ""
+    if refused:
+        fault = f"{fault}; no step: {refused}"
     height = controller.com[2] - controller.area.height
     first = min(int(np.searchsorted(trace.motion.time, control_from - 1e-9)), len(trace.motion.time) - 1)
     point = capture_point(trace.motion.com[first], trace.com_velocity[first], height)
-    outside = -float(controller.area.inside(point))
+    outside = -float(trace.standings[0].area.inside(point))
     if outside <= 0.0:
         return fault
     return f"{fault}; the capture point was {outside:.3f} m beyond the soles when the control began"
@@ -219,7 +238,9 @@ def _foot_motion(body: BodyModel, controller: BalanceRecovery, q: FloatArray) ->
 def _capture_reach(controller: BalanceRecovery, trace: RecoveryTrace) -> float:
     height = controller.com[2] - controller.area.height
     ahead = capture_point(trace.motion.com, trace.com_velocity, height)
-    return max(controller.area.reach(point) for point in ahead)
+    return max(
+        standing.area.reach(point) for standing, point in zip(trace.standings, ahead, strict=True)
+    )
 
 
 def _direction(pushes: Sequence[Push]) -> FloatArray:

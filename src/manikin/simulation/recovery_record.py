@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from manikin.balance import wrench_polytope
 from manikin.body import BodyModel
 from manikin.contact import Stance
-from manikin.control.balance_recovery import BalanceRecovery, RecoveryOutput, zmp_of
+from manikin.control.balance_recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
 from manikin.motion import Motion
 from manikin.spatial import GRAVITY, FloatArray, skew
 
@@ -22,6 +22,8 @@ class RecoveryTrace:
         motion: What happened; ``contact_force`` is what the controller expected of each foot and ``margin``
             that of the measured wrench of the ground in the polytope of both soles.
         zmp: (n, 2) of the measured force of the ground over the step, NaN where nothing carries [m].
+        zmp_inside: (n,) distance of the ZMP to the edge of the soles that carry, negative outside [m].
+        standings: n ways to stand about which the balance was kept.
         strategies: (n,) what decided the torques.
         gain_share: (n,) share of the largest posture gains.
         com_velocity: (n, 3) [m/s].
@@ -33,6 +35,8 @@ class RecoveryTrace:
 
     motion: Motion
     zmp: FloatArray
+    zmp_inside: FloatArray
+    standings: tuple[Standing, ...]
     strategies: NDArray[np.str_]
     gain_share: FloatArray
     com_velocity: FloatArray
@@ -77,9 +81,14 @@ class RecoveryRecorder:
         torque = np.array([output.tau for output in outputs])
         speed = np.array([state.v[6:] for state in states])
         joints = self._controller.groups.joints
+        zmp = np.array([self._zmp(wrench) for *_, wrench in self._rows])
         return RecoveryTrace(
             motion=self._motion(torque),
-            zmp=np.array([self._zmp(wrench) for *_, wrench in self._rows]),
+            zmp=zmp,
+            zmp_inside=np.array(
+                [float(o.standing.area.inside(point)) for o, point in zip(outputs, zmp, strict=True)]
+            ),
+            standings=tuple(output.standing for output in outputs),
             strategies=np.array([str(output.strategy) for output in outputs]),
             gain_share=np.array([output.gain_share for output in outputs]),
             com_velocity=np.array([state.momentum[:3] / state.mass for state in states]),
@@ -98,10 +107,11 @@ class RecoveryRecorder:
     def _motion(self, torque: FloatArray) -> Motion:
         outputs = [output for _, output, _, _ in self._rows]
         states = [output.state for output in outputs]
-        soles = self._controller.soles
-        wrenches = np.array([wrench for *_, wrench in self._rows])
-        stance = Stance(soles, 3.0 * self._body.mass * GRAVITY)
-        expected = np.array([output.wrenches for output in outputs])
+        feet = self._controller.groups.feet
+        expected = np.zeros((len(outputs), len(feet), 6))
+        for row, output in zip(expected, outputs, strict=True):
+            for name, wrench in output.wrenches.items():
+                row[feet.index(name)] = wrench
         return Motion(
             time=np.array([time for time, *_ in self._rows]),
             q=np.array([state.q for state in states]),
@@ -110,12 +120,24 @@ class RecoveryRecorder:
             tau=np.concatenate((np.zeros((len(torque), 6)), torque), axis=1),
             com=np.array([state.com for state in states]),
             angular_momentum=np.array([state.momentum[3:] for state in states]),
-            margin=np.asarray(wrench_polytope(stance).margin(wrenches)),
+            margin=self._margins(),
             support=np.linalg.norm(expected[..., :3], axis=-1) > 1.0,
             contact_force=expected,
-            contact_names=tuple(contact.effector for contact in soles),
+            contact_names=feet,
             joint_names=self._body.joint_names,
         )
+
+
+    def _margins(self) -> FloatArray:
+        """(n,) margins of the measured wrenches, each in the polytope of the soles that carried."""
+        wrenches = np.array([wrench for *_, wrench in self._rows])
+        standings = [output.standing for _, output, *_ in self._rows]
+        margins = np.empty(len(wrenches))
+        for standing in dict.fromkeys(standings):
+            stance = Stance(standing.soles, 3.0 * self._body.mass * GRAVITY)
+            chosen = np.array([other is standing for other in standings])
+            margins[chosen] = wrench_polytope(stance).margin(wrenches[chosen])
+        return margins
 
 
 class SegmentMomenta:

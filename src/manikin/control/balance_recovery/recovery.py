@@ -1,12 +1,14 @@
 """The controller that keeps a pushed body on its feet without a motion given beforehand ([Kudoh2002]_ 2)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.body import BodyModel
-from manikin.contact import Contact, sole
+from manikin.body import BodyModel, Configuration
+from manikin.body.limb import end_segments
+from manikin.contact import Contact
 from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, LinearMap, close_loop
 from manikin.control.balance_recovery.com_law import ComLaw, com_law
 from manikin.control.balance_recovery.joint_groups import joint_groups
@@ -19,6 +21,7 @@ from manikin.control.balance_recovery.problem import (
     leg_symmetry,
 )
 from manikin.control.balance_recovery.settings import RecoverySettings
+from manikin.control.balance_recovery.standing import Standing
 from manikin.control.balance_recovery.strategy import Strategy, StrategySwitch
 from manikin.control.balance_recovery.support_area import SupportArea, load_row, zmp_rows
 from manikin.control.build_qp import joint_acceleration_bounds
@@ -30,7 +33,9 @@ from manikin.control.contact_forces import (
 )
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.settings import Impedance
+from manikin.control.reference import EffectorReference
 from manikin.control.solver import QPSolution, make_solver
+from manikin.control.tasks import AccelerationTask, orientation_task, swing_task
 from manikin.spatial import GRAVITY, FloatArray, frozen_array
 
 FIRM = 100.0
@@ -45,6 +50,12 @@ SETTLING = 20.0
 NEARLY = 0.5
 """Torques that should not change may change by this [N.m]."""
 
+ROOT = "pelvis"
+"""Effector that is kept upright while a foot steps."""
+
+STEPPING_JOINTS = 0.1
+"""Weight of the joints while a foot steps."""
+
 ALIKE = 0.02
 """Angles of two legs that differ by less are equal [rad]."""
 
@@ -57,23 +68,25 @@ class RecoveryOutput:
         tau: (nv - 6,) joint torques to hold until the next step [N.m].
         strategy: What decided them.
         gain_share: Share of the largest posture gains that was used; 0 with another strategy.
-        wrenches: (2, 6) expected force [N] and moment about the sole's centre [N.m] of each foot.
+        wrenches: Expected force [N] and moment about the sole's centre [N.m] (6,) of each foot that carries.
         fallback: Empty when the program was solved; otherwise what was done instead.
         state: Dynamics at the measured state.
         problem: The program.
+        standing: About which the balance was kept.
     """
 
     tau: FloatArray
     strategy: Strategy
     gain_share: float
-    wrenches: FloatArray
+    wrenches: dict[str, FloatArray]
     fallback: str
     state: DynamicsState
     problem: RecoveryProblem
+    standing: Standing
 
 
 class BalanceRecovery:
-    """Keeps a body that stands on both feet upright; holds the choice of strategy and the solver's start."""
+    """Keeps a standing body upright; holds the choice of strategy and the solver's start."""
 
     def __init__(
         self,
@@ -81,48 +94,84 @@ class BalanceRecovery:
         q: ArrayLike,
         settings: RecoverySettings | None = None,
         *,
+        support: Sequence[str] | None = None,
+        welded: bool = False,
         friction: float = 0.7,
         joint_damping: ArrayLike | None = None,
     ) -> None:
-        """Prepare the controller for a posture on both feet.
+        """Prepare the controller for a posture on both feet or on one.
 
         Args:
             body: A body with two legs.
             q: (nq,) the posture to keep, soles on one level plane.
             settings: Weights, gains and limits; the defaults when omitted.
+            support: Effectors of the feet that carry; both when omitted.
+            welded: Whether the ground holds the feet down until the control reacts.
             friction: Of the soles.
             joint_damping: (nv - 6,) passive damping of the controlled body's joints [N.m.s/rad].
 
         Raises:
             BodyError: If the body does not stand on two legs.
-            InputError: If its soles are not level.
+            InputError: If its soles are not level, or the support is not of its feet.
         """
         self.body, self.settings = body, settings or RecoverySettings()
         self.groups = joint_groups(body)
+        self.friction, self._welded = friction, welded
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
         self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
-        feet = {name: body.effector_frame(name) for name in self.groups.feet}
-        first = Dynamics(body, feet).evaluate(np.array(q, dtype=np.float64), np.zeros(body.nv))
-        self.posture, self.com = first.q[7:].copy(), first.com.copy()
-        self.soles = tuple(_sole(body, name, first, friction) for name in self.groups.feet)
-        self.area = SupportArea.of(self.soles)
-        self._geometry = tuple(contact_geometry(body, contact, 0.0) for contact in self.soles)
-        segments = {
-            segment_key(name): body.segment_frame(name)
-            for geometry in self._geometry
-            for name in geometry.segments
-        }
-        self._dynamics = Dynamics(body, {**segments, **feet})
-        self._pairs = _alike_joints(body)
+        feet = self.groups.feet if support is None else tuple(support)
+        for name in feet:
+            if name not in self.groups.feet:
+                raise InputError(f"support has {name!r}; valid: {', '.join(self.groups.feet)}")
+        self._dynamics = Dynamics(body, _frames(body, self.groups.feet))
         self._locked = self.groups.locked(self.settings.locked)
-        self._switch = StrategySwitch(self.settings)
         self._solvers = {name: make_solver(self.settings.solver) for name in ("full", "relaxed")}
         self._previous = self._resting = np.zeros(joints)
-        self.step(first.q, first.v)
+        self.stand(Standing.of(body, q, feet, friction))
+        rotation, position = Configuration(body, q).effector_placement(ROOT)
+        self._upright = EffectorReference(rotation, position, np.zeros(6), np.zeros(6))
+        self.step(np.array(q, dtype=np.float64), np.zeros(body.nv))
+
+    def stand(self, standing: Standing) -> None:
+        """Keep the balance about another way to stand from now on."""
+        self.standing = standing
+        self._geometry = tuple(contact_geometry(self.body, contact, 0.0) for contact in standing.soles)
+        self._switch = StrategySwitch(self.settings)
+        self._alike = [
+            (left, right)
+            for left, right in _leg_joints(self.body)
+            if len(standing.soles) > 1 and abs(standing.posture[left] - standing.posture[right]) < ALIKE
+        ]
+
+    @property
+    def posture(self) -> FloatArray:
+        """(nv - 6,) joint angles that are kept [rad]."""
+        return self.standing.posture
+
+    @property
+    def com(self) -> FloatArray:
+        """(3,) centre of mass that is kept [m]."""
+        return self.standing.com
+
+    @property
+    def soles(self) -> tuple[Contact, ...]:
+        """Soles that carry."""
+        return self.standing.soles
+
+    @property
+    def area(self) -> SupportArea:
+        """Where the ZMP may be."""
+        return self.standing.area
 
     def step(
-        self, q: FloatArray, v: FloatArray, push: FeltPush | None = None, *, reacting: bool = True
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        push: FeltPush | None = None,
+        *,
+        reacting: bool = True,
+        swing: tuple[str, EffectorReference] | None = None,
     ) -> RecoveryOutput:
         """Decide the joint torques of the next period.
 
@@ -131,40 +180,55 @@ class BalanceRecovery:
             v: (nv,) measured velocity.
             push: What pushes the body and is felt.
             reacting: Whether the reaction delay is over.
+            swing: Effector of a foot that is on its way to another place, and where it should be now.
         """
         state = self._dynamics.evaluate(q, v)
         felt = push if push is not None and reacting else FeltPush.none(self.body.nv)
-        loop = close_loop(state, self.groups.feet, felt, settling=SETTLING)
-        law = com_law(state, self.com, self.area, self.settings)
-        strategy = self._switch.choose(state.com, law.settled, self.area) if reacting else Strategy.STIFF
-        rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
-        share = 0.0
+        loop = close_loop(state, self.standing.feet, felt, settling=SETTLING)
+        law = com_law(state, self.com, self.area, self.settings, turning=swing is None)
+        strategy, share = self._strategy(state, law, reacting, swing is not None), 0.0
         objective: Objective | None = None
-        if strategy is Strategy.STIFF:
-            objective = self._stiff(state)
-        elif strategy is Strategy.POSTURE:
-            calm = zmp_rows(self.area.shrunk(self.settings.posture_area), loop, state.com, 0.0)
-            found = posture_control(loop, calm, self._pull(self.settings.posture, state))
+        if strategy is Strategy.POSTURE:
+            found = self._posture_control(state, loop)
             if found is not None:
-                objective, share = self._held(state, found.joints), found.share
-            elif self.settings.posture_control_only:
-                objective = self._held(state, self._pull(self.settings.posture, state))
+                objective, share = found
             else:
                 strategy = Strategy.PROGRAM
-        if objective is None:
+        if strategy is Strategy.STIFF:
+            objective = self._stiff(state)
+        elif swing is not None:
+            objective = self._stepping(state, law, *swing)
+        elif objective is None:
             objective = self._balancing(state, law)
         contacts = self._contacts(state)
+        held = self._welded and strategy is Strategy.STIFF
+        rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
         problem = build_recovery_qp(
-            state, loop, contacts, felt, self._bounds(state, strategy), rows,
-            self._wished(state, loop), objective,
+            state, loop, contacts, felt, self._bounds(state, strategy), LinearMap.none(loop.size) if held else rows,
+            self._wished(state, loop), objective, pulling=held,
         )  # fmt: skip
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else self._torque(problem, solution, state)
         self._previous = tau
         if strategy is not Strategy.STIFF:
             self._resting = tau
-        wrenches = _wrenches(contacts, solution, loop.size)
-        return RecoveryOutput(tau, strategy, share, wrenches, fallback, state, problem)
+        wrenches = dict(zip(self.standing.feet, _wrenches(contacts, solution, loop.size), strict=True))
+        return RecoveryOutput(tau, strategy, share, wrenches, fallback, state, problem, self.standing)
+
+    def _strategy(self, state: DynamicsState, law: ComLaw, reacting: bool, swinging: bool) -> Strategy:
+        if not reacting:
+            return Strategy.STIFF
+        chosen = self._switch.choose(state.com, law.settled, self.area)
+        return Strategy.STEP if swinging else chosen
+
+    def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> tuple[Objective, float] | None:
+        """Objective of posture control and its share of the largest gains; None where the ZMP would leave."""
+        pull = self._pull(self.settings.posture, state)
+        calm = zmp_rows(self.area.shrunk(self.settings.posture_area), loop, state.com, 0.0)
+        found = posture_control(loop, calm, pull)
+        if found is not None:
+            return self._held(state, found.joints), found.share
+        return (self._held(state, pull), 0.0) if self.settings.posture_control_only else None
 
     # --- objectives --------------------------------------------------------------------------
 
@@ -195,6 +259,22 @@ class BalanceRecovery:
         pull = np.array([settings.com_weight, settings.com_weight, settings.height_weight])
         return Objective(weight, wanted, law.acceleration, pull, settings.upward)
 
+    def _stepping(
+        self, state: DynamicsState, law: ComLaw, foot: str, wanted: EffectorReference
+    ) -> Objective:
+        """A foot follows its way, the trunk stays upright and the centre of mass keeps its law."""
+        settings = self.settings
+        weight = np.full(len(self.posture), STEPPING_JOINTS)
+        joints = self._with_locked(state, self._pull(settings.posture, state), weight)
+        pull = np.array([settings.com_weight, settings.com_weight, settings.height_weight])
+        tasks = [
+            swing_task(foot, state.frames[foot], wanted, settings.swing, settings.swing_weight),
+            orientation_task(
+                ROOT, state.frames[ROOT], self._upright, settings.posture, settings.swing_weight
+            ),
+        ]
+        return Objective(weight, joints, law.acceleration, pull, tasks=tuple(tasks))
+
     def _with_locked(self, state: DynamicsState, wanted: FloatArray, weight: FloatArray) -> FloatArray:
         """Wanted accelerations with those that hold the locked joints; their weights are set."""
         result = wanted.copy()
@@ -204,7 +284,7 @@ class BalanceRecovery:
 
     def _wished(self, state: DynamicsState, loop: ClosedLoop) -> LinearMap:
         """Rows that hold where they can: alike legs and a loaded ground."""
-        alike = leg_symmetry(loop, state.q[7:], self._pairs, ALIKE)
+        alike = leg_symmetry(loop, state.q[7:], self._alike, ALIKE)
         return alike.joined(load_row(loop, self.settings.least_load * state.mass * GRAVITY))
 
     # --- limits ------------------------------------------------------------------------------
@@ -253,7 +333,7 @@ class BalanceRecovery:
 
 
 def _wrenches(contacts: list[ContactForceBasis], solution: QPSolution | None, start: int) -> FloatArray:
-    """(2, 6) wrench of each foot in a solution, zero without one."""
+    """(k, 6) wrench of each foot in a solution, zero without one."""
     if solution is None:
         return np.zeros((len(contacts), 6))
     ends = np.cumsum([start, *(basis.wrench.shape[1] for basis in contacts)])
@@ -262,15 +342,14 @@ def _wrenches(contacts: list[ContactForceBasis], solution: QPSolution | None, st
     )
 
 
-def _sole(body: BodyModel, name: str, state: DynamicsState, friction: float) -> Contact:
-    frame = state.frames[name]
-    return sole(
-        name, frame.position, rotation=frame.rotation, length=float(body.sole_length or 0.0),
-        width=float(body.sole_width or 0.0), friction=friction,
-    )  # fmt: skip
+def _frames(body: BodyModel, feet: Sequence[str]) -> dict[str, int]:
+    """Frames of feet and pelvis, and of the segments of the soles."""
+    found = {name: body.effector_frame(name) for name in (*feet, ROOT)}
+    segments = {name for foot in feet for name in end_segments(body, foot)}
+    return found | {segment_key(name): body.segment_frame(name) for name in sorted(segments)}
 
 
-def _alike_joints(body: BodyModel) -> list[tuple[int, int]]:
+def _leg_joints(body: BodyModel) -> list[tuple[int, int]]:
     """Left and right knee flexion and ankle flexion ([Kudoh2002]_ 2.49-2.50)."""
     names = [
         ("left_knee_flexion", "right_knee_flexion"),
