@@ -12,7 +12,7 @@ from manikin.contact import Contact
 from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, LinearMap, close_loop
 from manikin.control.balance_recovery.com_law import ComLaw, com_law
 from manikin.control.balance_recovery.joint_groups import joint_groups
-from manikin.control.balance_recovery.posture_control import posture_control
+from manikin.control.balance_recovery.posture_control import PostureControl, posture_control
 from manikin.control.balance_recovery.problem import (
     JointBounds,
     Objective,
@@ -188,12 +188,14 @@ class BalanceRecovery:
         law = com_law(state, self.com, self.area, self.settings, turning=swing is None)
         strategy, share = self._strategy(state, law, reacting, swing is not None), 0.0
         objective: Objective | None = None
+        leaving = False
         if strategy is Strategy.POSTURE:
             found = self._posture_control(state, loop)
-            if found is not None:
-                objective, share = found
-            else:
+            if found is None:
                 strategy = Strategy.PROGRAM
+            else:
+                objective, share = self._held(state, found.joints), found.share
+                leaving = not found.inside
         if strategy is Strategy.STIFF:
             objective = self._stiff(state)
         elif swing is not None:
@@ -201,11 +203,11 @@ class BalanceRecovery:
         elif objective is None:
             objective = self._balancing(state, law)
         contacts = self._contacts(state)
-        held = self._welded and strategy is Strategy.STIFF
+        free = leaving or (self._welded and strategy is Strategy.STIFF)
         rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
         problem = build_recovery_qp(
-            state, loop, contacts, felt, self._bounds(state, strategy), LinearMap.none(loop.size) if held else rows,
-            self._wished(state, loop), objective, pulling=held,
+            state, loop, contacts, felt, self._bounds(state, strategy),
+            LinearMap.none(loop.size) if free else rows, self._wished(state, loop), objective, pulling=free,
         )  # fmt: skip
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else self._torque(problem, solution, state)
@@ -221,14 +223,11 @@ class BalanceRecovery:
         chosen = self._switch.choose(state.com, law.settled, self.area)
         return Strategy.STEP if swinging else chosen
 
-    def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> tuple[Objective, float] | None:
-        """Objective of posture control and its share of the largest gains; None where the ZMP would leave."""
-        pull = self._pull(self.settings.posture, state)
+    def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
+        """Posture control with the ZMP well inside; None where it would leave and the program may be chosen."""
         calm = zmp_rows(self.area.shrunk(self.settings.posture_area), loop, state.com, 0.0)
-        found = posture_control(loop, calm, pull)
-        if found is not None:
-            return self._held(state, found.joints), found.share
-        return (self._held(state, pull), 0.0) if self.settings.posture_control_only else None
+        pull = self._pull(self.settings.posture, state)
+        return posture_control(loop, calm, pull, always=self.settings.posture_control_only)
 
     # --- objectives --------------------------------------------------------------------------
 

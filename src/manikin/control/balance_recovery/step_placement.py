@@ -23,6 +23,7 @@ class StepSettings:
     Attributes:
         most: Number of steps at most.
         beyond: A step is taken when the capture point is farther than this outside the soles [m].
+        again: And a further one when it is less than this inside the soles after the last one [m].
         shortest: Time from the decision to the landing at least [s].
         longest: And at most [s].
         speed: Mean speed of the foot at most [m/s].
@@ -36,6 +37,7 @@ class StepSettings:
 
     most: int = 1
     beyond: float = 0.02
+    again: float = 0.02
     shortest: float = 0.25
     longest: float = 0.6
     speed: float = 2.0
@@ -73,11 +75,14 @@ class StepGoal:
 DURATION_STEP = 0.025
 """Durations of steps that are tried differ by this [s]."""
 
-ALONG = np.linspace(-0.15, 0.15, 7)
+ALONG = np.linspace(-0.45, 0.15, 25)
 """Middles of the foot that are tried, from the capture point on landing, forwards [m]."""
 
-ACROSS = np.linspace(-0.2, 0.35, 12)
+ACROSS = np.linspace(-0.2, 0.35, 23)
 """And outwards from where the foot is now [m]."""
+
+FIRST_OF_TWO = 60
+"""First steps from which a second one is sought, those that leave the capture point least outside."""
 
 
 def capture_after(
@@ -97,49 +102,111 @@ def capture_after(
 
 
 def step_goals(
-    soles: tuple[Contact, Contact], capture: FloatArray, frequency: float, settings: StepSettings
+    soles: tuple[Contact, Contact], capture: FloatArray, frequency: float, settings: StepSettings, steps: int
 ) -> Iterator[StepGoal]:
     """Steps that capture the body, the shortest in time first, then the shortest in space.
+
+    Where no single step does and two may be taken, those follow from which a second one does.
 
     Args:
         soles: Both feet on the ground, the left one first.
         capture: (2,) capture point [m].
         frequency: Of the pendulum [1/s].
         settings: Limits.
+        steps: How many may be taken.
     """
-    for duration in np.arange(settings.shortest, settings.longest + 1e-9, DURATION_STEP):
-        found: list[tuple[float, StepGoal]] = []
-        for moving, standing, outward in ((soles[0], soles[1], 1.0), (soles[1], soles[0], -1.0)):
-            area = SupportArea.of([standing])
-            landing = capture_after(capture, area, frequency, float(duration), settings.inset)
-            for position in _places(moving, standing, outward, landing, float(duration), settings):
-                new = SupportArea.of([standing, _moved(moving, position)])
-                inside = float(new.inside(landing))
-                if inside >= settings.inside:
-                    rotation = moving.rotation_contact_to_world
-                    length = float(np.linalg.norm(position - moving.position))
-                    goal = StepGoal(moving.effector, position, rotation, float(duration), landing)
-                    found.append((length - inside, goal))
+    tried = [
+        _reachable(soles, moving, capture, frequency, float(duration), settings)
+        for duration in np.arange(settings.shortest, settings.longest + 1e-9, DURATION_STEP)
+        for moving in (0, 1)
+    ]
+    captured = False
+    for first, second in zip(tried[::2], tried[1::2], strict=True):
+        found = [goal for places in (first, second) for goal in places.captured(settings.inside)]
+        captured = captured or bool(found)
         yield from (goal for _, goal in sorted(found, key=lambda item: item[0]))
+    if captured or steps < 2:
+        return
+    leading = sorted((goal for places in tried for goal in places.nearest()), key=lambda item: item[0])
+    for _, goal in leading[:FIRST_OF_TWO]:
+        after = tuple(
+            replace(sole, position=goal.position, rotation_contact_to_world=goal.rotation)
+            if sole.effector == goal.foot else sole
+            for sole in soles
+        )  # fmt: skip
+        if next(step_goals((after[0], after[1]), goal.capture, frequency, settings, 1), None) is not None:
+            yield goal
 
 
-def _places(
-    moving: Contact, standing: Contact, outward: float, landing: FloatArray, duration: float,
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Places for one foot after one time: (k, 2) middles, room around the capture point (k,), and the move."""
+
+    foot: str
+    rotation: FloatArray
+    height: float
+    duration: float
+    capture: FloatArray
+    middles: FloatArray
+    room: FloatArray
+    moved: FloatArray
+
+    def captured(self, inside: float) -> list[tuple[float, StepGoal]]:
+        """Goals whose room is enough, with their cost."""
+        return [
+            (float(self.moved[k] - self.room[k]), self._goal(k)) for k in np.flatnonzero(self.room >= inside)
+        ]
+
+    def nearest(self) -> list[tuple[float, StepGoal]]:
+        """At each distance across, the goal that leaves the capture point least outside, with how far."""
+        found: dict[float, int] = {}
+        for k in np.argsort(self.room, kind="stable"):
+            found[round(float(self.middles[k, 1]), 6)] = int(k)
+        return [(-float(self.room[k]), self._goal(k)) for k in found.values()]
+
+    def _goal(self, k: int) -> StepGoal:
+        position = np.array([*self.middles[k], self.height])
+        return StepGoal(self.foot, position, self.rotation, self.duration, self.capture)
+
+
+def _reachable(
+    soles: tuple[Contact, Contact], moving: int, capture: FloatArray, frequency: float, duration: float,
     settings: StepSettings,
-) -> Iterator[FloatArray]:  # fmt: skip
-    """(3,) places for a foot that can be reached in time without crossing the legs."""
-    axes = moving.rotation_contact_to_world[:2, :2]
-    ahead = axes.T @ (landing - moving.position[:2])
-    for along in ahead[0] + ALONG:
-        for across in outward * ACROSS:
-            move = axes @ np.array([along, across])
-            position = moving.position + np.array([*move, 0.0])
-            between = axes.T @ (position - standing.position)[:2]
-            apart = outward * between[1] >= settings.apart
-            near = float(np.linalg.norm(between)) <= settings.reach
-            if apart and near and float(np.linalg.norm(move)) <= settings.speed * duration:
-                yield position
+) -> _Places:  # fmt: skip
+    """Places that a foot can be put down on in time, parallel to the other one and without crossing it."""
+    foot, stays = soles[moving], soles[1 - moving]
+    outward = 1.0 if moving == 0 else -1.0
+    area = SupportArea.of([stays])
+    landing = capture_after(capture, area, frequency, duration, settings.inset)
+    rotation = stays.rotation_contact_to_world
+    axes = rotation[:2, :2]
+    ahead = float(axes[:, 0] @ (landing - foot.position[:2]))
+    steps = np.stack(np.meshgrid(ahead + ALONG, outward * ACROSS, indexing="ij"), axis=-1).reshape(-1, 2)
+    middles = foot.position[:2] + steps @ axes.T
+    between = (middles - stays.position[:2]) @ axes
+    moved = np.linalg.norm(steps, axis=1)
+    allowed = (
+        (outward * between[:, 1] >= settings.apart)
+        & (np.linalg.norm(between, axis=1) <= settings.reach)
+        & (moved <= settings.speed * duration)
+    )
+    room = _room(area, middles[allowed] - stays.position[:2], landing)
+    return _Places(
+        foot.effector, rotation, float(stays.position[2]), duration, landing, middles[allowed], room,
+        moved[allowed],
+    )  # fmt: skip
 
 
-def _moved(contact: Contact, position: FloatArray) -> Contact:
-    return replace(contact, position=position)
+def _room(area: SupportArea, moves: FloatArray, point: FloatArray) -> FloatArray:
+    """(k,) distance of a point (2,) to the nearest edge of the hull of an area and its copies, inside > 0.
+
+    The hull of an area and its copy moved by ``d`` has the edges of the area, moved out where ``d`` does, and
+    the two that lead along ``d``.
+    """
+    normals, offsets = area.half_planes()
+    out = offsets + np.maximum(moves @ normals.T, 0.0) - normals @ point
+    length = np.maximum(np.linalg.norm(moves, axis=1), 1e-12)
+    beside = np.column_stack((-moves[:, 1], moves[:, 0])) / length[:, None]
+    corners = beside @ area.corners.T
+    along = np.stack((corners.max(axis=1) - beside @ point, beside @ point - corners.min(axis=1)), axis=1)
+    return np.min(np.concatenate((out, along), axis=1), axis=1)

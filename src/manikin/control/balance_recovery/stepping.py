@@ -27,6 +27,9 @@ from manikin.spatial import GRAVITY, FloatArray
 LANDED_FROM = 0.5
 """A touch before this share of the way in time is that of the lift-off."""
 
+LOOK_AGAIN = 0.05
+"""Where no step was found the next one is sought after this time [s]."""
+
 
 @dataclass(frozen=True, eq=False)
 class StepTaken:
@@ -71,6 +74,7 @@ class SteppingRecovery:
         self._home = balance.standing
         self._swing: SwingFoot | None = None
         self._from: Contact | None = None
+        self._look_again = -np.inf
 
     def step(
         self,
@@ -98,7 +102,7 @@ class SteppingRecovery:
             swing = None
         if swing is None:
             output = self.balance.step(q, v, push, reacting=reacting)
-            if output.strategy not in (Strategy.STIFF, Strategy.STEP) and self._must_step(output.state):
+            if output.strategy not in (Strategy.STIFF, Strategy.STEP) and self._must_step(time, output.state):
                 self._lift(time, output.state)
             return output
         reference = swing.sample(time)
@@ -106,10 +110,11 @@ class SteppingRecovery:
         self._aim(time, output.state, swing)
         return output
 
-    def _must_step(self, state: DynamicsState) -> bool:
-        if len(self.steps) >= self.settings.most or len(self.balance.soles) != 2:
+    def _must_step(self, time: float, state: DynamicsState) -> bool:
+        if len(self.steps) >= self.settings.most or len(self.balance.soles) != 2 or time < self._look_again:
             return False
-        return float(self.balance.area.inside(self._capture(state))) < -self.settings.beyond
+        room = float(self.balance.area.inside(self._capture(state)))
+        return room < (self.settings.again if self.steps else -self.settings.beyond)
 
     def _capture(self, state: DynamicsState) -> FloatArray:
         velocity = state.momentum[:3] / state.mass
@@ -123,10 +128,14 @@ class SteppingRecovery:
         """Begin the first step that the scene allows."""
         soles = {contact.effector: contact for contact in self.balance.soles}
         left, right = (soles[name] for name in self.balance.groups.feet)
-        goals = step_goals((left, right), self._capture(state), self._frequency, self.settings)
+        left_over = self.settings.most - len(self.steps)
+        goals = step_goals(
+            (left, right), self._capture(state), self._frequency, self.settings, left_over
+        )  # fmt: skip
         goal = self.check.first(goals, (left, right), state.q, self.settings.clearance)
         self.refused = self.check.refusal
         if goal is None:
+            self._look_again = time + LOOK_AGAIN
             return
         self._from = soles[goal.foot]
         stays = right if goal.foot == left.effector else left
