@@ -166,8 +166,7 @@ class _Run:
         if welded and task.steps:
             raise InputError(f"{task.steps} steps of held feet; valid: free feet, or no step")
         self.controller = BalanceRecovery(
-            body, self.q, settings, support=task.support, welded=welded, friction=task.friction,
-            joint_damping=damping,
+            body, self.q, settings, support=task.support, friction=task.friction, joint_damping=damping,
         )  # fmt: skip
         _check_standing(self.controller, self.q)
         held = None

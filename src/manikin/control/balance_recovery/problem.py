@@ -85,6 +85,16 @@ class RecoveryProblem:
         lower[rows], upper[rows] = -np.inf, np.inf
         return replace(self.program, rows_lower=lower, rows_upper=upper)
 
+    def loose(self) -> QuadraticProgram:
+        """Return the program with the torque limits alone: the ground may pull, the ZMP may be anywhere."""
+        program = self.relaxed()
+        first, _ = self.relaxable
+        lower, upper = program.rows_lower.copy(), program.rows_upper.copy()
+        after_torques = 6 + len(self.torque.offset)
+        lower[after_torques:first], upper[after_torques:first] = -np.inf, np.inf
+        lowest = np.full_like(program.lower, -np.inf)
+        return replace(program, rows_lower=lower, rows_upper=upper, lower=lowest)
+
 
 def build_recovery_qp(
     state: DynamicsState,

@@ -41,14 +41,11 @@ from manikin.spatial import GRAVITY, FloatArray, frozen_array
 FIRM = 100.0
 """Weight of joints that hold an angle, against 1 of those that need not."""
 
-LOOSE = 1e-3
-"""Weight of joints whose torque is given instead."""
-
 SETTLING = 20.0
 """Rate at which the controller damps what the feet move all the same [1/s]."""
 
-NEARLY = 0.5
-"""Torques that should not change may change by this [N.m]."""
+LEG_STIFFNESS = 3.0
+"""Stiffness of hips and knees before they react, at least, in ``m g h`` per radian."""
 
 ROOT = "pelvis"
 """Effector that is kept upright while a foot steps."""
@@ -71,7 +68,7 @@ class RecoveryOutput:
         wrenches: Expected force [N] and moment about the sole's centre [N.m] (6,) of each foot that carries.
         fallback: Empty when the program was solved; otherwise what was done instead.
         state: Dynamics at the measured state.
-        problem: The program.
+        problem: The program; None before the control reacts.
         standing: About which the balance was kept.
     """
 
@@ -81,7 +78,7 @@ class RecoveryOutput:
     wrenches: dict[str, FloatArray]
     fallback: str
     state: DynamicsState
-    problem: RecoveryProblem
+    problem: RecoveryProblem | None
     standing: Standing
 
 
@@ -95,7 +92,6 @@ class BalanceRecovery:
         settings: RecoverySettings | None = None,
         *,
         support: Sequence[str] | None = None,
-        welded: bool = False,
         friction: float = 0.7,
         joint_damping: ArrayLike | None = None,
     ) -> None:
@@ -106,7 +102,6 @@ class BalanceRecovery:
             q: (nq,) the posture to keep, soles on one level plane.
             settings: Weights, gains and limits; the defaults when omitted.
             support: Effectors of the feet that carry; both when omitted.
-            welded: Whether the ground holds the feet down until the control reacts.
             friction: Of the soles.
             joint_damping: (nv - 6,) passive damping of the controlled body's joints [N.m.s/rad].
 
@@ -116,7 +111,7 @@ class BalanceRecovery:
         """
         self.body, self.settings = body, settings or RecoverySettings()
         self.groups = joint_groups(body)
-        self.friction, self._welded = friction, welded
+        self.friction = friction
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
         self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
@@ -126,7 +121,7 @@ class BalanceRecovery:
                 raise InputError(f"support has {name!r}; valid: {', '.join(self.groups.feet)}")
         self._dynamics = Dynamics(body, _frames(body, self.groups.feet))
         self._locked = self.groups.locked(self.settings.locked)
-        self._solvers = {name: make_solver(self.settings.solver) for name in ("full", "relaxed")}
+        self._solvers = {name: make_solver(self.settings.solver) for name in ("full", "relaxed", "loose")}
         self._previous = self._resting = np.zeros(joints)
         self.stand(Standing.of(body, q, feet, friction))
         rotation, position = Configuration(body, q).effector_placement(ROOT)
@@ -183,45 +178,47 @@ class BalanceRecovery:
             swing: Effector of a foot that is on its way to another place, and where it should be now.
         """
         state = self._dynamics.evaluate(q, v)
-        felt = push if push is not None and reacting else FeltPush.none(self.body.nv)
+        if not reacting:
+            return self._output(state, Strategy.STIFF, self._stiff(state))
+        felt = push if push is not None else FeltPush.none(self.body.nv)
         loop = close_loop(state, self.standing.feet, felt, settling=SETTLING)
         law = com_law(state, self.com, self.area, self.settings, turning=swing is None)
-        strategy, share = self._strategy(state, law, reacting, swing is not None), 0.0
-        objective: Objective | None = None
-        leaving = False
-        if strategy is Strategy.POSTURE:
-            found = self._posture_control(state, loop)
-            if found is None:
-                strategy = Strategy.PROGRAM
-            else:
-                objective, share = self._held(state, found.joints), found.share
-                leaving = not found.inside
-        if strategy is Strategy.STIFF:
-            objective = self._stiff(state)
-        elif swing is not None:
-            objective = self._stepping(state, law, *swing)
-        elif objective is None:
-            objective = self._balancing(state, law)
-        contacts = self._contacts(state)
-        free = leaving or (self._welded and strategy is Strategy.STIFF)
+        strategy = self._switch.choose(state.com, law.settled, self.area)
         rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
+        share, leaving = 0.0, False
+        objective: Objective | None = None
+        if swing is not None:
+            strategy, objective = Strategy.STEP, self._stepping(state, law, *swing)
+        elif strategy is Strategy.POSTURE:
+            found = self._posture_control(state, loop)
+            if found is not None:
+                objective = self._held(state, found.joints)
+                share, leaving = found.share, not found.inside
+        if objective is None:
+            strategy, objective = Strategy.PROGRAM, self._balancing(state, law)
+        contacts = self._contacts(state)
         problem = build_recovery_qp(
-            state, loop, contacts, felt, self._bounds(state, strategy),
-            LinearMap.none(loop.size) if free else rows, self._wished(state, loop), objective, pulling=free,
+            state, loop, contacts, felt, self._bounds(state), LinearMap.none(loop.size) if leaving else rows,
+            self._wished(state, loop), objective, pulling=leaving,
         )  # fmt: skip
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else self._torque(problem, solution, state)
-        self._previous = tau
-        if strategy is not Strategy.STIFF:
-            self._resting = tau
+        self._resting = tau
         wrenches = dict(zip(self.standing.feet, _wrenches(contacts, solution, loop.size), strict=True))
-        return RecoveryOutput(tau, strategy, share, wrenches, fallback, state, problem, self.standing)
+        return self._output(state, strategy, tau, problem, share, wrenches, fallback)
 
-    def _strategy(self, state: DynamicsState, law: ComLaw, reacting: bool, swinging: bool) -> Strategy:
-        if not reacting:
-            return Strategy.STIFF
-        chosen = self._switch.choose(state.com, law.settled, self.area)
-        return Strategy.STEP if swinging else chosen
+    def _output(
+        self,
+        state: DynamicsState,
+        strategy: Strategy,
+        tau: FloatArray,
+        problem: RecoveryProblem | None = None,
+        share: float = 0.0,
+        wrenches: dict[str, FloatArray] | None = None,
+        fallback: str = "",
+    ) -> RecoveryOutput:
+        self._previous = tau
+        return RecoveryOutput(tau, strategy, share, wrenches or {}, fallback, state, problem, self.standing)
 
     def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
         """Posture control with the ZMP well inside; None where it would leave and the program may be chosen."""
@@ -240,11 +237,29 @@ class BalanceRecovery:
         weight = np.full(len(wanted), FIRM)
         return Objective(weight, self._with_locked(state, wanted, weight), np.zeros(3))
 
-    def _stiff(self, state: DynamicsState) -> Objective:
-        """Every joint but the ankles is held; these keep their torques, see :meth:`_bounds`."""
-        weight = np.full(len(self.posture), FIRM)
-        weight[self.groups.joints["ankle"]] = LOOSE
-        return Objective(weight, self._pull(self.settings.stiffness, state), np.zeros(3))
+    def _stiff(self, state: DynamicsState) -> FloatArray:
+        """Torques of muscles that do not react yet: springs and dampers about the posture.
+
+        A spring has the gains of :attr:`RecoverySettings.stiffness` on the inertia of what hangs on its
+        joint; hips and knees have :data:`LEG_STIFFNESS` at least, ankles a share of their own. The springs
+        act on the state at the end of the period, so that stiff ones on light segments do not swing up
+        ("stable PD", Tan et al. 2011).
+        """
+        settings, joints, period = self.settings, self.groups.joints, self.settings.period
+        inertia = np.diag(state.mass_matrix)[6:]
+        toppling = state.mass * GRAVITY * self.standing.height
+        stiffness = settings.stiffness.stiffness * inertia
+        legs = np.concatenate((joints["hip"], joints["knee"]))
+        stiffness[legs] = np.maximum(stiffness[legs], LEG_STIFFNESS * toppling)
+        stiffness[joints["ankle"]] = 0.5 * settings.ankle_stiffness * toppling
+        damping = 2.0 * np.sqrt(stiffness * inertia)
+        pull = np.zeros(len(state.v))
+        pull[6:] = stiffness * (self.posture - state.q[7:] - period * state.v[6:]) - damping * state.v[6:]
+        matrix = state.mass_matrix.copy()
+        matrix[np.arange(6, len(pull)), np.arange(6, len(pull))] += period * damping
+        spring = pull[6:] - period * damping * np.linalg.solve(matrix, pull)[6:]
+        limit = settings.strength * self.body.torque_limit
+        return np.clip(self._resting + spring, -limit, limit)
 
     def _balancing(self, state: DynamicsState, law: ComLaw) -> Objective:
         """The objective of the quadratic program (2.54) with the law of the centre of mass."""
@@ -295,24 +310,14 @@ class BalanceRecovery:
             for contact, geometry in zip(self.soles, self._geometry, strict=True)
         ]
 
-    def _bounds(self, state: DynamicsState, strategy: Strategy) -> JointBounds:
+    def _bounds(self, state: DynamicsState) -> JointBounds:
         body, settings = self.body, self.settings
         lower, upper = joint_acceleration_bounds(
             state.q[7:], state.v[6:], body.lower, body.upper, settings.strength * body.velocity_limit,
             settings.joint_limit_horizon, settings.max_joint_acceleration,
         )  # fmt: skip
         most = settings.strength * body.torque_limit
-        least = -most
-        if strategy is Strategy.STIFF:
-            ankles = self.groups.joints["ankle"]
-            most, least = most.copy(), least.copy()
-            height = self.com[2] - self.area.height
-            spring = 0.5 * settings.ankle_stiffness * state.mass * GRAVITY * height
-            torque = self._resting[ankles] + spring * (self.posture - state.q[7:])[ankles]
-            limit = most[ankles] - NEARLY
-            torque = np.clip(torque, -limit, limit)
-            least[ankles], most[ankles] = torque - NEARLY, torque + NEARLY
-        return JointBounds(least, most, lower, upper)
+        return JointBounds(-most, most, lower, upper)
 
     # --- solution ----------------------------------------------------------------------------
 
@@ -328,7 +333,10 @@ class BalanceRecovery:
         relaxed = self._solvers["relaxed"].solve(problem.relaxed())
         if relaxed.found:
             return relaxed, f"without stops: {solution.status}"
-        return None, f"previous torques: {solution.status}, then {relaxed.status}"
+        loose = self._solvers["loose"].solve(problem.loose())
+        if loose.found:
+            return loose, f"as on any ground: {solution.status}, then {relaxed.status}"
+        return None, f"previous torques: {solution.status}, {relaxed.status}, {loose.status}"
 
 
 def _wrenches(contacts: list[ContactForceBasis], solution: QPSolution | None, start: int) -> FloatArray:

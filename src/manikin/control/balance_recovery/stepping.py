@@ -133,8 +133,8 @@ class SteppingRecovery:
             (left, right), self._capture(state), self._frequency, self.settings, left_over
         )  # fmt: skip
         goal = self.check.first(goals, (left, right), state.q, self.settings.clearance)
-        self.refused = self.check.refusal
         if goal is None:
+            self.refused = self.refused or self.check.refusal
             self._look_again = time + LOOK_AGAIN
             return
         self._from = soles[goal.foot]
