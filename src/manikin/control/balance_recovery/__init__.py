@@ -13,7 +13,7 @@ from manikin.control.balance_recovery.problem import (
 )
 from manikin.control.balance_recovery.recovery import BalanceRecovery, RecoveryOutput
 from manikin.control.balance_recovery.settings import RecoverySettings
-from manikin.control.balance_recovery.standing import Standing
+from manikin.control.balance_recovery.standing import Standing, sole_at
 from manikin.control.balance_recovery.step_placement import StepGoal, StepSettings, capture_after, step_goals
 from manikin.control.balance_recovery.stepping import SteppingRecovery, StepTaken
 from manikin.control.balance_recovery.strategy import Strategy, StrategySwitch
@@ -48,6 +48,7 @@ __all__ = [
     "joint_groups",
     "leg_symmetry",
     "posture_control",
+    "sole_at",
     "step_goals",
     "zmp_of",
     "zmp_rows",

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limb import end_segments
@@ -158,6 +158,27 @@ class BalanceRecovery:
     def area(self) -> SupportArea:
         """Where the ZMP may be."""
         return self.standing.area
+
+    @property
+    def locked(self) -> NDArray[np.int64]:
+        """Hinges that hold the posture whatever happens."""
+        return self._locked
+
+    def evaluate(self, q: FloatArray, v: FloatArray) -> DynamicsState:
+        """Dynamics at a configuration (nq,) and velocity (nv,)."""
+        return self._dynamics.evaluate(q, v)
+
+    def problem_at(self, state: DynamicsState) -> RecoveryProblem:
+        """The program of a step at a state, with nothing pushing and an objective of no use."""
+        felt = FeltPush.none(self.body.nv)
+        loop = close_loop(state, self.standing.feet, felt)
+        rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
+        law = com_law(state, self.com, self.area, self.settings)
+        objective = self._balancing(state, law)
+        return build_recovery_qp(
+            state, loop, self._contacts(state), felt, self._bounds(state), rows,
+            LinearMap.none(loop.size), objective,
+        )  # fmt: skip
 
     def step(
         self,
