@@ -210,7 +210,7 @@ class _Run:
             self.world.advance(output.tau, self.substeps - 1)
             wrench = self.world.mean_wrench()
             if number >= 0:
-                self.recorder.add(time, output, sensed.a, wrench)
+                self.recorder.add(time, output, sensed, wrench, held=self.task.feet is Feet.HELD)
             fallen = self._fallen(output.state, lowest, time)
             if fallen:
                 break

@@ -15,6 +15,7 @@ from manikin.control.balance_recovery import (
     Strategy,
     capture_point,
 )
+from manikin.motion import Motion
 from manikin.simulation.recovery_record import RecoveryTrace
 from manikin.simulation.world import Push, Touch
 from manikin.spatial import FloatArray
@@ -32,6 +33,9 @@ STANDS_SPEED = 0.1
 FOOT_MOVED = 0.02
 """A foot that ends farther than this from where it stood has moved [m]."""
 
+FOOT_SLID = 0.1
+"""After a step a foot that slides by up to this is still one to stand on [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
@@ -47,7 +51,7 @@ class Recovery:
         time_to_rest: From the first push until the body stands at rest to the end [s]; None if it does not.
         final_height: Of the centre of mass above the ground at the end [m].
         capture_point: Farthest reach of the capture point over the support area; 1 is its edge.
-        foot_motion: Farthest that a foot is from its place at the end [m].
+        foot_motion: Farthest that a foot is, in the end, from where it was put down [m].
         control_from: When the control acted first after the first push began [s].
         soles: Where the feet that carry stand in the end.
         steps: Steps that were taken.
@@ -110,6 +114,7 @@ class Recovery:
             "max_zmp_excess_m": self.zmp_excess, "final_com_height_m": self.final_height,
             "time_to_rest_s": self.time_to_rest, "max_capture_point_reach": self.capture_point,
             "max_foot_motion_m": self.foot_motion,
+            "steps_taken": [step.summary() for step in self.steps],
             "posture_share": self.strategy_share(Strategy.POSTURE),
             "program_share": self.strategy_share(Strategy.PROGRAM),
             "angular_momentum_share": self.momentum_shares(), "peak_angular_momentum_Nms": peak,
@@ -152,14 +157,18 @@ def judge(
     rests = _rests(body, controller, trace)
     excess = -trace.zmp_inside
     counted = (motion.time >= control_from - 1e-9) & np.isfinite(excess)
-    moved = _foot_motion(body, controller, motion.q[-1])
+    moved = _foot_motion(body, controller.soles, motion, steps)
     segments = {segment.name for segment in body.segments}
     propped = [touch for touch in touches if touch.other not in segments]
     return Recovery(
         trace=trace,
         feet=feet,
         failure=_explained(
-            fallen or _fault(rests, moved, propped), controller, trace, control_from, refused
+            fallen or _fault(rests, moved, propped, FOOT_SLID if steps else FOOT_MOVED),
+            controller,
+            trace,
+            control_from,
+            refused,
         ),
         direction=direction,
         impulse=float(sum(_impulse(push) for push in pushes)),
@@ -193,12 +202,12 @@ def _rests(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -
     return high & slow & over & upright
 
 
-def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch]) -> str:
+def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch], most: float) -> str:
     if touches:
         return f"does not stand on its feet alone: {touches[0]}"
     if not rests[-1]:
         return "does not stand at rest and upright at the end"
-    if moved > FOOT_MOVED:
+    if moved > most:
         return f"a foot has moved by {moved:.3f} m"
     return ""
 
@@ -228,19 +237,22 @@ def _time_to_rest(rests: np.ndarray, since: FloatArray) -> float | None:
     return float(max(0.0, since[0 if not len(restless) else restless[-1] + 1]))
 
 
-def _foot_motion(body: BodyModel, controller: BalanceRecovery, q: FloatArray) -> float:
-    state = Configuration(body, q)
+def _foot_motion(
+    body: BodyModel, soles: Sequence[Contact], motion: Motion, steps: Sequence[StepTaken]
+) -> float:
+    """Farthest that a foot is in the end from where it was put down, or where it was in the beginning [m]."""
+    first, last = Configuration(body, motion.q[0]), Configuration(body, motion.q[-1])
+    places = {contact.effector: first.effector_placement(contact.effector)[1] for contact in soles}
+    places |= {step.foot: step.position for step in steps}
     return max(
-        float(np.linalg.norm(state.effector_placement(c.effector)[1] - c.position)) for c in controller.soles
+        float(np.linalg.norm(last.effector_placement(name)[1] - place)) for name, place in places.items()
     )
 
 
 def _capture_reach(controller: BalanceRecovery, trace: RecoveryTrace) -> float:
     height = controller.com[2] - controller.area.height
     ahead = capture_point(trace.motion.com, trace.com_velocity, height)
-    return max(
-        standing.area.reach(point) for standing, point in zip(trace.standings, ahead, strict=True)
-    )
+    return max(standing.area.reach(point) for standing, point in zip(trace.standings, ahead, strict=True))
 
 
 def _direction(pushes: Sequence[Push]) -> FloatArray:

@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from manikin.balance import wrench_polytope
 from manikin.body import BodyModel
+from manikin.body.limb import end_segments
 from manikin.contact import Stance
 from manikin.control.balance_recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
 from manikin.motion import Motion
+from manikin.simulation.world import Sensed
 from manikin.spatial import GRAVITY, FloatArray, skew
 
 
@@ -19,8 +21,9 @@ class RecoveryTrace:
     """Samples of a recovery, one per control step.
 
     Attributes:
-        motion: What happened; ``contact_force`` is what the controller expected of each foot and ``margin``
-            that of the measured wrench of the ground in the polytope of both soles.
+        motion: What happened; ``contact_force`` is what the ground did to each foot, measured on free feet
+            and, on held ones, the measured whole in equal shares, and ``margin`` that of the measured wrench
+            of the ground in the polytope of the soles that carry.
         zmp: (n, 2) of the measured force of the ground over the step, NaN where nothing carries [m].
         zmp_inside: (n,) distance of the ZMP to the edge of the soles that carry, negative outside [m].
         standings: n ways to stand about which the balance was kept.
@@ -60,18 +63,35 @@ class RecoveryRecorder:
         """Start empty."""
         self._body, self._controller = body, controller
         self._momenta = SegmentMomenta(body, controller.groups.segments)
+        self._ends = {foot: end_segments(body, foot) for foot in controller.groups.feet}
         self._rows: list[tuple[float, RecoveryOutput, FloatArray, FloatArray]] = []
+        self._forces: list[FloatArray] = []
 
-    def add(self, time: float, output: RecoveryOutput, a: FloatArray, wrench: FloatArray) -> None:
+    def add(
+        self, time: float, output: RecoveryOutput, sensed: Sensed, wrench: FloatArray, *, held: bool = False
+    ) -> None:
         """Add a step.
 
         Args:
             time: Of its beginning [s].
             output: What the controller decided then.
-            a: (nv,) measured acceleration.
+            sensed: What was felt in the first engine step after it.
             wrench: (6,) mean force and moment of the ground about the world's origin.
+            held: Whether the feet are held, which is not felt as a touch.
         """
-        self._rows.append((time, output, a, wrench))
+        self._rows.append((time, output, sensed.a, wrench))
+        self._forces.append(np.array([
+            self._shared(wrench, output.state.frames[foot].position, foot in output.standing.feet) if held
+            else sensed.wrench(output.state.frames[foot].position, names)
+            for foot, names in self._ends.items()
+        ]))  # fmt: skip
+
+    def _shared(self, wrench: FloatArray, position: FloatArray, carries: bool) -> FloatArray:
+        """Equal share of a foot that is held in the wrench of the ground, about its sole's middle."""
+        if not carries:
+            return np.zeros(6)
+        share = wrench / len(self._controller.soles)
+        return np.concatenate((share[:3], share[3:] - skew(position) @ share[:3]))
 
     def trace(self, control_ms: float) -> RecoveryTrace:
         """Turn the steps into a trace."""
@@ -108,10 +128,7 @@ class RecoveryRecorder:
         outputs = [output for _, output, _, _ in self._rows]
         states = [output.state for output in outputs]
         feet = self._controller.groups.feet
-        expected = np.zeros((len(outputs), len(feet), 6))
-        for row, output in zip(expected, outputs, strict=True):
-            for name, wrench in output.wrenches.items():
-                row[feet.index(name)] = wrench
+        forces = np.array(self._forces)
         return Motion(
             time=np.array([time for time, *_ in self._rows]),
             q=np.array([state.q for state in states]),
@@ -121,12 +138,11 @@ class RecoveryRecorder:
             com=np.array([state.com for state in states]),
             angular_momentum=np.array([state.momentum[3:] for state in states]),
             margin=self._margins(),
-            support=np.linalg.norm(expected[..., :3], axis=-1) > 1.0,
-            contact_force=expected,
+            support=np.linalg.norm(forces[..., :3], axis=-1) > 1.0,
+            contact_force=forces,
             contact_names=feet,
             joint_names=self._body.joint_names,
         )
-
 
     def _margins(self) -> FloatArray:
         """(n,) margins of the measured wrenches, each in the polytope of the soles that carried."""

@@ -32,10 +32,10 @@ from manikin.control.contact_forces import (
     segment_key,
 )
 from manikin.control.dynamics import Dynamics, DynamicsState
-from manikin.control.settings import Impedance
 from manikin.control.reference import EffectorReference
+from manikin.control.settings import Impedance
 from manikin.control.solver import QPSolution, make_solver
-from manikin.control.tasks import AccelerationTask, orientation_task, swing_task
+from manikin.control.tasks import orientation_task, swing_task
 from manikin.spatial import GRAVITY, FloatArray, frozen_array
 
 FIRM = 100.0
@@ -294,9 +294,7 @@ class BalanceRecovery:
         pull = np.array([settings.com_weight, settings.com_weight, settings.height_weight])
         return Objective(weight, wanted, law.acceleration, pull, settings.upward)
 
-    def _stepping(
-        self, state: DynamicsState, law: ComLaw, foot: str, wanted: EffectorReference
-    ) -> Objective:
+    def _stepping(self, state: DynamicsState, law: ComLaw, foot: str, wanted: EffectorReference) -> Objective:
         """A foot follows its way, the trunk stays upright and the centre of mass keeps its law."""
         settings = self.settings
         weight = np.full(len(self.posture), STEPPING_JOINTS)

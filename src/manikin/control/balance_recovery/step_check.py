@@ -102,5 +102,3 @@ class StepCheck:
         ]
         ignored = touching_pairs(self._body, touching)
         return self._proximity.minimum(q, ignored).distance > 0.0
-
-

@@ -88,7 +88,7 @@ FIRST_OF_TWO = 60
 def capture_after(
     capture: FloatArray, area: SupportArea, frequency: float, time: float, inset: float
 ) -> FloatArray:
-    """(2,) capture point after a time on a support area, its ZMP as near to the capture point as it may be [m].
+    """(2,) capture point after a time, with the ZMP as near to it as the support area allows [m].
 
     Args:
         capture: (2,) now [m].
@@ -140,7 +140,7 @@ def step_goals(
 
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """Places for one foot after one time: (k, 2) middles, room around the capture point (k,), and the move."""
+    """Places for one foot after one time: (k, 2) middles, room around the capture point (k,), moves (k,)."""
 
     foot: str
     rotation: FloatArray
@@ -154,7 +154,8 @@ class _Places:
     def captured(self, inside: float) -> list[tuple[float, StepGoal]]:
         """Goals whose room is enough, with their cost."""
         return [
-            (float(self.moved[k] - self.room[k]), self._goal(k)) for k in np.flatnonzero(self.room >= inside)
+            (float(self.moved[k] - self.room[k]), self._goal(k))
+            for k in np.flatnonzero(self.room >= inside).tolist()
         ]
 
     def nearest(self) -> list[tuple[float, StepGoal]]:

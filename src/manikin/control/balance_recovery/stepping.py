@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from manikin.control.balance_recovery.recovery import BalanceRecovery, RecoveryO
 from manikin.control.balance_recovery.standing import Standing, sole_at
 from manikin.control.balance_recovery.step_check import StepCheck
 from manikin.control.balance_recovery.step_placement import (
-    StepGoal,
     StepSettings,
     capture_after,
     step_goals,
@@ -50,6 +50,14 @@ class StepTaken:
     start: FloatArray
     goal: FloatArray
     position: FloatArray
+
+    def summary(self) -> dict[str, Any]:
+        """The step as JSON."""
+        return {
+            "foot": self.foot, "lifted_s": self.lifted, "landed_s": self.landed,
+            "length_m": float(np.linalg.norm(self.position - self.start)),
+            "from_m": self.start.tolist(), "goal_m": self.goal.tolist(), "to_m": self.position.tolist(),
+        }  # fmt: skip
 
 
 class SteppingRecovery:

@@ -43,9 +43,7 @@ class SwingFoot:
         """Lift a foot off at a position (3,) [m]."""
         level = np.zeros((3, 2))
         level[0] = position[:2]
-        return cls(
-            foot, rotation, start, duration, goal.copy(), clearance, start, level, float(position[2])
-        )
+        return cls(foot, rotation, start, duration, goal.copy(), clearance, start, level, float(position[2]))
 
     def share(self, time: float) -> float:
         """Share of the way in time, in [0, 1]."""
@@ -53,7 +51,9 @@ class SwingFoot:
 
     def sample(self, time: float) -> EffectorReference:
         """Go on to a time [s], not before the last one, and return where the foot should be."""
-        self._level = _ahead(self._level, self.goal[:2], self.start + self.duration - self._time, time - self._time)
+        self._level = _ahead(
+            self._level, self.goal[:2], self.start + self.duration - self._time, time - self._time
+        )
         self._time = time
         height, climb, lift = self._height(time)
         twist, acceleration = np.zeros(6), np.zeros(6)

@@ -189,7 +189,9 @@ def edge_limits(controller: BalanceRecovery, q: ArrayLike, duration: float) -> t
         turning = available_turning(controller, posture, normal)
         excess = turning.excess(weight, frequency)
         room = float(offset - normal @ controller.com[:2])
-        limits.append(EdgeLimit(normal, turning, excess, _impulse(controller, normal, room, excess, duration)))
+        limits.append(
+            EdgeLimit(normal, turning, excess, _impulse(controller, normal, room, excess, duration))
+        )
     return tuple(limits)
 
 
