@@ -38,7 +38,5 @@ def one_foot_posture(body: BodyModel, foot: str) -> FloatArray:
     )  # fmt: skip
     found = generate_posture(problem)
     if not found.succeeded:
-        raise InputError(
-            f"body {body.name!r} does not stand on the {foot.replace('_', ' ')}: {found.failure}"
-        )
+        raise InputError(f"body {body.name!r} does not stand on the {foot!r}: {found.failure}")
     return found.q

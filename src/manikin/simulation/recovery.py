@@ -109,7 +109,8 @@ class Recovery:
         trace = self.trace
         peak = {group: float(np.abs(self.turned(group)).max()) for group in trace.momentum}
         return {
-            "recovered": self.recovered, "steps": len(self.steps), "feet": self.feet, "impulse_Ns": self.impulse,
+            "recovered": self.recovered, "steps": len(self.steps), "feet": self.feet,
+            "impulse_Ns": self.impulse,
             "direction_deg": float(np.degrees(np.arctan2(self.direction[1], self.direction[0]))),
             "max_zmp_excess_m": self.zmp_excess, "final_com_height_m": self.final_height,
             "time_to_rest_s": self.time_to_rest, "max_capture_point_reach": self.capture_point,
@@ -160,16 +161,11 @@ def judge(
     moved = _foot_motion(body, controller.soles, motion, steps)
     segments = {segment.name for segment in body.segments}
     propped = [touch for touch in touches if touch.other not in segments]
+    fault = fallen or _fault(rests, moved, propped, FOOT_SLID if steps else FOOT_MOVED)
     return Recovery(
         trace=trace,
         feet=feet,
-        failure=_explained(
-            fallen or _fault(rests, moved, propped, FOOT_SLID if steps else FOOT_MOVED),
-            controller,
-            trace,
-            control_from,
-            refused,
-        ),
+        failure=_explained(fault, controller, trace, control_from, refused),
         direction=direction,
         impulse=float(sum(_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),

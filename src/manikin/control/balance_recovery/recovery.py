@@ -12,6 +12,7 @@ from manikin.contact import Contact
 from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, LinearMap, close_loop
 from manikin.control.balance_recovery.com_law import ComLaw, com_law
 from manikin.control.balance_recovery.joint_groups import joint_groups
+from manikin.control.balance_recovery.muscles import held_posture
 from manikin.control.balance_recovery.posture_control import PostureControl, posture_control
 from manikin.control.balance_recovery.problem import (
     JointBounds,
@@ -36,6 +37,7 @@ from manikin.control.reference import EffectorReference
 from manikin.control.settings import Impedance
 from manikin.control.solver import QPSolution, make_solver
 from manikin.control.tasks import orientation_task, swing_task
+from manikin.errors import InputError
 from manikin.spatial import GRAVITY, FloatArray, frozen_array
 
 FIRM = 100.0
@@ -43,9 +45,6 @@ FIRM = 100.0
 
 SETTLING = 20.0
 """Rate at which the controller damps what the feet move all the same [1/s]."""
-
-LEG_STIFFNESS = 3.0
-"""Stiffness of hips and knees before they react, at least, in ``m g h`` per radian."""
 
 ROOT = "pelvis"
 """Effector that is kept upright while a foot steps."""
@@ -200,7 +199,9 @@ class BalanceRecovery:
         """
         state = self._dynamics.evaluate(q, v)
         if not reacting:
-            return self._output(state, Strategy.STIFF, self._stiff(state))
+            tau = held_posture(state, self.standing, self.groups, self.settings, self._resting)
+            limit = self.settings.strength * self.body.torque_limit
+            return self._output(state, Strategy.STIFF, np.clip(tau, -limit, limit))
         felt = push if push is not None else FeltPush.none(self.body.nv)
         loop = close_loop(state, self.standing.feet, felt, settling=SETTLING)
         law = com_law(state, self.com, self.area, self.settings, turning=swing is None)
@@ -242,7 +243,7 @@ class BalanceRecovery:
         return RecoveryOutput(tau, strategy, share, wrenches or {}, fallback, state, problem, self.standing)
 
     def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
-        """Posture control with the ZMP well inside; None where it would leave and the program may be chosen."""
+        """Posture control with the ZMP well inside; None where it would leave."""
         calm = zmp_rows(self.area.shrunk(self.settings.posture_area), loop, state.com, 0.0)
         pull = self._pull(self.settings.posture, state)
         return posture_control(loop, calm, pull, always=self.settings.posture_control_only)
@@ -257,30 +258,6 @@ class BalanceRecovery:
         """Joint accelerations as wanted, and of locked joints what holds them."""
         weight = np.full(len(wanted), FIRM)
         return Objective(weight, self._with_locked(state, wanted, weight), np.zeros(3))
-
-    def _stiff(self, state: DynamicsState) -> FloatArray:
-        """Torques of muscles that do not react yet: springs and dampers about the posture.
-
-        A spring has the gains of :attr:`RecoverySettings.stiffness` on the inertia of what hangs on its
-        joint; hips and knees have :data:`LEG_STIFFNESS` at least, ankles a share of their own. The springs
-        act on the state at the end of the period, so that stiff ones on light segments do not swing up
-        ("stable PD", Tan et al. 2011).
-        """
-        settings, joints, period = self.settings, self.groups.joints, self.settings.period
-        inertia = np.diag(state.mass_matrix)[6:]
-        toppling = state.mass * GRAVITY * self.standing.height
-        stiffness = settings.stiffness.stiffness * inertia
-        legs = np.concatenate((joints["hip"], joints["knee"]))
-        stiffness[legs] = np.maximum(stiffness[legs], LEG_STIFFNESS * toppling)
-        stiffness[joints["ankle"]] = 0.5 * settings.ankle_stiffness * toppling
-        damping = 2.0 * np.sqrt(stiffness * inertia)
-        pull = np.zeros(len(state.v))
-        pull[6:] = stiffness * (self.posture - state.q[7:] - period * state.v[6:]) - damping * state.v[6:]
-        matrix = state.mass_matrix.copy()
-        matrix[np.arange(6, len(pull)), np.arange(6, len(pull))] += period * damping
-        spring = pull[6:] - period * damping * np.linalg.solve(matrix, pull)[6:]
-        limit = settings.strength * self.body.torque_limit
-        return np.clip(self._resting + spring, -limit, limit)
 
     def _balancing(self, state: DynamicsState, law: ComLaw) -> Objective:
         """The objective of the quadratic program (2.54) with the law of the centre of mass."""

@@ -94,9 +94,8 @@ def _ahead(state: FloatArray, goal: FloatArray, remaining: float, time: float) -
         return np.array([goal, np.zeros(2), np.zeros(2)])
     position, velocity, acceleration = state
     t = remaining
-    known = np.array([
-        goal - position - velocity * t - 0.5 * acceleration * t**2, -velocity - acceleration * t, -acceleration
-    ])  # fmt: skip
+    missing = goal - position - velocity * t - 0.5 * acceleration * t**2
+    known = np.array([missing, -velocity - acceleration * t, -acceleration])
     powers = np.array([[t**3, t**4, t**5], [3 * t**2, 4 * t**3, 5 * t**4], [6 * t, 12 * t**2, 20 * t**3]])
     third, fourth, fifth = np.linalg.solve(powers, known)
     x = time

@@ -1,13 +1,13 @@
 """How far arms, trunk and legs can help by turning: the bound of what is held without a step.
 
-A linear inverted pendulum with a flywheel (Pratt et al. 2006, Stephens 2007) whose ZMP is at the edge ``p`` of
-the soles and whose flywheel is turned with the moment ``M`` has the capture point
+A linear inverted pendulum with a flywheel (Pratt et al. 2006, Stephens 2007) whose ZMP is at the edge ``p``
+of the soles and whose flywheel is turned with the moment ``M`` has the capture point
 
     ``c' = w (c - p) - w M / (m g)``.
 
 The flywheel has to stop before the ends of its range. Turning with ``M`` for the time ``t``, on with the
-angular momentum ``L = M t`` for the time ``u``, and stopping with ``-M`` brings a capture point back to the edge
-that was outside it by
+angular momentum ``L = M t`` for the time ``u``, and stopping with ``-M`` brings a capture point back to the
+edge that was outside it by
 
     ``e = M / (m g) (1 - exp(-w t) - exp(-w (t + u)) (1 - exp(-w L / M)))``
 
@@ -90,7 +90,7 @@ def _axis(towards: FloatArray) -> FloatArray:
 
 
 def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArray) -> float:
-    """Largest moment beyond that of a ZMP at the edge: from the largest acceleration back, level and no drop."""
+    """Largest moment beyond that of a ZMP at the edge, from the largest level acceleration back."""
     problem = controller.problem_at(state)
     program, loop = problem.program, problem.loop
     push_back = np.zeros(len(program.gradient))
