@@ -18,11 +18,13 @@ from manikin.control.balance_recovery.step_placement import StepGoal, StepSettin
 from manikin.control.balance_recovery.stepping import SteppingRecovery, StepTaken
 from manikin.control.balance_recovery.strategy import Strategy, StrategySwitch
 from manikin.control.balance_recovery.support_area import SupportArea, zmp_of, zmp_rows
+from manikin.control.balance_recovery.turning import EdgeLimit, Turning, edge_limits, held_impulse
 
 __all__ = [
     "BalanceRecovery",
     "ClosedLoop",
     "ComLaw",
+    "EdgeLimit",
     "FeltPush",
     "JointBounds",
     "JointGroups",
@@ -40,11 +42,14 @@ __all__ = [
     "Strategy",
     "StrategySwitch",
     "SupportArea",
+    "Turning",
     "build_recovery_qp",
     "capture_after",
     "capture_point",
     "close_loop",
     "com_law",
+    "edge_limits",
+    "held_impulse",
     "joint_groups",
     "leg_symmetry",
     "posture_control",
