@@ -18,7 +18,7 @@ from manikin.scene import Scene
 from manikin.simulation.compile import compile_model
 from manikin.simulation.execute import CONTACT_TIME, JOINT_DAMPING
 from manikin.simulation.options import PhysicsOptions
-from manikin.simulation.recovery import Recovery, judge, trunk_lean
+from manikin.simulation.recovery import Recovery, at_rest, judge, trunk_lean
 from manikin.simulation.recovery_record import RecoveryRecorder
 from manikin.simulation.world import Push, World
 from manikin.spatial import FloatArray, finite_number
@@ -55,6 +55,9 @@ class RecoveryTask:
         duration: Of the run [s].
         q: (nq,) the posture; the body's standing one when None.
         friction: Of the soles.
+        until_at_rest: Once pushes and reaction delay are over, a body that has stood at rest for this time
+            ends the run [s]; it saves most of the time where only the verdict is wanted. None for a run to
+            its end, which alone shows all that follows, such as swung arms that come back.
     """
 
     pushes: tuple[Push, ...]
@@ -62,6 +65,7 @@ class RecoveryTask:
     duration: float = 3.5
     q: ArrayLike | None = None
     friction: float = 0.7
+    until_at_rest: float | None = None
 
 
 def push_near_com(
@@ -146,6 +150,8 @@ class _Run:
     ) -> None:
         self.body, self.task, self.settings = body, task, settings
         finite_number(task.duration, "duration [s]", above=0.0, at_most=60.0)
+        if task.until_at_rest is not None:
+            finite_number(task.until_at_rest, "until_at_rest [s]", above=0.0)
         self.q = np.array(body.standing_posture() if task.q is None else task.q, dtype=np.float64)
         physics = PhysicsOptions(
             friction=task.friction, joint_damping=JOINT_DAMPING, contact_time_constant=CONTACT_TIME
@@ -169,6 +175,8 @@ class _Run:
         feet = [name for foot in self.controller.groups.feet for name in end_segments(body, foot)]
         self.world.plan_touches([(feet, obstacle.name) for obstacle in ground])
         self.recorder = RecoveryRecorder(body, self.controller)
+        ends = [push.start + max(push.duration, settings.delay) for push in task.pushes]
+        self.rest_from = self.disturbed_until = max(ends, default=0.0)
 
     def run(self, progress: Callable[[float], None] | None) -> Recovery:
         began, control = clock.perf_counter(), 0.0
@@ -192,7 +200,7 @@ class _Run:
             if number >= 0:
                 self.recorder.add(time, output, sensed.a, wrench)
             fallen = self._fallen(output.state, lowest, time)
-            if fallen:
+            if fallen or self._stands_for_good(output.state, time):
                 break
             if progress is not None and number >= 0:
                 progress(number / count)
@@ -221,6 +229,15 @@ class _Run:
             wrench += np.concatenate((force, np.cross(point, force)))
             generalised += state.point_jacobian(push.segment, offset).T @ force
         return FeltPush(wrench, generalised)
+
+    def _stands_for_good(self, state: DynamicsState, time: float) -> bool:
+        """Whether the body has rested for as long as ends the run."""
+        wanted = self.task.until_at_rest
+        if wanted is None or time < self.disturbed_until:
+            return False
+        if not at_rest(self.body, self.controller, state.q, state.com, state.momentum[:3] / state.mass):
+            self.rest_from = time + self.substeps * self.world.model.options.timestep
+        return time - self.rest_from >= wanted - 1e-9
 
     def _fallen(self, state: DynamicsState, lowest: float, time: float) -> str:
         if self.world.divergence or not np.all(np.isfinite(state.com)):
