@@ -100,12 +100,12 @@ class MapDirectory:
         """
         asked = _asked(maps_as_dict(self.maps))
         kept = _asked(data)
-        for key in asked.keys() | kept.keys():
+        for key in dict.fromkeys((*asked, *kept)):
             if asked.get(key) != kept.get(key):
-                raise InputError(
-                    f"{self.path / MAP}: {key} is {json.dumps(kept.get(key))} there and "
-                    f"{json.dumps(asked.get(key))} now; valid: the same settings, or another directory"
-                )
+                there, now = (json.dumps(one.get(key)) for one in (kept, asked))
+                what = "other maps are compared there" if key == "compared" else (
+                    f"{key} is {there} there and {now} now")  # fmt: skip
+                raise InputError(f"{self.path / MAP}: {what}; valid: the same settings, or another directory")
         rest = {key: value for key, value in data.items() if key not in ("manikin", "complete", "compared")}
         try:
             return tuple(PushMap.from_dict(one) for one in (rest, *data["compared"]))

@@ -6,6 +6,7 @@ from textwrap import fill
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from manikin.errors import FigureError
 from manikin.figures.style import COLOURS, CYCLE, colours_of, new_figure
@@ -41,7 +42,7 @@ def push_map_figure(maps: Sequence[PushMap], soles: Sequence[FloatArray] = ()) -
     common, names = told_apart([one.conditions for one in maps])
     figure = new_figure(7.4, 7.9, "Largest impulse held, by direction of the push")
     axes = figure.add_subplot(projection="polar")
-    axes.set_title(fill(common, 96), fontsize=8.5, loc="left", color=COLOURS["soft"], pad=22)
+    axes.set_title(fill(common, 96), fontsize=8.5, color=COLOURS["soft"], pad=8)
     top = 1.08 * max(float(np.nanmax(one.held, initial=0.0)) for one in maps) or 1.0
     _dress(axes, top)
     _draw_soles(axes, soles, SOLES * top)
@@ -81,11 +82,13 @@ def _dress(axes: Axes, top: float) -> None:
     axes.set_ylim(0.0, top)
     axes.set_rlabel_position(202.5)  # type: ignore[attr-defined]
     axes.set_thetagrids(  # type: ignore[attr-defined]
-        range(0, 360, 45), ["ahead", "45°", "left, 90°", "135°", "back, 180°", "225°", "right, 270°", "315°"]
+        range(0, 360, 45), ["ahead", "45°", "left\n90°", "135°", "back, 180°", "225°", "right\n270°", "315°"]
     )
     axes.tick_params(labelsize=8, colors=COLOURS["soft"])
+    axes.tick_params(axis="x", pad=10)
+    ticks = np.array(MaxNLocator(5).tick_values(0.0, top))
+    axes.set_yticks(ticks[(ticks > 0.0) & (ticks < top)])
     axes.grid(True, color="#E3E3E3", linewidth=0.6)
-    axes.locator_params(axis="y", nbins=6)
     axes.yaxis.set_major_formatter("{x:g} N.s")
     axes.spines["polar"].set_color(COLOURS["soft"])
     axes.set_axisbelow(True)

@@ -11,24 +11,27 @@ def told_apart(maps: Sequence[Mapping[str, Any]]) -> tuple[str, list[str]]:
         maps: Conditions of each, as in its JSON.
 
     Returns:
-        Words for what is common, and for each map those for what differs; empty where nothing does.
+        Words for what is common, but for what goes without saying, and for each map those for what
+        differs; empty where nothing does.
     """
     spoken = [_words(one) for one in maps]
     differ = [len({words[place] for words in spoken}) > 1 for place in range(len(spoken[0]))]
     common = [word for word, other in zip(spoken[0], differ, strict=True) if not other]
     names = [[word for word, other in zip(words, differ, strict=True) if other] for words in spoken]
-    return ", ".join(filter(None, common)), [", ".join(filter(None, name)) for name in names]
+    usual = {"nothing locked", "with the program", "usual strength"}
+    return ", ".join(word for word in common if word not in usual), [", ".join(name) for name in names]
 
 
 def _words(one: Mapping[str, Any]) -> list[str]:
     """One text per condition, the same conditions in every list."""
     locked = " and ".join(one["locked"])
+    strength = one["strength"]
     return [
         _body(one["body"]),
         f"feet {one['feet']}",
         f"{locked} locked" if locked else "nothing locked",
         "posture control only" if one["posture_control_only"] else "with the program",
-        f"{one['strength']:g} times the strength",
+        "usual strength" if strength == 1.0 else f"{strength:g} times the strength",
         f"reaction after {one['delay_s']:g} s",
         f"push of {one['duration_s']:g} s",
     ]

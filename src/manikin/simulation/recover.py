@@ -18,6 +18,7 @@ from manikin.scene import Scene
 from manikin.simulation.compile import compile_model
 from manikin.simulation.execute import CONTACT_TIME, JOINT_DAMPING
 from manikin.simulation.options import PhysicsOptions
+from manikin.simulation.quiet_engine import quiet_engine
 from manikin.simulation.recovery import Recovery, at_rest, judge, trunk_lean
 from manikin.simulation.recovery_record import RecoveryRecorder
 from manikin.simulation.world import Push, World
@@ -139,7 +140,8 @@ def recover(
         BodyError: If it does not stand on two legs.
     """
     run = _Run(body, task, settings or RecoverySettings(), scene)
-    return run.run(progress)
+    with quiet_engine():
+        return run.run(progress)
 
 
 class _Run:
