@@ -3,7 +3,7 @@
 import math
 import time as clock
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -11,7 +11,14 @@ from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.limb import end_segments
-from manikin.control.balance_recovery import BalanceRecovery, FeltPush, RecoverySettings, joint_groups
+from manikin.control.balance_recovery import (
+    BalanceRecovery,
+    FeltPush,
+    RecoverySettings,
+    SteppingRecovery,
+    StepSettings,
+    joint_groups,
+)
 from manikin.control.dynamics import DynamicsState
 from manikin.errors import InputError
 from manikin.scene import Scene
@@ -56,6 +63,8 @@ class RecoveryTask:
         duration: Of the run [s].
         q: (nq,) the posture; the body's standing one when None.
         friction: Of the soles.
+        support: Effectors of the feet that carry; both when None.
+        steps: How many steps may be taken; feet that are held take none.
         until_at_rest: Once pushes and reaction delay are over, a body that has stood at rest for this time
             ends the run [s]; it saves most of the time where only the verdict is wanted. None for a run to
             its end, which alone shows all that follows, such as swung arms that come back.
@@ -66,6 +75,8 @@ class RecoveryTask:
     duration: float = 3.5
     q: ArrayLike | None = None
     friction: float = 0.7
+    support: tuple[str, ...] | None = None
+    steps: int = 0
     until_at_rest: float | None = None
 
 
@@ -159,12 +170,15 @@ class _Run:
             friction=task.friction, joint_damping=JOINT_DAMPING, contact_time_constant=CONTACT_TIME
         )
         damping = np.full(body.nv - 6, JOINT_DAMPING)
+        welded = task.feet is Feet.HELD
+        if welded and task.steps:
+            raise InputError(f"{task.steps} steps of held feet; valid: free feet, or no step")
         self.controller = BalanceRecovery(
-            body, self.q, settings, friction=task.friction, joint_damping=damping
-        )
+            body, self.q, settings, support=task.support, friction=task.friction, joint_damping=damping,
+        )  # fmt: skip
         _check_standing(self.controller, self.q)
         held = None
-        if task.feet is Feet.HELD:
+        if welded:
             held = {c.effector: (c.rotation_contact_to_world, c.position) for c in self.controller.soles}
         ground = scene or Scene([], floor_height=self.controller.area.height)
         self.world = World(compile_model(body, ground, physics, held))
@@ -177,6 +191,10 @@ class _Run:
         feet = [name for foot in self.controller.groups.feet for name in end_segments(body, foot)]
         self.world.plan_touches([(feet, obstacle.name) for obstacle in ground])
         self.recorder = RecoveryRecorder(body, self.controller)
+        self.grounds = tuple(ground.names)
+        self.stepping = SteppingRecovery(
+            body, self.controller, ground, replace(StepSettings(), most=task.steps)
+        )  # fmt: skip
         ends = [push.start + max(push.duration, settings.delay) for push in task.pushes]
         self.rest_from = self.disturbed_until = max(ends, default=0.0)
 
@@ -191,7 +209,9 @@ class _Run:
             time = number * period
             before = clock.perf_counter()
             q, v = self.world.q, self.world.v
-            output = self.controller.step(q, v, self._felt(q, time), reacting=self._reacts(time))
+            output = self.stepping.step(
+                time, q, v, self._felt(q, time), reacting=self._reacts(time), touching=self._touching()
+            )
             control += clock.perf_counter() - before
             if number == 0:
                 self.world.forget()
@@ -200,7 +220,7 @@ class _Run:
             self.world.advance(output.tau, self.substeps - 1)
             wrench = self.world.mean_wrench()
             if number >= 0:
-                self.recorder.add(time, output, sensed.a, wrench)
+                self.recorder.add(time, output, sensed, wrench, held=self.task.feet is Feet.HELD)
             fallen = self._fallen(output.state, lowest, time)
             if fallen or self._stands_for_good(output.state, time):
                 break
@@ -209,8 +229,16 @@ class _Run:
         trace = self.recorder.trace(1e3 * control / (number + settle + 1))
         return judge(
             self.body, self.controller, trace, self.task.pushes, str(self.task.feet), fallen,
-            self.world.touches, clock.perf_counter() - began,
+            self.world.touches, clock.perf_counter() - began, tuple(self.stepping.steps),
+            self.stepping.refused,
         )  # fmt: skip
+
+    def _touching(self) -> dict[str, bool]:
+        """Whether each foot touches anything of the scene."""
+        return {
+            foot: any(self.world.touching(end_segments(self.body, foot), name) for name in self.grounds)
+            for foot in self.controller.groups.feet
+        }
 
     def _reacts(self, time: float) -> bool:
         """Not from the beginning of the first push until the delay is over."""

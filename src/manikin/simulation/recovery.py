@@ -8,7 +8,14 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
-from manikin.control.balance_recovery import BalanceRecovery, JointGroups, Strategy, capture_point
+from manikin.control.balance_recovery import (
+    BalanceRecovery,
+    JointGroups,
+    StepTaken,
+    Strategy,
+    capture_point,
+)
+from manikin.motion import Motion
 from manikin.simulation.recovery_record import RecoveryTrace
 from manikin.simulation.world import Push, Touch
 from manikin.spatial import FloatArray
@@ -26,6 +33,9 @@ STANDS_SPEED = 0.1
 FOOT_MOVED = 0.02
 """A foot that ends farther than this from where it stood has moved [m]."""
 
+FOOT_SLID = 0.1
+"""After a step a foot that slides by up to this is still one to stand on [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
@@ -41,9 +51,10 @@ class Recovery:
         time_to_rest: From the first push until the body stands at rest to the end [s]; None if it does not.
         final_height: Of the centre of mass above the ground at the end [m].
         capture_point: Farthest reach of the capture point over the support area; 1 is its edge.
-        foot_motion: Farthest that a foot is from its place at the end [m].
+        foot_motion: Farthest that a foot is, in the end, from where it was put down [m].
         control_from: When the control acted first after the first push began [s].
-        soles: Where the feet stood.
+        soles: Where the feet that carry stand in the end.
+        steps: Steps that were taken.
         wall: Wall time [s].
     """
 
@@ -59,6 +70,7 @@ class Recovery:
     foot_motion: float
     control_from: float
     soles: tuple[Contact, ...]
+    steps: tuple[StepTaken, ...]
     wall: float
 
     @property
@@ -97,11 +109,12 @@ class Recovery:
         trace = self.trace
         peak = {group: float(np.abs(self.turned(group)).max()) for group in trace.momentum}
         return {
-            "recovered": self.recovered, "steps": 0, "feet": self.feet, "impulse_Ns": self.impulse,
+            "recovered": self.recovered, "steps": len(self.steps), "feet": self.feet, "impulse_Ns": self.impulse,
             "direction_deg": float(np.degrees(np.arctan2(self.direction[1], self.direction[0]))),
             "max_zmp_excess_m": self.zmp_excess, "final_com_height_m": self.final_height,
             "time_to_rest_s": self.time_to_rest, "max_capture_point_reach": self.capture_point,
             "max_foot_motion_m": self.foot_motion,
+            "steps_taken": [step.summary() for step in self.steps],
             "posture_share": self.strategy_share(Strategy.POSTURE),
             "program_share": self.strategy_share(Strategy.PROGRAM),
             "angular_momentum_share": self.momentum_shares(), "peak_angular_momentum_Nms": peak,
@@ -120,6 +133,8 @@ def judge(
     fallen: str,
     touches: Sequence[Touch],
     wall: float,
+    steps: tuple[StepTaken, ...] = (),
+    refused: str = "",
 ) -> Recovery:
     """Say what became of a push.
 
@@ -132,21 +147,29 @@ def judge(
         fallen: Why the run was ended before its time; empty when it was not.
         touches: Unplanned touches; those of the body with itself, as hand and thigh, are no support.
         wall: Wall time [s].
+        steps: Steps that were taken.
+        refused: Why a step that was needed was not taken.
     """
     motion, area = trace.motion, controller.area
     start = min((push.start for push in pushes), default=0.0)
     control_from = start + controller.settings.delay
     direction = _direction(pushes)
     rests = _rests(body, controller, trace)
-    excess = -area.inside(trace.zmp)
+    excess = -trace.zmp_inside
     counted = (motion.time >= control_from - 1e-9) & np.isfinite(excess)
-    moved = _foot_motion(body, controller, motion.q[-1])
+    moved = _foot_motion(body, controller.soles, motion, steps)
     segments = {segment.name for segment in body.segments}
     propped = [touch for touch in touches if touch.other not in segments]
     return Recovery(
         trace=trace,
         feet=feet,
-        failure=_explained(fallen or _fault(rests, moved, propped), controller, trace, control_from),
+        failure=_explained(
+            fallen or _fault(rests, moved, propped, FOOT_SLID if steps else FOOT_MOVED),
+            controller,
+            trace,
+            control_from,
+            refused,
+        ),
         direction=direction,
         impulse=float(sum(_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),
@@ -156,6 +179,7 @@ def judge(
         foot_motion=moved,
         control_from=control_from,
         soles=controller.soles,
+        steps=steps,
         wall=wall,
     )
 
@@ -195,24 +219,28 @@ def _rests(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -
     return np.array([at_rest(body, controller, *sample) for sample in samples])
 
 
-def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch]) -> str:
+def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch], most: float) -> str:
     if touches:
         return f"does not stand on its feet alone: {touches[0]}"
     if not rests[-1]:
         return "does not stand at rest and upright at the end"
-    if moved > FOOT_MOVED:
+    if moved > most:
         return f"a foot has moved by {moved:.3f} m"
     return ""
 
 
-def _explained(fault: str, controller: BalanceRecovery, trace: RecoveryTrace, control_from: float) -> str:
+def _explained(
+    fault: str, controller: BalanceRecovery, trace: RecoveryTrace, control_from: float, refused: str
+) -> str:
     """The fault with where the capture point was when the control began, if that was outside."""
     if not fault:
         return ""
+    if refused:
+        fault = f"{fault}; no step: {refused}"
     height = controller.com[2] - controller.area.height
     first = min(int(np.searchsorted(trace.motion.time, control_from - 1e-9)), len(trace.motion.time) - 1)
     point = capture_point(trace.motion.com[first], trace.com_velocity[first], height)
-    outside = -float(controller.area.inside(point))
+    outside = -float(trace.standings[0].area.inside(point))
     if outside <= 0.0:
         return fault
     return f"{fault}; the capture point was {outside:.3f} m beyond the soles when the control began"
@@ -226,17 +254,22 @@ def _time_to_rest(rests: np.ndarray, since: FloatArray) -> float | None:
     return float(max(0.0, since[0 if not len(restless) else restless[-1] + 1]))
 
 
-def _foot_motion(body: BodyModel, controller: BalanceRecovery, q: FloatArray) -> float:
-    state = Configuration(body, q)
+def _foot_motion(
+    body: BodyModel, soles: Sequence[Contact], motion: Motion, steps: Sequence[StepTaken]
+) -> float:
+    """Farthest that a foot is in the end from where it was put down, or where it was in the beginning [m]."""
+    first, last = Configuration(body, motion.q[0]), Configuration(body, motion.q[-1])
+    places = {contact.effector: first.effector_placement(contact.effector)[1] for contact in soles}
+    places |= {step.foot: step.position for step in steps}
     return max(
-        float(np.linalg.norm(state.effector_placement(c.effector)[1] - c.position)) for c in controller.soles
+        float(np.linalg.norm(last.effector_placement(name)[1] - place)) for name, place in places.items()
     )
 
 
 def _capture_reach(controller: BalanceRecovery, trace: RecoveryTrace) -> float:
     height = controller.com[2] - controller.area.height
     ahead = capture_point(trace.motion.com, trace.com_velocity, height)
-    return max(controller.area.reach(point) for point in ahead)
+    return max(standing.area.reach(point) for standing, point in zip(trace.standings, ahead, strict=True))
 
 
 def _direction(pushes: Sequence[Push]) -> FloatArray:

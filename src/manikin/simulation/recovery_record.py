@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 
 from manikin.balance import wrench_polytope
 from manikin.body import BodyModel
+from manikin.body.limb import end_segments
 from manikin.contact import Stance
-from manikin.control.balance_recovery import BalanceRecovery, RecoveryOutput, zmp_of
+from manikin.control.balance_recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
 from manikin.motion import Motion
+from manikin.simulation.world import Sensed
 from manikin.spatial import GRAVITY, FloatArray, skew
 
 
@@ -19,9 +21,12 @@ class RecoveryTrace:
     """Samples of a recovery, one per control step.
 
     Attributes:
-        motion: What happened; ``contact_force`` is what the controller expected of each foot and ``margin``
-            that of the measured wrench of the ground in the polytope of both soles.
+        motion: What happened; ``contact_force`` is what the ground did to each foot, measured on free feet
+            and, on held ones, the measured whole in equal shares, and ``margin`` that of the measured wrench
+            of the ground in the polytope of the soles that carry.
         zmp: (n, 2) of the measured force of the ground over the step, NaN where nothing carries [m].
+        zmp_inside: (n,) distance of the ZMP to the edge of the soles that carry, negative outside [m].
+        standings: n ways to stand about which the balance was kept.
         strategies: (n,) what decided the torques.
         gain_share: (n,) share of the largest posture gains.
         com_velocity: (n, 3) [m/s].
@@ -33,6 +38,8 @@ class RecoveryTrace:
 
     motion: Motion
     zmp: FloatArray
+    zmp_inside: FloatArray
+    standings: tuple[Standing, ...]
     strategies: NDArray[np.str_]
     gain_share: FloatArray
     com_velocity: FloatArray
@@ -56,18 +63,35 @@ class RecoveryRecorder:
         """Start empty."""
         self._body, self._controller = body, controller
         self._momenta = SegmentMomenta(body, controller.groups.segments)
+        self._ends = {foot: end_segments(body, foot) for foot in controller.groups.feet}
         self._rows: list[tuple[float, RecoveryOutput, FloatArray, FloatArray]] = []
+        self._forces: list[FloatArray] = []
 
-    def add(self, time: float, output: RecoveryOutput, a: FloatArray, wrench: FloatArray) -> None:
+    def add(
+        self, time: float, output: RecoveryOutput, sensed: Sensed, wrench: FloatArray, *, held: bool = False
+    ) -> None:
         """Add a step.
 
         Args:
             time: Of its beginning [s].
             output: What the controller decided then.
-            a: (nv,) measured acceleration.
+            sensed: What was felt in the first engine step after it.
             wrench: (6,) mean force and moment of the ground about the world's origin.
+            held: Whether the feet are held, which is not felt as a touch.
         """
-        self._rows.append((time, output, a, wrench))
+        self._rows.append((time, output, sensed.a, wrench))
+        self._forces.append(np.array([
+            self._shared(wrench, output.state.frames[foot].position, foot in output.standing.feet) if held
+            else sensed.wrench(output.state.frames[foot].position, names)
+            for foot, names in self._ends.items()
+        ]))  # fmt: skip
+
+    def _shared(self, wrench: FloatArray, position: FloatArray, carries: bool) -> FloatArray:
+        """Equal share of a foot that is held in the wrench of the ground, about its sole's middle."""
+        if not carries:
+            return np.zeros(6)
+        share = wrench / len(self._controller.soles)
+        return np.concatenate((share[:3], share[3:] - skew(position) @ share[:3]))
 
     def trace(self, control_ms: float) -> RecoveryTrace:
         """Turn the steps into a trace."""
@@ -77,9 +101,14 @@ class RecoveryRecorder:
         torque = np.array([output.tau for output in outputs])
         speed = np.array([state.v[6:] for state in states])
         joints = self._controller.groups.joints
+        zmp = np.array([self._zmp(wrench) for *_, wrench in self._rows])
         return RecoveryTrace(
             motion=self._motion(torque),
-            zmp=np.array([self._zmp(wrench) for *_, wrench in self._rows]),
+            zmp=zmp,
+            zmp_inside=np.array(
+                [float(o.standing.area.inside(point)) for o, point in zip(outputs, zmp, strict=True)]
+            ),
+            standings=tuple(output.standing for output in outputs),
             strategies=np.array([str(output.strategy) for output in outputs]),
             gain_share=np.array([output.gain_share for output in outputs]),
             com_velocity=np.array([state.momentum[:3] / state.mass for state in states]),
@@ -98,10 +127,8 @@ class RecoveryRecorder:
     def _motion(self, torque: FloatArray) -> Motion:
         outputs = [output for _, output, _, _ in self._rows]
         states = [output.state for output in outputs]
-        soles = self._controller.soles
-        wrenches = np.array([wrench for *_, wrench in self._rows])
-        stance = Stance(soles, 3.0 * self._body.mass * GRAVITY)
-        expected = np.array([output.wrenches for output in outputs])
+        feet = self._controller.groups.feet
+        forces = np.array(self._forces)
         return Motion(
             time=np.array([time for time, *_ in self._rows]),
             q=np.array([state.q for state in states]),
@@ -110,12 +137,23 @@ class RecoveryRecorder:
             tau=np.concatenate((np.zeros((len(torque), 6)), torque), axis=1),
             com=np.array([state.com for state in states]),
             angular_momentum=np.array([state.momentum[3:] for state in states]),
-            margin=np.asarray(wrench_polytope(stance).margin(wrenches)),
-            support=np.linalg.norm(expected[..., :3], axis=-1) > 1.0,
-            contact_force=expected,
-            contact_names=tuple(contact.effector for contact in soles),
+            margin=self._margins(),
+            support=np.linalg.norm(forces[..., :3], axis=-1) > 1.0,
+            contact_force=forces,
+            contact_names=feet,
             joint_names=self._body.joint_names,
         )
+
+    def _margins(self) -> FloatArray:
+        """(n,) margins of the measured wrenches, each in the polytope of the soles that carried."""
+        wrenches = np.array([wrench for *_, wrench in self._rows])
+        standings = [output.standing for _, output, *_ in self._rows]
+        margins = np.empty(len(wrenches))
+        for standing in dict.fromkeys(standings):
+            stance = Stance(standing.soles, 3.0 * self._body.mass * GRAVITY)
+            chosen = np.array([other is standing for other in standings])
+            margins[chosen] = wrench_polytope(stance).margin(wrenches[chosen])
+        return margins
 
 
 class SegmentMomenta:

@@ -13,6 +13,9 @@ from manikin.control.balance_recovery.problem import (
 )
 from manikin.control.balance_recovery.recovery import BalanceRecovery, RecoveryOutput
 from manikin.control.balance_recovery.settings import RecoverySettings
+from manikin.control.balance_recovery.standing import Standing, sole_at
+from manikin.control.balance_recovery.step_placement import StepGoal, StepSettings, capture_after, step_goals
+from manikin.control.balance_recovery.stepping import SteppingRecovery, StepTaken
 from manikin.control.balance_recovery.strategy import Strategy, StrategySwitch
 from manikin.control.balance_recovery.support_area import SupportArea, zmp_of, zmp_rows
 
@@ -29,16 +32,24 @@ __all__ = [
     "RecoveryOutput",
     "RecoveryProblem",
     "RecoverySettings",
+    "Standing",
+    "StepGoal",
+    "StepSettings",
+    "StepTaken",
+    "SteppingRecovery",
     "Strategy",
     "StrategySwitch",
     "SupportArea",
     "build_recovery_qp",
+    "capture_after",
     "capture_point",
     "close_loop",
     "com_law",
     "joint_groups",
     "leg_symmetry",
     "posture_control",
+    "sole_at",
+    "step_goals",
     "zmp_of",
     "zmp_rows",
 ]

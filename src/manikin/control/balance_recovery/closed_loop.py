@@ -28,6 +28,11 @@ class LinearMap:
     matrix: FloatArray
     offset: FloatArray
 
+    @classmethod
+    def none(cls, size: int) -> "LinearMap":
+        """No value at all, of ``size`` accelerations."""
+        return cls(np.zeros((0, size)), np.zeros(0))
+
     def joined(self, other: "LinearMap") -> "LinearMap":
         """Both values, one after the other."""
         return LinearMap(

@@ -50,7 +50,14 @@ class ComLaw:
     need: float
 
 
-def com_law(state: DynamicsState, home: FloatArray, area: SupportArea, settings: RecoverySettings) -> ComLaw:
+def com_law(
+    state: DynamicsState,
+    home: FloatArray,
+    area: SupportArea,
+    settings: RecoverySettings,
+    *,
+    turning: bool = True,
+) -> ComLaw:
     """Find the wanted acceleration of the centre of mass.
 
     Args:
@@ -58,20 +65,23 @@ def com_law(state: DynamicsState, home: FloatArray, area: SupportArea, settings:
         home: (3,) where the centre of mass shall be [m].
         area: Where the ZMP may be.
         settings: Gains.
+        turning: Whether arms and trunk may turn where the ZMP is not enough; otherwise they are stopped.
     """
     height, weight = home[2] - area.height, state.mass * GRAVITY
     frequency = np.sqrt(GRAVITY / height)
     velocity = state.momentum[:3] / state.mass
-    turning = np.array([state.momentum[4], -state.momentum[3]])
-    amount = float(np.linalg.norm(turning))
+    turned = np.array([state.momentum[4], -state.momentum[3]])
+    amount = float(np.linalg.norm(turned))
     most = settings.turning * weight
     settled = capture_point(state.com, velocity, height)
     if amount > 0.0:
-        settled = settled + settings.turning * (1.0 - np.exp(-frequency * amount / most)) * turning / amount
+        settled = settled + settings.turning * (1.0 - np.exp(-frequency * amount / most)) * turned / amount
     need = float(np.clip((area.reach(settled) - NEED[0]) / (NEED[1] - NEED[0]), 0.0, 1.0))
+    if not turning:
+        need = 0.0
     zmp = area.nearest(settled + settings.calm / frequency * (settled - home[:2]), settings.sole_inset)
     outward = settled - area.centre
-    stopping = turning / max(STOPPING, amount / most)
+    stopping = turned / max(STOPPING, amount / most)
     moment = need * most * outward / max(float(np.linalg.norm(outward)), 1e-9) - (1.0 - need) * stopping
     law = np.empty(3)
     law[:2] = frequency**2 * (state.com[:2] - zmp) - moment / (state.mass * height)

@@ -14,6 +14,7 @@ from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, L
 from manikin.control.build_qp import QuadraticProgram
 from manikin.control.contact_forces import ContactForceBasis
 from manikin.control.dynamics import DynamicsState
+from manikin.control.tasks import AccelerationTask
 from manikin.spatial import FloatArray
 
 FORCE_WEIGHT = 1e-5
@@ -49,6 +50,7 @@ class Objective:
         law: (3,) wanted acceleration of the centre of mass [m/s^2].
         com_weight: (3,) of its squared error; 0 leaves it free.
         upward: Slope of the upward acceleration.
+        tasks: Further squares, of generalised accelerations.
     """
 
     weight: FloatArray
@@ -56,6 +58,7 @@ class Objective:
     law: FloatArray
     com_weight: FloatArray = field(default_factory=lambda: np.zeros(3))
     upward: float = 0.0
+    tasks: tuple[AccelerationTask, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +85,16 @@ class RecoveryProblem:
         lower[rows], upper[rows] = -np.inf, np.inf
         return replace(self.program, rows_lower=lower, rows_upper=upper)
 
+    def loose(self) -> QuadraticProgram:
+        """Return the program with the torque limits alone: the ground may pull, the ZMP may be anywhere."""
+        program = self.relaxed()
+        first, _ = self.relaxable
+        lower, upper = program.rows_lower.copy(), program.rows_upper.copy()
+        after_torques = 6 + len(self.torque.offset)
+        lower[after_torques:first], upper[after_torques:first] = -np.inf, np.inf
+        lowest = np.full_like(program.lower, -np.inf)
+        return replace(program, rows_lower=lower, rows_upper=upper, lower=lowest)
+
 
 def build_recovery_qp(
     state: DynamicsState,
@@ -92,6 +105,8 @@ def build_recovery_qp(
     zmp: LinearMap,
     symmetry: LinearMap,
     objective: Objective,
+    *,
+    pulling: bool = False,
 ) -> RecoveryProblem:
     """Build the program of one step.
 
@@ -104,6 +119,7 @@ def build_recovery_qp(
         zmp: Rows that are not positive when the ZMP is inside (2.57-2.60).
         symmetry: Rows that are not positive when the legs grow no less alike (2.63-2.64).
         objective: What is minimised.
+        pulling: Whether the ground may pull as well.
     """
     k, joints = loop.size, len(state.v) - 6
     generalised = np.concatenate([basis.generalised for basis in contacts], axis=1)
@@ -129,7 +145,8 @@ def build_recovery_qp(
     part = slice(part.stop, part.stop + len(symmetry.offset))
     rows[part, :k], upper[part] = symmetry.matrix, -symmetry.offset
 
-    variable_lower = np.concatenate((np.full(k, -np.inf), np.zeros(forces)))
+    least = -np.inf if pulling else 0.0
+    variable_lower = np.concatenate((np.full(k, -np.inf), np.full(forces, least)))
     hessian, gradient = _cost(loop, objective, size)
     program = QuadraticProgram(
         hessian, gradient, rows, lower, upper, variable_lower, np.full(size, np.inf), 6
@@ -171,5 +188,10 @@ def _cost(loop: ClosedLoop, objective: Objective, size: int) -> tuple[FloatArray
     hessian[:k, :k] += pulled.T @ loop.com.matrix
     gradient[:k] += (loop.com.offset - objective.law) @ pulled
     gradient[:k] -= objective.upward * loop.com.matrix[2]
+    for task in objective.tasks:
+        moved = task.matrix @ loop.acceleration.matrix
+        weighted = moved * task.weight[:, None]
+        hessian[:k, :k] += weighted.T @ moved
+        gradient[:k] += (task.matrix @ loop.acceleration.offset - task.target) @ weighted
     hessian[np.arange(k, size), np.arange(k, size)] = FORCE_WEIGHT
     return hessian, gradient

@@ -7,6 +7,7 @@ from manikin.errors import InputError
 from manikin.spatial import finite_number
 
 _HEIGHT, _UNWINDING = Impedance(20.0, 9.0), Impedance(4.0, 4.0)
+_SWING = Impedance(900.0, 60.0)
 _POSTURE, _STIFFNESS = Impedance(100.0, 20.0), Impedance(400.0, 40.0)
 
 
@@ -31,6 +32,8 @@ class RecoverySettings:
         arm_weight: Of a squared acceleration of an arm's joint, against 1 of any other: the diagonal of
             ``C_theta`` (2.27).
         upward: Wanted acceleration of the centre of mass upward, as the slope of the objective (2.54).
+        swing: Gains with which a stepping foot follows its way.
+        swing_weight: Of its squared error, and of that of the pelvis' tilt meanwhile.
         unwinding: Of the objective's joint accelerations: they are measured from those that bring the joints
             gently back to the posture; the thesis has none, so that swung arms go on to their stops.
         posture: Largest gains of the posture control (2.65); their ratio is kept where they must be less.
@@ -64,6 +67,8 @@ class RecoverySettings:
     height_weight: float = 1e3
     arm_weight: float = 0.03
     upward: float = 1.0
+    swing: Impedance = _SWING
+    swing_weight: float = 1e3
     unwinding: Impedance = _UNWINDING
     posture: Impedance = _POSTURE
     stiffness: Impedance = _STIFFNESS

@@ -16,6 +16,8 @@ class Strategy(StrEnum):
     """Posture control."""
     PROGRAM = "program"
     """The quadratic program of the balance."""
+    STEP = "step"
+    """The same program while a foot steps."""
 
 
 class StrategySwitch:

@@ -65,6 +65,21 @@ class SupportArea:
         room = offsets - normals @ self.centre
         return self.centre + (point - self.centre) / max(1.0, float(np.max(along / room)))
 
+    def closest(self, point: FloatArray, inset: float = 0.0) -> FloatArray:
+        """Point (2,) of the area, less ``inset`` [m] along its edge, that is nearest to a point (2,)."""
+        normals, offsets = self.half_planes(inset)
+        if np.all(normals @ point <= offsets):
+            return point.copy()
+        # Corner i of the smaller area is where the edges that meet in corner i of the area come to.
+        before = np.roll(normals, 1, axis=0), np.roll(offsets, 1)
+        corners = np.linalg.solve(
+            np.stack((before[0], normals), axis=1), np.stack((before[1], offsets), axis=1)[..., None]
+        )[..., 0]
+        edges = np.roll(corners, -1, axis=0) - corners
+        along = np.sum((point - corners) * edges, axis=1) / np.sum(edges**2, axis=1)
+        nearest = corners + np.clip(along, 0.0, 1.0)[:, None] * edges
+        return nearest[np.argmin(np.linalg.norm(nearest - point, axis=1))]
+
     def half_planes(self, inset: float = 0.0) -> tuple[FloatArray, FloatArray]:
         """Unit outward normals (k, 2) and offsets (k,) with ``normals @ p <= offsets`` inside."""
         along = np.roll(self.corners, -1, axis=0) - self.corners
