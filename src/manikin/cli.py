@@ -1,28 +1,36 @@
-"""The command line: ``manikin scenarios | run | compare | view | balance | contact | export``.
+"""The command line: ``manikin scenarios | run | push | compare | view | balance | contact | export``.
 
 Exit status: 0 done, 2 bad input (one line on standard error), 3 a run that ended in an
 explained failure, 130 interrupted.  With ``--json`` standard output holds exactly one
 JSON object; everything else goes to standard error.
 """
 
-import ctypes
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from manikin.commands.console import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    JsonOption,
+    complain,
+    flattened,
+    print_json,
+    print_table,
+    refuse,
+    stdout_kept_clean,
+)
+from manikin.commands.job import print_summary, run_job
+from manikin.commands.push import push
 from manikin.errors import InputError, ManikinError
 from manikin.interruption import Interruption
 from manikin.version import __version__
-
-if TYPE_CHECKING:
-    from manikin.scenarios import Scenario
-
-DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
 
 ALL = "all"
 """In place of a scenario: every built-in one with its variants."""
@@ -38,7 +46,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 ScenarioArgument = Annotated[
     str,
     typer.Argument(
@@ -62,13 +69,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise KeyboardInterrupt
         return status if isinstance(status, int) else DONE
     except typer.TyperException as error:
-        return _complain(f"{error.format_message().rstrip('.')}; see 'manikin --help'", BAD_INPUT)
+        return complain(f"{error.format_message().rstrip('.')}; see 'manikin --help'", BAD_INPUT)
     except InputError as error:
-        return _complain(str(error), BAD_INPUT)
+        return complain(str(error), BAD_INPUT)
     except ManikinError as error:
-        return _complain(str(error), FAILED)
+        return complain(str(error), FAILED)
     except (KeyboardInterrupt, typer.Abort):
-        return _complain("interrupted; the files of finished stages are kept", INTERRUPTED)
+        return complain("interrupted; the files of finished stages are kept", INTERRUPTED)
     except BrokenPipeError:
         # The reader of our output has gone, as in "manikin ... | head"; nobody is left to tell.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -94,7 +101,7 @@ def scenarios(json: JsonOption = False) -> None:
     found = list_scenarios()
     variants = {name: list_variants(name) for name in found}
     if json:
-        _print_json({"scenarios": found, "variants": variants})
+        print_json({"scenarios": found, "variants": variants})
         return
     rows: dict[str, str] = {}
     for name, description in found.items():
@@ -140,15 +147,15 @@ def run(
 ) -> int:
     """Plan a scenario, execute it in the physics engine and report."""
     if scenario == ALL:
-        _refuse(variant is not None, "--variant", "every variant is run")
-        _refuse(bool(overrides), "--set", "it belongs to one scenario")
+        refuse(variant is not None, "--variant", "every variant is run")
+        refuse(bool(overrides), "--set", "it belongs to one scenario")
         given = {"--seed": seed, "--stature": stature, "--mass": mass, "--sex": sex}
         words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
         _check_values(seed, stature, mass, sex)
         directory = out if out is not None else None if json else Path("runs")
         asked = {"stature_m": stature, "seed": seed}
         return _run_all(directory, asked, tuple(words), context.obj, draw=figures, workers=jobs, json=json)
-    _refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
+    refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
     from manikin.scenarios import load_scenario
 
     job = load_scenario(scenario, variant, overrides or ())
@@ -156,12 +163,15 @@ def run(
     if seed is not None:
         job = job.with_seed(seed)
     directory = out if out is not None else None if json else Path("runs") / job.name
-    summary = _run(job, directory, context.obj, draw=figures)
+    summary = run_job(job, directory, context.obj, draw=figures)
     if json:
-        _print_json(summary)
+        print_json(summary)
     else:
-        _print_summary(summary, directory)
+        print_summary(summary, directory)
     return DONE if summary["succeeded"] else FAILED
+
+
+app.command()(push)
 
 
 @app.command()
@@ -184,10 +194,10 @@ def compare(
         from manikin.products import write_comparison_products
         from manikin.progress import StageProgress
 
-        with _stdout_kept_clean(), StageProgress() as bars:
+        with stdout_kept_clean(), StageProgress() as bars:
             write_comparison_products(comparison, out, bars)
     if json:
-        _print_json(comparison.as_dict())
+        print_json(comparison.as_dict())
         return
     from manikin.comparison.report import report, report_console
 
@@ -253,12 +263,12 @@ def balance(
     from manikin.scenarios.stance_file import load_stance_file
 
     question = load_stance_file(stance)
-    with _stdout_kept_clean():
+    with stdout_kept_clean():
         report = question.evaluate().as_dict(polytope=polytope and json)
     if json:
-        _print_json(report)
+        print_json(report)
     else:
-        _print_table(_flat(report))
+        print_table(flattened(report))
 
 
 @app.command()
@@ -301,7 +311,7 @@ def contact(
     from manikin.scenarios.start import start_posture
 
     job = load_scenario(scenario)
-    with _stdout_kept_clean():
+    with stdout_kept_clean():
         body, scene = job.build_body(), job.build_scene()
         q = start_posture(job, body, scene, at=at, heading_deg=heading, posture=posture)
         question = ContactQuestion.of(
@@ -314,9 +324,9 @@ def contact(
             write_contact_figure(body, scene, answer, figure)
     report = answer.as_dict()
     if json:
-        _print_json(report)
+        print_json(report)
     else:
-        _print_table({key: value for key, value in report.items() if key != "q"})
+        print_table({key: value for key, value in report.items() if key != "q"})
         if not report["found"]:
             typer.echo(f"no contact: {report['failure']}", err=True)
     return DONE if report["found"] else FAILED
@@ -343,32 +353,6 @@ def export(
 
     written = export_motion(read_motions(source), source, format, out=out, which=motion, rate=rate)
     typer.echo(str(written))
-
-
-def _run(
-    job: "Scenario", directory: Path | None, interruption: Interruption, *, draw: bool
-) -> dict[str, Any]:
-    from manikin.progress import StageProgress
-
-    with _stdout_kept_clean(), StageProgress() as bars:
-        from manikin import pipeline
-
-        def progress(stage: str, share: float) -> None:
-            interruption.check()
-            bars(stage, share)
-
-        result = pipeline.run(job, out=directory, seed=job.seed, progress=progress)
-        interruption.check()
-        if directory is not None and draw:
-            from manikin.products import write_products
-
-            write_products(directory, progress)
-        return dict(result.summary)
-
-
-def _refuse(given: bool, option: str, because: str) -> None:
-    if given:
-        raise InputError(f"{option} does not go with this run: {because}; valid: leave it out")
 
 
 def _check_values(seed: int | None, stature: float | None, mass: float | None, sex: str | None) -> None:
@@ -411,79 +395,11 @@ def _run_all(
     if out is not None:
         write_text(out / RESULTS, to_json(found) + "\n")
     if json:
-        _print_json(found)
+        print_json(found)
     else:
         typer.echo(text_table(found))
         typer.echo(f"{found['succeeded']} as expected, {found['failed']} not, {found['wall_s']:.0f} s")
     return FAILED if found["failed"] else DONE
-
-
-def _print_summary(summary: dict[str, Any], directory: Path | None) -> None:
-    _print_table(_flat({key: value for key, value in summary.items() if key != "failure"}))
-    failure = summary.get("failure")
-    if failure:
-        typer.echo(f"failed in {failure['stage']}: {failure['reason']}", err=True)
-    fault = (summary.get("execution") or {}).get("failure")
-    if fault and not failure:
-        typer.echo(f"its execution, an attempt, failed: {fault['reason']}", err=True)
-    if directory is not None:
-        typer.echo(f"files in {directory}; see them with: manikin view {directory}", err=True)
-
-
-def _flat(value: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Nested sections as one level of dotted keys; long mappings and lists as their size."""
-    flat: dict[str, Any] = {}
-    for key, item in value.items():
-        if isinstance(item, dict) and key != "peak_torque_Nm":
-            flat.update(_flat(item, f"{prefix}{key}."))
-        else:
-            flat[f"{prefix}{key}"] = item
-    return flat
-
-
-def _print_table(rows: dict[str, Any]) -> None:
-    width = max(len(name) for name in rows)
-    for name, value in rows.items():
-        typer.echo(f"{name:{width}}  {_shown(value)}")
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    if isinstance(value, dict):
-        if value and all(isinstance(item, (int, float)) for item in value.values()):
-            name, top = max(value.items(), key=lambda item: abs(item[1]))
-            return f"largest {top:.4g} ({name})"
-        return " ".join(_shown(item) for item in value.values()) or "-"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_shown(item) for item in value) + "]"
-    return "-" if value is None else str(value)
-
-
-def _print_json(value: dict[str, Any]) -> None:
-    from manikin.output import to_json
-
-    typer.echo(to_json(value))
-
-
-def _complain(message: str, status: int) -> int:
-    typer.echo(f"manikin: {' '.join(message.split())}", err=True)
-    return status
-
-
-@contextmanager
-def _stdout_kept_clean() -> Iterator[None]:
-    """Send what libraries, native ones too, print on standard output to standard error meanwhile."""
-    sys.stdout.flush()
-    saved = os.dup(1)
-    os.dup2(2, 1)
-    try:
-        with redirect_stdout(sys.stderr):
-            yield
-    finally:
-        ctypes.CDLL(None).fflush(None)  # C's own buffer, which a solver's banner may wait in
-        os.dup2(saved, 1)
-        os.close(saved)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """What is drawn: figures and the BVH file of a run, the comparison of two, a contact that was found."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +11,22 @@ from manikin.comparison import RunComparison
 from manikin.contact_planning.single_contact import ContactAnswer
 from manikin.errors import MotionFileError
 from manikin.export import export_motion
-from manikin.figures import ChoicePanel, contact_choice_figure, write_comparison, write_figures
+from manikin.figures import (
+    ChoicePanel,
+    contact_choice_figure,
+    push_map_figure,
+    write_comparison,
+    write_figures,
+)
 from manikin.figures.style import readable
 from manikin.figures.write import save_figure
 from manikin.output import FIGURES, to_json
 from manikin.record import read_run
 from manikin.scene import Scene
+from manikin.simulation import PushMap, PushTrials
 
 COMPARISON = "comparison.json"
+PUSH_MAP = "push_map"
 
 
 def write_products(directory: str | Path, progress: Callable[[str, float], None] | None = None) -> list[Path]:
@@ -96,6 +104,26 @@ def write_contact_figure(body: BodyModel, scene: Scene, answer: ContactAnswer, p
         panels.append(ChoicePanel(title, result.q, (result.contact,), (result.limb,), task))
     figure = contact_choice_figure(body, scene, panels, f"Contact of {readable(result.limb)}")
     save_figure(figure, file)
+    return file
+
+
+def write_push_map_figure(maps: Sequence[PushMap], trials: PushTrials, folder: Path) -> Path:
+    """Draw push maps around the soles of the body.
+
+    Args:
+        maps: With what is known of them.
+        trials: The body and stance of the first one.
+        folder: Existing folder.
+
+    Returns:
+        The file written.
+
+    Raises:
+        FigureError: If no impulse was held.
+        MotionFileError: If the file cannot be written.
+    """
+    file = folder / f"{PUSH_MAP}.png"
+    save_figure(push_map_figure(maps, trials.soles()), file)
     return file
 
 

@@ -148,7 +148,7 @@ def test_scenarios_are_listed_with_one_line_each(capfd):
         (["export", "."], "--format"),
         (["balance", "none.yaml"], "no such file"),
         (["balance", "."], "is a directory"),
-        (["push", "--force", "200"], "No such command"),
+        (["push", "--force", "200"], "--direction is missing"),
     ],
 )
 def test_mistakes_give_one_line_and_status_2(capfd, tmp_path, monkeypatch, arguments, says):

@@ -1,8 +1,8 @@
 """The body: one neutral description and the engine models built from it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, fields
+from functools import cached_property, partial
 from itertools import combinations
 from math import fsum
 from types import MappingProxyType
@@ -80,6 +80,12 @@ class BodyModel:
             raise BodyError(f"segments weigh {total!r} kg; valid: {self.nominal_mass!r} kg")
         object.__setattr__(self, "effectors", MappingProxyType(dict(self.effectors)))
         object.__setattr__(self, "standing_angles", MappingProxyType(dict(self.standing_angles)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what describes the body, for other processes; what was computed from it is left out."""
+        given = {each.name: getattr(self, each.name) for each in fields(self)}
+        plain = {"effectors": dict(self.effectors), "standing_angles": dict(self.standing_angles)}
+        return partial(BodyModel, **(given | plain)), ()
 
     # --- description ---------------------------------------------------------------------
 

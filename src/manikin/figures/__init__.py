@@ -13,6 +13,7 @@ from manikin.figures.footprints import footprint_figure
 from manikin.figures.margin import margin_figure
 from manikin.figures.planes import planes_figure
 from manikin.figures.postures import postures_figure
+from manikin.figures.push_map import push_map_figure
 from manikin.figures.scene import scene_figure
 from manikin.figures.timing import timing_figure
 from manikin.figures.tracking import tracking_figure
@@ -37,6 +38,7 @@ __all__ = [
     "margin_figure",
     "planes_figure",
     "postures_figure",
+    "push_map_figure",
     "scene_figure",
     "timing_figure",
     "tracking_figure",

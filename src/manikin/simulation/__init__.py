@@ -4,15 +4,22 @@ from manikin.simulation.compile import SimulationModel, compile_model
 from manikin.simulation.execute import default_physics, execute
 from manikin.simulation.execution import Execution
 from manikin.simulation.options import PhysicsOptions
+from manikin.simulation.push_map import PushMap, equal_directions
+from manikin.simulation.push_processes import search_directions
+from manikin.simulation.push_search import DirectionSearch, HeldImpulse, PushTrials, largest_held
 from manikin.simulation.recover import Feet, RecoveryTask, push_near_com, recover
 from manikin.simulation.recovery import Recovery
 from manikin.simulation.world import Push, Touch, World
 
 __all__ = [
+    "DirectionSearch",
     "Execution",
     "Feet",
+    "HeldImpulse",
     "PhysicsOptions",
     "Push",
+    "PushMap",
+    "PushTrials",
     "Recovery",
     "RecoveryTask",
     "SimulationModel",
@@ -20,7 +27,10 @@ __all__ = [
     "World",
     "compile_model",
     "default_physics",
+    "equal_directions",
     "execute",
+    "largest_held",
     "push_near_com",
     "recover",
+    "search_directions",
 ]

@@ -25,7 +25,8 @@ from manikin.scene import Scene
 from manikin.simulation.compile import compile_model
 from manikin.simulation.execute import CONTACT_TIME, JOINT_DAMPING
 from manikin.simulation.options import PhysicsOptions
-from manikin.simulation.recovery import Recovery, judge, trunk_lean
+from manikin.simulation.quiet_engine import quiet_engine
+from manikin.simulation.recovery import Recovery, at_rest, judge, trunk_lean
 from manikin.simulation.recovery_record import RecoveryRecorder
 from manikin.simulation.world import Push, World
 from manikin.spatial import FloatArray, finite_number
@@ -64,6 +65,9 @@ class RecoveryTask:
         friction: Of the soles.
         support: Effectors of the feet that carry; both when None.
         steps: How many steps may be taken; feet that are held take none.
+        until_at_rest: Once pushes and reaction delay are over, a body that has stood at rest for this time
+            ends the run [s]; it saves most of the time where only the verdict is wanted. None for a run to
+            its end, which alone shows all that follows, such as swung arms that come back.
     """
 
     pushes: tuple[Push, ...]
@@ -73,6 +77,7 @@ class RecoveryTask:
     friction: float = 0.7
     support: tuple[str, ...] | None = None
     steps: int = 0
+    until_at_rest: float | None = None
 
 
 def push_near_com(
@@ -146,7 +151,8 @@ def recover(
         BodyError: If it does not stand on two legs.
     """
     run = _Run(body, task, settings or RecoverySettings(), scene)
-    return run.run(progress)
+    with quiet_engine():
+        return run.run(progress)
 
 
 class _Run:
@@ -157,6 +163,8 @@ class _Run:
     ) -> None:
         self.body, self.task, self.settings = body, task, settings
         finite_number(task.duration, "duration [s]", above=0.0, at_most=60.0)
+        if task.until_at_rest is not None:
+            finite_number(task.until_at_rest, "until_at_rest [s]", above=0.0)
         self.q = np.array(body.standing_posture() if task.q is None else task.q, dtype=np.float64)
         physics = PhysicsOptions(
             friction=task.friction, joint_damping=JOINT_DAMPING, contact_time_constant=CONTACT_TIME
@@ -187,6 +195,8 @@ class _Run:
         self.stepping = SteppingRecovery(
             body, self.controller, ground, replace(StepSettings(), most=task.steps)
         )  # fmt: skip
+        ends = [push.start + max(push.duration, settings.delay) for push in task.pushes]
+        self.rest_from = self.disturbed_until = max(ends, default=0.0)
 
     def run(self, progress: Callable[[float], None] | None) -> Recovery:
         began, control = clock.perf_counter(), 0.0
@@ -212,7 +222,7 @@ class _Run:
             if number >= 0:
                 self.recorder.add(time, output, sensed, wrench, held=self.task.feet is Feet.HELD)
             fallen = self._fallen(output.state, lowest, time)
-            if fallen:
+            if fallen or self._stands_for_good(output.state, time):
                 break
             if progress is not None and number >= 0:
                 progress(number / count)
@@ -249,6 +259,15 @@ class _Run:
             wrench += np.concatenate((force, np.cross(point, force)))
             generalised += state.point_jacobian(push.segment, offset).T @ force
         return FeltPush(wrench, generalised)
+
+    def _stands_for_good(self, state: DynamicsState, time: float) -> bool:
+        """Whether the body has rested for as long as ends the run."""
+        wanted = self.task.until_at_rest
+        if wanted is None or time < self.disturbed_until:
+            return False
+        if not at_rest(self.body, self.controller, state.q, state.com, state.momentum[:3] / state.mass):
+            self.rest_from = time + self.substeps * self.world.model.options.timestep
+        return time - self.rest_from >= wanted - 1e-9
 
     def _fallen(self, state: DynamicsState, lowest: float, time: float) -> str:
         if self.world.divergence or not np.all(np.isfinite(state.com)):

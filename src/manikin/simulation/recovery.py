@@ -188,14 +188,31 @@ def trunk_lean(body: BodyModel, groups: JointGroups, q: FloatArray) -> float:
     return float(np.arccos(np.clip(upright, -1.0, 1.0)))
 
 
+def at_rest(
+    body: BodyModel, controller: BalanceRecovery, q: FloatArray, com: FloatArray, velocity: FloatArray
+) -> bool:
+    """Whether a body stands at rest: high, upright and slow, its centre of mass over its soles.
+
+    Args:
+        body: The body.
+        controller: What keeps it.
+        q: (nq,) configuration.
+        com: (3,) centre of mass [m].
+        velocity: (3,) of the centre of mass [m/s].
+    """
+    height = controller.area.height
+    return bool(
+        com[2] - height >= STANDS_HEIGHT * (controller.com[2] - height)
+        and np.linalg.norm(velocity) <= STANDS_SPEED
+        and controller.area.inside(com[:2]) > 0.0
+        and trunk_lean(body, controller.groups, q) <= STANDS_LEAN
+    )
+
+
 def _rests(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -> np.ndarray:
-    """(n,) whether the body stands at rest: high, upright and slow, its centre of mass over its soles."""
-    motion, height = trace.motion, controller.area.height
-    high = motion.com[:, 2] - height >= STANDS_HEIGHT * (controller.com[2] - height)
-    slow = np.linalg.norm(trace.com_velocity, axis=1) <= STANDS_SPEED
-    over = controller.area.inside(motion.com[:, :2]) > 0.0
-    upright = np.array([trunk_lean(body, controller.groups, q) <= STANDS_LEAN for q in motion.q])
-    return high & slow & over & upright
+    """(n,) whether the body stands at rest."""
+    samples = zip(trace.motion.q, trace.motion.com, trace.com_velocity, strict=True)
+    return np.array([at_rest(body, controller, *sample) for sample in samples])
 
 
 def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch], most: float) -> str:

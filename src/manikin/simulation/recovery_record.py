@@ -185,7 +185,7 @@ class SegmentMomenta:
                 placement = pin.updateFramePlacement(self._model, self._data, frame)
                 twist = pin.getFrameVelocity(self._model, self._data, frame, pin.LOCAL)
                 rotation = placement.rotation
-                speed = rotation @ (twist.linear + np.cross(twist.angular, segment.com))
+                speed = rotation @ (twist.linear + skew(twist.angular) @ segment.com)
                 arm = placement.translation + rotation @ segment.com - com
                 total += rotation @ (segment.inertia @ twist.angular)
                 total += segment.mass * (skew(arm) @ (speed - velocity))

@@ -5,7 +5,9 @@ import math
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
 from manikin.control.balance_recovery import RecoverySettings
 from manikin.errors import InputError, ScenarioError
-from manikin.simulation import Feet, Recovery, RecoveryTask, push_near_com, recover
+from manikin.scenarios import Scenario
+from manikin.scenarios.sections.push import PushSection, RecoverySection
+from manikin.simulation import Feet, Push, PushTrials, Recovery, RecoveryTask, push_near_com, recover
 from manikin.spatial import rotation_from_yaw
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report
@@ -24,13 +26,7 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
         ScenarioError: If there is nothing to recover from, or the push is not usable.
     """
     scenario, body = context.scenario, context.body
-    section, push = scenario.recovery, scenario.push
-    if section is None or push is None:
-        raise ScenarioError(f"scenario {scenario.name!r} has no recovery; valid: recovery and push")
-    settings = RecoverySettings(
-        delay=section.delay_s, locked=tuple(section.locked), strength=section.strength,
-        posture_control_only=section.posture_control_only,
-    )  # fmt: skip
+    section, push = _sections(scenario)
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
     try:
         pushes = (
@@ -40,15 +36,49 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
         )  # fmt: skip
     except InputError as error:
         raise scenario.refused(("push",), error) from None
-    task = RecoveryTask(pushes, Feet(section.feet), section.duration_s, friction=section.friction)
     found = recover(
-        body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
+        body,
+        _task(section, pushes),
+        _settings(section),
+        scene=context.scene,
+        progress=lambda share: report.progress(STAGE, share),
     )
     report.finish(STAGE, found.summary())
     if found.failure:
         report.fail(STAGE, found.failure, float(found.trace.motion.time[-1]), f"feet {section.feet}")
     report.keep_motions(_schedule(found), None, found.trace.motion)
     return found
+
+
+def push_trials(scenario: Scenario) -> PushTrials:
+    """The body and stance of a scenario with a ``recovery`` section, to be pushed from any direction.
+
+    Of its push only the duration and the beginning are taken over; the ground is level and empty.
+
+    Raises:
+        ScenarioError: If there is nothing to recover from.
+    """
+    section, push = _sections(scenario)
+    return PushTrials(
+        scenario.build_body(), _task(section, ()), _settings(section), push.duration_s, push.at_s
+    )
+
+
+def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
+    if scenario.recovery is None or scenario.push is None:
+        raise ScenarioError(f"scenario {scenario.name!r} has no recovery; valid: recovery and push")
+    return scenario.recovery, scenario.push
+
+
+def _task(section: RecoverySection, pushes: tuple[Push, ...]) -> RecoveryTask:
+    return RecoveryTask(pushes, Feet(section.feet), section.duration_s, friction=section.friction)
+
+
+def _settings(section: RecoverySection) -> RecoverySettings:
+    return RecoverySettings(
+        delay=section.delay_s, locked=tuple(section.locked), strength=section.strength,
+        posture_control_only=section.posture_control_only,
+    )  # fmt: skip
 
 
 def _schedule(found: Recovery) -> ContactSchedule:

@@ -1,0 +1,134 @@
+"""What is pushed and how, as the options of ``manikin push`` say it, turned into a scenario."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from manikin.errors import InputError
+
+if TYPE_CHECKING:
+    from manikin.scenarios import Scenario
+
+_OPTIONS: dict[tuple[str | int, ...], str] = {
+    ("push", "direction_deg"): "--direction",
+    ("push", "duration_s"): "--duration",
+    ("recovery", "duration_s"): "--duration",
+    ("recovery", "delay_s"): "--delay",
+    ("recovery", "feet"): "--feet",
+    ("recovery", "locked"): "--locked",
+    ("recovery", "strength"): "--strength",
+    ("body", "model"): "--body",
+    ("body", "stature_m"): "--stature",
+    ("body", "mass_kg"): "--mass",
+    ("body", "sex"): "--sex",
+}
+"""Where the values of the scenario come from, for messages."""
+
+
+@dataclass(frozen=True)
+class PushOptions:
+    """The options that a single push and a map have in common.
+
+    Attributes:
+        duration: Of the push [s].
+        delay: From the beginning of the push until the body reacts [s]; None for the scenarios' own.
+        feet: ``"held"`` or ``"free"``; None for the scenarios' own.
+        locked: Groups of joints that hold the posture.
+        posture_control_only: Whether the quadratic program is left out.
+        strength: Torque and speed limits relative to those of the body.
+        body: ``"kudoh"`` or ``"human"``.
+        stature, mass, sex: Of a human [m], [kg]; None for the scenarios' own.
+    """
+
+    duration: float = 0.1
+    delay: float | None = None
+    feet: str | None = None
+    locked: tuple[str, ...] = ()
+    posture_control_only: bool = False
+    strength: float = 1.0
+    body: str = "kudoh"
+    stature: float | None = None
+    mass: float | None = None
+    sex: str | None = None
+
+    def scenario(self, name: str, force: float = 1.0, direction: float = 0.0) -> "Scenario":
+        """The scenario of one push.
+
+        Args:
+            name: Of the scenario.
+            force: [N].
+            direction: Of the force, counter-clockwise from the body's forward axis [deg].
+
+        Raises:
+            ScenarioError: If a value is not usable; the message names the option.
+        """
+        from manikin.scenarios import Scenario
+        from manikin.scenarios.schema import ScenarioFile
+        from manikin.scenarios.validation import validate
+        from manikin.simulation.push_search import PUSH_BEGINS, run_duration
+        from manikin.simulation.recover import STRONGEST
+        from manikin.spatial import finite_number
+
+        if self.body not in ("kudoh", "human"):
+            raise InputError(f"--body is {self.body!r}; valid: kudoh or human")
+        finite_number(force, "--force [N]", above=0.0, at_most=STRONGEST)
+        body = {"model": self.body, "stature_m": self.stature, "mass_kg": self.mass, "sex": self.sex}
+        recovery = {
+            "feet": self.feet, "delay_s": self.delay, "locked": list(self.locked), "strength": self.strength,
+            "posture_control_only": self.posture_control_only, "duration_s": run_duration(self.duration),
+        }  # fmt: skip
+        data = {
+            "name": name, "body": _given(body), "recovery": _given(recovery),
+            "push": {"force_N": force, "direction_deg": direction, "duration_s": self.duration,
+                     "at_s": PUSH_BEGINS},
+        }  # fmt: skip
+        return Scenario(validate(ScenarioFile, data, "push", _OPTIONS), "push", Path.cwd(), _OPTIONS)
+
+    def changed(self, text: str) -> "PushOptions":
+        """The same with some options set as ``KEY=VALUE,KEY=VALUE`` says; several groups are ``arms+hips``.
+
+        Raises:
+            InputError: If that is not what the text is.
+        """
+        changes = dict(_setting(part.strip(), text) for part in text.split(","))
+        return replace(self, **changes)
+
+
+def conditions(scenario: "Scenario", tolerance: float) -> dict[str, Any]:
+    """Plain values that say what a map is about, with every default.
+
+    Args:
+        scenario: Of any of its pushes.
+        tolerance: Of its search [N.s].
+    """
+    assert scenario.recovery is not None
+    assert scenario.push is not None
+    recovery = scenario.recovery.model_dump(mode="json", exclude={"duration_s"})
+    return {
+        "body": scenario.file.body.model_dump(mode="json", exclude_none=True), **recovery,
+        "duration_s": scenario.push.duration_s, "tolerance_Ns": tolerance,
+    }  # fmt: skip
+
+
+def _given(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _setting(part: str, text: str) -> tuple[str, Any]:
+    """Field and value of one setting of a comparison."""
+    key, equals, value = part.partition("=")
+    if key == "posture-control-only" and value in ("", "yes", "no"):
+        return "posture_control_only", value != "no"
+    if key == "feet" and value:
+        return key, value
+    if key == "locked" and value:
+        return key, () if value == "none" else tuple(value.split("+"))
+    if key in ("delay", "strength") and equals:
+        try:
+            return key, float(value)
+        except ValueError:
+            pass
+    raise InputError(
+        f"--compare {text}: {part!r} is not a setting; valid: feet=free, locked=arms+hips or none, "
+        "delay=SECONDS, strength=X, posture-control-only, or several with commas between"
+    )

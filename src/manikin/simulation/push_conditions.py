@@ -1,0 +1,43 @@
+"""The conditions of push maps in words: what several have in common, and what tells them apart."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+def told_apart(maps: Sequence[Mapping[str, Any]]) -> tuple[str, list[str]]:
+    """What maps have in common, and a name for each that tells it from the others.
+
+    Args:
+        maps: Conditions of each, as in its JSON.
+
+    Returns:
+        Words for what is common, but for what goes without saying, and for each map those for what
+        differs; empty where nothing does.
+    """
+    spoken = [_words(one) for one in maps]
+    differ = [len({words[place] for words in spoken}) > 1 for place in range(len(spoken[0]))]
+    common = [word for word, other in zip(spoken[0], differ, strict=True) if not other]
+    names = [[word for word, other in zip(words, differ, strict=True) if other] for words in spoken]
+    usual = {"nothing locked", "with the program", "usual strength"}
+    return ", ".join(word for word in common if word not in usual), [", ".join(name) for name in names]
+
+
+def _words(one: Mapping[str, Any]) -> list[str]:
+    """One text per condition, the same conditions in every list."""
+    locked = " and ".join(one["locked"])
+    strength = one["strength"]
+    return [
+        _body(one["body"]),
+        f"feet {one['feet']}",
+        f"{locked} locked" if locked else "nothing locked",
+        "posture control only" if one["posture_control_only"] else "with the program",
+        "usual strength" if strength == 1.0 else f"{strength:g} times the strength",
+        f"reaction after {one['delay_s']:g} s",
+        f"push of {one['duration_s']:g} s",
+    ]
+
+
+def _body(body: Mapping[str, Any]) -> str:
+    if body["model"] == "kudoh":
+        return "body of Kudoh"
+    return f"{body['sex']} of {body['stature_m']:g} m and {body['mass_kg']:g} kg"

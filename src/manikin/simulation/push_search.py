@@ -1,0 +1,196 @@
+"""The largest impulse that a standing body recovers from, from one direction."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from manikin.body import BodyModel
+from manikin.control.balance_recovery import BalanceRecovery, RecoverySettings
+from manikin.simulation.recover import STRONGEST, RecoveryTask, push_near_com, recover
+from manikin.simulation.recovery import Recovery
+from manikin.spatial import FloatArray, finite_number, rotation_from_yaw
+
+FIRST = 20.0
+"""Impulse that a search begins with [N.s]."""
+
+PUSH_BEGINS = 0.2
+"""When pushes begin [s], as in the scenarios after the thesis."""
+
+AFTERWARDS = 3.2
+"""Time from the end of a push to the end of its run [s]; a body that does not stand at rest by then has
+not recovered."""
+
+AT_REST = 0.5
+"""Time at rest after which a trial is taken as held until it is confirmed [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class PushTrials:
+    """One body in one stance, to be pushed again and again from different directions.
+
+    Attributes:
+        body: The body.
+        task: Its stance; the pushes and the duration are those of each trial.
+        settings: Of the controller.
+        push_duration: Of every push [s]; its force is the impulse divided by this.
+        begins: When the push begins [s].
+    """
+
+    body: BodyModel
+    task: RecoveryTask = field(default_factory=lambda: RecoveryTask(()))
+    settings: RecoverySettings = field(default_factory=RecoverySettings)
+    push_duration: float = 0.1
+    begins: float = PUSH_BEGINS
+
+    def __post_init__(self) -> None:
+        finite_number(self.push_duration, "push duration [s]", above=0.0, at_most=60.0)
+        finite_number(self.begins, "push start [s]", at_least=0.0)
+
+    @property
+    def strongest(self) -> float:
+        """Largest impulse that a push may have [N.s]."""
+        return STRONGEST * self.push_duration
+
+    def soles(self) -> tuple[FloatArray, ...]:
+        """(4, 2) corners of each sole from the centre of mass, x ahead [m]."""
+        q = self.body.standing_posture() if self.task.q is None else self.task.q
+        controller = BalanceRecovery(self.body, q, self.settings)
+        return tuple(sole.points_in_world[:, :2] - controller.com[:2] for sole in controller.soles)
+
+    def push(self, direction_deg: float, impulse: float, *, until_at_rest: float | None = None) -> Recovery:
+        """Push once.
+
+        Args:
+            direction_deg: Of the force, counter-clockwise from the body's forward axis [deg].
+            impulse: [N.s].
+            until_at_rest: End the run early, see :class:`~manikin.simulation.recover.RecoveryTask`.
+
+        Raises:
+            InputError: If the push is too strong or the body does not stand.
+        """
+        axis = rotation_from_yaw(math.radians(direction_deg))[:, 0]
+        force = min(impulse / self.push_duration, STRONGEST) * axis
+        push = push_near_com(self.body, force, self.begins, self.push_duration, q=self.task.q)
+        duration = run_duration(self.push_duration, self.begins)
+        task = replace(self.task, pushes=(push,), duration=duration, until_at_rest=until_at_rest)
+        return recover(self.body, task, self.settings)
+
+
+def run_duration(push_duration: float, begins: float = PUSH_BEGINS) -> float:
+    """Duration of the run of a push [s]: 3.5 s for one of 0.1 s, as in the scenarios."""
+    return round(begins + push_duration + AFTERWARDS, 9)
+
+
+@dataclass(frozen=True)
+class HeldImpulse:
+    """Between which two impulses a body ceases to recover.
+
+    Attributes:
+        held: Largest impulse found that it recovers from [N.s]; None where it falls without any push.
+        beyond: Smallest impulse found that it does not recover from [N.s]; None where it recovers from the
+            strongest push there may be.
+        trials: Number of pushes that were simulated.
+    """
+
+    held: float | None
+    beyond: float | None
+    trials: int = 0
+
+
+def largest_held(
+    holds: Callable[[float], bool], *, tolerance: float, first: float = FIRST, strongest: float = math.inf
+) -> HeldImpulse:
+    """Search the largest impulse that is held, by bisection.
+
+    The first impulse is doubled until one is not held, or halved until one is; the gap between the two is
+    then bisected down to the tolerance.  Recovery need not be monotone in the force: a body may fall from a
+    push and recover from a harder one, for which it swings its arms in time.  What is found is *one* border
+    between an impulse that was held and a larger one that was not; both were tried, what lies elsewhere was
+    not.
+
+    Args:
+        holds: Whether an impulse [N.s] is held.
+        tolerance: Largest gap between the two impulses [N.s].
+        first: Impulse to begin with [N.s].
+        strongest: No impulse beyond this is tried [N.s].
+
+    Raises:
+        InputError: If the tolerance is not positive.
+    """
+    finite_number(tolerance, "tolerance [N.s]", above=0.0)
+    trials = 0
+
+    def tried(impulse: float) -> bool:
+        nonlocal trials
+        trials += 1
+        return holds(impulse)
+
+    held, beyond = _bracket(tried, tolerance, min(first, strongest), strongest)
+    while held is not None and beyond is not None and beyond - held > tolerance:
+        middle = 0.5 * (held + beyond)
+        if tried(middle):
+            held = middle
+        else:
+            beyond = middle
+    return HeldImpulse(held, beyond, trials)
+
+
+def _bracket(
+    holds: Callable[[float], bool], tolerance: float, first: float, strongest: float
+) -> tuple[float | None, float | None]:
+    """An impulse that is held and one that is not; None for what there is not."""
+    impulse = first
+    if holds(impulse):
+        while impulse < strongest:
+            larger = min(2.0 * impulse, strongest)
+            if not holds(larger):
+                return impulse, larger
+            impulse = larger
+        return impulse, None
+    while impulse > tolerance:
+        if holds(0.5 * impulse):
+            return 0.5 * impulse, impulse
+        impulse *= 0.5
+    return (0.0 if holds(0.0) else None), impulse
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionSearch:
+    """Search of the largest impulse held from one direction; it can be sent to another process.
+
+    Attributes:
+        trials: Who is pushed, and how.
+        direction_deg: Of the force, counter-clockwise from the body's forward axis [deg].
+        tolerance: Largest gap between what is held and what is not [N.s].
+    """
+
+    trials: PushTrials
+    direction_deg: float
+    tolerance: float = 1.0
+
+    def run(self, go_on: Callable[[], None] | None = None) -> HeldImpulse:
+        """Search.
+
+        Trials end early once the body has stood at rest for a while.  The impulse found in the end is
+        confirmed by a run to its end; should it fail there, the search is made again with such runs alone.
+
+        Args:
+            go_on: Called before every trial; raises to give up.
+        """
+        quick = self._search(AT_REST, go_on)
+        if not quick.held:
+            return quick
+        if go_on is not None:
+            go_on()
+        if self.trials.push(self.direction_deg, quick.held).recovered:
+            return replace(quick, trials=quick.trials + 1)
+        whole = self._search(None, go_on)
+        return replace(whole, trials=whole.trials + quick.trials + 1)
+
+    def _search(self, until_at_rest: float | None, go_on: Callable[[], None] | None) -> HeldImpulse:
+        def holds(impulse: float) -> bool:
+            if go_on is not None:
+                go_on()
+            return self.trials.push(self.direction_deg, impulse, until_at_rest=until_at_rest).recovered
+
+        return largest_held(holds, tolerance=self.tolerance, strongest=self.trials.strongest)

@@ -1,0 +1,51 @@
+"""The figure of push maps: every impulse where its push leads, ahead upward, the soles in the middle."""
+
+import numpy as np
+import pytest
+
+from manikin.body import kudoh
+from manikin.errors import FigureError
+from manikin.figures import push_map_figure
+from manikin.simulation import HeldImpulse, PushMap, PushTrials
+from manikin.simulation.push_conditions import told_apart
+
+CONDITIONS = {
+    "body": {"model": "kudoh"}, "feet": "free", "delay_s": 0.2, "friction": 0.7, "locked": [],
+    "posture_control_only": False, "strength": 1.0, "duration_s": 0.1, "tolerance_Ns": 1.0,
+}  # fmt: skip
+FOUND = (HeldImpulse(30.0, 31.0, 9), HeldImpulse(45.0, 46.0, 9), HeldImpulse(25.0, 26.0, 9), None)
+MAP = PushMap(CONDITIONS, (0.0, 90.0, 180.0, 270.0), FOUND)
+
+
+def test_ahead_is_up_and_left_is_left():
+    figure = push_map_figure([MAP], PushTrials(kudoh()).soles())
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    curve = next(line for line in axes.lines if len(line.get_xdata()) == 5)
+    centre, ahead, left = axes.transData.transform([(0.0, 0.0), (0.0, 30.0), (np.pi / 2, 45.0)])
+    drawn = axes.transData.transform(np.column_stack([curve.get_xdata(), curve.get_ydata()]))
+    np.testing.assert_allclose(drawn[:2], [ahead, left])
+    assert drawn[0][1] > centre[1] + 100.0
+    assert drawn[1][0] < centre[0] - 100.0
+    assert np.isnan(drawn[3]).any()  # not searched yet: a gap
+    np.testing.assert_allclose(drawn[4], drawn[0])  # closed
+    soles = [patch.get_window_extent() for patch in axes.patches if len(patch.get_xy()) == 5]
+    assert len(soles) == 2
+    assert soles[0].x1 < centre[0] < soles[1].x0  # left and right of the centre of mass
+    for sole in soles:
+        assert sole.height / sole.width == pytest.approx(kudoh().sole_length / kudoh().sole_width, rel=1e-6)
+
+
+def test_curves_are_named_by_what_tells_them_apart():
+    other = PushMap(CONDITIONS | {"locked": ["arms"], "delay_s": 0.0}, MAP.directions, FOUND)
+    (axes,) = push_map_figure([MAP, other]).axes
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert names == ["nothing locked, reaction after 0.2 s", "arms locked, reaction after 0 s"]
+    common, names = told_apart([CONDITIONS])
+    assert names == [""]
+    assert common == "body of Kudoh, feet free, reaction after 0.2 s, push of 0.1 s"
+
+
+def test_a_map_of_nothing_is_not_drawn():
+    with pytest.raises(FigureError, match="valid: a map"):
+        push_map_figure([PushMap.empty(CONDITIONS, (0.0, 180.0))])
