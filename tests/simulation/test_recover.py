@@ -6,17 +6,32 @@ import numpy as np
 import pytest
 
 from manikin.body import Configuration, human, kudoh
-from manikin.control.balance_recovery import RecoverySettings, Strategy, joint_groups
+from manikin.control.balance_recovery import (
+    BalanceRecovery,
+    RecoverySettings,
+    Strategy,
+    edge_limits,
+    held_impulse,
+    joint_groups,
+)
 from manikin.errors import InputError
-from manikin.simulation import Feet, RecoveryTask, push_near_com, recover
+from manikin.scene import Box, Obstacle, Scene
+from manikin.simulation import Feet, RecoveryTask, one_foot_posture, push_near_com, recover
 from manikin.simulation.recovery_record import SegmentMomenta
+from manikin.spatial import GRAVITY
 
 KUDOH, HUMAN = kudoh(), human()
 
 
-def pushed(force, *, body=KUDOH, delay=0.2, feet=Feet.HELD, lasting=0.1, frequency=0.0, until=3.5, **options):
-    push = push_near_com(body, force, 0.2, lasting, frequency=frequency)
-    return recover(body, RecoveryTask((push,), feet, until), RecoverySettings(delay=delay, **options))
+def pushed(
+    force, *, body=KUDOH, delay=0.2, feet=Feet.HELD, lasting=0.1, frequency=0.0, until=3.5, steps=0,
+    scene=None, foot=None, **options,
+):  # fmt: skip
+    q = None if foot is None else one_foot_posture(body, foot)
+    push = push_near_com(body, force, 0.2, lasting, frequency=frequency, q=q)
+    support = None if foot is None else (foot,)
+    task = RecoveryTask((push,), feet, until, q=q, support=support, steps=steps)
+    return recover(body, task, RecoverySettings(delay=delay, **options), scene=scene)
 
 
 @pytest.fixture(scope="module")
@@ -128,6 +143,117 @@ def test_the_program_recovers_what_posture_control_alone_does_not():
     force = (250.0, 0.0, 0.0)
     assert pushed(force, until=2.7).recovered
     assert not pushed(force, posture_control_only=True, until=2.7).recovered
+
+
+# --- steps ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def stepped():
+    """Experiment 1 with the delay of the thesis, on free feet that may step."""
+    return pushed((500.0, 0.0, 0.0), feet=Feet.FREE, steps=1)
+
+
+def test_a_step_recovers_what_no_body_can_hold(stepped):
+    """Experiment 1: the capture point is beyond the toes, and the foot goes to where it will be."""
+    assert stepped.recovered, stepped.failure
+    (step,) = stepped.steps
+    assert step.position[0] - step.start[0] > 0.3
+    assert np.linalg.norm(step.position - step.goal) < 0.02
+    assert 0.2 < step.landed - step.lifted < 0.5
+    assert stepped.summary()["steps"] == 1
+    assert stepped.foot_motion < 0.02
+
+
+def test_the_body_stands_on_both_feet_after_its_step(stepped):
+    """The measured forces of the feet carry the weight, and each of them a part of it."""
+    forces = stepped.trace.motion.contact_force[-1]
+    assert forces[:, 2].sum() == pytest.approx(KUDOH.mass * GRAVITY, rel=0.01)
+    assert forces[:, 2].min() > 0.1 * KUDOH.mass * GRAVITY
+    (step,) = stepped.steps
+    flying = (stepped.trace.motion.time > step.lifted + 0.05) & (
+        stepped.trace.motion.time < step.landed - 0.01
+    )
+    number = stepped.trace.motion.contact_names.index(step.foot)
+    assert np.abs(stepped.trace.motion.contact_force[flying, number]).max() == 0.0
+
+
+def test_a_step_back_recovers_experiment_2():
+    found = pushed((-300.0, 0.0, 0.0), feet=Feet.FREE, steps=1)
+    assert found.recovered, found.failure
+    assert [step.position[0] < step.start[0] - 0.2 for step in found.steps] == [True]
+    assert found.time_to_rest < 3.0
+
+
+def test_two_steps_recover_more_than_one():
+    """600 N from the front: one step does not do, as the run that may take one says."""
+    one, two = (pushed((-600.0, 0.0, 0.0), feet=Feet.FREE, steps=steps) for steps in (1, 2))
+    assert not one.recovered
+    assert two.recovered, two.failure
+    assert [step.foot for step in two.steps] == ["left_foot", "right_foot"]
+
+
+def boxes(*places):
+    return Scene([
+        Obstacle(f"box_{number}", Box((0.3, 0.25, 0.3)), translation=(*place, 0.15))
+        for number, place in enumerate(places)
+    ])  # fmt: skip
+
+
+def test_a_step_goes_where_the_scene_leaves_room(stepped):
+    """A box where the left foot went: the right one goes, or another place is found."""
+    (step,) = stepped.steps
+    found = pushed((500.0, 0.0, 0.0), feet=Feet.FREE, steps=1, scene=boxes(step.position[:2] + [0.03, 0.0]))
+    assert found.recovered, found.failure
+    assert np.linalg.norm(found.steps[0].position - step.position) > 0.1
+
+
+def test_a_step_without_room_is_not_taken_and_that_is_said():
+    found = pushed((500.0, 0.0, 0.0), feet=Feet.FREE, steps=1, scene=boxes((0.5, 0.15), (0.5, -0.15)))
+    assert not found.recovered
+    assert not found.steps
+    assert "no step: " in found.failure
+
+
+def test_a_human_steps_as_well():
+    found = pushed((500.0, 0.0, 0.0), body=HUMAN, feet=Feet.FREE, steps=2)
+    assert found.recovered, found.failure
+    assert found.steps
+
+
+def test_held_feet_take_no_step():
+    with pytest.raises(InputError, match="free feet, or no step"):
+        pushed((500.0, 0.0, 0.0), steps=1)
+
+
+# --- one foot -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("body", [KUDOH, HUMAN], ids=["kudoh", "human"])
+@pytest.mark.parametrize("force", [(100.0, 0.0, 0.0), (0.0, -60.0, 0.0)])
+def test_a_push_is_held_on_one_foot(body, force):
+    found = pushed(force, body=body, feet=Feet.FREE, foot="left_foot")
+    assert found.recovered, found.failure
+    other = found.trace.motion.contact_names.index("right_foot")
+    assert np.abs(found.trace.motion.contact_force[:, other]).max() == 0.0
+
+
+def test_less_is_held_on_one_foot_than_on_two():
+    """From the side: 200 N are held on two feet, experiment 4, and not on one."""
+    assert pushed((0.0, 200.0, 0.0), feet=Feet.FREE).recovered
+    assert not pushed((0.0, 200.0, 0.0), feet=Feet.FREE, foot="left_foot").recovered
+
+
+def test_nothing_beyond_the_bound_is_held():
+    """A tenth more than the pendulum with a flywheel holds, from four sides."""
+    controller = BalanceRecovery(KUDOH, KUDOH.standing_posture())
+    limits = edge_limits(controller, KUDOH.standing_posture(), 0.1)
+    for angle in np.radians([0.0, 45.0, 90.0, 180.0]):
+        force = 1.1 * held_impulse(limits, angle) / 0.1 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        assert not pushed(force, feet=Feet.FREE).recovered
+
+
+# --- what is switched off, and what is no recovery ------------------------------------------------
 
 
 def test_locked_arms_stay_where_they_are():

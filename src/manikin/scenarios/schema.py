@@ -164,6 +164,10 @@ class ScenarioFile(Section):
             raise refuse("task.act", "is given beside recovery; valid: one of them")
         if self.floor_height_m != 0.0:
             raise refuse("floor_height_m", f"is {self.floor_height_m}; valid in a recovery: 0")
+        if self.recovery.steps and self.recovery.feet == "held":
+            raise refuse("recovery.steps", f"is {self.recovery.steps} of held feet; valid: 0, or free feet")
+        if self.recovery.steps and self.recovery.support != "both":
+            raise refuse("recovery.steps", f"is {self.recovery.steps} on one foot; valid: 0, or both feet")
         if self.push.at_s >= self.recovery.duration_s:
             raise refuse(
                 "push.at_s",

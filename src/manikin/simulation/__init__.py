@@ -3,6 +3,7 @@
 from manikin.simulation.compile import SimulationModel, compile_model
 from manikin.simulation.execute import default_physics, execute
 from manikin.simulation.execution import Execution
+from manikin.simulation.one_foot import one_foot_posture
 from manikin.simulation.options import PhysicsOptions
 from manikin.simulation.push_map import PushMap, equal_directions
 from manikin.simulation.push_processes import search_directions
@@ -30,6 +31,7 @@ __all__ = [
     "equal_directions",
     "execute",
     "largest_held",
+    "one_foot_posture",
     "push_near_com",
     "recover",
     "search_directions",

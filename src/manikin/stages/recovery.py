@@ -1,13 +1,24 @@
 """The recovery stage: a standing body is pushed and keeps its balance, in the physics engine."""
 
 import math
+from dataclasses import replace
+from itertools import groupby
 
+from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
-from manikin.control.balance_recovery import RecoverySettings
+from manikin.control.balance_recovery import BalanceRecovery, RecoverySettings, edge_limits, held_impulse
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections.push import PushSection, RecoverySection
-from manikin.simulation import Feet, Push, PushTrials, Recovery, RecoveryTask, push_near_com, recover
+from manikin.simulation import (
+    Feet,
+    PushTrials,
+    Recovery,
+    RecoveryTask,
+    one_foot_posture,
+    push_near_com,
+    recover,
+)
 from manikin.spatial import rotation_from_yaw
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report
@@ -28,22 +39,18 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     scenario, body = context.scenario, context.body
     section, push = _sections(scenario)
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
+    task, settings = _task(body, section), _settings(section)
     try:
-        pushes = (
-            push_near_com(
-                body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0
-            ),
-        )  # fmt: skip
+        one = push_near_com(
+            body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
+        )
     except InputError as error:
         raise scenario.refused(("push",), error) from None
+    task = replace(task, pushes=(one,))
     found = recover(
-        body,
-        _task(section, pushes),
-        _settings(section),
-        scene=context.scene,
-        progress=lambda share: report.progress(STAGE, share),
+        body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
     )
-    report.finish(STAGE, found.summary())
+    report.finish(STAGE, found.summary() | _bound(body, task, settings, found))
     if found.failure:
         report.fail(STAGE, found.failure, float(found.trace.motion.time[-1]), f"feet {section.feet}")
     report.keep_motions(_schedule(found), None, found.trace.motion)
@@ -59,9 +66,8 @@ def push_trials(scenario: Scenario) -> PushTrials:
         ScenarioError: If there is nothing to recover from.
     """
     section, push = _sections(scenario)
-    return PushTrials(
-        scenario.build_body(), _task(section, ()), _settings(section), push.duration_s, push.at_s
-    )
+    body = scenario.build_body()
+    return PushTrials(body, _task(body, section), _settings(section), push.duration_s, push.at_s)
 
 
 def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
@@ -70,18 +76,39 @@ def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
     return scenario.recovery, scenario.push
 
 
-def _task(section: RecoverySection, pushes: tuple[Push, ...]) -> RecoveryTask:
-    return RecoveryTask(pushes, Feet(section.feet), section.duration_s, friction=section.friction)
+def _task(body: BodyModel, section: RecoverySection) -> RecoveryTask:
+    one = section.support if section.support != "both" else None
+    return RecoveryTask(
+        (), Feet(section.feet), section.duration_s, friction=section.friction, steps=section.steps,
+        q=None if one is None else one_foot_posture(body, one), support=None if one is None else (one,),
+    )  # fmt: skip
 
 
 def _settings(section: RecoverySection) -> RecoverySettings:
     return RecoverySettings(
         delay=section.delay_s, locked=tuple(section.locked), strength=section.strength,
-        posture_control_only=section.posture_control_only,
+        posture_control_only=section.posture_control_only, ankle_stiffness=section.ankle_stiffness,
     )  # fmt: skip
 
 
+def _bound(
+    body: BodyModel, task: RecoveryTask, settings: RecoverySettings, found: Recovery
+) -> dict[str, float | None]:
+    """Upper bound of the impulse that free feet hold without a step, for one push that is no sine."""
+    if task.feet is Feet.HELD or len(task.pushes) != 1 or task.pushes[0].frequency > 0.0:
+        return {"bound_Ns": None}
+    q = body.standing_posture() if task.q is None else task.q
+    controller = BalanceRecovery(body, q, settings, support=task.support, friction=task.friction)
+    limits = edge_limits(controller, q, task.pushes[0].duration)
+    return {"bound_Ns": held_impulse(limits, math.atan2(found.direction[1], found.direction[0]))}
+
+
 def _schedule(found: Recovery) -> ContactSchedule:
-    """Both feet stand where they are all the time."""
-    time = found.trace.motion.time
-    return ContactSchedule(StanceSequence([Phase(Stance(found.soles))]), [float(time[0]), float(time[-1])])
+    """The feet that carried, in time."""
+    time, standings = found.trace.motion.time, found.trace.standings
+    phases, instants, first = [], [float(time[0])], 0
+    for standing, run in groupby(standings):
+        first += len(list(run))
+        phases.append(Phase(Stance(standing.soles)))
+        instants.append(float(time[min(first, len(time) - 1)]))
+    return ContactSchedule(StanceSequence(phases), instants)

@@ -170,9 +170,9 @@ def held_impulse(limits: Sequence[EdgeLimit], direction: float) -> float:
 def edge_limits(controller: BalanceRecovery, q: ArrayLike, duration: float) -> tuple[EdgeLimit, ...]:
     """Upper bounds of what is held without a step, by edge of the support area.
 
-    The pendulum is pushed with a constant force. Until it reacts it has the spring of its ankles, and over
-    the side of two feet the stiffness of both legs, with which the ZMP can be at the edge at once; then its
-    ZMP is at the edge and its flywheel turns. The mass stays as high as in the posture: the bound leaves out
+    The pendulum is pushed with a constant force. Until it reacts it has the spring of its ankles. Over the
+    side of two feet it has the stiffness of both legs, with which the ZMP can be at the edge at once, as with
+    ankles of more than ``m g h`` per radian. Then its ZMP is at the edge and its flywheel turns. The mass stays as high as in the posture: the bound leaves out
     that a bent body is lower, and that trunk and arms which turn down unload the ground. A body holds less.
 
     Args:
@@ -206,7 +206,8 @@ def _impulse(
     ahead = feet[0].rotation_contact_to_world[:2, 0]
     share = 0.5 * len(feet) * settings.ankle_stiffness
     start, zmp = np.zeros(2), 0.0
-    if len(feet) > 1 and abs(normal @ ahead) < np.sqrt(0.5):
+    sideways = len(feet) > 1 and abs(normal @ ahead) < np.sqrt(0.5)
+    if sideways or share > 1.0:
         start, zmp, share = np.array([-room, 0.0]), room, 0.0
     # The excess is linear in the impulse: from its values without and with one of 1 N.s.
     values = []

@@ -1,6 +1,6 @@
 """Section of a scenario file: a disturbance."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -22,7 +22,7 @@ class PushSection(Section):
 
 
 class RecoverySection(Section):
-    """A body that stands on both feet, is pushed, and keeps its balance without a motion given beforehand."""
+    """A body that stands, is pushed, and keeps its balance without a motion given beforehand."""
 
     feet: Literal["held", "free"] = Field(
         default="held",
@@ -30,6 +30,17 @@ class RecoverySection(Section):
     )
     delay_s: NonNegative = Field(
         default=0.2, description="from the beginning of the push until the body reacts [s]"
+    )
+    support: Literal["both", "left_foot", "right_foot"] = Field(
+        default="both", description="feet that it stands on: both, left_foot or right_foot"
+    )
+    steps: Annotated[int, Field(ge=0, le=2)] = Field(
+        default=0, description="how many steps it may take, 0 to 2; free feet only"
+    )
+    ankle_stiffness: NonNegative = Field(
+        default=0.64,
+        description="stiffness of both ankles together before the body reacts, in m g h per radian "
+        "(default: calf muscles at rest)",
     )
     duration_s: Duration = Field(default=3.5, description="of the run [s]")
     friction: Positive = Field(default=0.7, description="of the soles")
