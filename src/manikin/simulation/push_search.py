@@ -54,7 +54,7 @@ class PushTrials:
     def soles(self) -> tuple[FloatArray, ...]:
         """(4, 2) corners of each sole from the centre of mass, x ahead [m]."""
         q = self.body.standing_posture() if self.task.q is None else self.task.q
-        controller = BalanceRecovery(self.body, q, self.settings)
+        controller = BalanceRecovery(self.body, q, self.settings, support=self.task.support)
         return tuple(sole.points_in_world[:, :2] - controller.com[:2] for sole in controller.soles)
 
     def push(self, direction_deg: float, impulse: float, *, until_at_rest: float | None = None) -> Recovery:

@@ -1,13 +1,16 @@
 """The recovery stage: a standing body is pushed and keeps its balance, in the physics engine."""
 
 import math
+from dataclasses import replace
 
+from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
 from manikin.control.balance_recovery import RecoverySettings
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections.push import PushSection, RecoverySection
-from manikin.simulation import Feet, Push, PushTrials, Recovery, RecoveryTask, push_near_com, recover
+from manikin.simulation import Feet, PushTrials, Recovery, RecoveryTask, push_near_com, recover
+from manikin.simulation.one_foot import one_foot_posture
 from manikin.spatial import rotation_from_yaw
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report
@@ -27,22 +30,20 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     """
     scenario, body = context.scenario, context.body
     section, push = _sections(scenario)
+    task = _task(scenario, section, body)
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
     try:
         pushes = (
             push_near_com(
-                body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0
+                body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
             ),
         )  # fmt: skip
     except InputError as error:
         raise scenario.refused(("push",), error) from None
     found = recover(
-        body,
-        _task(section, pushes),
-        _settings(section),
-        scene=context.scene,
+        body, replace(task, pushes=pushes), _settings(section), scene=context.scene,
         progress=lambda share: report.progress(STAGE, share),
-    )
+    )  # fmt: skip
     report.finish(STAGE, found.summary())
     if found.failure:
         report.fail(STAGE, found.failure, float(found.trace.motion.time[-1]), f"feet {section.feet}")
@@ -59,9 +60,10 @@ def push_trials(scenario: Scenario) -> PushTrials:
         ScenarioError: If there is nothing to recover from.
     """
     section, push = _sections(scenario)
+    body = scenario.build_body()
     return PushTrials(
-        scenario.build_body(), _task(section, ()), _settings(section), push.duration_s, push.at_s
-    )
+        body, _task(scenario, section, body), _settings(section), push.duration_s, push.at_s
+    )  # fmt: skip
 
 
 def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
@@ -70,8 +72,16 @@ def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
     return scenario.recovery, scenario.push
 
 
-def _task(section: RecoverySection, pushes: tuple[Push, ...]) -> RecoveryTask:
-    return RecoveryTask(pushes, Feet(section.feet), section.duration_s, friction=section.friction)
+def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> RecoveryTask:
+    """The stance, without a push."""
+    task = RecoveryTask((), Feet(section.feet), section.duration_s, friction=section.friction)
+    if section.support == "both":
+        return task
+    foot = f"{section.support}_foot"
+    try:
+        return replace(task, q=one_foot_posture(body, foot), support=(foot,))
+    except InputError as error:
+        raise scenario.refused(("recovery", "support"), error) from None
 
 
 def _settings(section: RecoverySection) -> RecoverySettings:

@@ -22,11 +22,14 @@ class PushSection(Section):
 
 
 class RecoverySection(Section):
-    """A body that stands on both feet, is pushed, and keeps its balance without a motion given beforehand."""
+    """A body that stands, is pushed, and keeps its balance without a motion given beforehand."""
 
     feet: Literal["held", "free"] = Field(
         default="held",
         description="held: welded to the ground, as in Kudoh (2002); free: in contact with friction",
+    )
+    support: Literal["both", "left", "right"] = Field(
+        default="both", description="feet that the body stands on; beside a single one the other is raised"
     )
     delay_s: NonNegative = Field(
         default=0.2, description="from the beginning of the push until the body reacts [s]"
