@@ -31,6 +31,10 @@ MAP = ["push", "--map", "--directions", "4", "--jobs", "1"]
         ([*ONE, "--duration", "nan"], "--duration: "),
         ([*ONE, "--delay", "-1"], "--delay: recovery.delay_s is -1.0"),
         ([*ONE, "--feet", "glued"], "--feet: recovery.feet is 'glued'; valid: 'held' or 'free'"),
+        (
+            [*ONE, "--support", "hand"],
+            "--support: recovery.support is 'hand'; valid: 'both', 'left' or 'right'",
+        ),
         ([*ONE, "--locked", "legs"], "'arms' or 'hips'"),
         ([*ONE, "--strength", "0"], "--strength: recovery.strength is 0.0"),
         ([*ONE, "--body", "insect"], "--body is 'insect'; valid: kudoh or human"),
@@ -96,6 +100,15 @@ def test_a_push_for_people_leaves_a_run_directory(capfd, tmp_path, monkeypatch):
     assert untimed(again["push"]) == untimed(summary["push"])
 
 
+def test_a_body_on_one_foot_is_pushed_too(capfd):
+    """It holds 3 N.s where it carries itself, and falls from what two feet hold."""
+    for force, status in (("30", DONE), ("250", FAILED)):
+        options = ["--support", "left", "--feet", "free", "--json"]
+        assert main(["push", "--force", force, "--direction", "90", *options]) == status
+        found = json.loads(capfd.readouterr().out)
+        assert found["push"]["recovered"] is (status == DONE)
+
+
 @pytest.mark.parametrize("options", [[], ["--delay", "100"]], ids=["too hard", "never reacts"])
 def test_a_body_that_falls_is_status_3_with_a_reason(capfd, options):
     force = "100" if options else "500"
@@ -134,7 +147,7 @@ def searched(monkeypatch):
 
 def test_a_map_has_its_figure_table_and_json(capfd, tmp_path, searched):
     out = tmp_path / "map"
-    arguments = [*MAP, "--feet", "free", "--compare", "locked=arms", "--out", str(out), "--json"]
+    arguments = [*MAP, "--feet", "free", "--compare", "locked=arms,support=left", "--out", str(out), "--json"]
     assert main(arguments) == DONE
     printed = json.loads(capfd.readouterr().out)
     assert printed == json.loads((out / "map.json").read_text())
@@ -146,7 +159,7 @@ def test_a_map_has_its_figure_table_and_json(capfd, tmp_path, searched):
     assert said == {"body": {"model": "kudoh"}, "feet": "free", "locked": [], "delay_s": 0.2,
                     "duration_s": 0.1, "tolerance_Ns": 1.0}  # fmt: skip
     (other,) = printed["compared"]
-    assert other["locked"] == ["arms"]
+    assert (printed["support"], other["support"], other["locked"]) == ("both", "left", ["arms"])
     assert other["impulse_Ns"] == [37.0, 34.0, 31.0, 28.0]
     rows = list(csv.DictReader((out / "map.csv").read_text().splitlines()))
     assert [float(row["impulse_Ns"]) for row in rows] == printed["impulse_Ns"] + other["impulse_Ns"]

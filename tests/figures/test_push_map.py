@@ -10,8 +10,8 @@ from manikin.simulation import HeldImpulse, PushMap, PushTrials
 from manikin.simulation.push_conditions import told_apart
 
 CONDITIONS = {
-    "body": {"model": "kudoh"}, "feet": "free", "delay_s": 0.2, "friction": 0.7, "locked": [],
-    "posture_control_only": False, "strength": 1.0, "duration_s": 0.1, "tolerance_Ns": 1.0,
+    "body": {"model": "kudoh"}, "feet": "free", "support": "both", "delay_s": 0.2, "friction": 0.7,
+    "locked": [], "posture_control_only": False, "strength": 1.0, "duration_s": 0.1, "tolerance_Ns": 1.0,
 }  # fmt: skip
 FOUND = (HeldImpulse(30.0, 31.0, 9), HeldImpulse(45.0, 46.0, 9), HeldImpulse(25.0, 26.0, 9), None)
 MAP = PushMap(CONDITIONS, (0.0, 90.0, 180.0, 270.0), FOUND)

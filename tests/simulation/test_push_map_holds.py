@@ -40,6 +40,7 @@ def random_pushes(shares, border, seed):
 def test_the_stored_map_is_complete_and_of_the_body_of_kudoh():
     assert STORED["complete"]
     assert STORED["body"] == {"model": "kudoh"}
+    assert STORED["support"] == "both"
     assert (STORED["locked"], STORED["strength"], STORED["posture_control_only"]) == ([], 1.0, False)
     assert np.all(MAP.held > 20.0)
     assert np.all(MAP.beyond - MAP.held <= STORED["tolerance_Ns"])

@@ -33,6 +33,9 @@ def push(
         str | None,
         typer.Option(metavar="held|free", help="Welded to the ground, or in contact. Default: held."),
     ] = None,
+    support: Annotated[
+        str | None, typer.Option(metavar="both|left|right", help="Feet to stand on. Default: both.")
+    ] = None,
     locked: Annotated[
         list[str] | None,
         typer.Option(metavar="arms|hips", help="Joints that hold the posture; repeatable."),
@@ -60,8 +63,8 @@ def push(
         list[str] | None,
         typer.Option(
             metavar="KEY=VALUE",
-            help="With --map: a further map that differs in this, such as locked=arms, feet=free or "
-            "delay=0; repeatable.",
+            help="With --map: a further map that differs in this, such as locked=arms, support=left "
+            "or delay=0; repeatable.",
         ),
     ] = None,
     jobs: Annotated[
@@ -76,7 +79,17 @@ def push(
 ) -> int:
     """Push a standing body and see whether it stays on its feet."""
     options = PushOptions(
-        duration, delay, feet, tuple(locked or ()), posture_control_only, strength, body, stature, mass, sex
+        duration,
+        delay,
+        feet,
+        support,
+        tuple(locked or ()),
+        posture_control_only,
+        strength,
+        body,
+        stature,
+        mass,
+        sex,
     )
     if map_:
         refuse(force is not None, "--force", "it is what a map searches")

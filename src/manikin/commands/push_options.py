@@ -15,6 +15,7 @@ _OPTIONS: dict[tuple[str | int, ...], str] = {
     ("recovery", "duration_s"): "--duration",
     ("recovery", "delay_s"): "--delay",
     ("recovery", "feet"): "--feet",
+    ("recovery", "support"): "--support",
     ("recovery", "locked"): "--locked",
     ("recovery", "strength"): "--strength",
     ("body", "model"): "--body",
@@ -33,6 +34,7 @@ class PushOptions:
         duration: Of the push [s].
         delay: From the beginning of the push until the body reacts [s]; None for the scenarios' own.
         feet: ``"held"`` or ``"free"``; None for the scenarios' own.
+        support: ``"both"`` feet, or ``"left"`` or ``"right"``; None for the scenarios' own.
         locked: Groups of joints that hold the posture.
         posture_control_only: Whether the quadratic program is left out.
         strength: Torque and speed limits relative to those of the body.
@@ -43,6 +45,7 @@ class PushOptions:
     duration: float = 0.1
     delay: float | None = None
     feet: str | None = None
+    support: str | None = None
     locked: tuple[str, ...] = ()
     posture_control_only: bool = False
     strength: float = 1.0
@@ -74,8 +77,9 @@ class PushOptions:
         finite_number(force, "--force [N]", above=0.0, at_most=STRONGEST)
         body = {"model": self.body, "stature_m": self.stature, "mass_kg": self.mass, "sex": self.sex}
         recovery = {
-            "feet": self.feet, "delay_s": self.delay, "locked": list(self.locked), "strength": self.strength,
-            "posture_control_only": self.posture_control_only, "duration_s": run_duration(self.duration),
+            "feet": self.feet, "support": self.support, "delay_s": self.delay, "locked": list(self.locked),
+            "strength": self.strength, "posture_control_only": self.posture_control_only,
+            "duration_s": run_duration(self.duration),
         }  # fmt: skip
         data = {
             "name": name, "body": _given(body), "recovery": _given(recovery),
@@ -119,7 +123,7 @@ def _setting(part: str, text: str) -> tuple[str, Any]:
     key, equals, value = part.partition("=")
     if key == "posture-control-only" and value in ("", "yes", "no"):
         return "posture_control_only", value != "no"
-    if key == "feet" and value:
+    if key in ("feet", "support") and value:
         return key, value
     if key == "locked" and value:
         return key, () if value == "none" else tuple(value.split("+"))
@@ -129,6 +133,6 @@ def _setting(part: str, text: str) -> tuple[str, Any]:
         except ValueError:
             pass
     raise InputError(
-        f"--compare {text}: {part!r} is not a setting; valid: feet=free, locked=arms+hips or none, "
-        "delay=SECONDS, strength=X, posture-control-only, or several with commas between"
+        f"--compare {text}: {part!r} is not a setting; valid: feet=free, support=left, locked=arms+hips "
+        "or none, delay=SECONDS, strength=X, posture-control-only, or several with commas between"
     )

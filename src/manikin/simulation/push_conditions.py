@@ -18,7 +18,7 @@ def told_apart(maps: Sequence[Mapping[str, Any]]) -> tuple[str, list[str]]:
     differ = [len({words[place] for words in spoken}) > 1 for place in range(len(spoken[0]))]
     common = [word for word, other in zip(spoken[0], differ, strict=True) if not other]
     names = [[word for word, other in zip(words, differ, strict=True) if other] for words in spoken]
-    usual = {"nothing locked", "with the program", "usual strength"}
+    usual = {"nothing locked", "with the program", "usual strength", "on both feet"}
     return ", ".join(word for word in common if word not in usual), [", ".join(name) for name in names]
 
 
@@ -29,6 +29,7 @@ def _words(one: Mapping[str, Any]) -> list[str]:
     return [
         _body(one["body"]),
         f"feet {one['feet']}",
+        "on both feet" if one["support"] == "both" else f"on the {one['support']} foot",
         f"{locked} locked" if locked else "nothing locked",
         "posture control only" if one["posture_control_only"] else "with the program",
         "usual strength" if strength == 1.0 else f"{strength:g} times the strength",

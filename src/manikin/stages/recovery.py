@@ -39,7 +39,7 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     scenario, body = context.scenario, context.body
     section, push = _sections(scenario)
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
-    task, settings = _task(body, section), _settings(section)
+    task, settings = _task(scenario, section, body), _settings(section)
     try:
         one = push_near_com(
             body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
@@ -67,7 +67,7 @@ def push_trials(scenario: Scenario) -> PushTrials:
     """
     section, push = _sections(scenario)
     body = scenario.build_body()
-    return PushTrials(body, _task(body, section), _settings(section), push.duration_s, push.at_s)
+    return PushTrials(body, _task(scenario, section, body), _settings(section), push.duration_s, push.at_s)
 
 
 def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
@@ -76,12 +76,18 @@ def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
     return scenario.recovery, scenario.push
 
 
-def _task(body: BodyModel, section: RecoverySection) -> RecoveryTask:
-    one = section.support if section.support != "both" else None
-    return RecoveryTask(
-        (), Feet(section.feet), section.duration_s, friction=section.friction, steps=section.steps,
-        q=None if one is None else one_foot_posture(body, one), support=None if one is None else (one,),
-    )  # fmt: skip
+def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> RecoveryTask:
+    """The stance, without a push."""
+    task = RecoveryTask(
+        (), Feet(section.feet), section.duration_s, friction=section.friction, steps=section.steps
+    )
+    if section.support == "both":
+        return task
+    foot = f"{section.support}_foot"
+    try:
+        return replace(task, q=one_foot_posture(body, foot), support=(foot,))
+    except InputError as error:
+        raise scenario.refused(("recovery", "support"), error) from None
 
 
 def _settings(section: RecoverySection) -> RecoverySettings:

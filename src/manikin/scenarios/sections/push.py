@@ -28,11 +28,11 @@ class RecoverySection(Section):
         default="held",
         description="held: welded to the ground, as in Kudoh (2002); free: in contact with friction",
     )
+    support: Literal["both", "left", "right"] = Field(
+        default="both", description="feet that the body stands on; beside a single one the other is raised"
+    )
     delay_s: NonNegative = Field(
         default=0.2, description="from the beginning of the push until the body reacts [s]"
-    )
-    support: Literal["both", "left_foot", "right_foot"] = Field(
-        default="both", description="feet that it stands on: both, left_foot or right_foot"
     )
     steps: Annotated[int, Field(ge=0, le=2)] = Field(
         default=0, description="how many steps it may take, 0 to 2; free feet only"
