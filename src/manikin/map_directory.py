@@ -25,8 +25,8 @@ from manikin.version import __version__
 MAP = "map.json"
 TABLE = "map.csv"
 
-RESULTS = ("impulse_Ns", "beyond_Ns", "trials")
-"""Keys of a map that are found; all others say what was asked."""
+RESULTS = ("impulse_Ns", "beyond_Ns", "trials", "bound_Ns")
+"""Keys of a map that are found or computed; all others say what was asked."""
 
 
 def maps_as_dict(maps: Sequence[PushMap]) -> dict[str, Any]:
@@ -140,9 +140,10 @@ def _table(maps: Sequence[PushMap]) -> str:
     """One row per map and direction; what is not known is empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["map", "direction_deg", "impulse_Ns", "beyond_Ns"])
+    writer.writerow(["map", "direction_deg", "impulse_Ns", "beyond_Ns", "bound_Ns"])
     for number, one in enumerate(maps):
-        for direction, found in zip(one.directions, one.found, strict=True):
-            row = ("", "") if found is None else (found.held, found.beyond)
+        bounds = one.bound or (None,) * len(one.directions)
+        for direction, found, bound in zip(one.directions, one.found, bounds, strict=True):
+            row = (None, None, bound) if found is None else (found.held, found.beyond, bound)
             writer.writerow([number, direction, *("" if value is None else value for value in row)])
     return text.getvalue()

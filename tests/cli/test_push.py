@@ -35,6 +35,15 @@ MAP = ["push", "--map", "--directions", "4", "--jobs", "1"]
             [*ONE, "--support", "hand"],
             "--support: recovery.support is 'hand'; valid: 'both', 'left' or 'right'",
         ),
+        ([*ONE, "--steps", "3", "--feet", "free"], "--steps: recovery.steps is 3; valid: a number <= 2"),
+        ([*ONE, "--steps", "-1", "--feet", "free"], "--steps: recovery.steps is -1"),
+        ([*ONE, "--steps", "1"], "--steps: recovery.steps is 1 of held feet; valid: 0, or free feet"),
+        (
+            [*ONE, "--steps", "1", "--feet", "free", "--support", "left"],
+            "--steps: recovery.steps is 1 on one foot; valid: 0, or both feet",
+        ),
+        ([*ONE, "--ankle-stiffness", "-1"], "--ankle-stiffness: recovery.ankle_stiffness is -1.0"),
+        ([*ONE, "--ankle-stiffness", "nan"], "--ankle-stiffness: recovery.ankle_stiffness is nan"),
         ([*ONE, "--locked", "legs"], "'arms' or 'hips'"),
         ([*ONE, "--strength", "0"], "--strength: recovery.strength is 0.0"),
         ([*ONE, "--body", "insect"], "--body is 'insect'; valid: kudoh or human"),
@@ -56,6 +65,10 @@ MAP = ["push", "--map", "--directions", "4", "--jobs", "1"]
         ([*MAP, "--compare", "arms"], "'arms' is not a setting; valid: feet=free"),
         ([*MAP, "--compare", "delay=soon"], "'delay=soon' is not a setting"),
         ([*MAP, "--compare", "delay=-1"], "recovery.delay_s is -1.0"),
+        ([*MAP, "--compare", "steps=0.5"], "'steps=0.5' is not a setting"),
+        ([*MAP, "--compare", "steps=1"], "recovery.steps is 1 of held feet"),
+        ([*MAP, "--compare", "ankle-stiffness="], "'ankle-stiffness=' is not a setting"),
+        ([*MAP, "--compare", "ankle-stiffness=-2"], "recovery.ankle_stiffness is -2.0"),
         ([*MAP, "--compare", "locked=legs"], "'arms' or 'hips'"),
     ],
 )
@@ -109,6 +122,21 @@ def test_a_body_on_one_foot_is_pushed_too(capfd):
         assert found["push"]["recovered"] is (status == DONE)
 
 
+def test_a_body_that_may_step_or_has_stiff_ankles_holds_what_it_cannot_hold_without(capfd):
+    """45 N.s from the back are beyond the bound without a step; stiff ankles raise that bound."""
+    options = ["--direction", "0", "--feet", "free", "--json"]
+    found = {}
+    for name, more in {"none": [], "step": ["--steps", "1"], "stiff": ["--ankle-stiffness", "1.3"]}.items():
+        main(["push", "--force", "450", *options, *more])
+        found[name] = json.loads(capfd.readouterr().out)["push"]
+    assert not found["none"]["recovered"]
+    assert found["none"]["steps"] == 0
+    assert found["step"]["recovered"]
+    assert found["step"]["steps"] == 1
+    assert found["step"]["impulse_Ns"] > found["step"]["bound_Ns"] == found["none"]["bound_Ns"]
+    assert found["stiff"]["bound_Ns"] > 1.2 * found["none"]["bound_Ns"]
+
+
 @pytest.mark.parametrize("options", [[], ["--delay", "100"]], ids=["too hard", "never reacts"])
 def test_a_body_that_falls_is_status_3_with_a_reason(capfd, options):
     force = "100" if options else "500"
@@ -158,11 +186,16 @@ def test_a_map_has_its_figure_table_and_json(capfd, tmp_path, searched):
     said = {key: printed[key] for key in ("body", "feet", "locked", "delay_s", "duration_s", "tolerance_Ns")}
     assert said == {"body": {"model": "kudoh"}, "feet": "free", "locked": [], "delay_s": 0.2,
                     "duration_s": 0.1, "tolerance_Ns": 1.0}  # fmt: skip
+    assert (printed["steps"], printed["ankle_stiffness"]) == (0, 0.64)
     (other,) = printed["compared"]
     assert (printed["support"], other["support"], other["locked"]) == ("both", "left", ["arms"])
     assert other["impulse_Ns"] == [37.0, 34.0, 31.0, 28.0]
     rows = list(csv.DictReader((out / "map.csv").read_text().splitlines()))
-    assert [float(row["impulse_Ns"]) for row in rows] == printed["impulse_Ns"] + other["impulse_Ns"]
+    for column in ("impulse_Ns", "bound_Ns"):
+        assert [float(row[column]) for row in rows] == printed[column] + other[column]
+    ahead, left, back, right = printed["bound_Ns"]
+    assert back < ahead < left == pytest.approx(right, rel=1e-3)
+    assert other["bound_Ns"][1] < other["bound_Ns"][3]  # of the left foot, whose outer edge is near
     assert (out / "figures" / "push_map.png").stat().st_size > 10_000
     assert len(searched) == 8
 
@@ -233,8 +266,19 @@ def test_a_map_for_people_is_a_table(capfd, tmp_path, monkeypatch):
     out, err = capfd.readouterr()
     assert "nothing locked  arms locked" in out
     assert out.splitlines()[2].split() == ["0", "40.0", "37.0"]
+    found = json.loads((tmp_path / "runs" / "push-map" / "map.json").read_text())
+    assert found["bound_Ns"] is None  # of held feet
     assert "files in runs/push-map" in err
     assert not (tmp_path / "runs" / "push-map" / "figures").exists()
+
+
+@pytest.mark.usefixtures("searched")
+def test_maps_with_and_without_a_step_and_stiff_ankles(capfd):
+    compare = ["--compare", "steps=1", "--compare", "steps=2,ankle-stiffness=1.3"]
+    assert main([*MAP, "--feet", "free", *compare]) == DONE
+    head = capfd.readouterr().out.splitlines()[1]
+    names = ["no step, usual ankles", "up to 1 step, usual ankles", "up to 2 steps, ankles of 1.3 m g h"]
+    assert head.split("  ")[-3:] == names
 
 
 @pytest.mark.slow
@@ -245,6 +289,7 @@ def test_a_real_map_of_four_directions(capfd, tmp_path):
     found = json.loads(capfd.readouterr().out)
     held, beyond = np.array(found["impulse_Ns"]), np.array(found["beyond_Ns"])
     assert np.all((held > 10.0) & (beyond - held <= 10.0) & (beyond > held))
+    assert np.all(held <= found["bound_Ns"])
     for impulse, status in ((held[0], DONE), (beyond[0], FAILED)):
         force = ["--force", str(impulse / 0.1), "--direction", "0", "--feet", "free"]
         assert main(["push", *force, "--json"]) == status

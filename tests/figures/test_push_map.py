@@ -1,5 +1,7 @@
 """The figure of push maps: every impulse where its push leads, ahead upward, the soles in the middle."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from manikin.simulation.push_conditions import told_apart
 CONDITIONS = {
     "body": {"model": "kudoh"}, "feet": "free", "support": "both", "delay_s": 0.2, "friction": 0.7,
     "locked": [], "posture_control_only": False, "strength": 1.0, "duration_s": 0.1, "tolerance_Ns": 1.0,
+    "steps": 0, "ankle_stiffness": 0.64,
 }  # fmt: skip
 FOUND = (HeldImpulse(30.0, 31.0, 9), HeldImpulse(45.0, 46.0, 9), HeldImpulse(25.0, 26.0, 9), None)
 MAP = PushMap(CONDITIONS, (0.0, 90.0, 180.0, 270.0), FOUND)
@@ -44,6 +47,24 @@ def test_curves_are_named_by_what_tells_them_apart():
     common, names = told_apart([CONDITIONS])
     assert names == [""]
     assert common == "body of Kudoh, feet free, reaction after 0.2 s, push of 0.1 s"
+    common, names = told_apart([CONDITIONS | {"steps": steps, "ankle_stiffness": 1.3} for steps in (0, 1, 2)])
+    assert names == ["no step", "up to 1 step", "up to 2 steps"]
+    assert "ankles of 1.3 m g h" in common
+
+
+def test_bounds_are_dashed_with_one_name_and_inside_the_figure():
+    high = replace(MAP, bound=(40.0, 70.0, 30.0, 65.0))
+    low = replace(MAP, conditions=CONDITIONS | {"locked": ["arms"]}, bound=(35.0, 60.0, 28.0, 55.0))
+    (axes,) = push_map_figure([high, low]).axes
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert names == ["nothing locked", "arms locked", "bound without a step"]
+    dashed = [line for line in axes.lines if line.get_linestyle() == "--" and len(line.get_xdata())]
+    for line, one in zip(dashed, (high, low), strict=True):
+        np.testing.assert_allclose(line.get_ydata(), [*one.bound, one.bound[0]])
+    assert axes.get_ylim()[1] > 70.0
+    (alone,) = push_map_figure([high]).axes
+    assert [text.get_text() for text in alone.get_legend().get_texts()] == ["held", "bound without a step"]
+    assert push_map_figure([MAP]).axes[0].get_legend() is None
 
 
 def test_a_map_of_nothing_is_not_drawn():

@@ -4,6 +4,7 @@ import multiprocessing
 import pickle
 import types
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human, kudoh
+from manikin.control.balance_recovery import RecoverySettings
 from manikin.errors import InputError
 from manikin.motion.description import describe_body
 from manikin.simulation import (
@@ -83,15 +85,29 @@ def test_a_map_has_directions(count):
 
 def test_a_map_survives_its_file_and_reads_between_directions_on_the_safe_side():
     found = (HeldImpulse(20.0, 21.0, 9), HeldImpulse(40.0, 41.0, 9), HeldImpulse(30.0, None, 9))
-    whole = PushMap({"feet": "free"}, (0.0, 120.0, 240.0), found)
+    whole = PushMap({"feet": "free"}, (0.0, 120.0, 240.0), found, (25.0, 50.0, 35.0))
     again = PushMap.from_dict(whole.as_dict())
     assert (again.conditions, again.directions, again.found) == (whole.conditions, whole.directions, found)
+    assert again.bound == (25.0, 50.0, 35.0)
     assert (whole.surely_held(60.0), whole.surely_held(180.0), whole.surely_held(-1.0)) == (20.0, 30.0, 20.0)
     assert (whole.surely_held(0.0), whole.surely_beyond(60.0)) == (20.0, 41.0)
     assert np.isnan(whole.surely_beyond(180.0))
     part = PushMap.empty({}, (0.0, 120.0, 240.0)).with_found(1, HeldImpulse(None, 1.0, 6))
     assert part.missing == (0, 2)
     assert PushMap.from_dict(part.as_dict()).missing == (0, 2)
+    assert PushMap.from_dict(part.as_dict()).bound is None
+    with pytest.raises(ValueError, match="2 bounds of 3 directions"):
+        PushMap.from_dict(part.as_dict() | {"bound_Ns": [1.0, 2.0]})
+
+
+def test_bounds_are_those_of_the_stance():
+    """Mirror images from the sides of two feet; later reaction holds less; welded feet have no bound."""
+    angles = (0.0, 60.0, 300.0)
+    ahead, left, right = TRIALS.bound(angles)
+    assert left == pytest.approx(right, rel=1e-3)
+    late = replace(TRIALS, settings=RecoverySettings(delay=0.3)).bound(angles)
+    assert late[0] < 0.95 * ahead
+    assert PushTrials(KUDOH).bound(angles) is None
 
 
 @pytest.mark.parametrize("body", [KUDOH, human(1.6, 55.0, "female")], ids=["kudoh", "human"])

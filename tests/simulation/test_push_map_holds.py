@@ -17,7 +17,7 @@ from manikin.simulation.recovery import STANDS_HEIGHT
 
 STORED = json.loads((Path(__file__).parent / "data" / "push_map_kudoh_free.json").read_text())
 MAP = PushMap.from_dict(STORED)
-# Pushed at once, and for 0.3 s at rest only: some of the time saved that 400 pushes take.
+# Pushed at once, and for 0.2 s at rest only: some of the time saved that 400 pushes take.
 TRIALS = PushTrials(
     kudoh(),
     RecoveryTask((), Feet(STORED["feet"])),
@@ -25,31 +25,43 @@ TRIALS = PushTrials(
     STORED["duration_s"],
     begins=0.0,
 )
-PUSHES = 200
+AT_REST = 0.2
+PUSHES, CHUNK = 200, 25
+CHUNKS = pytest.mark.parametrize("first", range(0, PUSHES, CHUNK))
+"""Parts of the pushes, for several processes of the tests."""
 
 
-def random_pushes(shares, border, seed):
-    """Direction, impulse and outcome of each push; impulses are shares of those at the border."""
-    rng = np.random.default_rng(seed)
-    for _ in range(PUSHES):
+def random_pushes(first, shares, border, seed):
+    """Direction, impulse and outcome of a chunk of pushes; impulses are shares of those at the border."""
+    rng = np.random.default_rng([seed, first])
+    for _ in range(CHUNK):
         direction = rng.uniform(0.0, 360.0)
         impulse = rng.uniform(*shares) * border(direction)
-        yield direction, impulse, TRIALS.push(direction, impulse, until_at_rest=0.3)
+        yield direction, impulse, TRIALS.push(direction, impulse, until_at_rest=AT_REST)
 
 
 def test_the_stored_map_is_complete_and_of_the_body_of_kudoh():
     assert STORED["complete"]
     assert STORED["body"] == {"model": "kudoh"}
-    assert STORED["support"] == "both"
+    assert (STORED["support"], STORED["steps"]) == ("both", 0)
     assert (STORED["locked"], STORED["strength"], STORED["posture_control_only"]) == ([], 1.0, False)
+    assert STORED["ankle_stiffness"] == TRIALS.settings.ankle_stiffness
     assert np.all(MAP.held > 20.0)
     assert np.all(MAP.beyond - MAP.held <= STORED["tolerance_Ns"])
 
 
+def test_nothing_is_held_beyond_the_bound_without_a_step():
+    """Which is that of the controller as it is, and more than half of which is held in every direction."""
+    np.testing.assert_allclose(MAP.bound, TRIALS.bound(MAP.directions), rtol=1e-4)
+    assert np.all(MAP.held <= MAP.bound)
+    assert np.all(MAP.held > 0.5 * np.array(MAP.bound))
+
+
 @pytest.mark.slow
-def test_pushes_of_at_most_four_fifths_of_the_map_are_held():
+@CHUNKS
+def test_pushes_of_at_most_four_fifths_of_the_map_are_held(first):
     """Between two directions of the map, of the smaller impulse. Who stands, stands upright on both feet."""
-    pushes = list(random_pushes((0.0, 0.8), MAP.surely_held, 1))
+    pushes = list(random_pushes(first, (0.0, 0.8), MAP.surely_held, 1))
     assert [
         (direction, impulse, found.failure) for direction, impulse, found in pushes if found.failure
     ] == []
@@ -60,8 +72,9 @@ def test_pushes_of_at_most_four_fifths_of_the_map_are_held():
 
 
 @pytest.mark.slow
-def test_nothing_beyond_thirteen_tenths_of_the_map_is_called_a_recovery():
+@CHUNKS
+def test_nothing_beyond_thirteen_tenths_of_the_map_is_called_a_recovery(first):
     """Between two directions of the map, of the larger impulse. Each fall is explained."""
-    pushes = list(random_pushes((1.3, 2.5), MAP.surely_beyond, 2))
+    pushes = list(random_pushes(first, (1.3, 2.5), MAP.surely_beyond, 2))
     assert [push for *push, found in pushes if found.recovered] == []
     assert all(found.failure and found.time_to_rest is None for *_, found in pushes)

@@ -36,6 +36,13 @@ def push(
     support: Annotated[
         str | None, typer.Option(metavar="both|left|right", help="Feet to stand on. Default: both.")
     ] = None,
+    steps: Annotated[
+        int | None, typer.Option(metavar="0|1|2", help="Steps that free feet may take. Default: 0.")
+    ] = None,
+    ankle_stiffness: Annotated[
+        float | None,
+        typer.Option(metavar="X", help="Before the body reacts [m g h per radian]. Default: 0.64."),
+    ] = None,
     locked: Annotated[
         list[str] | None,
         typer.Option(metavar="arms|hips", help="Joints that hold the posture; repeatable."),
@@ -79,17 +86,19 @@ def push(
 ) -> int:
     """Push a standing body and see whether it stays on its feet."""
     options = PushOptions(
-        duration,
-        delay,
-        feet,
-        support,
-        tuple(locked or ()),
-        posture_control_only,
-        strength,
-        body,
-        stature,
-        mass,
-        sex,
+        duration=duration,
+        delay=delay,
+        feet=feet,
+        support=support,
+        steps=steps,
+        ankle_stiffness=ankle_stiffness,
+        locked=tuple(locked or ()),
+        posture_control_only=posture_control_only,
+        strength=strength,
+        body=body,
+        stature=stature,
+        mass=mass,
+        sex=sex,
     )
     if map_:
         refuse(force is not None, "--force", "it is what a map searches")

@@ -49,7 +49,8 @@ class MapRequest:
             job = options.scenario("push-map")
             trials = push_trials(job)
             searches = [DirectionSearch(trials, direction, tolerance) for direction in directions]
-            found.append((PushMap.empty(conditions(job, tolerance), directions), searches))
+            empty = PushMap.empty(conditions(job, tolerance), directions, trials.bound(directions))
+            found.append((empty, searches))
         return found
 
 

@@ -16,6 +16,8 @@ _OPTIONS: dict[tuple[str | int, ...], str] = {
     ("recovery", "delay_s"): "--delay",
     ("recovery", "feet"): "--feet",
     ("recovery", "support"): "--support",
+    ("recovery", "steps"): "--steps",
+    ("recovery", "ankle_stiffness"): "--ankle-stiffness",
     ("recovery", "locked"): "--locked",
     ("recovery", "strength"): "--strength",
     ("body", "model"): "--body",
@@ -24,6 +26,14 @@ _OPTIONS: dict[tuple[str | int, ...], str] = {
     ("body", "sex"): "--sex",
 }
 """Where the values of the scenario come from, for messages."""
+
+_NUMBERS: dict[str, tuple[str, type[int] | type[float]]] = {
+    "steps": ("steps", int),
+    "delay": ("delay", float),
+    "ankle-stiffness": ("ankle_stiffness", float),
+    "strength": ("strength", float),
+}
+"""Settings of a comparison that are numbers, with their field and kind."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +45,9 @@ class PushOptions:
         delay: From the beginning of the push until the body reacts [s]; None for the scenarios' own.
         feet: ``"held"`` or ``"free"``; None for the scenarios' own.
         support: ``"both"`` feet, or ``"left"`` or ``"right"``; None for the scenarios' own.
+        steps: How many steps may be taken; None for the scenarios' own.
+        ankle_stiffness: Of both ankles before the body reacts, in ``m g h`` per radian; None for the
+            scenarios' own.
         locked: Groups of joints that hold the posture.
         posture_control_only: Whether the quadratic program is left out.
         strength: Torque and speed limits relative to those of the body.
@@ -46,6 +59,8 @@ class PushOptions:
     delay: float | None = None
     feet: str | None = None
     support: str | None = None
+    steps: int | None = None
+    ankle_stiffness: float | None = None
     locked: tuple[str, ...] = ()
     posture_control_only: bool = False
     strength: float = 1.0
@@ -77,7 +92,8 @@ class PushOptions:
         finite_number(force, "--force [N]", above=0.0, at_most=STRONGEST)
         body = {"model": self.body, "stature_m": self.stature, "mass_kg": self.mass, "sex": self.sex}
         recovery = {
-            "feet": self.feet, "support": self.support, "delay_s": self.delay, "locked": list(self.locked),
+            "feet": self.feet, "support": self.support, "steps": self.steps, "delay_s": self.delay,
+            "ankle_stiffness": self.ankle_stiffness, "locked": list(self.locked),
             "strength": self.strength, "posture_control_only": self.posture_control_only,
             "duration_s": run_duration(self.duration),
         }  # fmt: skip
@@ -127,12 +143,14 @@ def _setting(part: str, text: str) -> tuple[str, Any]:
         return key, value
     if key == "locked" and value:
         return key, () if value == "none" else tuple(value.split("+"))
-    if key in ("delay", "strength") and equals:
+    if key in _NUMBERS and equals:
+        field, number = _NUMBERS[key]
         try:
-            return key, float(value)
+            return field, number(value)
         except ValueError:
             pass
     raise InputError(
-        f"--compare {text}: {part!r} is not a setting; valid: feet=free, support=left, locked=arms+hips "
-        "or none, delay=SECONDS, strength=X, posture-control-only, or several with commas between"
+        f"--compare {text}: {part!r} is not a setting; valid: feet=free, support=left, steps=1, "
+        "locked=arms+hips or none, delay=SECONDS, ankle-stiffness=X, strength=X, posture-control-only, or "
+        "several with commas between"
     )

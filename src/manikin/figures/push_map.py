@@ -22,13 +22,16 @@ CURVES = ("#0072B2", "#D55E00", *CYCLE)
 
 MARKERS = "osD^vP*X"
 
+BOUND = "bound without a step"
+
 
 def push_map_figure(maps: Sequence[PushMap], soles: Sequence[FloatArray] = ()) -> Figure:
     """Draw the largest impulse held by direction, of one map or several.
 
     Ahead is up and left is left; a point stands where the force of the push leads. The soles are drawn in the
     middle for orientation, about the centre of mass and to a scale of their own. A direction that is not
-    known, or in which the body does not stand by itself, is a gap.
+    known, or in which the body does not stand by itself, is a gap. Dashed is the upper bound of what each
+    holds without a step, where there is one.
 
     Args:
         maps: At least one with a known direction.
@@ -43,12 +46,14 @@ def push_map_figure(maps: Sequence[PushMap], soles: Sequence[FloatArray] = ()) -
     figure = new_figure(7.4, 7.9, "Largest impulse held, by direction of the push")
     axes = figure.add_subplot(projection="polar")
     axes.set_title(fill(common, 96), fontsize=8.5, color=COLOURS["soft"], pad=8)
-    top = 1.08 * max(float(np.nanmax(one.held, initial=0.0)) for one in maps) or 1.0
+    top = 1.08 * max(float(np.nanmax([*one.held, *(one.bound or ())], initial=0.0)) for one in maps) or 1.0
     _dress(axes, top)
     _draw_soles(axes, soles, SOLES * top)
     for number, (one, name) in enumerate(zip(maps, names, strict=True)):
         _draw_curve(axes, one, name or "held", number)
-    if len(maps) > 1:
+    if any(one.bound for one in maps):
+        axes.plot([], [], "--", linewidth=0.9, color=COLOURS["soft"], label=BOUND)
+    if len(axes.get_legend_handles_labels()[1]) > 1:
         axes.legend(fontsize=8.5, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=2)
     return figure
 
@@ -58,6 +63,8 @@ def _draw_curve(axes: Axes, one: PushMap, name: str, number: int) -> None:
     colour = CURVES[number % len(CURVES)]
     angle = np.radians([*one.directions, one.directions[0]])
     held = np.append(one.held, one.held[0])
+    if one.bound:
+        axes.plot(angle, [*one.bound, one.bound[0]], "--", linewidth=0.9, color=colour, zorder=3.5)
     axes.plot(
         angle, held, marker=MARKERS[number % len(MARKERS)], markersize=3.8, linewidth=1.6, color=colour,
         label=name, zorder=4 - 0.1 * number,

@@ -30,16 +30,22 @@ class PushMap:
         conditions: Plain values that say who was pushed and how, for files and figures.
         directions: (n,) of the force, counter-clockwise from the body's forward axis, ascending [deg].
         found: What was found for each direction; None where it has not been searched yet.
+        bound: (n,) upper bound of the impulse held without a step, from the pendulum with a flywheel
+            [N.s]; None where there is none, as of feet that are held.
     """
 
     conditions: Mapping[str, Any]
     directions: tuple[float, ...]
     found: tuple[HeldImpulse | None, ...]
+    bound: tuple[float, ...] | None = None
 
     @classmethod
-    def empty(cls, conditions: Mapping[str, Any], directions: Sequence[float]) -> "PushMap":
-        """A map of which nothing is known."""
-        return cls(conditions, tuple(directions), (None,) * len(directions))
+    def empty(
+        cls, conditions: Mapping[str, Any], directions: Sequence[float], bound: Sequence[float] | None = None
+    ) -> "PushMap":
+        """A map of which nothing is known but its bound."""
+        bounds = None if bound is None else tuple(bound)
+        return cls(conditions, tuple(directions), (None,) * len(directions), bounds)
 
     @property
     def missing(self) -> tuple[int, ...]:
@@ -82,6 +88,7 @@ class PushMap:
             "impulse_Ns": [None if f is None else f.held for f in self.found],
             "beyond_Ns": [None if f is None else f.beyond for f in self.found],
             "trials": [None if f is None else f.trials for f in self.found],
+            "bound_Ns": None if self.bound is None else list(self.bound),
         }  # fmt: skip
 
     @classmethod
@@ -93,8 +100,10 @@ class PushMap:
             ValueError: If the lists are not equally long.
         """
         rest = dict(data)
-        directions = tuple(rest.pop("directions_deg"))
+        directions, bound = tuple(rest.pop("directions_deg")), rest.pop("bound_Ns")
         rows = zip(directions, *(rest.pop(key) for key in ("impulse_Ns", "beyond_Ns", "trials")), strict=True)
         found = tuple(None if trials is None else HeldImpulse(held, beyond, trials)
                       for _, held, beyond, trials in rows)  # fmt: skip
-        return cls(rest, directions, found)
+        if bound is not None and len(bound) != len(directions):
+            raise ValueError(f"{len(bound)} bounds of {len(directions)} directions")
+        return cls(rest, directions, found, None if bound is None else tuple(bound))

@@ -1,12 +1,14 @@
 """The largest impulse that a standing body recovers from, from one direction."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
+from numpy.typing import ArrayLike
+
 from manikin.body import BodyModel
-from manikin.control.balance_recovery import BalanceRecovery, RecoverySettings
-from manikin.simulation.recover import STRONGEST, RecoveryTask, push_near_com, recover
+from manikin.control.balance_recovery import BalanceRecovery, RecoverySettings, edge_limits, held_impulse
+from manikin.simulation.recover import STRONGEST, Feet, RecoveryTask, push_near_com, recover
 from manikin.simulation.recovery import Recovery
 from manikin.spatial import FloatArray, finite_number, rotation_from_yaw
 
@@ -53,9 +55,31 @@ class PushTrials:
 
     def soles(self) -> tuple[FloatArray, ...]:
         """(4, 2) corners of each sole from the centre of mass, x ahead [m]."""
-        q = self.body.standing_posture() if self.task.q is None else self.task.q
-        controller = BalanceRecovery(self.body, q, self.settings, support=self.task.support)
+        controller = self._controller()
         return tuple(sole.points_in_world[:, :2] - controller.com[:2] for sole in controller.soles)
+
+    def bound(self, directions_deg: Sequence[float]) -> tuple[float, ...] | None:
+        """(n,) upper bound of the impulse that is held without a step [N.s].
+
+        It is that of a pendulum with a flywheel, see
+        :func:`~manikin.control.balance_recovery.edge_limits`; None for feet that are held.
+
+        Args:
+            directions_deg: (n,) of the force, counter-clockwise from the body's forward axis [deg].
+        """
+        if self.task.feet is Feet.HELD:
+            return None
+        limits = edge_limits(self._controller(), self._posture, self.push_duration)
+        return tuple(held_impulse(limits, math.radians(direction)) for direction in directions_deg)
+
+    @property
+    def _posture(self) -> ArrayLike:
+        return self.body.standing_posture() if self.task.q is None else self.task.q
+
+    def _controller(self) -> BalanceRecovery:
+        return BalanceRecovery(
+            self.body, self._posture, self.settings, support=self.task.support, friction=self.task.friction
+        )
 
     def push(self, direction_deg: float, impulse: float, *, until_at_rest: float | None = None) -> Recovery:
         """Push once.

@@ -6,7 +6,7 @@ from itertools import groupby
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
-from manikin.control.balance_recovery import BalanceRecovery, RecoverySettings, edge_limits, held_impulse
+from manikin.control.balance_recovery import RecoverySettings
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections.push import PushSection, RecoverySection
@@ -101,12 +101,11 @@ def _bound(
     body: BodyModel, task: RecoveryTask, settings: RecoverySettings, found: Recovery
 ) -> dict[str, float | None]:
     """Upper bound of the impulse that free feet hold without a step, for one push that is no sine."""
-    if task.feet is Feet.HELD or len(task.pushes) != 1 or task.pushes[0].frequency > 0.0:
+    if len(task.pushes) != 1 or task.pushes[0].frequency > 0.0:
         return {"bound_Ns": None}
-    q = body.standing_posture() if task.q is None else task.q
-    controller = BalanceRecovery(body, q, settings, support=task.support, friction=task.friction)
-    limits = edge_limits(controller, q, task.pushes[0].duration)
-    return {"bound_Ns": held_impulse(limits, math.atan2(found.direction[1], found.direction[0]))}
+    direction = math.degrees(math.atan2(found.direction[1], found.direction[0]))
+    bound = PushTrials(body, task, settings, task.pushes[0].duration).bound([direction])
+    return {"bound_Ns": None if bound is None else bound[0]}
 
 
 def _schedule(found: Recovery) -> ContactSchedule:
