@@ -4,6 +4,7 @@ from manikin.simulation.compile import SimulationModel, compile_model
 from manikin.simulation.execute import default_physics, execute
 from manikin.simulation.execution import Execution
 from manikin.simulation.options import PhysicsOptions
+from manikin.simulation.pushed import PushOutcome, push_impulse, push_on_the_way
 from manikin.simulation.recover import Feet, RecoveryTask, push_near_com, recover
 from manikin.simulation.recovery import Recovery
 from manikin.simulation.world import Push, Touch, World
@@ -13,6 +14,7 @@ __all__ = [
     "Feet",
     "PhysicsOptions",
     "Push",
+    "PushOutcome",
     "Recovery",
     "RecoveryTask",
     "SimulationModel",
@@ -21,6 +23,8 @@ __all__ = [
     "compile_model",
     "default_physics",
     "execute",
+    "push_impulse",
     "push_near_com",
+    "push_on_the_way",
     "recover",
 ]

@@ -1,23 +1,33 @@
 """Section of a scenario file: a disturbance."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from manikin.scenarios.validation import Duration, NonNegative, Number, Positive, Section
 
+LARGEST_FORCE = 5000.0
+"""Some seven body weights, far beyond what can be held [N]; ``manikin.simulation.recover`` has the same."""
+
+LARGEST_FREQUENCY = 100.0
+"""Of a sine: ten of the physics' steps are left for each period [Hz]."""
+
+Force = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST_FORCE)]
+
 
 class PushSection(Section):
     """A push on the trunk: of the thorax during an execution, near the centre of mass in a recovery."""
 
-    force_N: Positive = Field(description="size [N]; of a sine its amplitude")
+    force_N: Force = Field(description="size [N]; of a sine its amplitude")
     direction_deg: Number = Field(
         description="of the force, counter-clockwise from the body's forward axis [deg]"
     )
     duration_s: Duration = Field(description="how long [s]")
     at_s: NonNegative = Field(description="when it begins [s]")
     frequency_hz: Positive | None = Field(
-        default=None, description="of a sine that begins with the push [Hz] (default: a constant force)"
+        default=None,
+        le=LARGEST_FREQUENCY,
+        description="of a sine that begins with the push [Hz] (default: a constant force)",
     )
 
 

@@ -1,0 +1,159 @@
+"""Measure the pushes that a body on its way survives, beside what its margin predicts: ``python docs/pushed.py``.
+
+Writes ``docs/pushed.json``, of which ``docs/generate.py`` makes the tables, and ``docs/images/pushed.png``; with
+``--figure`` the figure alone. Takes some 20 minutes on two cores, and goes on where it was interrupted.
+"""
+
+import json
+import sys
+import tempfile
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from threadpoolctl import threadpool_limits
+
+from manikin.atomic import atomic_path
+from manikin.balance.impulse import predict_impulse
+from manikin.body import Configuration
+from manikin.control import ControlSettings, ReturnSettings
+from manikin.figures.style import COLOURS, CYCLE, dress, new_figure
+from manikin.figures.write import save_figure
+from manikin.motion.file import MotionFile, read_motions
+from manikin.pipeline import run
+from manikin.simulation import Push, execute, push_on_the_way
+from manikin.stages import ExecutionRequirements
+
+DOCS = Path(__file__).parent
+RESULTS = DOCS / "pushed.json"
+FIGURE = DOCS / "images" / "pushed.png"
+TIMES = {"platform": (0.2, 0.65, 1.65, 2.7), "walk": (0.1, 0.55, 0.95)}
+"""When the pushes begin [s]: standing, in double and in single supports."""
+DIRECTIONS = tuple(range(0, 360, 45))
+DURATION = 0.1
+RESOLUTION = 2.0
+"""Of the bisection [N.s]."""
+LARGEST = 100.0
+"""No more is tried [N.s]."""
+PREDICTIONS = {
+    "plan": "room that the plan leaves",
+    "capture": "capture point to the edge",
+    "margin": "wrench margin",
+}
+
+
+class Job(NamedTuple):
+    """One bisection: where, when, in which direction, and whether with the return to the plan or without."""
+
+    scenario: str
+    time_s: float
+    direction_deg: int
+    returning: bool
+
+
+def survives(plan: MotionFile, push: Push, returning: bool) -> bool:
+    """Whether the body comes back on its plan and to its goal."""
+    settings = ControlSettings(returning=ReturnSettings() if returning else None)
+    result = execute(plan.body, plan.scene, plan.planned, plan.schedule, pushes=[push], settings=settings)
+    return result.succeeded and ExecutionRequirements().violation(result) is None
+
+
+def largest_impulse(plan: MotionFile, job: Job, guess: float) -> float:
+    """Largest impulse that is survived [N.s], by bisection from a guess; all smaller ones are taken to be."""
+
+    def good(impulse: float) -> bool:
+        force = impulse / DURATION
+        push = push_on_the_way(plan.planned, force, job.direction_deg, job.time_s, DURATION)
+        return survives(plan, push, job.returning)
+
+    middle = min(max(guess, RESOLUTION), LARGEST)
+    low, high = (middle, 1.5 * middle) if good(middle) else (middle / 1.5, middle)
+    while low == middle and high < LARGEST and good(high):
+        middle = low = high
+        high *= 1.5
+    while high == middle and high > RESOLUTION and not good(low):
+        middle = high = low
+        low /= 1.5
+    while high - low > RESOLUTION:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if good(middle) else (low, middle)
+    return low
+
+
+def measured(folder: str, job: Job) -> dict[str, Any]:
+    """Largest impulse of one job, and what was predicted."""
+    with threadpool_limits(1):
+        plan = read_motions(Path(folder) / job.scenario)
+        motion = plan.planned
+        push = push_on_the_way(motion, 1.0, job.direction_deg, job.time_s, DURATION)
+        at = motion.q[min(np.searchsorted(motion.time, job.time_s), len(motion.q) - 1)]
+        height = Configuration(plan.body, at).point(push.segment, plan.body.segment(push.segment).com)[2]
+        found = predict_impulse(
+            motion, plan.schedule, plan.body.mass, job.time_s, push.force[:2],
+            duration=DURATION, height=float(height),
+        )  # fmt: skip
+        values = {key: round(getattr(found, key), 1) for key in PREDICTIONS}
+        values["measured_Ns"] = round(largest_impulse(plan, job, found.plan), 1)
+    feet = len(plan.schedule.stance_at(job.time_s))
+    return {**job._asdict(), "feet": feet, **values}
+
+
+def jobs() -> list[Job]:
+    """What is measured: all directions with the return, the four main ones also without."""
+    both = [(True, d) for d in DIRECTIONS] + [(False, d) for d in DIRECTIONS[::2]]
+    places = [(name, time) for name, times in TIMES.items() for time in times]
+    return sorted(
+        (Job(name, time, direction, returning) for name, time in places for returning, direction in both),
+        key=lambda job: not job.returning,
+    )
+
+
+def measure() -> None:
+    """Measure what is missing; everything is kept as soon as it is known."""
+    found = json.loads(RESULTS.read_text()) if RESULTS.exists() else []
+    done = {Job(*(item[name] for name in Job._fields)) for item in found}
+    wanted = [job for job in jobs() if job not in done]
+    with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(2) as pool:
+        for name in sorted({job.scenario for job in wanted}):
+            run(name, out=Path(folder) / name)
+        for answer in as_completed([pool.submit(measured, folder, job) for job in wanted]):
+            found.append(answer.result())
+            found.sort(key=lambda item: tuple(item[name] for name in Job._fields))
+            with atomic_path(RESULTS) as path:
+                path.write_text(json.dumps(found, indent=1) + "\n")
+
+
+def draw() -> None:
+    """Predicted against measured, one panel per prediction."""
+    found = json.loads(RESULTS.read_text())
+    figure = new_figure(11.0, 4.2, "Largest impulse that a body on its way can take: predicted and measured")
+    panels = figure.subplots(1, len(PREDICTIONS), sharex=True, sharey=True)
+    for axes, (key, words) in zip(panels, PREDICTIONS.items(), strict=True):
+        _panel(axes, found, key)
+        dress(axes, "measured [N.s]" if key == "plan" else "", "predicted [N.s]", words)
+    panels[0].legend(fontsize=8, loc="upper right", framealpha=0.9, edgecolor="none")
+    save_figure(figure, FIGURE)
+
+
+def _panel(axes: Axes, found: list[dict[str, Any]], key: str) -> None:
+    top = max(push["measured_Ns"] for push in found) + 5.0
+    axes.plot([0, top], [0, top], color=COLOURS["ink"], linewidth=0.9)
+    axes.axvline(0.0, color=COLOURS["soft"], linewidth=0.6)
+    groups = [(name, feet) for name in TIMES for feet in (2, 1)]
+    for number, (name, feet) in enumerate(groups):
+        pushes = [p for p in found if (p["scenario"], p["feet"], p["returning"]) == (name, feet, True)]
+        axes.plot(
+            [p[key] for p in pushes], [p["measured_Ns"] for p in pushes], linestyle="none",
+            marker="o" if feet == 2 else "^", markersize=4.5, color=CYCLE[number], alpha=0.8,
+            label=f"{name}, {'both feet' if feet == 2 else 'one foot'}",
+        )  # fmt: skip
+    axes.set_xlim(-35.0, top)
+    axes.set_ylim(0.0, top)
+
+
+if __name__ == "__main__":
+    if "--figure" not in sys.argv:
+        measure()
+    draw()
