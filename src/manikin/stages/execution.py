@@ -11,6 +11,7 @@ from manikin.stages.planned_motion import PlannedMotion
 from manikin.stages.report import Failure, Report, place
 from manikin.stages.requirements import ExecutionRequirements
 
+
 def execute_motion(
     context: RunContext, report: Report, planned: PlannedMotion, requirements: ExecutionRequirements
 ) -> Execution:
