@@ -8,6 +8,7 @@ cores, and goes on where it was interrupted.
 import json
 import sys
 import tempfile
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,6 +41,8 @@ DIRECTIONS = tuple(range(0, 360, 45))
 DURATION = 0.1
 RESOLUTION = 2.0
 """Of the bisection [N.s]."""
+SHARES = (0.25, 0.5, 0.75)
+"""Of what was found that are tried as well."""
 LARGEST = 100.0
 """No more is tried [N.s]."""
 PREDICTIONS = {
@@ -86,25 +89,48 @@ def survives(plan: Plan, push: Push, returning: bool) -> bool:
 
 
 def largest_impulse(plan: Plan, job: Job, guess: float) -> float:
-    """Largest impulse that is survived [N.s], by bisection from a guess; all smaller ones are taken to be."""
+    """Impulse up to which pushes are survived [N.s], by bisection from a guess.
+
+    Not every push weaker than one that is survived is survived itself. Those at shares of what was found are
+    tried, too, and the first of them that is not takes its place.
+    """
 
     def good(impulse: float) -> bool:
         force = impulse / DURATION
         push = push_on_the_way(plan.motion, force, job.direction_deg, job.time_s, DURATION)
         return survives(plan, push, job.returning)
 
-    middle = min(max(guess, RESOLUTION), LARGEST)
-    low, high = (middle, 1.5 * middle) if good(middle) else (middle / 1.5, middle)
-    while low == middle and high < LARGEST and good(high):
-        middle = low = high
-        high *= 1.5
-    while high == middle and high > RESOLUTION and not good(low):
-        middle = high = low
-        low /= 1.5
+    return without_gaps(good, between(good, *bracket(good, min(max(guess, RESOLUTION), LARGEST))))
+
+
+def bracket(good: Callable[[float], bool], guess: float) -> tuple[float, float]:
+    """One impulse that is survived, or too small to tell, and one that is not or is the largest [N.s]."""
+    low = high = guess
+    if good(guess):
+        while (low := high) < LARGEST and good(high := 1.5 * low):
+            pass
+        return low, high
+    while (high := low) > RESOLUTION and not good(low := high / 1.5):
+        pass
+    return low, high
+
+
+def between(good: Callable[[float], bool], low: float, high: float) -> float:
+    """Bisect between an impulse that is survived and one that is not [N.s]."""
     while high - low > RESOLUTION:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if good(middle) else (low, middle)
     return low
+
+
+def without_gaps(good: Callable[[float], bool], found: float) -> float:
+    """The same, or less where a weaker push is not survived [N.s]."""
+    last = 0.0
+    for share in SHARES:
+        if not good(share * found):
+            return between(good, last, share * found)
+        last = share * found
+    return found
 
 
 def measured(folder: str, job: Job) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def test_without_a_push_being_ready_for_one_changes_no_bit(stepping, undisturbed
 
 
 def test_a_short_push_changes_the_momentum_by_its_impulse(stepping, undisturbed):
-    """10 N.s within 10 ms, before the ground has answered: at most 1 % of it, by the soles' friction."""
+    """10 N.s within 10 ms, less what the ground takes meanwhile, which is read from two samples (0.5 N.s)."""
     push = Push("thorax", np.array([1000.0, 0.0, 0.0]), 0.3, 0.01)
     assert push_impulse(push) == pytest.approx(10.0)
     hit = execute(
@@ -125,6 +125,19 @@ def test_the_impulse_of_a_sine_counts_both_ways(duration, impulse):
     """The integral of ``|pi sin(2 pi t)|`` is 1 over each half wave."""
     push = Push("thorax", np.array([0.0, np.pi, 0.0]), 0.0, duration, frequency=1.0)
     assert push_impulse(push) == pytest.approx(impulse)
+
+
+def test_a_sine_is_one_in_an_execution_too(stand):
+    """A full wave within 20 ms leaves hardly any momentum, a constant force of that size up to 2 N.s."""
+    plan = stand(0.3)
+    speed = {}
+    for frequency in (0.0, 50.0):
+        push = push_on_the_way(plan.motion, 100.0, 0.0, 0.1, 0.02, frequency)
+        moved = execute(plan.body, Scene(), plan.motion, plan.schedule, pushes=[push], hold=0.0).motion
+        sample = int(np.searchsorted(moved.time, 0.12 - 1e-6))
+        speed[frequency] = _momentum(plan.body, moved, sample)[0]
+    assert 0.5 < speed[0.0] < 2.1
+    assert abs(speed[50.0]) < 0.2 * speed[0.0]
 
 
 # --- the clock -----------------------------------------------------------------------------------
