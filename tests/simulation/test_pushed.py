@@ -6,6 +6,7 @@ import pytest
 from manikin.control import ControlSettings, ReturnSettings
 from manikin.control.balance_recovery.support_area import SupportArea
 from manikin.control.plan_return import Deviation, PlanClock
+from manikin.control.reference import Reference
 from manikin.errors import InputError
 from manikin.scene import Scene
 from manikin.simulation import Push, execute, push_impulse, push_on_the_way
@@ -138,6 +139,23 @@ def test_a_sine_is_one_in_an_execution_too(stand):
         speed[frequency] = _momentum(plan.body, moved, sample)[0]
     assert 0.5 < speed[0.0] < 2.1
     assert abs(speed[50.0]) < 0.2 * speed[0.0]
+
+
+def test_a_plan_at_another_rate_has_its_velocities_and_what_slowing_down_takes(stepping):
+    """At the rate r all velocities are r times as large; from r to s within a hold, a = (s v' - r v) / T."""
+    frames = {"pelvis": stepping.body.effector_frame("pelvis")}
+    reference = Reference(stepping.body, stepping.motion, frames, 0.005)
+    full, then = reference.sample(0.5), reference.sample(0.5 + 0.25 * 0.005)
+    slow = reference.sample(0.5, 0.5, 0.25)
+    np.testing.assert_array_equal(slow.com, full.com)
+    np.testing.assert_allclose(slow.com_velocity, 0.5 * full.com_velocity)
+    np.testing.assert_allclose(slow.v, 0.5 * full.v)
+    np.testing.assert_allclose(slow.effectors["pelvis"].twist, 0.5 * full.effectors["pelvis"].twist)
+    expected = (0.25 * then.com_velocity - 0.5 * full.com_velocity) / 0.005
+    np.testing.assert_allclose(slow.com_acceleration, expected, atol=1e-9)
+    still = reference.sample(0.5, 0.0, 0.0)
+    for rates in (still.v, still.a, still.com_velocity, still.com_acceleration):
+        assert not np.any(rates)
 
 
 # --- the clock -----------------------------------------------------------------------------------
