@@ -73,7 +73,7 @@ class RecoverySettings:
     posture: Impedance = _POSTURE
     stiffness: Impedance = _STIFFNESS
     ankle_stiffness: float = 0.64
-    sole_inset: float = 0.01
+    sole_inset: float = 0.005
     friction_share: float = 0.9
     inner: float = 0.7
     outer: float = 0.9
