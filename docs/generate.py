@@ -293,6 +293,59 @@ def heuristics_table() -> str:
     return "\n".join(rows) + "\n"
 
 
+# --- pushed while moving -------------------------------------------------------------------------
+
+
+PREDICTIONS = {
+    "best": "the larger of the next two where the plan can wait, else the first of them",
+    "plan": "the room that the plan leaves",
+    "capture": "the capture point's distance to the edge",
+    "margin": "the wrench margin",
+}
+
+
+def pushed_impulses() -> str:
+    """Impulses held at each time, measured by ``docs/pushed.py``."""
+    found = json.loads((DOCS / "pushed.json").read_text(encoding="utf-8"))
+    rows = [
+        "| scenario | at [s] | feet | from the back | from the right | from the front | from the left |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for name, time, feet in dict.fromkeys((i["scenario"], i["time_s"], i["feet"]) for i in found):
+        cells = []
+        for direction in (0, 90, 180, 270):
+            key = (name, time, direction)
+            here = [i for i in found if (i["scenario"], i["time_s"], i["direction_deg"]) == key]
+            values = {item["returning"]: item["measured_Ns"] for item in here}
+            after, before = (f"{values[key]:.0f}" if key in values else "-" for key in (True, False))
+            cells.append(f"{after} ({before}; {here[0]['best']:.0f})" if here else "-")
+        rows.append(f"| {name} | {time:g} | {feet} | {' | '.join(cells)} |")
+    return "\n".join(rows) + "\n"
+
+
+def pushed_predictions() -> str:
+    """How well each prediction meets what was measured by ``docs/pushed.py``."""
+    found = json.loads((DOCS / "pushed.json").read_text(encoding="utf-8"))
+    rows = [
+        "| predicted from | pushes | correlation | measured / predicted: median | middle half | of one foot |"
+        " of both feet |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    held = [item for item in found if item["returning"]]
+    measured = np.array([item["measured_Ns"] for item in held])
+    single = np.array([item["feet"] == 1 for item in held])
+    for key, words in PREDICTIONS.items():
+        predicted = np.array([item[key] for item in held])
+        ratios, good = measured / np.where(predicted > 0.0, predicted, np.nan), predicted > 0.0
+        low, middle, high = np.percentile(ratios[good], (25, 50, 75))
+        one, both = (float(np.median(ratios[good & some])) for some in (single, ~single))
+        rows.append(
+            f"| {words} | {len(held)} | {np.corrcoef(predicted, measured)[0, 1]:.2f} | {middle:.2f} | "
+            f"{low:.2f} to {high:.2f} | {one:.2f} | {both:.2f} |"
+        )
+    return "\n".join(rows) + "\n"
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "scenario": lambda: schema_tables(json_schema()),
     "stance": lambda: schema_tables(StanceFile.model_json_schema()),
@@ -306,6 +359,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "walls-trials": walls_trials,
     "walls-spacing": walls_spacing,
     "heuristics": heuristics_table,
+    "pushed-impulses": pushed_impulses,
+    "pushed-predictions": pushed_predictions,
 }
 
 

@@ -26,7 +26,7 @@ KEYS = {
     "execution": {
         "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m", "min_margin",
         "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm", "realtime_factor",
-        "lowest_com_m", "head_clearance_m", "wall_s",
+        "lowest_com_m", "head_clearance_m", "push", "wall_s",
     },
 }  # fmt: skip
 

@@ -173,10 +173,13 @@ def test_a_mistake_in_the_extended_file_is_placed_there(tmp_path):
 def test_an_unknown_variant_names_the_valid_ones(tmp_path):
     path = write(tmp_path, CHILD)
     with pytest.raises(
-        ScenarioError, match=r"no variant 'slo'; did you mean 'slow'\? valid: slippery, found, slow, bare"
+        ScenarioError,
+        match=r"no variant 'slo'; did you mean 'slow'\? valid: slippery, found, pushed, pushed-hard, slow",
     ):
         load_scenario(path, "slo")
-    with pytest.raises(ScenarioError, match=r"no variant ''; valid: slippery, found, slow, bare"):
+    with pytest.raises(
+        ScenarioError, match=r"no variant ''; valid: slippery, found, pushed, pushed-hard, slow"
+    ):
         load_scenario(f"{path}@")
     with pytest.raises(ScenarioError, match="names a variant, and so does 'bare'"):
         load_scenario(f"{path}@slow", "bare")

@@ -7,6 +7,7 @@ from manikin.control.settings import (
     ControlSettings,
     Impedance,
     Impedances,
+    ReturnSettings,
     SupportSettings,
     TaskWeights,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "Impedance",
     "Impedances",
     "QuadraticProgram",
+    "ReturnSettings",
     "SupportMode",
     "SupportSettings",
     "SupportState",

@@ -26,6 +26,12 @@ from manikin.control.contact_forces import (
 )
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.force_wish import ForceWish
+from manikin.control.plan_return import (
+    Deviation,
+    PlanClock,
+    deviation_from_plan,
+    returning_acceleration,
+)
 from manikin.control.reference import Reference, ReferenceSample
 from manikin.control.settings import ControlSettings, Impedance
 from manikin.control.solver import QPSolution, make_solver
@@ -69,6 +75,7 @@ class ControlOutput:
         reference: Planned state.
         problem: The program that was solved (or not).
         iterations: Iterations of the solver.
+        waited: How long the plan has waited for the body so far [s]: its own time is that much less.
     """
 
     tau: FloatArray
@@ -80,13 +87,17 @@ class ControlOutput:
     reference: ReferenceSample
     problem: ControlProblem
     iterations: int
+    waited: float = 0.0
 
 
 class Controller:
     """Follows a planned motion by one quadratic program per control step.
 
-    Keeps two things between steps: the state of the supports and the solver's starting
-    point. Both are functions of the steps made so far, so that equal runs give equal bits.
+    Keeps three things between steps: the state of the supports, the time of the plan and the solver's
+    starting point. All are functions of the steps made so far, so that equal runs give equal bits.
+
+    Attributes:
+        clock: Time of the plan.
     """
 
     def __init__(
@@ -135,6 +146,7 @@ class Controller:
         self.reference = Reference(body, motion, frames, self.settings.period)
         self._solver = make_solver(self.settings.solver)
         self._spare_solver = make_solver(self.settings.solver)
+        self.clock = PlanClock(self.settings.period, self.settings.returning)
         self._previous = np.zeros(joints)
         self._carried: dict[str, float] = {}
 
@@ -150,10 +162,12 @@ class Controller:
             touching: Whether each effector is felt to touch its support; the schedule is
                 trusted where it says nothing.
         """
+        waited = self.clock.waited
+        time = self.clock.at(time)
         supports = self._switch.update(time, touching)
         state = self._dynamics.evaluate(q, v)
-        reference = self.reference.sample(time)
-        problem = self.problem(state, reference, supports, time)
+        reference, deviation = self._where(time, state, supports)
+        problem = self.problem(state, reference, supports, time, deviation)
         solution, fallback = self._solve(problem)
         tau = self._previous if solution is None else problem.torque(solution.x)
         self._previous = tau
@@ -170,7 +184,22 @@ class Controller:
             reference=reference,
             problem=problem,
             iterations=0 if solution is None else solution.iterations,
+            waited=waited,
         )
+
+    def _where(
+        self, time: float, state: DynamicsState, supports: Mapping[str, SupportState]
+    ) -> tuple[ReferenceSample, Deviation | None]:
+        """Where the plan is at its own time, how far the body is from it, and let the plan's time pass."""
+        clock, rate = self.clock, self.clock.rate
+        reference = self.reference.sample(time, rate, rate)
+        if self.settings.returning is None:
+            return reference, None
+        deviation = deviation_from_plan(state, reference, supports)
+        clock.advance(clock.next_rate(deviation))
+        if clock.rate != rate:
+            reference = self.reference.sample(time, rate, clock.rate)
+        return reference, deviation
 
     def problem(
         self,
@@ -178,11 +207,12 @@ class Controller:
         reference: ReferenceSample,
         supports: Mapping[str, SupportState],
         time: float = -np.inf,
+        deviation: Deviation | None = None,
     ) -> ControlProblem:
         """Build the program of one step, without solving it; wished forces are those of the time [s]."""
         return build_qp(
             state,
-            self.tasks(state, reference, supports),
+            self.tasks(state, reference, supports, deviation),
             [
                 self._wishing(self._loaded(support, support.contact, state), time)
                 for support in supports.values()
@@ -195,11 +225,15 @@ class Controller:
         )
 
     def tasks(
-        self, state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState]
+        self,
+        state: DynamicsState,
+        reference: ReferenceSample,
+        supports: Mapping[str, SupportState],
+        deviation: Deviation | None = None,
     ) -> list[AccelerationTask]:
         """List the weighted tasks of one step."""
         gains, weights = self.settings.impedances, self.settings.weights
-        tasks = [com_task(state, reference, gains.com, weights.com)]
+        tasks = [self._com_task(state, reference, deviation)]
         if not self._rests(supports):
             tasks.append(
                 orientation_task(
@@ -218,6 +252,17 @@ class Controller:
                 angular_momentum_task(state, reference, gains.angular_momentum, weights.angular_momentum)
             )
         return tasks
+
+    def _com_task(
+        self, state: DynamicsState, reference: ReferenceSample, deviation: Deviation | None
+    ) -> AccelerationTask:
+        task = com_task(state, reference, self.settings.impedances.com, self.settings.weights.com)
+        returning = self.settings.returning
+        if returning is None or deviation is None or returning.share(deviation.size, deviation.speed) == 0.0:
+            return task
+        drift = state.momentum_drift[:3] / state.mass
+        wanted = returning_acceleration(task.target + drift, state, reference, deviation, returning)
+        return replace(task, target=wanted - drift)
 
     def _rests(self, supports: Mapping[str, SupportState]) -> bool:
         """Whether the pelvis itself is on a support, which then says how it is turned."""

@@ -91,10 +91,18 @@ class Reference:
         self._rest = np.zeros(self._model.nv)
         self._next: _Rates | None = None
 
-    def sample(self, time: float) -> ReferenceSample:
-        """Return the planned state at ``time`` [s], interpolated between the samples."""
-        now, then = self._rates(time), self._rates(time + self._period)
+    def sample(self, time: float, rate: float = 1.0, next_rate: float = 1.0) -> ReferenceSample:
+        """Return the planned state at a time, interpolated between the samples.
+
+        Args:
+            time: Of the plan [s].
+            rate: How fast the plan's time goes now, relative to real time.
+            next_rate: And at the end of the hold.
+        """
+        now, then = self._rates(time), self._rates(time + next_rate * self._period)
         self._next = then
+        if rate != 1.0 or next_rate != 1.0:
+            now, then = now.slowed(rate), then.slowed(next_rate)
         return ReferenceSample(
             q=now.q,
             v=now.v,
@@ -167,3 +175,14 @@ class _Rates:
     com_velocity: FloatArray
     angular_momentum: FloatArray
     frames: dict[str, _FrameRate]
+
+    def slowed(self, rate: float) -> "_Rates":
+        """The same state, passed at ``rate`` times the speed."""
+        frames = {
+            name: _FrameRate(frame.rotation, frame.position, rate * frame.twist)
+            for name, frame in self.frames.items()
+        }
+        return _Rates(
+            self.time, self.q, rate * self.v, self.com, rate * self.com_velocity,
+            rate * self.angular_momentum, frames,
+        )  # fmt: skip

@@ -137,6 +137,59 @@ class SupportSettings:
 
 
 @dataclass(frozen=True)
+class ReturnSettings:
+    """When a body counts as pushed off its plan, and how it comes back; see ``manikin.control.plan_return``.
+
+    Attributes:
+        small: Deviation of the capture point up to which the plan is followed as ever [m].
+        large: Deviation from which the law of the return holds alone, and the plan may wait [m].
+        rate: At which the capture point is brought back [1/s].
+        turning: How far beyond the edge of the soles the wanted ZMP may be, which arms and trunk make up
+            for [m].
+        sole_inset: The edge is this far inside the soles [m].
+        ahead: The plan waits unless more than this share of the deviation is along its way.
+        stoppable: Reach of the planned capture point, from 0 in the centre of the support polygon to 1 on its
+            edge, up to which a plan can be stopped.
+        slow: Speed of the planned centre of mass up to which the law of the return holds [m/s].
+        brisk: Speed from which it does not, and the plan does not wait: in a stride, a body that follows its
+            plan stiffly takes more [m/s].
+        stopping_time: In which its clock comes to a stop, and is back at its speed [s].
+        longest_wait: The plan waits no longer than this altogether [s].
+    """
+
+    small: float = 0.01
+    large: float = 0.03
+    rate: float = 6.0
+    turning: float = 0.4
+    sole_inset: float = 0.01
+    ahead: float = 0.3
+    stoppable: float = 0.5
+    slow: float = 0.35
+    brisk: float = 0.5
+    stopping_time: float = 0.15
+    longest_wait: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in ("small", "rate", "stoppable", "stopping_time"):
+            finite_number(getattr(self, name), f"return setting {name!r}", above=0.0)
+        for name in ("turning", "sole_inset", "ahead", "longest_wait"):
+            finite_number(getattr(self, name), f"return setting {name!r}", at_least=0.0)
+        finite_number(self.large, "return setting 'large'", above=self.small)
+        finite_number(self.slow, "return setting 'slow'", at_least=0.0)
+        finite_number(self.brisk, "return setting 'brisk'", above=self.slow)
+
+    def share(self, deviation: float, speed: float) -> float:
+        """Share of the law of the return, in [0, 1].
+
+        Args:
+            deviation: Of the capture point [m].
+            speed: Of the planned centre of mass [m/s].
+        """
+        off = min(max((deviation - self.small) / (self.large - self.small), 0.0), 1.0)
+        return off * min(max((self.brisk - speed) / (self.brisk - self.slow), 0.0), 1.0)
+
+
+@dataclass(frozen=True)
 class ControlSettings:
     """Everything about the controller that can be tuned.
 
@@ -148,6 +201,7 @@ class ControlSettings:
         joint_limit_horizon: Joint angles and speeds must stay admissible over this time [s].
         max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
         solver: ``"daqp"``, ``"proxqp"`` or ``"piqp"``.
+        returning: What to do when the body is off its plan; None follows the plan as ever.
     """
 
     period: float = 0.005
@@ -157,6 +211,7 @@ class ControlSettings:
     joint_limit_horizon: float = 0.05
     max_joint_acceleration: float = 500.0
     solver: str = "daqp"
+    returning: ReturnSettings | None = None
 
     def __post_init__(self) -> None:
         for name in ("period", "joint_limit_horizon", "max_joint_acceleration"):

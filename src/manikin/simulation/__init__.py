@@ -8,6 +8,7 @@ from manikin.simulation.options import PhysicsOptions
 from manikin.simulation.push_map import PushMap, equal_directions
 from manikin.simulation.push_processes import search_directions
 from manikin.simulation.push_search import DirectionSearch, HeldImpulse, PushTrials, largest_held
+from manikin.simulation.pushed import PushOutcome, push_impulse, push_on_the_way
 from manikin.simulation.recover import Feet, RecoveryTask, push_near_com, recover
 from manikin.simulation.recovery import Recovery
 from manikin.simulation.world import Push, Touch, World
@@ -20,6 +21,7 @@ __all__ = [
     "PhysicsOptions",
     "Push",
     "PushMap",
+    "PushOutcome",
     "PushTrials",
     "Recovery",
     "RecoveryTask",
@@ -32,7 +34,9 @@ __all__ = [
     "execute",
     "largest_held",
     "one_foot_posture",
+    "push_impulse",
     "push_near_com",
+    "push_on_the_way",
     "recover",
     "search_directions",
 ]

@@ -17,8 +17,9 @@ from manikin.scene import Scene
 from manikin.simulation.compile import compile_model
 from manikin.simulation.execution import Execution
 from manikin.simulation.options import PhysicsOptions
+from manikin.simulation.pushed import push_outcome
 from manikin.simulation.recorder import SWITCHING, Recorder, near
-from manikin.simulation.world import Grip, Push, World
+from manikin.simulation.world import Grip, Push, Touch, World
 from manikin.spatial import finite_number
 
 JOINT_DAMPING = 0.1
@@ -97,7 +98,8 @@ def execute(
         settings: Controller settings; the defaults when omitted.
         physics: Settings of the engine; :func:`default_physics` when omitted.
         hold: Time to stand at the end [s].
-        pushes: Forces that disturb the execution, in the motion's time.
+        pushes: Forces that disturb the execution, in real time, from the motion's first sample on its own;
+            from then on a touch of the body with itself is no failure.
         padded: Obstacles that any part of the body may lean on, such as a backrest.
         wishes: Forces that effectors in contact should feel.
         progress: Called with the share done, in [0, 1], after every control step.
@@ -139,8 +141,12 @@ class _Run:
         self.controller = Controller(body, motion, schedule, settings, joint_damping=damping, wishes=wishes)
         self.holds = _holds(body, scene, schedule)
         self.world = World(compile_model(body, scene, physics), padded)
+        self.pushes = tuple(pushes)
         for push in pushes:
-            self.world.apply_push(push.segment, push.force, push.start, push.duration)
+            self.world.apply_push(
+                push.segment, push.force, push.start, push.duration, point=push.point,
+                frequency=push.frequency,
+            )  # fmt: skip
         segments = {name: end_segments(body, name) for name in schedule.sequence.effectors}
         self.recorder = Recorder(schedule, segments)
         self.failure, self.failure_time = "", None
@@ -156,11 +162,13 @@ class _Run:
         settle = self._settling_steps()
         self.world.reset(self.plan.q[0], self.plan.v[0], start - settle * self.period)
         count = round((self.plan.duration + hold) / self.period) + 1
-        for number in range(-settle, count):
+        number = -settle
+        while number < count + round(self.controller.clock.waited / self.period):
             time = start + number * self.period
-            self._switch(time)
+            plan_time = self.controller.clock.at(time)
+            self._switch(plan_time)
             before = clock.perf_counter()
-            output = self.controller.step(time, self.world.q, self.world.v, self._touching(time))
+            output = self.controller.step(time, self.world.q, self.world.v, self._touching(plan_time))
             control += clock.perf_counter() - before
             if number == 0:
                 self.world.forget()
@@ -171,8 +179,9 @@ class _Run:
                 self.recorder.record(sensed, output, self.world.mean_wrench())
             if number >= 0 and self._failed(output):
                 break
-            if number >= 0 and progress is not None:
-                progress((number + 1) / count)
+            number += 1
+            if number > 0 and progress is not None:
+                progress(min(number / count, 1.0))
         return self._report(clock.perf_counter() - began, control)
 
     def _settling_steps(self) -> int:
@@ -181,7 +190,7 @@ class _Run:
         return round(SETTLING / self.period) if at_rest else 0
 
     def _switch(self, time: float) -> None:
-        """Tell the world which touches are planned now, and hold on to grasps."""
+        """Tell the world which touches are planned at a time of the plan, and hold on to grasps."""
         now = tuple(number for number, hold in enumerate(self.holds) if _expected(hold.interval, time))
         if now != self._planned_now:
             planned = [(self.holds[i].segments, self.holds[i].obstacle) for i in now]
@@ -233,8 +242,9 @@ class _Run:
     def _report(self, wall: float, control: float) -> Execution:
         recorder, world = self.recorder, self.world
         fell = self.failure.startswith("fell")
-        if not self.failure and world.touches:
-            self._fail(f"unplanned touch: {world.touches[0]}", world.touches[0].time)
+        touches = self._counted_touches()
+        if not self.failure and touches:
+            self._fail(f"unplanned touch: {touches[0]}", touches[0].time)
         executed = recorder.motion(self.body.joint_names, self.body.mass)
         com = recorder.com_errors()
         bound = com[: max(recorder.bound_samples(), 1)]
@@ -263,7 +273,15 @@ class _Run:
             touches=world.touches,
             fallbacks=tuple(recorder.fallbacks),
             max_slip_m=recorder.max_slip,
+            push=push_outcome(self.pushes, recorder, self.failure),
+            schedule=recorder.delayed_schedule(),
         )
+
+    def _counted_touches(self) -> tuple[Touch, ...]:
+        """Unplanned touches that are a failure; an arm that swings in a recovery may brush the body."""
+        pushed = min((push.start for push in self.pushes), default=np.inf)
+        own = {segment.name for segment in self.body.segments}
+        return tuple(t for t in self.world.touches if t.time < pushed or t.other not in own)
 
 
 def _expected(interval: SupportInterval, time: float) -> bool:

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
+from manikin.contact import ContactSchedule
 from manikin.motion import Motion
+from manikin.simulation.pushed import PushOutcome
 from manikin.simulation.world import Touch
 
 
@@ -40,6 +42,8 @@ class Execution:
         touches: Touches that were not planned.
         fallbacks: Time [s] and reason of every control step whose program was not solved.
         max_slip_m: Farthest that an effector moved along its surface while in contact [m].
+        push: What became of the pushes; None without one.
+        schedule: When the planned contacts were due, later where the plan waited; None where it did not.
     """
 
     motion: Motion
@@ -63,6 +67,8 @@ class Execution:
     touches: tuple[Touch, ...]
     fallbacks: tuple[tuple[float, str], ...]
     max_slip_m: float
+    push: PushOutcome | None = None
+    schedule: ContactSchedule | None = None
 
     @property
     def succeeded(self) -> bool:
@@ -76,4 +82,6 @@ class Execution:
             "min_margin", "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm",
             "realtime_factor", "wall_s",
         )  # fmt: skip
-        return {name: getattr(self, name) for name in names}
+        block = {name: getattr(self, name) for name in names}
+        block["push"] = None if self.push is None else self.push.as_dict()
+        return block

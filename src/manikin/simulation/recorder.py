@@ -42,6 +42,11 @@ class Sample:
     wrenches: FloatArray
     total: FloatArray
 
+    @property
+    def plan_time(self) -> float:
+        """Time of the plan [s], which may have waited for the body."""
+        return self.sensed.time - self.output.waited
+
 
 class Recorder:
     """Keeps every control step of an execution."""
@@ -70,15 +75,16 @@ class Recorder:
             output: What the controller decided.
             total: (6,) mean wrench of all contacts over the whole step.
         """
-        wrenches = np.array([self._wrench(name, sensed) for name in self.effectors])
+        plan_time = sensed.time - output.waited
+        wrenches = np.array([self._wrench(name, sensed, plan_time) for name in self.effectors])
         self.samples.append(Sample(sensed, output, wrenches, total))
         if output.fallback:
             self.fallbacks.append((sensed.time, output.fallback))
         for name in self.effectors:
-            self._measure_slip(name, output, sensed.time)
+            self._measure_slip(name, output, plan_time)
 
-    def _wrench(self, name: str, sensed: Sensed) -> FloatArray:
-        contact = self._nearest_contact(name, sensed.time)
+    def _wrench(self, name: str, sensed: Sensed, plan_time: float) -> FloatArray:
+        contact = self._nearest_contact(name, plan_time)
         if contact.kind is ContactKind.GRASP:
             return sensed.grip_wrench(name, contact.position)
         return sensed.wrench(contact.position, self._segments[name])
@@ -113,7 +119,7 @@ class Recorder:
 
     def bound_samples(self) -> int:
         """Number of samples before the body sits down, after which its CoM need not follow a plan."""
-        times = np.array([s.sensed.time for s in self.samples])
+        times = np.array([s.plan_time for s in self.samples])
         seated = [
             item.start for found in self._intervals.values() for item in found if item.contact.settle > 0.0
         ]
@@ -124,11 +130,7 @@ class Recorder:
 
         What slides to its place on a seat does not count.
         """
-        firm = [
-            name
-            for name in self.effectors
-            if all(item.contact.settle == 0.0 for item in self._intervals[name])
-        ]
+        firm = self._firm()
         errors = _lengths(
             [
                 s.output.state.frames[name].position - s.output.reference.effectors[name].position
@@ -141,6 +143,31 @@ class Recorder:
         row, column = divmod(int(np.argmax(errors)), len(firm))
         return float(errors.max()), firm[column], self.samples[row].sensed.time
 
+    def last_effector_error(self) -> float:
+        """Largest distance of an effector's origin from its plan in the last step [m]; counted as above."""
+        last = self.samples[-1].output
+        planned = last.reference.effectors
+        errors = [last.state.frames[name].position - planned[name].position for name in self._firm()]
+        return float(_lengths(errors).max(initial=0.0))
+
+    def delayed_schedule(self) -> ContactSchedule | None:
+        """When the planned contacts were due; None where the plan never waited."""
+        if not self.samples or self.samples[-1].output.waited == 0.0:
+            return None
+        waited = np.array([sample.output.waited for sample in self.samples])
+        planned = np.array([sample.plan_time for sample in self.samples])
+        instants = self._schedule.instants
+        late = waited[np.minimum(np.searchsorted(planned, instants), len(waited) - 1)]
+        return ContactSchedule(self._schedule.sequence, instants + late)
+
+    def _firm(self) -> list[str]:
+        """Effectors none of whose contacts slide to their places."""
+        return [
+            name
+            for name in self.effectors
+            if all(item.contact.settle == 0.0 for item in self._intervals[name])
+        ]
+
     def margins(self, mass: float) -> FloatArray:
         """(n,) wrench margin of the mean measured wrenches [N.m].
 
@@ -152,7 +179,7 @@ class Recorder:
             mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
         """
         totals = np.array([sample.total for sample in self.samples])
-        phases = self._schedule.phase_at([sample.sensed.time for sample in self.samples])
+        phases = self._schedule.phase_at([sample.plan_time for sample in self.samples])
         margins = np.empty(len(self.samples))
         settling = self._settling_rows()
         early = self._early_seats()
@@ -171,7 +198,7 @@ class Recorder:
 
     def _settling_rows(self) -> NDArray[np.bool_]:
         """(n,) whether a contact is still on its way to its place."""
-        times = np.array([sample.sensed.time for sample in self.samples])
+        times = np.array([sample.plan_time for sample in self.samples])
         rows = np.zeros(len(times), dtype=bool)
         for name in self.effectors:
             rows |= self._schedule.settling(times, name)
@@ -186,7 +213,7 @@ class Recorder:
                     continue
                 for row, (sample, after) in enumerate(itertools.pairwise(self.samples)):
                     force = np.maximum(*(np.abs(s.wrenches[column, :3]).max() for s in (sample, after)))
-                    if 0.0 < interval.start - sample.sensed.time <= EARLY_SEAT and force > _PRESSES:
+                    if 0.0 < interval.start - sample.plan_time <= EARLY_SEAT and force > _PRESSES:
                         found.setdefault(row, []).append(interval.contact)
         return found
 
@@ -194,8 +221,8 @@ class Recorder:
         """The stance with what is settling where it is now."""
         contacts = []
         for contact in stance:
-            early = contact.effector not in self._schedule.stance_at(sample.sensed.time)
-            if early or self._schedule.settling(sample.sensed.time, contact.effector)[0]:
+            early = contact.effector not in self._schedule.stance_at(sample.plan_time)
+            if early or self._schedule.settling(sample.plan_time, contact.effector)[0]:
                 here = sample.output.state.frames[contact.effector].position
                 contact = replace(contact, position=here)
             contacts.append(contact)

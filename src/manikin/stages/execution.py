@@ -1,28 +1,24 @@
 """The execution stage: the planned motion under control in the physics engine, and its report."""
 
-import numpy as np
-
 from manikin.contact import ContactSchedule
-from manikin.control import ControlSettings, SupportSettings
+from manikin.control import ControlSettings, ReturnSettings, SupportSettings
 from manikin.motion import Motion
 from manikin.scenarios import Scenario
-from manikin.simulation import Execution, Push, execute
-from manikin.spatial import rotation_from_yaw
+from manikin.simulation import Execution, Push, execute, push_on_the_way
 from manikin.stages.act import measured_act_failure
 from manikin.stages.context import RunContext
 from manikin.stages.planned_motion import PlannedMotion
 from manikin.stages.report import Failure, Report, place
 from manikin.stages.requirements import ExecutionRequirements
-from manikin.wholebody.configuration_spline import rotation_from_quaternion
-
-PUSHED_SEGMENT = "thorax"
-"""Segment on whose centre of mass the scenario's push acts."""
 
 
 def execute_motion(
     context: RunContext, report: Report, planned: PlannedMotion, requirements: ExecutionRequirements
 ) -> Execution:
     """Execute a motion, with the scenario's push and its act, and measure what became of it.
+
+    A body that may be pushed is ready for it, but not told when or whence; see
+    :mod:`manikin.control.plan_return`.
 
     Args:
         context: Of the run.
@@ -32,7 +28,10 @@ def execute_motion(
     """
     scenario, act = context.scenario, planned.act
     # The share of the friction that planning keeps to, where it has its own, holds in control too.
-    settings = ControlSettings(supports=SupportSettings(friction_share=scenario.friction_share))
+    settings = ControlSettings(
+        supports=SupportSettings(friction_share=scenario.friction_share),
+        returning=None if scenario.push is None else ReturnSettings(),
+    )
     result = execute(
         context.body, context.scene, planned.motion, planned.schedule,
         pushes=_pushes(scenario, planned.motion), padded=context.padded, settings=settings,
@@ -46,7 +45,7 @@ def execute_motion(
         "required": scenario.execution_required,
         "failure": None if failure is None else failure.as_dict(),
         **result.summary(),
-        **context.passage(planned.schedule, result.motion).summary(),
+        **context.passage(result.schedule or planned.schedule, result.motion).summary(),
     }
     report.finish("execution", block)
     if failure is not None and scenario.execution_required:
@@ -65,7 +64,7 @@ def _failure(
     if broken is None:
         return None
     reason, time = broken
-    phase = int(schedule.phase_at(time))
+    phase = int((result.schedule or schedule).phase_at(time))
     held = ", ".join(schedule.sequence[phase].stance.effectors)
     return Failure("execution", reason, time, place(phase, held))
 
@@ -76,13 +75,8 @@ def _pushes(scenario: Scenario, motion: Motion) -> tuple[Push, ...]:
     if push is None:
         return ()
     scenario.check_push(float(motion.time[-1]))
-    sample = min(int(np.searchsorted(motion.time, push.at_s)), len(motion.time) - 1)
-    forward = rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]
-    heading = float(np.arctan2(forward[1], forward[0]))
-    direction = rotation_from_yaw(heading + np.deg2rad(push.direction_deg))[:, 0]
     return (
-        Push(
-            PUSHED_SEGMENT, push.force_N * direction, push.at_s, push.duration_s,
-            frequency=push.frequency_hz or 0.0,
+        push_on_the_way(
+            motion, push.force_N, push.direction_deg, push.at_s, push.duration_s, push.frequency_hz or 0.0
         ),
-    )  # fmt: skip
+    )

@@ -94,6 +94,7 @@ def _settings(section: RecoverySection) -> RecoverySettings:
     return RecoverySettings(
         delay=section.delay_s, locked=tuple(section.locked), strength=section.strength,
         posture_control_only=section.posture_control_only, ankle_stiffness=section.ankle_stiffness,
+        sole_inset=section.sole_inset_m,
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.simulation import Execution
+from manikin.simulation.pushed import BACK, PushOutcome
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,15 @@ class ExecutionRequirements:
     def violation(self, execution: Execution, seated: bool = False) -> tuple[str, float] | None:
         """Explain the first requirement that is not kept, with a time [s], or None.
 
-        Where what was measured does not say when, the time is that of the least margin.
+        Where what was measured does not say when, the time is that of the least margin. A body that was
+        pushed is out of balance and off its plan for a while; it has to be back on it at the end.
 
         Args:
             execution: What happened.
             seated: Whether the motion ends on a seat.
         """
+        if execution.push is not None:
+            return self._not_returned(execution, execution.push)
         penetration = self.padding_compression if seated else self.penetration
         thinnest = float(execution.motion.time[int(np.argmin(execution.motion.margin))])
         if execution.min_margin <= self.margin:
@@ -56,4 +60,15 @@ class ExecutionRequirements:
         ):
             if value > limit:
                 return f"{what} is {value:.4f} m; allowed {limit:g} m", time
+        return None
+
+    def _not_returned(self, execution: Execution, push: PushOutcome) -> tuple[str, float] | None:
+        """What a body that was pushed has not come back to, or None."""
+        end = float(execution.motion.time[-1])
+        if push.return_s is None and not execution.failure:
+            error = execution.final_com_error_m
+            return f"not back on its plan: the CoM ends {error:.3f} m from it; allowed {BACK:g} m", end
+        if push.max_foot_deviation_m > self.foot_error:
+            error = push.max_foot_deviation_m
+            return f"an effector ends {error:.3f} m from its plan; allowed {self.foot_error:g} m", end
         return None

@@ -6,18 +6,28 @@ from pydantic import Field
 
 from manikin.scenarios.validation import Duration, NonNegative, Number, Positive, Section
 
+LARGEST_FORCE = 5000.0
+"""Some seven body weights, far beyond what can be held [N]; ``manikin.simulation.recover`` has the same."""
+
+LARGEST_FREQUENCY = 100.0
+"""Of a sine: ten of the physics' steps are left for each period [Hz]."""
+
+Force = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST_FORCE)]
+
 
 class PushSection(Section):
     """A push on the trunk: of the thorax during an execution, near the centre of mass in a recovery."""
 
-    force_N: Positive = Field(description="size [N]; of a sine its amplitude")
+    force_N: Force = Field(description="size [N]; of a sine its amplitude")
     direction_deg: Number = Field(
         description="of the force, counter-clockwise from the body's forward axis [deg]"
     )
     duration_s: Duration = Field(description="how long [s]")
     at_s: NonNegative = Field(description="when it begins [s]")
     frequency_hz: Positive | None = Field(
-        default=None, description="of a sine that begins with the push [Hz] (default: a constant force)"
+        default=None,
+        le=LARGEST_FREQUENCY,
+        description="of a sine that begins with the push [Hz] (default: a constant force)",
     )
 
 
@@ -41,6 +51,9 @@ class RecoverySection(Section):
         default=0.64,
         description="stiffness of both ankles together before the body reacts, in m g h per radian "
         "(default: calf muscles at rest)",
+    )
+    sole_inset_m: NonNegative = Field(
+        default=0.005, description="how far inside the edge of the soles the ZMP is kept [m]"
     )
     duration_s: Duration = Field(default=3.5, description="of the run [s]")
     friction: Positive = Field(default=0.7, description="of the soles")

@@ -1,0 +1,185 @@
+"""What the controller does when something has pushed the body off its plan.
+
+The capture point ``c = s + s' / w`` of the body is compared with that of the plan; ``e`` is their difference.
+As long as ``|e|`` is small nothing is done, and the plan is followed as if nothing were looked at. Beyond
+that, two things change:
+
+*The wish of the centre of mass.* Following the plan stiffly asks for a ZMP far beyond the soles, and arms and
+trunk are thrown about for it. Instead the wish is the ZMP that brings the capture point back to that of the
+plan at the rate ``k``, ``p = p_plan + (1 + k / w) e``, and it is kept within a distance beyond the
+support polygon: so much is left for arms and trunk.
+
+*The time of the plan.* A plan that goes on takes its next foot off the ground whether the body stands well
+or not. Its clock is stopped, over a short time, and goes on when ``e`` is small again; but only while all
+feet are on the ground, only where both the body and the plan could be stopped as they stand, which is where
+both capture points are well inside the polygon, and not where the body is pushed ahead, the way that the plan
+goes anyway. While a foot flies, therefore, time goes on and it lands when it should.
+
+Neither is done where the plan is brisk, as in the middle of a stride: it cannot be stopped there, and a body
+that follows it stiffly was found to take more.
+
+The polygon is the hull of the soles that carry load, seen from above; the height of the pendulum is taken
+over their mean height. With anything else than soles in contact neither is done.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.balance.polygon import convex_polygon
+from manikin.contact import ContactKind
+from manikin.control.balance_recovery.support_area import SupportArea
+from manikin.control.dynamics import DynamicsState
+from manikin.control.reference import ReferenceSample
+from manikin.control.settings import ReturnSettings
+from manikin.control.supports import SupportMode, SupportState
+from manikin.spatial import GRAVITY, FloatArray
+
+LEAST_HEIGHT = 0.2
+"""A centre of mass lower than this over its soles is no pendulum's [m]."""
+
+LEAST_SPEED = 0.05
+"""A plan slower than this goes nowhere [m/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Deviation:
+    """How far the body is from its plan.
+
+    Attributes:
+        error: (2,) its capture point less that of the plan [m].
+        capture_point: (2,) its own [m].
+        planned: (2,) that of the plan [m].
+        area: Where the ZMP may be.
+        frequency: ``w`` of the pendulum [1/s].
+        ahead: Part of the error along the plan's way, relative to it.
+        speed: Of the planned centre of mass, level [m/s].
+        grounded: Whether every effector of the plan is on its support.
+    """
+
+    error: FloatArray
+    capture_point: FloatArray
+    planned: FloatArray
+    area: SupportArea
+    frequency: float
+    ahead: float
+    speed: float
+    grounded: bool
+
+    @property
+    def size(self) -> float:
+        """Length of the error [m]."""
+        return float(np.linalg.norm(self.error))
+
+
+def deviation_from_plan(
+    state: DynamicsState, reference: ReferenceSample, supports: Mapping[str, SupportState]
+) -> Deviation | None:
+    """Compare the body with its plan; None where it does not stand on soles alone.
+
+    Args:
+        state: Of the body.
+        reference: The plan at this time.
+        supports: Of its effectors.
+    """
+    held = [
+        support.contact
+        for support in supports.values()
+        if support.mode is SupportMode.STANCE and support.contact is not None
+    ]
+    if not held or any(contact.kind is not ContactKind.SOLE for contact in held):
+        return None
+    points = np.concatenate([contact.points_in_world for contact in held])
+    corners, ground = convex_polygon(points[:, :2]), float(points[:, 2].mean())
+    height = float(state.com[2]) - ground
+    if len(corners) < 3 or height < LEAST_HEIGHT:
+        return None
+    frequency = float(np.sqrt(GRAVITY / height))
+    velocity = state.momentum[:2] / state.mass
+    actual = state.com[:2] + velocity / frequency
+    planned = reference.com[:2] + reference.com_velocity[:2] / frequency
+    speed = float(np.linalg.norm(reference.com_velocity[:2]))
+    error = actual - planned
+    along = float(error @ reference.com_velocity[:2]) / max(speed, LEAST_SPEED)
+    grounded = all(support.mode is SupportMode.STANCE for support in supports.values())
+    ahead = along / max(float(np.linalg.norm(error)), 1e-9)
+    return Deviation(error, actual, planned, SupportArea(corners, ground), frequency, ahead, speed, grounded)
+
+
+def returning_acceleration(
+    wanted: FloatArray,
+    state: DynamicsState,
+    reference: ReferenceSample,
+    deviation: Deviation,
+    settings: ReturnSettings,
+) -> FloatArray:
+    """(3,) wanted acceleration of the centre of mass of a body that is off its plan [m/s^2].
+
+    Args:
+        wanted: (3,) what following the plan asks for; upward it is kept.
+        state: Of the body.
+        reference: The plan at this time.
+        deviation: How far the body is from it.
+        settings: Gains and limits.
+    """
+    share = settings.share(deviation.size, deviation.speed)
+    square, area = deviation.frequency**2, deviation.area
+    planned = reference.com[:2] - reference.com_acceleration[:2] / square
+    zmp = planned + (1.0 + settings.rate / deviation.frequency) * deviation.error
+    zmp = area.nearest(zmp, settings.sole_inset - settings.turning)
+    law = wanted.copy()
+    law[:2] = square * (state.com[:2] - zmp)
+    return (1.0 - share) * wanted + share * law
+
+
+class PlanClock:
+    """The time of the plan, which stops while the body finds its way back.
+
+    Attributes:
+        waited: How long it has stood still so far [s].
+        rate: Its speed relative to real time, in [0, 1].
+    """
+
+    def __init__(self, period: float, settings: ReturnSettings | None) -> None:
+        """Start together with real time.
+
+        Args:
+            period: Of the control steps [s].
+            settings: When it waits; None for never.
+        """
+        self.waited, self.rate = 0.0, 1.0
+        self._period, self._settings = period, settings
+        self._off = False
+
+    def at(self, time: float) -> float:
+        """Time of the plan at the time of a control step [s]."""
+        return time - self.waited
+
+    def next_rate(self, deviation: Deviation | None) -> float:
+        """Rate at the end of the step that begins now."""
+        settings = self._settings
+        if settings is None:
+            return 1.0
+        size = 0.0 if deviation is None else deviation.size
+        self._off = size > (settings.small if self._off else settings.large)
+        stops = self._off and deviation is not None and self._may_stop(deviation, settings)
+        step = self._period / settings.stopping_time
+        return float(np.clip(0.0 if stops else 1.0, self.rate - step, self.rate + step))
+
+    def advance(self, rate: float) -> None:
+        """Let one step pass at whose end the rate is ``rate``."""
+        self.waited += (1.0 - rate) * self._period
+        self.rate = rate
+
+    def _may_stop(self, deviation: Deviation, settings: ReturnSettings) -> bool:
+        """Whether body and plan can be stopped here, and whether that helps."""
+        area = deviation.area
+        return (
+            deviation.grounded
+            and self.waited < settings.longest_wait
+            and deviation.ahead <= settings.ahead
+            and deviation.speed < settings.brisk
+            and area.reach(deviation.capture_point) < 1.0
+            and area.reach(deviation.planned) < settings.stoppable
+        )
