@@ -293,6 +293,31 @@ def heuristics_table() -> str:
     return "\n".join(rows) + "\n"
 
 
+# --- pushed while standing -----------------------------------------------------------------------
+
+
+def push_map() -> str:
+    """Impulses held by direction, of the maps in ``push_map.json`` as ``manikin push --map`` wrote it."""
+    found = json.loads((DOCS / "push_map.json").read_text(encoding="utf-8"))
+    maps = [found, *found["compared"]]
+    rows = [
+        "| pushed | ahead | to the left | back | to the right | least | most | share of the bound |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for one in maps:
+        held, directions = one["impulse_Ns"], one["directions_deg"]
+        cells = [f"{held[directions.index(angle)]:.0f}" for angle in (0.0, 90.0, 180.0, 270.0)]
+        for extreme in (min, max):
+            place = held.index(extreme(held))
+            cells.append(f"{held[place]:.0f} at {directions[place]:.0f}°")
+        shares = np.array(held) / one["bound_Ns"]
+        cells.append(f"{shares.min():.2f} to {shares.max():.2f}")
+        feet = "both feet" if one["support"] == "both" else f"the {one['support']} foot"
+        locked = f", {' and '.join(one['locked'])} locked" if one["locked"] else ""
+        rows.append(f"| on {feet}{locked} | {' | '.join(cells)} |")
+    return "\n".join(rows) + "\n"
+
+
 # --- pushed while moving -------------------------------------------------------------------------
 
 
@@ -359,6 +384,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "walls-trials": walls_trials,
     "walls-spacing": walls_spacing,
     "heuristics": heuristics_table,
+    "push-map": push_map,
     "pushed-impulses": pushed_impulses,
     "pushed-predictions": pushed_predictions,
 }
