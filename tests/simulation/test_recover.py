@@ -264,6 +264,37 @@ def test_locked_arms_stay_where_they_are():
         assert np.abs(np.degrees(angle(found, name))).max() < 6.0
 
 
+def test_locked_hips_and_trunk_stay_where_they_are():
+    """At 150 N from the back."""
+    found = pushed((150.0, 0.0, 0.0), locked=("hips",), until=2.5)
+    assert found.recovered, found.failure
+    for name in ("left_hip_flexion", "waist_flexion", "right_hip_abduction"):
+        assert np.abs(np.degrees(angle(found, name))).max() < 6.0
+
+
+def test_both_experiments_stand_with_the_delay_on_ankles_that_hold():
+    """1 and 2 as in the thesis: at rest within 3 s, the ZMP inside as soon as the control acts (3.3)."""
+    back = pushed((500.0, 0.0, 0.0), ankle_stiffness=45.0, sole_inset=0.01)
+    front = pushed((-300.0, 0.0, 0.0), ankle_stiffness=12.0)
+    for found in (back, front):
+        assert found.recovered, found.failure
+        assert found.time_to_rest < 3.0
+        assert found.zmp_excess < 1e-3
+        arms = found.turned("arms")  # positive the way of the fall: backward arms in 1, forward and up in 2
+        assert arms[np.argmax(np.abs(arms))] > 5.0
+    assert np.degrees(angle(back, "waist_flexion")).max() > 40.0
+    assert np.degrees(angle(front, "left_shoulder_flexion")).max() > 60.0
+
+
+@pytest.mark.parametrize(("stature", "mass", "sex"), [(1.55, 48.0, "female"), (1.95, 105.0, "male")])
+def test_bodies_of_any_size_recover(stature, mass, sex):
+    """A push that gives each the same speed, 0.25 m/s, on free feet."""
+    body = human(stature, mass, sex)
+    found = pushed((2.5 * mass, 0.0, 0.0), body=body, feet=Feet.FREE, until=2.5)
+    assert found.recovered, found.failure
+    assert found.zmp_excess < 1e-3
+
+
 def test_another_standing_body_recovers_as_well():
     found = pushed((200.0, 0.0, 0.0), body=HUMAN, until=2.2)
     assert found.recovered, found.failure

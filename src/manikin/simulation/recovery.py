@@ -155,13 +155,13 @@ def judge(
     start = min((push.start for push in pushes), default=0.0)
     control_from = start + controller.settings.delay
     direction = _direction(pushes)
-    rests = _rests(body, controller, trace)
+    rests_from = _rests_from(body, controller, trace)
     excess = -trace.zmp_inside
     counted = (motion.time >= control_from - 1e-9) & np.isfinite(excess)
     moved = _foot_motion(body, controller.soles, motion, steps)
     segments = {segment.name for segment in body.segments}
     propped = [touch for touch in touches if touch.other not in segments]
-    fault = fallen or _fault(rests, moved, propped, FOOT_SLID if steps else FOOT_MOVED)
+    fault = fallen or _fault(rests_from is not None, moved, propped, FOOT_SLID if steps else FOOT_MOVED)
     return Recovery(
         trace=trace,
         feet=feet,
@@ -169,7 +169,7 @@ def judge(
         direction=direction,
         impulse=float(sum(_impulse(push) for push in pushes)),
         zmp_excess=float(np.max(excess[counted], initial=0.0)),
-        time_to_rest=_time_to_rest(rests, motion.time - start),
+        time_to_rest=None if rests_from is None else max(0.0, rests_from - start),
         final_height=float(motion.com[-1, 2] - area.height),
         capture_point=_capture_reach(controller, trace),
         foot_motion=moved,
@@ -209,16 +209,21 @@ def at_rest(
     )
 
 
-def _rests(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -> np.ndarray:
-    """(n,) whether the body stands at rest."""
-    samples = zip(trace.motion.q, trace.motion.com, trace.com_velocity, strict=True)
-    return np.array([at_rest(body, controller, *sample) for sample in samples])
+def _rests_from(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -> float | None:
+    """Time from which the body stands at rest to the end [s]; None if it does not."""
+    samples = zip(trace.motion.time, trace.motion.q, trace.motion.com, trace.com_velocity, strict=True)
+    since = None
+    for time, *sample in reversed(list(samples)):
+        if not at_rest(body, controller, *sample):
+            break
+        since = float(time)
+    return since
 
 
-def _fault(rests: np.ndarray, moved: float, touches: Sequence[Touch], most: float) -> str:
+def _fault(rests: bool, moved: float, touches: Sequence[Touch], most: float) -> str:
     if touches:
         return f"does not stand on its feet alone: {touches[0]}"
-    if not rests[-1]:
+    if not rests:
         return "does not stand at rest and upright at the end"
     if moved > most:
         return f"a foot has moved by {moved:.3f} m"
@@ -240,14 +245,6 @@ def _explained(
     if outside <= 0.0:
         return fault
     return f"{fault}; the capture point was {outside:.3f} m beyond the soles when the control began"
-
-
-def _time_to_rest(rests: np.ndarray, since: FloatArray) -> float | None:
-    """Time after which the body rests to the end [s]."""
-    if not rests[-1]:
-        return None
-    restless = np.flatnonzero(~rests)
-    return float(max(0.0, since[0 if not len(restless) else restless[-1] + 1]))
 
 
 def _foot_motion(

@@ -18,7 +18,7 @@ from manikin.spatial import FloatArray, finite_number
 
 @dataclass(frozen=True)
 class StepSettings:
-    """Limits of a step; those of quick steps of people, by measurements of others (Maki and McIlroy 1997).
+    """Limits of a step; the values are ours, of the order of quick steps of people.
 
     Attributes:
         most: Number of steps at most.

@@ -172,8 +172,9 @@ def edge_limits(controller: BalanceRecovery, q: ArrayLike, duration: float) -> t
 
     The pendulum is pushed with a constant force. Until it reacts it has the spring of its ankles. Over the
     side of two feet it has the stiffness of both legs, with which the ZMP can be at the edge at once, as with
-    ankles of more than ``m g h`` per radian. Then its ZMP is at the edge and its flywheel turns. The mass stays as high as in the posture: the bound leaves out
-    that a bent body is lower, and that trunk and arms which turn down unload the ground. A body holds less.
+    ankles of more than ``m g h`` per radian. Then its ZMP is at the edge and its flywheel turns. The mass
+    stays as high as in the posture: the bound leaves out that a bent body is lower, and that trunk and arms
+    which turn down unload the ground. A body holds less.
 
     Args:
         controller: Of the balance.
