@@ -14,16 +14,13 @@ from manikin.control.balance_recovery import (
     BalanceRecovery,
     RecoverySettings,
     Standing,
-    StepSettings,
     SupportArea,
-    capture_after,
     edge_limits,
     held_impulse,
-    step_goals,
 )
 from manikin.control.balance_recovery.muscles import held_posture
-from manikin.control.balance_recovery.swing_foot import SwingFoot
 from manikin.control.balance_recovery.turning import Turning, _swayed
+from manikin.control.stepping import StepSettings, SwingFoot, capture_after, step_goals
 from manikin.errors import InputError
 from manikin.spatial import GRAVITY
 

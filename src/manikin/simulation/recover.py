@@ -15,11 +15,10 @@ from manikin.control.balance_recovery import (
     BalanceRecovery,
     FeltPush,
     RecoverySettings,
-    SteppingRecovery,
-    StepSettings,
     joint_groups,
 )
 from manikin.control.dynamics import DynamicsState
+from manikin.control.stepping import SteppingRecovery, StepSettings
 from manikin.errors import InputError
 from manikin.scene import Scene
 from manikin.simulation.compile import compile_model

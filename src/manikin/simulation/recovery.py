@@ -11,10 +11,10 @@ from manikin.contact import Contact
 from manikin.control.balance_recovery import (
     BalanceRecovery,
     JointGroups,
-    StepTaken,
     Strategy,
     capture_point,
 )
+from manikin.control.stepping import StepTaken
 from manikin.motion import Motion
 from manikin.simulation.recovery_record import RecoveryTrace
 from manikin.simulation.world import Push, Touch

@@ -1,4 +1,4 @@
-"""Recovery from pushes on both feet: posture control and a quadratic program ([Kudoh2002]_)."""
+"""Recovery from pushes without a step: posture control and a quadratic program ([Kudoh2002]_)."""
 
 from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, LinearMap, close_loop
 from manikin.control.balance_recovery.com_law import ComLaw, capture_point, com_law
@@ -14,8 +14,6 @@ from manikin.control.balance_recovery.problem import (
 from manikin.control.balance_recovery.recovery import BalanceRecovery, RecoveryOutput
 from manikin.control.balance_recovery.settings import RecoverySettings
 from manikin.control.balance_recovery.standing import Standing, sole_at
-from manikin.control.balance_recovery.step_placement import StepGoal, StepSettings, capture_after, step_goals
-from manikin.control.balance_recovery.stepping import SteppingRecovery, StepTaken
 from manikin.control.balance_recovery.strategy import Strategy, StrategySwitch
 from manikin.control.balance_recovery.support_area import SupportArea, zmp_of, zmp_rows
 from manikin.control.balance_recovery.turning import EdgeLimit, Turning, edge_limits, held_impulse
@@ -35,16 +33,11 @@ __all__ = [
     "RecoveryProblem",
     "RecoverySettings",
     "Standing",
-    "StepGoal",
-    "StepSettings",
-    "StepTaken",
-    "SteppingRecovery",
     "Strategy",
     "StrategySwitch",
     "SupportArea",
     "Turning",
     "build_recovery_qp",
-    "capture_after",
     "capture_point",
     "close_loop",
     "com_law",
@@ -54,7 +47,6 @@ __all__ = [
     "leg_symmetry",
     "posture_control",
     "sole_at",
-    "step_goals",
     "zmp_of",
     "zmp_rows",
 ]

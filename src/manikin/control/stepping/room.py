@@ -7,8 +7,8 @@ import numpy as np
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
 from manikin.control.balance_recovery.standing import Standing, sole_at
-from manikin.control.balance_recovery.step_placement import StepGoal
 from manikin.control.balance_recovery.support_area import SupportArea
+from manikin.control.stepping.placement import StepGoal
 from manikin.errors import ContactError
 from manikin.posture import Placement, PostureProblem, com_target, generate_posture, touching_pairs
 from manikin.scene import Proximity, Scene

@@ -12,15 +12,15 @@ from manikin.control.balance_recovery.closed_loop import FeltPush
 from manikin.control.balance_recovery.com_law import capture_point
 from manikin.control.balance_recovery.recovery import BalanceRecovery, RecoveryOutput
 from manikin.control.balance_recovery.standing import Standing, sole_at
-from manikin.control.balance_recovery.step_check import StepCheck
-from manikin.control.balance_recovery.step_placement import (
+from manikin.control.balance_recovery.strategy import Strategy
+from manikin.control.dynamics import DynamicsState
+from manikin.control.stepping.placement import (
     StepSettings,
     capture_after,
     step_goals,
 )
-from manikin.control.balance_recovery.strategy import Strategy
-from manikin.control.balance_recovery.swing_foot import SwingFoot
-from manikin.control.dynamics import DynamicsState
+from manikin.control.stepping.room import StepCheck
+from manikin.control.stepping.swing_foot import SwingFoot
 from manikin.scene import Scene
 from manikin.spatial import GRAVITY, FloatArray
 

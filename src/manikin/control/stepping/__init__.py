@@ -1,0 +1,15 @@
+"""Recovery from pushes with steps: where a foot is put down, whether there is room, and how it gets there."""
+
+from manikin.control.stepping.placement import StepGoal, StepSettings, capture_after, step_goals
+from manikin.control.stepping.stepping import SteppingRecovery, StepTaken
+from manikin.control.stepping.swing_foot import SwingFoot
+
+__all__ = [
+    "StepGoal",
+    "StepSettings",
+    "StepTaken",
+    "SteppingRecovery",
+    "SwingFoot",
+    "capture_after",
+    "step_goals",
+]
