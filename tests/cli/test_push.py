@@ -273,9 +273,9 @@ def test_a_map_for_people_is_a_table(capfd, tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("searched")
-def test_maps_with_and_without_a_step_and_stiff_ankles(capfd):
+def test_maps_with_and_without_a_step_and_stiff_ankles(capfd, tmp_path):
     compare = ["--compare", "steps=1", "--compare", "steps=2,ankle-stiffness=1.3"]
-    assert main([*MAP, "--feet", "free", *compare]) == DONE
+    assert main([*MAP, "--feet", "free", *compare, "--out", str(tmp_path), "--no-figures"]) == DONE
     head = capfd.readouterr().out.splitlines()[1]
     names = ["no step, usual ankles", "up to 1 step, usual ankles", "up to 2 steps, ankles of 1.3 m g h"]
     assert head.split("  ")[-3:] == names
