@@ -1,6 +1,7 @@
 """Whether the scene leaves room for a step, and the posture in which the body then stands."""
 
 from collections.abc import Iterable
+from functools import cached_property
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from manikin.spatial import FloatArray
 LEVEL = 0.003
 """Soles of a new stance may lie at heights that differ by this [m]; a step onto another level is none."""
 
+ABOVE = 0.03
+"""Height over a sole at which its place is looked at for what stands there [m]."""
+
 TRIED = 40
 """Places that are examined before a step is given up."""
 
@@ -27,9 +31,12 @@ class StepCheck:
     def __init__(self, body: BodyModel, scene: Scene, friction: float) -> None:
         """Measure one body in one scene."""
         self._body, self._scene, self._friction = body, scene, friction
-        self._proximity = Proximity(body, scene, self_collision=False)
         self._home = body.standing_posture()
         self.refusal = ""
+
+    @cached_property
+    def _proximity(self) -> Proximity:
+        return Proximity(self._body, self._scene, self_collision=False)
 
     def first(
         self, goals: Iterable[StepGoal], soles: tuple[Contact, Contact], q: FloatArray, clearance: float
@@ -60,12 +67,15 @@ class StepCheck:
         return None
 
     def free(self, contact: Contact) -> bool:
-        """Whether a sole would lie on a surface with all its corners."""
+        """Whether a sole would lie on a surface with all its corners, and nothing stands on that place."""
         try:
             self._scene.supporting_surface(contact, LEVEL)
         except ContactError:
             return False
-        return True
+        corners = contact.points_in_world
+        around = np.concatenate((corners, 0.5 * (corners + np.roll(corners, 1, axis=0)), [contact.position]))
+        above = around + ABOVE * contact.normal
+        return all(self._scene.nearest(point)[1] > ABOVE - LEVEL for point in above)
 
     def standing(self, soles: tuple[Contact, ...], q: FloatArray) -> Standing:
         """Posture on given soles with the centre of mass over their middle, near a configuration (nq,)."""

@@ -145,6 +145,7 @@ class SteppingRecovery:
             self.refused = self.refused or self.check.refusal
             self._look_again = time + LOOK_AGAIN
             return
+        self.refused = ""
         self._from = soles[goal.foot]
         stays = right if goal.foot == left.effector else left
         self.balance.stand(
