@@ -12,7 +12,8 @@ from manikin.simulation import HeldImpulse, PushMap, PushTrials
 from manikin.simulation.push_conditions import told_apart
 
 CONDITIONS = {
-    "body": {"model": "kudoh"}, "feet": "free", "support": "both", "delay_s": 0.2, "friction": 0.7,
+    "body": {"model": "kudoh"}, "feet": "free", "support": "both", "feet_apart_m": None, "delay_s": 0.2,
+    "friction": 0.7,
     "locked": [], "posture_control_only": False, "strength": 1.0, "duration_s": 0.1, "tolerance_Ns": 1.0,
     "steps": 0, "ankle_stiffness": 0.64,
 }  # fmt: skip

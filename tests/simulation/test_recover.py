@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from manikin.body import Configuration, human, kudoh
 from manikin.control.balance_recovery import (
@@ -18,7 +20,14 @@ from manikin.control.balance_recovery import (
 from manikin.control.stepping.room import StepCheck
 from manikin.errors import InputError
 from manikin.scene import Box, Obstacle, Scene
-from manikin.simulation import Feet, RecoveryTask, one_foot_posture, push_near_com, recover
+from manikin.simulation import (
+    Feet,
+    RecoveryTask,
+    feet_apart_posture,
+    one_foot_posture,
+    push_near_com,
+    recover,
+)
 from manikin.simulation.recovery_record import SegmentMomenta
 from manikin.spatial import GRAVITY
 
@@ -27,9 +36,10 @@ KUDOH, HUMAN = kudoh(), human()
 
 def pushed(
     force, *, body=KUDOH, delay=0.2, feet=Feet.HELD, lasting=0.1, frequency=0.0, until=3.5, steps=0,
-    scene=None, foot=None, **options,
+    scene=None, foot=None, apart=None, **options,
 ):  # fmt: skip
     q = None if foot is None else one_foot_posture(body, foot)
+    q = q if apart is None else feet_apart_posture(body, apart)
     push = push_near_com(body, force, 0.2, lasting, frequency=frequency, q=q)
     support = None if foot is None else (foot,)
     task = RecoveryTask((push,), feet, until, q=q, support=support, steps=steps)
@@ -250,6 +260,41 @@ def test_a_push_is_held_on_one_foot(body, force):
     assert found.recovered, found.failure
     other = found.trace.motion.contact_names.index("right_foot")
     assert np.abs(found.trace.motion.contact_force[:, other]).max() == 0.0
+
+
+@settings(max_examples=10, deadline=None)
+@given(distance=st.floats(0.1, 0.6))
+def test_feet_are_as_far_apart_as_wanted(distance):
+    """Both soles stay flat on the ground, and the centre of mass is over the middle between them.
+
+    1 mm is the tolerance of generated postures.
+    """
+    state = Configuration(KUDOH, feet_apart_posture(KUDOH, distance))
+    soles = [
+        sole_at(KUDOH, foot, *state.effector_placement(foot), friction=1.0)
+        for foot in joint_groups(KUDOH).feet
+    ]
+    left, right = (sole.position for sole in soles)
+    np.testing.assert_allclose(left - right, [0.0, distance, 0.0], atol=1e-3)
+    np.testing.assert_allclose(state.com[:2], 0.5 * (left + right)[:2], atol=1e-3)
+    for sole in soles:
+        assert np.ptp(sole.points_in_world[:, 2]) < 1e-3
+
+
+@pytest.mark.parametrize("distance", [0.05, -0.3, np.nan, 2.5])
+def test_feet_that_would_overlap_or_are_out_of_reach_are_refused(distance):
+    with pytest.raises(InputError, match=r"distance between the feet|does not stand"):
+        feet_apart_posture(KUDOH, distance)
+
+
+@pytest.mark.slow
+def test_from_the_side_less_is_held_with_the_feet_together():
+    """As in the thesis ([Kudoh2002]_ 3.3, experiment 4): the soles are then 20 cm wide and 25 cm long."""
+    ahead, back = (pushed((force, 0.0, 0.0), apart=0.1) for force in (250.0, -250.0))
+    assert ahead.recovered
+    assert back.recovered
+    assert not pushed((0.0, 250.0, 0.0), apart=0.1).recovered
+    assert pushed((0.0, 200.0, 0.0), apart=0.1).recovered
 
 
 def test_less_is_held_on_one_foot_than_on_two():

@@ -36,6 +36,10 @@ def push(
     support: Annotated[
         str | None, typer.Option(metavar="both|left|right", help="Feet to stand on. Default: both.")
     ] = None,
+    feet_apart: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Between the middles of both soles [m]. Default: as the body stands."),
+    ] = None,
     steps: Annotated[
         int | None, typer.Option(metavar="0|1|2", help="Steps that free feet may take. Default: 0.")
     ] = None,
@@ -90,6 +94,7 @@ def push(
         delay=delay,
         feet=feet,
         support=support,
+        feet_apart=feet_apart,
         steps=steps,
         ankle_stiffness=ankle_stiffness,
         locked=tuple(locked or ()),

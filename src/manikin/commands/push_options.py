@@ -16,6 +16,7 @@ _OPTIONS: dict[tuple[str | int, ...], str] = {
     ("recovery", "delay_s"): "--delay",
     ("recovery", "feet"): "--feet",
     ("recovery", "support"): "--support",
+    ("recovery", "feet_apart_m"): "--feet-apart",
     ("recovery", "steps"): "--steps",
     ("recovery", "ankle_stiffness"): "--ankle-stiffness",
     ("recovery", "locked"): "--locked",
@@ -29,6 +30,7 @@ _OPTIONS: dict[tuple[str | int, ...], str] = {
 
 _NUMBERS: dict[str, tuple[str, type[int] | type[float]]] = {
     "steps": ("steps", int),
+    "feet-apart": ("feet_apart", float),
     "delay": ("delay", float),
     "ankle-stiffness": ("ankle_stiffness", float),
     "strength": ("strength", float),
@@ -45,6 +47,7 @@ class PushOptions:
         delay: From the beginning of the push until the body reacts [s]; None for the scenarios' own.
         feet: ``"held"`` or ``"free"``; None for the scenarios' own.
         support: ``"both"`` feet, or ``"left"`` or ``"right"``; None for the scenarios' own.
+        feet_apart: Distance between the middles of both soles [m]; None for that of the body's posture.
         steps: How many steps may be taken; None for the scenarios' own.
         ankle_stiffness: Of both ankles before the body reacts, in ``m g h`` per radian; None for the
             scenarios' own.
@@ -59,6 +62,7 @@ class PushOptions:
     delay: float | None = None
     feet: str | None = None
     support: str | None = None
+    feet_apart: float | None = None
     steps: int | None = None
     ankle_stiffness: float | None = None
     locked: tuple[str, ...] = ()
@@ -92,7 +96,8 @@ class PushOptions:
         finite_number(force, "--force [N]", above=0.0, at_most=STRONGEST)
         body = {"model": self.body, "stature_m": self.stature, "mass_kg": self.mass, "sex": self.sex}
         recovery = {
-            "feet": self.feet, "support": self.support, "steps": self.steps, "delay_s": self.delay,
+            "feet": self.feet, "support": self.support, "feet_apart_m": self.feet_apart,
+            "steps": self.steps, "delay_s": self.delay,
             "ankle_stiffness": self.ankle_stiffness, "locked": list(self.locked),
             "strength": self.strength, "posture_control_only": self.posture_control_only,
             "duration_s": run_duration(self.duration),
@@ -151,6 +156,6 @@ def _setting(part: str, text: str) -> tuple[str, Any]:
             pass
     raise InputError(
         f"--compare {text}: {part!r} is not a setting; valid: feet=free, support=left, steps=1, "
-        "locked=arms+hips or none, delay=SECONDS, ankle-stiffness=X, strength=X, posture-control-only, or "
-        "several with commas between"
+        "feet-apart=M, locked=arms+hips or none, delay=SECONDS, ankle-stiffness=X, strength=X, "
+        "posture-control-only, or several with commas between"
     )

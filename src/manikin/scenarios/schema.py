@@ -168,6 +168,11 @@ class ScenarioFile(Section):
             raise refuse("recovery.steps", f"is {self.recovery.steps} of held feet; valid: 0, or free feet")
         if self.recovery.steps and self.recovery.support != "both":
             raise refuse("recovery.steps", f"is {self.recovery.steps} on one foot; valid: 0, or both feet")
+        if self.recovery.feet_apart_m is not None and self.recovery.support != "both":
+            raise refuse(
+                "recovery.feet_apart_m",
+                f"is {self.recovery.feet_apart_m:g} on one foot; valid: leave it out, or both feet",
+            )
         if self.push.at_s >= self.recovery.duration_s:
             raise refuse(
                 "push.at_s",

@@ -3,7 +3,6 @@
 from manikin.simulation.compile import SimulationModel, compile_model
 from manikin.simulation.execute import default_physics, execute
 from manikin.simulation.execution import Execution
-from manikin.simulation.one_foot import one_foot_posture
 from manikin.simulation.options import PhysicsOptions
 from manikin.simulation.push_map import PushMap, equal_directions
 from manikin.simulation.push_processes import search_directions
@@ -11,6 +10,7 @@ from manikin.simulation.push_search import DirectionSearch, HeldImpulse, PushTri
 from manikin.simulation.pushed import PushOutcome, push_impulse, push_on_the_way
 from manikin.simulation.recover import Feet, RecoveryTask, push_near_com, recover
 from manikin.simulation.recovery import Recovery
+from manikin.simulation.stances import feet_apart_posture, one_foot_posture
 from manikin.simulation.world import Push, Touch, World
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "default_physics",
     "equal_directions",
     "execute",
+    "feet_apart_posture",
     "largest_held",
     "one_foot_posture",
     "push_impulse",

@@ -5,7 +5,15 @@ from typing import Any
 
 from manikin.control.balance_recovery import RecoverySettings
 
-USUAL = {"on both feet", "no step", "nothing locked", "with the program", "usual strength", "usual ankles"}
+USUAL = {
+    "on both feet",
+    "usual stance",
+    "no step",
+    "nothing locked",
+    "with the program",
+    "usual strength",
+    "usual ankles",
+}
 """What goes without saying."""
 
 
@@ -29,11 +37,13 @@ def told_apart(maps: Sequence[Mapping[str, Any]]) -> tuple[str, list[str]]:
 def _words(one: Mapping[str, Any]) -> list[str]:
     """One text per condition, the same conditions in every list."""
     locked = " and ".join(one["locked"])
+    apart = one["feet_apart_m"]
     strength, ankles, steps = one["strength"], one["ankle_stiffness"], one["steps"]
     return [
         _body(one["body"]),
         f"feet {one['feet']}",
         "on both feet" if one["support"] == "both" else f"on the {one['support']} foot",
+        f"feet {apart:g} m apart" if apart else "usual stance",
         f"up to {steps} step{'s' * (steps > 1)}" if steps else "no step",
         f"{locked} locked" if locked else "nothing locked",
         "posture control only" if one["posture_control_only"] else "with the program",

@@ -15,6 +15,7 @@ from manikin.simulation import (
     PushTrials,
     Recovery,
     RecoveryTask,
+    feet_apart_posture,
     one_foot_posture,
     push_near_com,
     recover,
@@ -82,7 +83,12 @@ def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> Reco
         (), Feet(section.feet), section.duration_s, friction=section.friction, steps=section.steps
     )
     if section.support == "both":
-        return task
+        if section.feet_apart_m is None:
+            return task
+        try:
+            return replace(task, q=feet_apart_posture(body, section.feet_apart_m))
+        except InputError as error:
+            raise scenario.refused(("recovery", "feet_apart_m"), error) from None
     foot = f"{section.support}_foot"
     try:
         return replace(task, q=one_foot_posture(body, foot), support=(foot,))

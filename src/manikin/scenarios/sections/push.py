@@ -41,6 +41,10 @@ class RecoverySection(Section):
     support: Literal["both", "left", "right"] = Field(
         default="both", description="feet that the body stands on; beside a single one the other is raised"
     )
+    feet_apart_m: Positive | None = Field(
+        default=None,
+        description="distance between the middles of both soles, sideways [m] (default: as the body stands)",
+    )
     delay_s: NonNegative = Field(
         default=0.2, description="from the beginning of the push until the body reacts [s]"
     )
