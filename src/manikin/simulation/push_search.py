@@ -18,7 +18,7 @@ FIRST = 20.0
 PUSH_BEGINS = 0.2
 """When pushes begin [s], as in the scenarios after the thesis."""
 
-AFTERWARDS = 3.2
+AFTERWARDS = 5.2
 """Time from the end of a push to the end of its run [s]; a body that does not stand at rest by then has
 not recovered."""
 
@@ -101,7 +101,7 @@ class PushTrials:
 
 
 def run_duration(push_duration: float, begins: float = PUSH_BEGINS) -> float:
-    """Duration of the run of a push [s]: 3.5 s for one of 0.1 s, as in the scenarios."""
+    """Duration of the run of a push [s]: 5.5 s for one of 0.1 s."""
     return round(begins + push_duration + AFTERWARDS, 9)
 
 

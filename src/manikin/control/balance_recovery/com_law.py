@@ -15,8 +15,10 @@ point over the soles when it begins with the *settled point*
 
     ``c + M / (m g) (1 - exp(-w L / M))``
 
-over them. While that is beyond the soles the law asks for turning with ``M``, and once it is over them for
-stopping it. This part is ours; it is what a controller that looks no step ahead has in place of a plan.
+over them. While that is beyond the soles the law asks for turning, and once it is over them for stopping
+it. The moment that stops it is what uses up the range ``R`` of arms and trunk that is left, ``M = L^2 / (2
+R)``: stopping sooner and harder would throw the capture point out again. This part is ours; it is what a
+controller that looks no step ahead has in place of a plan.
 """
 
 from dataclasses import dataclass
@@ -42,12 +44,19 @@ class ComLaw:
     Attributes:
         acceleration: (3,) of the centre of mass [m/s^2].
         settled: (2,) settled point [m].
+        reach: Of the settled point over the soles: 1 at their edge.
         need: How much turning is needed, in [0, 1].
     """
 
     acceleration: FloatArray
     settled: FloatArray
+    reach: float
     need: float
+
+
+def fall_momentum(state: DynamicsState) -> FloatArray:
+    """(2,) angular momentum about the horizontal axes, as the direction of the fall that it goes with."""
+    return np.array([state.momentum[4], -state.momentum[3]])
 
 
 def com_law(
@@ -55,8 +64,9 @@ def com_law(
     home: FloatArray,
     area: SupportArea,
     settings: RecoverySettings,
+    turned: FloatArray,
     *,
-    turning: bool = True,
+    may_turn: bool = True,
 ) -> ComLaw:
     """Find the wanted acceleration of the centre of mass.
 
@@ -65,28 +75,39 @@ def com_law(
         home: (3,) where the centre of mass shall be [m].
         area: Where the ZMP may be.
         settings: Gains.
-        turning: Whether arms and trunk may turn where the ZMP is not enough; otherwise they are stopped.
+        turned: (2,) integral over time of :func:`fall_momentum` [kg.m^2].
+        may_turn: Whether arms and trunk may turn where the ZMP is not enough; otherwise they are stopped.
     """
     height, weight = home[2] - area.height, state.mass * GRAVITY
     frequency = np.sqrt(GRAVITY / height)
     velocity = state.momentum[:3] / state.mass
-    turned = np.array([state.momentum[4], -state.momentum[3]])
-    amount = float(np.linalg.norm(turned))
+    momentum = fall_momentum(state)
+    amount = float(np.linalg.norm(momentum))
     most = settings.turning * weight
+    brake = _braking(momentum, turned, state.mass, settings)
     settled = capture_point(state.com, velocity, height)
     if amount > 0.0:
-        settled = settled + settings.turning * (1.0 - np.exp(-frequency * amount / most)) * turned / amount
-    need = float(np.clip((area.reach(settled) - NEED[0]) / (NEED[1] - NEED[0]), 0.0, 1.0))
-    if not turning:
+        settled = settled + brake / weight * (1.0 - np.exp(-frequency * amount / brake)) * momentum / amount
+    reach = area.reach(settled)
+    need = float(np.clip((reach - NEED[0]) / (NEED[1] - NEED[0]), 0.0, 1.0))
+    if not may_turn:
         need = 0.0
     zmp = area.nearest(settled + settings.calm / frequency * (settled - home[:2]), settings.sole_inset)
     outward = settled - area.centre
-    stopping = turned / max(STOPPING, amount / most)
+    stopping = momentum / max(STOPPING, amount / brake)
     moment = need * most * outward / max(float(np.linalg.norm(outward)), 1e-9) - (1.0 - need) * stopping
     law = np.empty(3)
     law[:2] = frequency**2 * (state.com[:2] - zmp) - moment / (state.mass * height)
     law[2] = settings.height.stiffness * (home[2] - state.com[2]) - settings.height.damping * velocity[2]
-    return ComLaw(law, settled, need)
+    return ComLaw(law, settled, reach, need)
+
+
+def _braking(momentum: FloatArray, turned: FloatArray, mass: float, settings: RecoverySettings) -> float:
+    """Moment that stops the turning at the end of the range [N.m]."""
+    weight, amount = mass * GRAVITY, float(np.linalg.norm(momentum))
+    left = settings.range * mass - float(turned @ momentum) / max(amount, 1e-9)
+    needed = amount**2 / (2.0 * left) if left > 0.0 else np.inf
+    return float(np.clip(needed, settings.least_braking * weight, settings.turning * weight))
 
 
 def capture_point(com: FloatArray, velocity: FloatArray, height: float) -> FloatArray:

@@ -9,10 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.body import BodyModel, Configuration
 from manikin.body.limb import end_segments
 from manikin.contact import Contact
+from manikin.control.balance_recovery.arm_swing import ArmSwing
 from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, LinearMap, close_loop
-from manikin.control.balance_recovery.com_law import ComLaw, com_law
+from manikin.control.balance_recovery.com_law import ComLaw, com_law, fall_momentum
 from manikin.control.balance_recovery.joint_groups import joint_groups
 from manikin.control.balance_recovery.muscles import held_posture
+from manikin.control.balance_recovery.objectives import ROOT, Objectives, pull
 from manikin.control.balance_recovery.posture_control import PostureControl, posture_control
 from manikin.control.balance_recovery.problem import (
     JointBounds,
@@ -34,23 +36,12 @@ from manikin.control.contact_forces import (
 )
 from manikin.control.dynamics import Dynamics, DynamicsState
 from manikin.control.reference import EffectorReference
-from manikin.control.settings import Impedance
 from manikin.control.solver import QPSolution, make_solver
-from manikin.control.tasks import orientation_task, swing_task
 from manikin.errors import InputError
 from manikin.spatial import GRAVITY, FloatArray, frozen_array
 
-FIRM = 100.0
-"""Weight of joints that hold an angle, against 1 of those that need not."""
-
 SETTLING = 20.0
 """Rate at which the controller damps what the feet move all the same [1/s]."""
-
-ROOT = "pelvis"
-"""Effector that is kept upright while a foot steps."""
-
-STEPPING_JOINTS = 0.1
-"""Weight of the joints while a foot steps."""
 
 ALIKE = 0.02
 """Angles of two legs that differ by less are equal [rad]."""
@@ -119,16 +110,19 @@ class BalanceRecovery:
             if name not in self.groups.feet:
                 raise InputError(f"support has {name!r}; valid: {', '.join(self.groups.feet)}")
         self._dynamics = Dynamics(body, _frames(body, self.groups.feet))
-        self._locked = self.groups.locked(self.settings.locked)
         self._solvers = {name: make_solver(self.settings.solver) for name in ("full", "relaxed", "loose")}
         self._previous = self._resting = np.zeros(joints)
+        self._arms = ArmSwing(body, self.groups)
         self.stand(Standing.of(body, q, feet, friction))
         rotation, position = Configuration(body, q).effector_placement(ROOT)
-        self._upright = EffectorReference(rotation, position, np.zeros(6), np.zeros(6))
+        upright = EffectorReference(rotation, position, np.zeros(6), np.zeros(6))
+        self._ahead = rotation[:2, 0] / np.linalg.norm(rotation[:2, 0])
+        self._objectives = Objectives(self.settings, self.groups, self._arms, upright)
         self.step(np.array(q, dtype=np.float64), np.zeros(body.nv))
 
     def stand(self, standing: Standing) -> None:
         """Keep the balance about another way to stand from now on."""
+        self._begin_anew()
         self.standing = standing
         self._geometry = tuple(contact_geometry(self.body, contact, 0.0) for contact in standing.soles)
         self._switch = StrategySwitch(self.settings)
@@ -161,7 +155,7 @@ class BalanceRecovery:
     @property
     def locked(self) -> NDArray[np.int64]:
         """Hinges that hold the posture whatever happens."""
-        return self._locked
+        return self._objectives.locked
 
     def evaluate(self, q: FloatArray, v: FloatArray) -> DynamicsState:
         """Dynamics at a configuration (nq,) and velocity (nv,)."""
@@ -172,8 +166,8 @@ class BalanceRecovery:
         felt = FeltPush.none(self.body.nv)
         loop = close_loop(state, self.standing.feet, felt)
         rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
-        law = com_law(state, self.com, self.area, self.settings)
-        objective = self._balancing(state, law)
+        law = com_law(state, self.com, self.area, self.settings, self._turned)
+        objective = self._objectives.balancing(state, self.posture, law, self._time)
         return build_recovery_qp(
             state, loop, self._contacts(state), felt, self._bounds(state), rows,
             LinearMap.none(loop.size), objective,
@@ -204,20 +198,24 @@ class BalanceRecovery:
             return self._output(state, Strategy.STIFF, np.clip(tau, -limit, limit))
         felt = push if push is not None else FeltPush.none(self.body.nv)
         loop = close_loop(state, self.standing.feet, felt, settling=SETTLING)
-        law = com_law(state, self.com, self.area, self.settings, turning=swing is None)
+        law = self._law(state, may_turn=swing is None)
         strategy = self._switch.choose(state.com, law.settled, self.area)
         rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
         share, leaving = 0.0, False
         objective: Objective | None = None
         if swing is not None:
-            strategy, objective = Strategy.STEP, self._stepping(state, law, *swing)
+            strategy, objective = Strategy.STEP, self._objectives.stepping(state, self.posture, law, *swing)
         elif strategy is Strategy.POSTURE:
             found = self._posture_control(state, loop)
             if found is not None:
-                objective = self._held(state, found.joints)
+                objective = self._objectives.held(state, self.posture, found.joints)
                 share, leaving = found.share, not found.inside
+                self._arms.reset()
         if objective is None:
-            strategy, objective = Strategy.PROGRAM, self._balancing(state, law)
+            strategy, objective = (
+                Strategy.PROGRAM,
+                self._objectives.balancing(state, self.posture, law, self._time),
+            )
         contacts = self._contacts(state)
         problem = build_recovery_qp(
             state, loop, contacts, felt, self._bounds(state), LinearMap.none(loop.size) if leaving else rows,
@@ -242,62 +240,32 @@ class BalanceRecovery:
         self._previous = tau
         return RecoveryOutput(tau, strategy, share, wrenches or {}, fallback, state, problem, self.standing)
 
+    def _law(self, state: DynamicsState, *, may_turn: bool) -> ComLaw:
+        """The law of the centre of mass one period later, with what has been turned meanwhile."""
+        self._time += self.settings.period
+        self._turned = self._turned + self.settings.period * fall_momentum(state)
+        law = com_law(state, self.com, self.area, self.settings, self._turned, may_turn=may_turn)
+        if law.need > 0.0:
+            self._arms.begin(self._time, law.settled - self.area.centre, law.reach, self._ahead)
+        return law
+
+    def _begin_anew(self) -> None:
+        """Nothing has been turned yet."""
+        self._time, self._turned = 0.0, np.zeros(2)
+        self._arms.reset()
+
     def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
         """Posture control with the ZMP well inside; None where it would leave."""
         calm = zmp_rows(self.area.shrunk(self.settings.posture_area), loop, state.com, 0.0)
-        pull = self._pull(self.settings.posture, state)
-        return posture_control(loop, calm, pull, always=self.settings.posture_control_only)
+        wanted = pull(self.settings.posture, state, self.posture)
+        return posture_control(loop, calm, wanted, always=self.settings.posture_control_only)
 
-    # --- objectives --------------------------------------------------------------------------
-
-    def _pull(self, gains: Impedance, state: DynamicsState) -> FloatArray:
-        """(nv - 6,) joint accelerations back to the posture."""
-        return gains.stiffness * (self.posture - state.q[7:]) - gains.damping * state.v[6:]
-
-    def _held(self, state: DynamicsState, wanted: FloatArray) -> Objective:
-        """Joint accelerations as wanted, and of locked joints what holds them."""
-        weight = np.full(len(wanted), FIRM)
-        return Objective(weight, self._with_locked(state, wanted, weight), np.zeros(3))
-
-    def _balancing(self, state: DynamicsState, law: ComLaw) -> Objective:
-        """The objective of the quadratic program (2.54) with the law of the centre of mass."""
-        settings = self.settings
-        weight = np.ones(len(self.posture))
-        weight[self.groups.joints["arm"]] = settings.arm_weight
-        gains = settings.unwinding
-        damping = gains.damping + (1.0 - law.need) * settings.stopping
-        wanted = self._pull(Impedance(gains.stiffness, damping), state)
-        wanted = self._with_locked(state, wanted, weight)
-        pull = np.array([settings.com_weight, settings.com_weight, settings.height_weight])
-        return Objective(weight, wanted, law.acceleration, pull, settings.upward)
-
-    def _stepping(self, state: DynamicsState, law: ComLaw, foot: str, wanted: EffectorReference) -> Objective:
-        """A foot follows its way, the trunk stays upright and the centre of mass keeps its law."""
-        settings = self.settings
-        weight = np.full(len(self.posture), STEPPING_JOINTS)
-        joints = self._with_locked(state, self._pull(settings.posture, state), weight)
-        pull = np.array([settings.com_weight, settings.com_weight, settings.height_weight])
-        tasks = [
-            swing_task(foot, state.frames[foot], wanted, settings.swing, settings.swing_weight),
-            orientation_task(
-                ROOT, state.frames[ROOT], self._upright, settings.posture, settings.swing_weight
-            ),
-        ]
-        return Objective(weight, joints, law.acceleration, pull, tasks=tuple(tasks))
-
-    def _with_locked(self, state: DynamicsState, wanted: FloatArray, weight: FloatArray) -> FloatArray:
-        """Wanted accelerations with those that hold the locked joints; their weights are set."""
-        result = wanted.copy()
-        result[self._locked] = self._pull(self.settings.stiffness, state)[self._locked]
-        weight[self._locked] = FIRM * 10.0
-        return result
+    # --- limits ------------------------------------------------------------------------------
 
     def _wished(self, state: DynamicsState, loop: ClosedLoop) -> LinearMap:
         """Rows that hold where they can: alike legs and a loaded ground."""
         alike = leg_symmetry(loop, state.q[7:], self._alike, ALIKE)
         return alike.joined(load_row(loop, self.settings.least_load * state.mass * GRAVITY))
-
-    # --- limits ------------------------------------------------------------------------------
 
     def _contacts(self, state: DynamicsState) -> list[ContactForceBasis]:
         share = self.settings.friction_share

@@ -22,8 +22,11 @@ class RecoverySettings:
             limits leave no choice, where the thesis' equality would have no solution.
         calm: Rate at which the law of the centre of mass brings the capture point back [1/s]
             ([Kudoh2002]_ 2.45-2.48, see :mod:`manikin.control.balance_recovery.com_law`).
-        turning: Moment with which arms and trunk turn where the ZMP is not enough, and are stopped again, in
-            body weights [m].
+        turning: Largest moment with which arms and trunk turn where the ZMP is not enough, and are stopped
+            again, in body weights [m].
+        least_braking: Smallest moment with which they are stopped, in body weights [m].
+        range: How far arms, trunk and legs can turn: the integral over time of the angular momentum, for
+            each kilogram of the body [m^2].
         least_load: The ground carries at least this share of the weight where that is possible: a body that
             lets itself drop has nothing to push against.
         stopping: Damping of all joints while the turning is stopped [1/s].
@@ -59,9 +62,11 @@ class RecoverySettings:
     period: float = 0.005
     delay: float = 0.2
     com_weight: float = 1e4
-    calm: float = 2.0
-    turning: float = 0.3
-    least_load: float = 0.6
+    calm: float = 4.8
+    turning: float = 0.35
+    least_braking: float = 0.1
+    range: float = 0.16
+    least_load: float = 0.15
     stopping: float = 10.0
     height: Impedance = _HEIGHT
     height_weight: float = 1e3
@@ -88,12 +93,17 @@ class RecoverySettings:
     def __post_init__(self) -> None:
         positive = (
             "period", "com_weight", "friction_share", "inner", "outer", "posture_area", "strength",
-            "joint_limit_horizon", "max_joint_acceleration", "turning", "arm_weight",
+            "joint_limit_horizon", "max_joint_acceleration", "turning", "least_braking", "range",
+            "arm_weight",
         )  # fmt: skip
         for name in positive:
             finite_number(getattr(self, name), f"recovery {name}", above=0.0)
         for name in ("delay", "upward", "sole_inset", "ankle_stiffness"):
             finite_number(getattr(self, name), f"recovery {name}", at_least=0.0)
+        if self.least_braking > self.turning:
+            raise InputError(
+                f"recovery least_braking is {self.least_braking:g}; valid: at most turning, {self.turning:g}"
+            )
         if self.inner > self.outer:
             raise InputError(f"recovery inner is {self.inner:g}, outer {self.outer:g}; valid: inner <= outer")
         for name in self.locked:
