@@ -26,6 +26,7 @@ from manikin.figures import (
     zmp_figure,
 )
 from manikin.figures.margin import phase_minima
+from manikin.figures.postures import MOST, eventful_instants
 from manikin.figures.views import ABOVE, ALONG_Y, best_view
 from manikin.motion.file import MotionFile
 from manikin.record import ComTrack, RunRecord
@@ -203,6 +204,17 @@ def test_timing_bars_are_the_durations_and_mark_the_shortest(run):
     np.testing.assert_allclose([bar.get_height() for bar in bars], run.schedule.durations, atol=1e-12)
     # Phases 1, 3 and 5 of the published solution last exactly as long as they must.
     assert [number for number, bar in enumerate(bars) if bar.get_hatch()] == [1, 3, 5]
+
+
+def test_a_motion_in_one_stance_is_drawn_where_much_happens(run):
+    """The joints turn equally far from each instant to the next, to a hundredth of the whole."""
+    motion = list(run.motions.values())[-1]
+    instants = eventful_instants(motion)
+    assert len(instants) == MOST
+    np.testing.assert_allclose(instants[[0, -1]], motion.time[[0, -1]])
+    turned = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(motion.q[:, 7:], axis=0)).sum(axis=1))))
+    shares = np.diff(np.interp(instants, motion.time, turned)) / turned[-1]
+    np.testing.assert_allclose(shares, 1.0 / (MOST - 1), atol=0.01)
 
 
 def test_postures_are_labelled_with_the_key_instants(run, seated):

@@ -31,7 +31,8 @@ GAP = 0.12
 def postures_figure(record: RunRecord) -> Figure:
     """Draw the body at the key instants, seen along y and along x ([Qiu2012]_ Fig. 5.14, 6.8, 7.10, 7.13).
 
-    The executed motion is drawn, or else the planned one; grey, the path of the CoM.
+    A motion in one stance has no key instants; it is drawn where much happens. The executed motion is drawn,
+    or else the planned one; grey, the path of the CoM.
 
     Args:
         record: With a whole-body motion and the body.
@@ -44,6 +45,8 @@ def postures_figure(record: RunRecord) -> Figure:
     phases = need(record.phases, "phases")
     name, motion = list(motions.items())[-1]
     instants = chosen_instants(phases.instants)
+    if len(instants) == 2:
+        instants = eventful_instants(motion)
     samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
     low, high = _frame(record, motion.com)
     spans = high - low
@@ -124,6 +127,13 @@ def chosen_instants(instants: FloatArray) -> FloatArray:
     if len(instants) <= MOST:
         return instants
     return instants[np.unique(np.linspace(0, len(instants) - 1, MOST).round().astype(int))]
+
+
+def eventful_instants(motion: Motion) -> FloatArray:
+    """At most :data:`MOST` instants between which the joints turn equally far, from begin to end [s]."""
+    travel = np.abs(np.diff(motion.q[:, 7:], axis=0)).sum(axis=1)
+    turned = np.concatenate(([0.0], np.cumsum(travel + 1e-9)))
+    return np.interp(np.linspace(0.0, turned[-1], min(MOST, len(turned))), turned, motion.time)
 
 
 def _frame(record: RunRecord, com: FloatArray) -> tuple[FloatArray, FloatArray]:
