@@ -3,8 +3,9 @@
 Skeletons are read from BVH and from ASF with AMC, markers from C3D and TRC, force plates from C3D and MOT.
 """
 
-from manikin.mocap.amc import Skeleton, read_amc, read_asf
+from manikin.mocap.amc import read_amc
 from manikin.mocap.anatomy import Anatomy, anatomy_of
+from manikin.mocap.asf import Skeleton, read_asf
 from manikin.mocap.ball_joints import ball_joint_angles
 from manikin.mocap.bvh import read_bvh
 from manikin.mocap.c3d import read_c3d

@@ -153,15 +153,14 @@ class MarkerRecording:
 
 def unique_names(names: Sequence[str]) -> tuple[str, ...]:
     """Names of which the second ``RKNE`` is ``RKNE_2``; those without a name are ``marker_7`` by place."""
-    taken, found = set(names), []
+    given, found = set(names), {}
+    counts: dict[str, int] = {}
     for place, name in enumerate(names, start=1):
-        wanted = name or f"marker_{place}"
-        if wanted in found or (not name and wanted in taken):
-            count = 2
-            while f"{wanted}_{count}" in taken or f"{wanted}_{count}" in found:
-                count += 1
-            wanted = f"{wanted}_{count}"
-        found.append(wanted)
+        stem = wanted = name or f"marker_{place}"
+        while wanted in found or (wanted != name and wanted in given):
+            counts[stem] = counts.get(stem, 1) + 1
+            wanted = f"{stem}_{counts[stem]}"
+        found[wanted] = place
     return tuple(found)
 
 

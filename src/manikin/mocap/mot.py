@@ -129,7 +129,8 @@ def _declared(head: str, file: str) -> dict[str, int]:
 
 def _plates(names: list[str], file: str) -> dict[str, list[int]]:
     """Nine columns of each plate, force, point and moment, by the beginning of their names."""
-    if len(set(names)) != len(names):
+    places = {name: place for place, name in enumerate(names)}
+    if len(places) != len(names):
         raise InputError(f"{file}: a column occurs twice; valid: unique names")
     found = {}
     for name in names:
@@ -137,12 +138,12 @@ def _plates(names: list[str], file: str) -> dict[str, list[int]]:
             continue
         stem = name[:-2]
         moments = [f"{stem}m", stem.replace("force", "torque"), stem.replace("force", "moment")]
-        moment = next((m for m in moments if f"{m}x" in names), f"{stem}m")
+        moment = next((m for m in moments if f"{m}x" in places), f"{stem}m")
         wanted = [f"{part}{axis}" for part in (f"{stem}v", f"{stem}p", moment) for axis in "xyz"]
-        missing = [column for column in wanted if column not in names]
+        missing = [column for column in wanted if column not in places]
         if missing:
             raise InputError(f"{file}: no column {missing[0][:60]!r}; valid: force, point and moment of each")
-        found[stem.strip("_") or "plate"] = [names.index(column) for column in wanted]
+        found[stem.strip("_") or "plate"] = [places[column] for column in wanted]
     if not found:
         raise InputError(f"{file}: no columns of a force plate; valid: ground_force_1_vx and so on")
     return found

@@ -104,6 +104,12 @@ def rotations_of(angles: FloatArray, axes: str) -> FloatArray:
     return np.array(total)
 
 
+def fixed_turns(angles: FloatArray, order: str) -> FloatArray:
+    """(n, 3, 3) turns by (n, 3) angles [rad] about the fixed X, Y and Z, in the order of happening."""
+    reverse = order[::-1]
+    return rotations_of(angles[:, ["XYZ".index(axis) for axis in reverse]], reverse)
+
+
 def _turns(angle: FloatArray, axis: int) -> FloatArray:
     """(n, 3, 3) turns about one coordinate axis."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
