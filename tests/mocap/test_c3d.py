@@ -181,6 +181,7 @@ def test_without_ezc3d_one_line_says_what_to_install(c3d_file, monkeypatch):
         (("POINT", "ANGLES"), texts(["LASI", "RASI", "LKneeAngles"]), "no point is a place"),
         (("ANALOG", "USED"), integers([600], ()), "ANALOG:USED"),
         (("ANALOG", "SCALE"), reals([1.0]), "ANALOG:SCALE"),
+        (("ANALOG", "UNITS"), texts(["N"] * 3 + ["N.m"] * 3), "moments in N.m of lengths in mm"),
         (("FORCE_PLATFORM", "USED"), integers([9], ()), "force plates"),
         (("FORCE_PLATFORM", "TYPE"), integers([7]), "type"),
         (("FORCE_PLATFORM", "TYPE"), integers([3]), "CHANNEL"),

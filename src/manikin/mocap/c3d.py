@@ -52,6 +52,8 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     if points.shape != (4, layout.points, layout.frames):
         raise layout.error(f"data of shape {points.shape}", f"{layout.frames} frames, {layout.points} points")
     unit = metres_per(next(iter(_texts(parameters, "POINT", "UNITS")), ""), f"{file}: POINT:UNITS")
+    if with_plates:
+        _check_moments(parameters, layout)
     turn = rotation_to_z_up(up or _declared_up(parameters), f"{file}: POINT:Y_SCREEN")
     rate = layout.real("POINT", "RATE")
     start = (layout.first_frame - 1) / rate
@@ -172,6 +174,19 @@ def _check_channels(layout: C3dLayout, count: int, each: int) -> None:
     used = used.reshape(size[1], size[0])[:count, :each]
     if used.min() < 1 or used.max() > layout.channels:
         raise layout.error("FORCE_PLATFORM:CHANNEL names no channel", f"1 to {layout.channels}")
+
+
+def _check_moments(parameters: Mapping[str, Any], layout: C3dLayout) -> None:
+    """The library adds moments and forces times lengths: their units have to agree, where they are told."""
+    lengths = _texts(parameters, "POINT", "UNITS")[0].lower()
+    units = _texts(parameters, "ANALOG", "UNITS")
+    for channel in np.unique(layout.integers("FORCE_PLATFORM", "CHANNEL")).tolist():
+        declared = units[channel - 1] if 0 < channel <= len(units) else ""
+        plain = "".join(letter for letter in declared.lower() if letter.isalpha())
+        if plain in ("nm", "nmm") and plain != f"n{lengths}":
+            raise layout.error(
+                f"moments in {declared} of lengths in {lengths}", f"N{lengths}, or plates=False"
+            )
 
 
 def _check_matrices(layout: C3dLayout, count: int, needed: bool) -> None:
