@@ -1,14 +1,28 @@
-"""Recorded human motion: readers of BVH and of ASF with AMC, and the angles of hips and shoulders."""
+"""Recorded human motion: readers, and the angles of hips and shoulders.
 
-from manikin.mocap.amc import Skeleton, read_amc, read_asf
+Skeletons are read from BVH and from ASF with AMC, markers from C3D and TRC, force plates from C3D and MOT.
+"""
+
+from manikin.mocap.amc import read_amc
 from manikin.mocap.anatomy import Anatomy, anatomy_of
+from manikin.mocap.asf import Skeleton, read_asf
 from manikin.mocap.ball_joints import ball_joint_angles
 from manikin.mocap.bvh import read_bvh
+from manikin.mocap.c3d import read_c3d
+from manikin.mocap.force_plate import ForcePlate
+from manikin.mocap.gaps import Gap
+from manikin.mocap.markers import Event, MarkerRecording
+from manikin.mocap.mot import read_mot
 from manikin.mocap.read import read_recording
 from manikin.mocap.recording import Recording
+from manikin.mocap.trc import read_trc
 
 __all__ = [
     "Anatomy",
+    "Event",
+    "ForcePlate",
+    "Gap",
+    "MarkerRecording",
     "Recording",
     "Skeleton",
     "anatomy_of",
@@ -16,5 +30,8 @@ __all__ = [
     "read_amc",
     "read_asf",
     "read_bvh",
+    "read_c3d",
+    "read_mot",
     "read_recording",
+    "read_trc",
 ]

@@ -74,6 +74,7 @@ class _Hierarchy:
     def __init__(self, words: list[str], file: str) -> None:
         self.file = file
         self.joints: list[_Joint] = []
+        self._names: set[str] = set()
         self._words = words
         self._next = 0
         self._expect("ROOT")
@@ -103,8 +104,9 @@ class _Hierarchy:
 
     def _begin(self, parent: int) -> int:
         name = self._word()
-        if any(joint.name == name for joint in self.joints):
+        if name in self._names:
             raise self._error(f"joint {name[:40]!r} occurs twice", "unique names")
+        self._names.add(name)
         self._expect("{")
         self.joints.append(_Joint(name, parent))
         return len(self.joints) - 1

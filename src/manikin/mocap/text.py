@@ -1,4 +1,4 @@
-"""Reading the text files of motion capture: decoding, numbers and rotations of three angles."""
+"""Reading the text files of motion capture: decoding, numbers, instants and rotations of three angles."""
 
 from pathlib import Path
 
@@ -6,6 +6,9 @@ import numpy as np
 
 from manikin.errors import InputError
 from manikin.spatial import FloatArray
+
+LARGEST = 1e12
+"""Largest number that is read: beyond it nothing is measured, and sums and products could overflow."""
 
 
 def read_text(path: str | Path, kind: str) -> str:
@@ -32,24 +35,28 @@ def read_text(path: str | Path, kind: str) -> str:
     return text
 
 
-def numbers(words: list[str], where: str) -> FloatArray:
-    """(n,) finite numbers.
+def numbers(words: list[str], where: str, gaps: bool = False) -> FloatArray:
+    """(n,) finite numbers, none beyond :data:`LARGEST`.
 
     Args:
         words: Their texts.
         where: File and line or key, for the message.
+        gaps: Whether ``nan`` may stand where there is no number.
 
     Raises:
-        InputError: If a word is no finite number.
+        InputError: If a word is no such number.
     """
     try:
-        values = np.array(words, dtype=np.float64)
+        values = np.array([float(word) for word in words], dtype=np.float64)
     except ValueError:
         wrong = next(word for word in words if not _is_number(word))
         raise InputError(f"{where}: {wrong[:40]!r} is no number; valid: finite numbers") from None
-    if not np.all(np.isfinite(values)):
-        wrong = words[int(np.argmin(np.isfinite(values)))]
-        raise InputError(f"{where}: is {wrong[:40]!r}; valid: finite numbers")
+    good = np.abs(values) <= LARGEST
+    if gaps:
+        good |= np.isnan(values)
+    if not np.all(good):
+        wrong = words[int(np.argmin(good))]
+        raise InputError(f"{where}: is {wrong[:40]!r}; valid: finite numbers up to {LARGEST:g}")
     return values
 
 
@@ -62,6 +69,23 @@ def whole_number(word: str, where: str) -> int:
     if not (word.isascii() and word.isdigit()) or len(word) > 12:
         raise InputError(f"{where}: {word[:40]!r} is no frame count or number; valid: a whole number >= 0")
     return int(word)
+
+
+def check_even(time: FloatArray, rate: float, where: str) -> None:
+    """Refuse instants that are not at an even rate, to half a frame.
+
+    Args:
+        time: (n,) [s].
+        rate: Per second [Hz].
+        where: File, for the message.
+
+    Raises:
+        InputError: If an instant is elsewhere.
+    """
+    off = np.abs((time - time[0]) * rate - np.arange(len(time)))
+    if not np.all(off < 0.5):
+        row = int(np.argmin(off < 0.5)) + 1
+        raise InputError(f"{where}: row {row} is not at an even {rate:g} Hz; valid: no row missing")
 
 
 def rotations_of(angles: FloatArray, axes: str) -> FloatArray:
@@ -78,6 +102,12 @@ def rotations_of(angles: FloatArray, axes: str) -> FloatArray:
     for column, axis in enumerate(axes):
         total = total @ _turns(angles[:, column], "XYZ".index(axis))
     return np.array(total)
+
+
+def fixed_turns(angles: FloatArray, order: str) -> FloatArray:
+    """(n, 3, 3) turns by (n, 3) angles [rad] about the fixed X, Y and Z, in the order of happening."""
+    reverse = order[::-1]
+    return rotations_of(angles[:, ["XYZ".index(axis) for axis in reverse]], reverse)
 
 
 def _turns(angle: FloatArray, axis: int) -> FloatArray:

@@ -1,0 +1,233 @@
+"""Markers, force plates and events in C3D files, by the library ezc3d.
+
+The file declares the unit of length, the rates, and the axis that points up on the screen
+(``POINT:Y_SCREEN``, z where it is missing). Points that are angles, forces, moments or powers, computed by
+other programs, are left out. Events and the first frame are on the clock of the trial from which the file
+may be cut.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manikin.errors import InputError
+from manikin.mocap.axes import metres_per, rotation_to_z_up
+from manikin.mocap.c3d_layout import C3dLayout, c3d_layout
+from manikin.mocap.force_plate import ForcePlate, wrench_at_world_origin
+from manikin.mocap.markers import Event, MarkerRecording, unique_names, without_unseen
+from manikin.mocap.text import LARGEST
+from manikin.spatial import FloatArray
+
+NO_PLACES = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "ENERGIES")
+"""Parameters of ``POINT`` that list the points which are no places."""
+
+CHANNELS = {1: 6, 2: 6, 3: 8, 4: 6}
+"""Channels of the types of force plates that can be read."""
+
+
+def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> MarkerRecording:
+    """Read a C3D file.
+
+    Args:
+        path: The file.
+        up: The file's axis that points up; None for the one that it declares.
+        plates: Whether force plates are read.
+
+    Raises:
+        InputError: If the file is missing, damaged or cut short, a force plate is of a type that is not
+            known or wrongly described, or ezc3d is not installed.
+    """
+    file = str(path)
+    ezc3d = _library(file)
+    layout = c3d_layout(_content(path), file)
+    with_plates = plates and _has_plates(layout)
+    try:
+        found = ezc3d.c3d(file, extract_forceplat_data=with_plates)
+    except (OSError, RuntimeError, ValueError, IndexError, KeyError, TypeError, MemoryError) as error:
+        reason = " ".join(str(error).split())[:100]
+        raise InputError(f"{file}: cannot be read ({reason}); valid: a complete C3D file") from None
+    parameters, points = found["parameters"], found["data"]["points"]
+    if points.shape != (4, layout.points, layout.frames):
+        raise layout.error(f"data of shape {points.shape}", f"{layout.frames} frames, {layout.points} points")
+    unit = metres_per(next(iter(_texts(parameters, "POINT", "UNITS")), ""), f"{file}: POINT:UNITS")
+    if with_plates:
+        _check_moments(parameters, layout)
+    turn = rotation_to_z_up(up or _declared_up(parameters), f"{file}: POINT:Y_SCREEN")
+    rate = layout.real("POINT", "RATE")
+    start = (layout.first_frame - 1) / rate
+    names, kept = _markers(parameters, layout)
+    positions = unit * _finite(points[:3, kept], file, "a point").transpose(2, 1, 0) @ turn.T
+    return MarkerRecording(
+        Path(path).name, names, without_unseen(positions), rate, start,
+        _plates(found["data"]["platform"], layout, unit, turn, rate, start) if with_plates else (),
+        _events(parameters, layout),
+    )  # fmt: skip
+
+
+def _library(file: str) -> Any:
+    try:
+        import ezc3d
+    except ModuleNotFoundError as error:
+        if error.name != "ezc3d":
+            raise
+        raise InputError(
+            f"{file}: C3D files need ezc3d; install it with: pip install 'manikin[mocap]'"
+        ) from None
+    return ezc3d
+
+
+def _content(path: str | Path) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}; valid: a C3D file") from None
+
+
+def _finite(values: FloatArray, file: str, what: str) -> FloatArray:
+    """Values, NaN in gaps, of which none is absurd."""
+    values = np.asarray(values, dtype=np.float64)
+    if np.any(np.abs(values) > LARGEST):
+        raise InputError(f"{file}: {what} beyond {LARGEST:g}; valid: finite numbers")
+    return values
+
+
+def _texts(parameters: Mapping[str, Any], group: str, name: str) -> list[str]:
+    values = parameters.get(group, {}).get(name, {}).get("value", [])
+    return [str(value).strip() for value in values] if isinstance(values, list) else []
+
+
+def _declared_up(parameters: Mapping[str, Any]) -> str:
+    return next(iter(_texts(parameters, "POINT", "Y_SCREEN")), "") or "+z"
+
+
+# --- points ------------------------------------------------------------------------------------
+
+
+def _markers(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[tuple[str, ...], list[int]]:
+    """Names and indices of the points that are places."""
+    labels = _texts(parameters, "POINT", "LABELS")
+    for number in range(2, 1 + layout.points // 255 + 1):
+        labels += _texts(parameters, "POINT", f"LABELS{number}")
+    labels = (labels + [""] * layout.points)[: layout.points]
+    others = {name for group in NO_PLACES for name in _texts(parameters, "POINT", group) if name}
+    kept = [place for place, label in enumerate(labels) if label not in others]
+    if not kept:
+        raise layout.error("no point is a place", "at least one marker")
+    return unique_names([labels[place] for place in kept]), kept
+
+
+def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ...]:
+    """Events, whose instants the file holds as minutes and seconds."""
+    declared = layout.parameters.get(("EVENT", "TIMES"))
+    if declared and declared.kind < 0:
+        raise layout.error("EVENT:TIMES are text", "two finite numbers per event")
+    times = np.asarray(parameters.get("EVENT", {}).get("TIMES", {}).get("value", []), dtype=np.float64)
+    if not times.size:
+        return ()
+    if times.ndim == 1 and times.size % 2 == 0:  # as some programs write them
+        times = times.reshape(-1, 2).T
+    if times.ndim != 2 or len(times) != 2 or not np.all(np.abs(times) <= LARGEST):
+        raise layout.error("EVENT:TIMES are no minutes and seconds", "two finite numbers per event")
+    instants = 60.0 * times[0] + times[1]
+    labels, contexts = (
+        (_texts(parameters, "EVENT", name) + [""] * len(instants))[: len(instants)]
+        for name in ("LABELS", "CONTEXTS")
+    )
+    return tuple(map(Event, labels, contexts, instants.tolist()))
+
+
+# --- force plates ------------------------------------------------------------------------------
+
+
+def _has_plates(layout: C3dLayout) -> bool:
+    """Whether there are force plates; what the library reads of them is complete."""
+    used = layout.integers("FORCE_PLATFORM", "USED")
+    count = int(used[0]) if len(used) else 0
+    if not count:
+        return False
+    types = layout.integers("FORCE_PLATFORM", "TYPE")[:count]
+    wrong = sorted(set(types.tolist()) - set(CHANNELS))
+    if wrong or len(types) < count:
+        raise layout.error(
+            f"force plates of type {wrong}, {len(types)} of {count}", "1 to 4, or plates=False"
+        )
+    for name, each in (("CORNERS", 12), ("ORIGIN", 3)):
+        if layout.count("FORCE_PLATFORM", name) < each * count:
+            raise layout.error(f"FORCE_PLATFORM:{name} has too few values", f"{each} for each of {count}")
+    _check_channels(layout, count, max(CHANNELS[kind] for kind in types.tolist()))
+    _check_matrices(layout, count, 4 in types)
+    if 3 in types and 0 < layout.count("FORCE_PLATFORM", "FPCOPPOLY") < 12 * count:
+        raise layout.error("FORCE_PLATFORM:FPCOPPOLY has too few values", f"12 for each of {count}")
+    if layout.count("FORCE_PLATFORM", "UNITS") == 0 and ("FORCE_PLATFORM", "UNITS") in layout.parameters:
+        raise layout.error("FORCE_PLATFORM:UNITS is empty", "a unit")
+    return True
+
+
+def _check_channels(layout: C3dLayout, count: int, each: int) -> None:
+    parameter = layout.parameters.get(("FORCE_PLATFORM", "CHANNEL"))
+    size = parameter.dimensions if parameter else ()
+    used = layout.integers("FORCE_PLATFORM", "CHANNEL")
+    if len(size) != 2 or size[0] < each or size[1] < count:
+        raise layout.error(f"FORCE_PLATFORM:CHANNEL is of size {size}", f"({each}, {count})")
+    used = used.reshape(size[1], size[0])[:count, :each]
+    if used.min() < 1 or used.max() > layout.channels:
+        raise layout.error("FORCE_PLATFORM:CHANNEL names no channel", f"1 to {layout.channels}")
+
+
+def _check_moments(parameters: Mapping[str, Any], layout: C3dLayout) -> None:
+    """The library adds moments and forces times lengths: their units have to agree, where they are told."""
+    lengths = _texts(parameters, "POINT", "UNITS")[0].lower()
+    units = _texts(parameters, "ANALOG", "UNITS")
+    for channel in np.unique(layout.integers("FORCE_PLATFORM", "CHANNEL")).tolist():
+        declared = units[channel - 1] if 0 < channel <= len(units) else ""
+        plain = "".join(letter for letter in declared.lower() if letter.isalpha())
+        if plain in ("nm", "nmm") and plain != f"n{lengths}":
+            raise layout.error(
+                f"moments in {declared} of lengths in {lengths}", f"N{lengths}, or plates=False"
+            )
+
+
+def _check_matrices(layout: C3dLayout, count: int, needed: bool) -> None:
+    parameter = layout.parameters.get(("FORCE_PLATFORM", "CAL_MATRIX"))
+    size = parameter.dimensions if parameter else ()
+    complete = len(size) == 3 and min(size[:2]) >= 6 and size[2] >= count
+    if not complete and (needed or (len(size) > 2 and parameter is not None and parameter.count)):
+        raise layout.error(f"FORCE_PLATFORM:CAL_MATRIX is of size {size}", f"(6, 6, {count})")
+
+
+def _plates(
+    platforms: list[Mapping[str, Any]],
+    layout: C3dLayout,
+    unit: float,
+    turn: FloatArray,
+    rate: float,
+    start: float,
+) -> tuple[ForcePlate, ...]:
+    """Plates of what the library computed: moments about the middle of the corners, in the file's unit."""
+    found = []
+    for number, platform in enumerate(platforms, start=1):
+        name = f"{layout.file}: force plate {number}"
+        force, moment, corners = (
+            _finite(np.asarray(platform[key]).T, layout.file, f"force plate {number}")
+            for key in ("force", "moment", "corners")
+        )
+        if platform["unit_force"].strip() not in ("N", "") or len(force) != layout.frames * layout.samples:
+            raise layout.error(f"force plate {number} in {platform['unit_force'][:20]!r}", "N, every sample")
+        if any(np.isnan(values).any() for values in (force, moment, corners)):
+            raise layout.error(f"force plate {number} is described or measured by NaN", "finite numbers")
+        corners = unit * corners @ turn.T
+        middle, normal = corners.mean(axis=0), _normal(corners, name)
+        wrenches = wrench_at_world_origin(force @ turn.T, unit * moment @ turn.T, middle)
+        found.append(ForcePlate(name, wrenches, middle, rate * layout.samples, start, normal, corners))
+    return tuple(found)
+
+
+def _normal(corners: FloatArray, name: str) -> FloatArray:
+    """(3,) upward unit normal of the surface, by its diagonals."""
+    normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
+    size = float(np.linalg.norm(normal))
+    if size < 1e-6:
+        raise InputError(f"{name}: its corners enclose no surface; valid: four corners, one after the other")
+    return normal * (np.sign(normal[2]) or 1.0) / size
