@@ -20,7 +20,7 @@ _HALF_TURN = np.radians(150.0)
 _ASIDE = 0.1
 """Room that a detour leaves beside an obstacle [m]."""
 
-_MANY = 3
+_MANY = 2
 """Of more obstacles in the way than this, all are passed on one side or all on the other."""
 
 
@@ -100,9 +100,11 @@ def detours(
         else ((s,) * count for s in (1.0, -1.0))
     )
     for choice in sides:
-        yield [
+        via = [
             centres[i] + choice[i] * (obstacles[i].reach + walker.width / 2 + _ASIDE) * left for i in order
         ]
+        if not _blocked(via, obstacles, walker):
+            yield via
 
 
 def turned_between(points: FloatArray, turn: float) -> FloatArray:
@@ -121,6 +123,13 @@ def _turns(start: FloatArray, goal: FloatArray) -> tuple[float, float]:
 
 def _other_way(turn: float) -> float:
     return turn - 2.0 * np.pi if turn > 0.0 else turn + 2.0 * np.pi
+
+
+def _blocked(via: Sequence[FloatArray], obstacles: Sequence[WalkObstacle], walker: Walker) -> bool:
+    """Whether a place to pass is in an obstacle that rests."""
+    resting = [one for one in obstacles if not one.moves]
+    points = np.array(via)[:, None, :]
+    return any(bool(np.any(one.distance(points, np.zeros(len(via))) < walker.depth / 2)) for one in resting)
 
 
 def _smooth(share: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """Finding walking paths: the criterion minimised from several guesses, around obstacles as well."""
 
 import multiprocessing
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,6 +17,7 @@ from manikin.locomotion.objective import PROSE_ORDER, WalkObjective
 from manikin.locomotion.obstacles import Walker, WalkObstacle, clearance
 from manikin.locomotion.path import TOLERANCE, WalkingPath, WalkingTask
 from manikin.locomotion.programme import Programme, Structure, obstacle_parameters, transcribe
+from manikin.locomotion.ways import Grid
 from manikin.spatial import FloatArray, finite_number, frozen_array
 
 NEAREST, FARTHEST = 0.01, 100.0
@@ -24,6 +25,9 @@ NEAREST, FARTHEST = 0.01, 100.0
 
 _ROUNDS = 4
 """Solutions whose room between the samples of the programme is made up for."""
+
+_SPEED_SHARE = 0.999
+"""Part of the speed limit that is used, because the speed between the samples is a little higher."""
 
 _SHORT = 10.0
 """Distance up to which twenty pieces are enough [m]."""
@@ -46,7 +50,8 @@ def walking_path(
 
     Every initial guess is optimised and the cheapest path is returned, whose heading may end whole turns from
     the goal's. Obstacles, which the thesis leaves open (5.6), are constraints under the same cost: if the
-    path without them is in their way, detours on both sides are tried.
+    path without them is in their way, ways between them from a grid and detours on both sides are optimised
+    and the cheapest is returned. All are local optima; a cheaper one elsewhere cannot be excluded.
 
     Args:
         start: (3,) x, y [m], heading [rad], counter-clockwise from x.
@@ -149,7 +154,7 @@ def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatA
         "weights": task.objective.weights,
         "offsets": task.walker.offsets,
         "room": task.walker.depth / 2 + task.room + tightening,
-        "max_speed": task.max_speed or 0.0,
+        "max_speed": _SPEED_SHARE * (task.max_speed or 0.0),
     }
     for index, obstacle in enumerate(task.obstacles):
         values |= obstacle_parameters(index, obstacle)
@@ -229,6 +234,8 @@ def _solve(task: WalkingTask, guess: _Guess) -> WalkingPath:
 
 def _lacking(path: WalkingPath) -> FloatArray:
     """(obstacles,) room that a path lacks beside each, measured every few millimetres [m]."""
+    if not path.task.obstacles:
+        return np.zeros(0)
     time = np.linspace(0.0, path.duration, 1001)
     room = clearance(path.task.obstacles, path.task.walker, path.place_at(time), time)
     return path.task.room - room.min(axis=0)
@@ -258,29 +265,43 @@ def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
     lacking = _lacking(kept)
     if free.succeeded and np.all(lacking <= 0.0):
         return kept
+    grid = Grid(task.obstacles, task.start, task.goal)
+    narrow = grid.way(task.walker.depth / 2 + task.room - grid.tolerance)
+    if narrow is None:
+        return replace(kept, failure="the obstacles leave no way to the goal", others={})
+    wide = grid.way(task.walker.width / 2 + task.room)
+    ways = {"narrow way": narrow} | ({} if wide is None else {"wide way": wide})
     blocking = [one for one, lack in zip(task.obstacles, lacking, strict=True) if lack > 0.0]
-    attempts = [_solve(task, guess) for guess in _detour_guesses(task, free, blocking)]
-    return _cheapest(attempts)
+    guesses = (*_way_guesses(task, free, ways), *_detour_guesses(task, free, blocking))
+    return _cheapest([_solve(task, guess) for guess in guesses])
+
+
+def _way_guesses(task: WalkingTask, free: WalkingPath, ways: Mapping[str, FloatArray]) -> Iterator[_Guess]:
+    """Along ways over the grid; along the narrow one, where the shoulders may not fit, turned aside too."""
+    structure = programme_of(task).structure
+    for name, way in ways.items():
+        points = guess_path(structure, "turning", task.start, task.goal, list(way))
+        yield _Guess(name, points, 1.2 * free.duration)
+        if name == "narrow way":
+            for side, turn in (("left", -np.pi / 2), ("right", np.pi / 2)):
+                turned = turned_between(points, turn)
+                yield _Guess(f"{name}, {side} shoulder first", turned, 1.2 * free.duration)
 
 
 def _detour_guesses(
     task: WalkingTask, free: WalkingPath, blocking: Sequence[WalkObstacle]
 ) -> Iterator[_Guess]:
+    """Past what is in the way on either side; straight on, sooner or later where something moves."""
     structure = programme_of(task).structure
-    points = free.spline.control_points
     times = np.linspace(0.0, free.duration, 201)
     room = clearance(blocking, task.walker, free.place_at(times), times)
     nearest = [float(times[i]) for i in room.argmin(axis=0)]
     for number, via in enumerate(detours(blocking, nearest, task.walker, task.start, task.goal)):
         way = guess_path(structure, "turning", task.start, task.goal, via)
         yield _Guess(f"detour {number}", way, 1.2 * free.duration)
-    yield _Guess("straight on", points, free.duration)
-    if len(blocking) > 1:
-        for name, turn in (("left shoulder first", -np.pi / 2), ("right shoulder first", np.pi / 2)):
-            yield _Guess(name, turned_between(points, turn), 1.2 * free.duration)
     if any(one.moves for one in blocking):
-        for name, factor in (("sooner", 0.7), ("later", 1.6)):
-            yield _Guess(name, points, factor * free.duration)
+        for name, factor in (("straight on", 1.0), ("sooner", 0.7), ("later", 1.6)):
+            yield _Guess(name, free.spline.control_points, factor * free.duration)
 
 
 def _one(

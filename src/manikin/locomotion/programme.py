@@ -88,7 +88,7 @@ class Programme:
                 "print_level": 0,
                 "sb": "yes",
                 "tol": 1e-6,
-                "max_iter": 200,
+                "max_iter": 100,
                 "bound_relax_factor": 0.0,
                 "mu_strategy": "adaptive",
                 "linear_solver": "mumps",
