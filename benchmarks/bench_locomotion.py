@@ -19,7 +19,8 @@ from manikin.locomotion import (
 )
 from manikin.locomotion.guesses import kinds_of_guesses
 from manikin.locomotion.inverse import RecordedWalk, identify_objective
-from manikin.locomotion.plan import _guesses, _solve
+from manikin.locomotion.plan import _guesses
+from manikin.locomotion.solve import solve
 
 ORDERS = {"prose": PROSE_ORDER, "literal": LITERAL_ORDER}
 
@@ -49,7 +50,7 @@ def test_path_from_all_guesses(benchmark, order):
 def test_path_from_one_guess(benchmark, kind):
     tasks = [walking_path(START, target).task for target in experiment_targets()]
     guesses = [next(guess for guess in _guesses(task) if guess.name == kind) for task in tasks]
-    per_target(benchmark, lambda i: _solve(tasks[i], guesses[i]))
+    per_target(benchmark, lambda i: solve(tasks[i], guesses[i]))
 
 
 def test_path_from_a_neighbour(benchmark):

@@ -19,8 +19,8 @@ from manikin.errors import InputError, SolverError
 from manikin.locomotion.objective import TERMS, WalkObjective
 from manikin.locomotion.obstacles import Walker
 from manikin.locomotion.path import WalkingPath, WalkingTask
-from manikin.locomotion.plan import parameters_of, programme_of
 from manikin.locomotion.programme import DEGREE, Programme
+from manikin.locomotion.solve import parameters_of, programme_of
 from manikin.spatial import FloatArray, frozen_array
 from manikin.spline import BSpline, basis_matrix
 
@@ -194,7 +194,7 @@ class _Fit:
 
     def _solved(self, objective: WalkObjective) -> _Match:
         task, programme = replace(self._task, objective=objective), self._programme
-        values = parameters_of(task, np.zeros(0), task.goal)
+        values = parameters_of(task, np.zeros(1), task.goal)
         parameters = programme.pack_parameters(values)
         solution = programme.solver(x0=self._unknowns, p=parameters)
         stats = programme.solver.stats()

@@ -188,13 +188,13 @@ class WalkingPath:
         rate, second = self.spline(share, 1) / self.duration, self.spline(share, 2) / self.duration**2
         return body_motion(self.spline(share), rate, second)
 
-    def term_integrals(self) -> FloatArray:
-        """(5,) integrals of the terms without their weights, by Simpson's rule over many instants."""
-        dense = self._dense
+    def term_integrals(self, intervals: int = _DENSE) -> FloatArray:
+        """(5,) integrals of the terms without their weights, by Simpson's rule over evenly many intervals."""
+        dense = self._dense if intervals == _DENSE else self._sampled(intervals)
         rates = cost_rates(dense.place, dense.acceleration, self.task.goal, self.task.objective)
         weights = np.full(len(rates), 2.0)
         weights[1::2], weights[0], weights[-1] = 4.0, 1.0, 1.0
-        return self.duration / (3.0 * _DENSE) * weights @ rates
+        return self.duration / (3.0 * intervals) * weights @ rates
 
     def residuals(self) -> WalkingResiduals:
         """Integrate the model under the accelerations and measure everything densely, without the solver."""
@@ -237,7 +237,10 @@ class WalkingPath:
 
     @cached_property
     def _dense(self) -> "_Dense":
-        time = np.linspace(0.0, self.duration, _DENSE + 1)
+        return self._sampled(_DENSE)
+
+    def _sampled(self, intervals: int) -> "_Dense":
+        time = np.linspace(0.0, self.duration, intervals + 1)
         return _Dense(time, self.place_at(time), *self.motion_at(time))
 
 

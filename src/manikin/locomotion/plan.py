@@ -3,7 +3,7 @@
 import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,25 +12,15 @@ from numpy.typing import ArrayLike
 
 from manikin.errors import InputError
 from manikin.locomotion.guesses import detours, guess_duration, guess_path, kinds_of_guesses, turned_between
-from manikin.locomotion.model import to_world
 from manikin.locomotion.objective import PROSE_ORDER, WalkObjective
 from manikin.locomotion.obstacles import Walker, WalkObstacle, clearance
-from manikin.locomotion.path import TOLERANCE, WalkingPath, WalkingTask
-from manikin.locomotion.programme import Programme, Structure, obstacle_parameters, transcribe
+from manikin.locomotion.path import WalkingPath, WalkingTask
+from manikin.locomotion.solve import Guess, bent, cheapest, lacking, programme_of, sharpened, solve
 from manikin.locomotion.ways import Grid
 from manikin.spatial import FloatArray, finite_number, frozen_array
 
 NEAREST, FARTHEST = 0.01, 100.0
 """Distances from start to goal that can be asked [m]; at none, the direction of the goal has no value."""
-
-_ROUNDS = 4
-"""Solutions whose room between the samples of the programme is made up for."""
-
-_SPEED_SHARE = 0.999
-"""Part of the speed limit that is used, because the speed between the samples is a little higher."""
-
-_SHORT = 10.0
-"""Distance up to which twenty pieces are enough [m]."""
 
 
 def walking_path(
@@ -84,11 +74,9 @@ def walking_path(
         goal_velocity=frozen_array(goal_velocity, "walking goal_velocity [m/s, m/s, rad/s]", (3,)),
     )
     _check(task)
-    guesses = _guesses(task) if like is None else [_Guess("like another", *_bent(like, task))]
-    free = _cheapest([_solve(replace(task, obstacles=()), guess) for guess in guesses])
-    if not task.obstacles:
-        return free
-    return _around(task, free)
+    guesses = _guesses(task) if like is None else [Guess("like another", *bent(like, task))]
+    free = cheapest([solve(replace(task, obstacles=()), guess) for guess in guesses])
+    return sharpened(_around(task, free) if task.obstacles else free)
 
 
 def walking_paths(
@@ -124,52 +112,6 @@ def walking_paths(
         return list(pool.map(one, wanted, chunksize=max(1, len(wanted) // (4 * workers))))
 
 
-def programme_of(task: WalkingTask) -> Programme:
-    """The compiled programme of a task, shared by all tasks of the same structure."""
-    distance = float(np.hypot(*(task.goal - task.start)[:2]))
-    return transcribe(
-        Structure(
-            pieces=20 if distance <= _SHORT else 40,
-            obstacles=tuple((len(one.corners), len(one.times)) for one in task.obstacles),
-            discs=len(task.walker.offsets) if task.obstacles else 1,
-            limited_speed=task.max_speed is not None,
-        )
-    )
-
-
-def parameters_of(task: WalkingTask, tightening: FloatArray, turned_goal: FloatArray) -> dict[str, Any]:
-    """Parameters of the programme by name.
-
-    Args:
-        task: What is asked.
-        tightening: (obstacles,) further distance to keep at the samples [m].
-        turned_goal: (3,) the goal, its heading by whole turns as the guess arrives.
-    """
-    values: dict[str, Any] = {
-        "start": task.start,
-        "goal": turned_goal,
-        "start_rate": to_world(task.start[2], task.start_velocity),
-        "goal_rate": to_world(task.goal[2], task.goal_velocity),
-        "fade": task.objective.goal_fade,
-        "weights": task.objective.weights,
-        "offsets": task.walker.offsets,
-        "room": task.walker.depth / 2 + task.room + tightening,
-        "max_speed": _SPEED_SHARE * (task.max_speed or 0.0),
-    }
-    for index, obstacle in enumerate(task.obstacles):
-        values |= obstacle_parameters(index, obstacle)
-    return values
-
-
-@dataclass(frozen=True, eq=False)
-class _Guess:
-    """Where the solver starts: its name, (n, 3) control points and duration [s]."""
-
-    name: str
-    points: FloatArray
-    duration: float
-
-
 def _check(task: WalkingTask) -> None:
     distance = float(np.hypot(*(task.goal - task.start)[:2]))
     if not NEAREST <= distance <= FARTHEST:
@@ -186,84 +128,18 @@ def _check(task: WalkingTask) -> None:
                 )
 
 
-def _guesses(task: WalkingTask) -> Iterator[_Guess]:
+def _guesses(task: WalkingTask) -> Iterator[Guess]:
     structure = programme_of(replace(task, obstacles=())).structure
     duration = guess_duration(task.objective, task.start, task.goal)
     for kind in kinds_of_guesses(task.start, task.goal):
-        yield _Guess(kind, guess_path(structure, kind, task.start, task.goal), duration)
-
-
-def _bent(path: WalkingPath, task: WalkingTask) -> tuple[FloatArray, float]:
-    """Control points and duration of a path, its ends moved to those of another task."""
-    structure = programme_of(replace(task, obstacles=())).structure
-    share = np.linspace(0.0, 1.0, structure.pieces + 4)[:, None]
-    points = (
-        path.spline(share[:, 0])
-        if len(path.spline.control_points) != len(share)
-        else path.spline.control_points
-    )
-    goal = task.goal.copy()
-    goal[2] += 2.0 * np.pi * np.round((points[-1, 2] - goal[2]) / (2.0 * np.pi))
-    moved = points + (1.0 - share) * (task.start - points[0]) + share * (goal - points[-1])
-    return moved, path.duration
-
-
-def _solve(task: WalkingTask, guess: _Guess) -> WalkingPath:
-    """Optimise from one guess, again with more room where the path between the samples had too little."""
-    programme = programme_of(task)
-    tightening = np.zeros(len(task.obstacles))
-    unknowns = programme.pack(guess.points, guess.duration)
-    for _ in range(_ROUNDS):
-        values = parameters_of(task, tightening, guess.points[-1])
-        solution = programme.solver(
-            x0=unknowns, p=programme.pack_parameters(values), lbg=np.zeros(sum(programme.rows))
-        )
-        stats = programme.solver.stats()
-        unknowns = np.asarray(solution["x"], dtype=np.float64).ravel()
-        spline, duration = programme.unpack(unknowns, values)
-        failure = None if stats["success"] else f"the solver ended with {stats['return_status']}"
-        path = WalkingPath(
-            task, spline, duration, float(solution["f"]), guess.name, int(stats["iter_count"]), failure
-        )  # fmt: skip
-        lacking = _lacking(path)
-        if failure is not None or np.all(lacking <= 0.5 * TOLERANCE):
-            break
-        tightening = tightening + 1.2 * np.maximum(lacking, 0.0) + 1e-5
-    return path if np.all(lacking <= TOLERANCE) else _refused(path, lacking)
-
-
-def _lacking(path: WalkingPath) -> FloatArray:
-    """(obstacles,) room that a path lacks beside each, measured every few millimetres [m]."""
-    if not path.task.obstacles:
-        return np.zeros(0)
-    time = np.linspace(0.0, path.duration, 1001)
-    room = clearance(path.task.obstacles, path.task.walker, path.place_at(time), time)
-    return path.task.room - room.min(axis=0)
-
-
-def _refused(path: WalkingPath, lacking: FloatArray) -> WalkingPath:
-    worst = int(np.argmax(lacking))
-    name = path.task.obstacles[worst].name
-    reason = f"no way around obstacle {name!r} was found; the nearest attempt lacks {lacking[worst]:.3g} m"
-    return replace(path, failure=reason)
-
-
-def _cheapest(paths: Sequence[WalkingPath]) -> WalkingPath:
-    """The cheapest of those that are solutions, or else any that is nearest to one."""
-    found = [path for path in paths if path.succeeded]
-    best = min(found, key=lambda path: path.cost) if found else min(paths, key=_shortfall)
-    return replace(best, others={path.guess: path.cost for path in found})
-
-
-def _shortfall(path: WalkingPath) -> float:
-    return float(max(_lacking(path).max(initial=0.0), 0.0))
+        yield Guess(kind, guess_path(structure, kind, task.start, task.goal), duration)
 
 
 def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
     """The free path if it has room, else the best of the detours around what is in its way."""
     kept = replace(free, task=task)
-    lacking = _lacking(kept)
-    if free.succeeded and np.all(lacking <= 0.0):
+    short = lacking(kept)
+    if free.succeeded and np.all(short <= 0.0):
         return kept
     grid = Grid(task.obstacles, task.start, task.goal)
     narrow = grid.way(task.walker.depth / 2 + task.room - grid.tolerance)
@@ -271,37 +147,39 @@ def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
         return replace(kept, failure="the obstacles leave no way to the goal", others={})
     wide = grid.way(task.walker.width / 2 + task.room)
     ways = {"narrow way": narrow} | ({} if wide is None else {"wide way": wide})
-    blocking = [one for one, lack in zip(task.obstacles, lacking, strict=True) if lack > 0.0]
+    blocking = [one for one, lack in zip(task.obstacles, short, strict=False) if lack > 0.0]
     guesses = (*_way_guesses(task, free, ways), *_detour_guesses(task, free, blocking))
-    return _cheapest([_solve(task, guess) for guess in guesses])
+    return cheapest([solve(task, guess) for guess in guesses])
 
 
-def _way_guesses(task: WalkingTask, free: WalkingPath, ways: Mapping[str, FloatArray]) -> Iterator[_Guess]:
+def _way_guesses(task: WalkingTask, free: WalkingPath, ways: Mapping[str, FloatArray]) -> Iterator[Guess]:
     """Along ways over the grid; along the narrow one, where the shoulders may not fit, turned aside too."""
     structure = programme_of(task).structure
     for name, way in ways.items():
         points = guess_path(structure, "turning", task.start, task.goal, list(way))
-        yield _Guess(name, points, 1.2 * free.duration)
+        yield Guess(name, points, 1.2 * free.duration)
         if name == "narrow way":
             for side, turn in (("left", -np.pi / 2), ("right", np.pi / 2)):
                 turned = turned_between(points, turn)
-                yield _Guess(f"{name}, {side} shoulder first", turned, 1.2 * free.duration)
+                yield Guess(f"{name}, {side} shoulder first", turned, 1.2 * free.duration)
 
 
 def _detour_guesses(
     task: WalkingTask, free: WalkingPath, blocking: Sequence[WalkObstacle]
-) -> Iterator[_Guess]:
+) -> Iterator[Guess]:
     """Past what is in the way on either side; straight on, sooner or later where something moves."""
+    if not blocking:
+        return
     structure = programme_of(task).structure
     times = np.linspace(0.0, free.duration, 201)
     room = clearance(blocking, task.walker, free.place_at(times), times)
     nearest = [float(times[i]) for i in room.argmin(axis=0)]
     for number, via in enumerate(detours(blocking, nearest, task.walker, task.start, task.goal)):
         way = guess_path(structure, "turning", task.start, task.goal, via)
-        yield _Guess(f"detour {number}", way, 1.2 * free.duration)
+        yield Guess(f"detour {number}", way, 1.2 * free.duration)
     if any(one.moves for one in blocking):
         for name, factor in (("straight on", 1.0), ("sooner", 0.7), ("later", 1.6)):
-            yield _Guess(name, free.spline.control_points, factor * free.duration)
+            yield Guess(name, free.spline.control_points, factor * free.duration)
 
 
 def _one(
