@@ -1,0 +1,108 @@
+"""What a skeleton tells beyond its joint centres: turns of pelvis, thorax and head, feet and hands.
+
+Each is expressed by points on our segments, as markers would be. They weigh less than joint centres,
+for they are placed by assumption: where the trunk is most extended, pelvis and thorax are taken to be
+aligned with it; on the mean of a recording the head looks where the chest points.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manikin.body import BodyModel
+from manikin.mocap.closed_form import frames, trunk_axes
+from manikin.mocap.joint_centres import far_point, joint_of
+from manikin.mocap.proportions import hanging_arms, middle
+from manikin.mocap.recording import Recording
+from manikin.mocap.targets import Targets
+from manikin.spatial import FloatArray
+
+WEIGHT = 0.05
+"""Of a guide, against 1 of a joint centre."""
+
+ARM = 0.2
+"""Distance of a guide from the middle of its segment's joints [m]."""
+
+_PARTS = {"pelvis": "thigh", "thorax": "upper_arm"}
+
+HEADS = ("head", "Head")
+NECKS = ("neck", "Neck", "lowerneck")
+
+
+def trunk_turns(recording: Recording, centres: Mapping[str, FloatArray], segment: str) -> FloatArray:
+    """(n, 3, 3) from the axes of ``"pelvis"`` or ``"thorax"`` to the world's.
+
+    The recorded joint's turns, aligned with the line from hips to shoulders where that is longest and the
+    arms hang; the
+    left-right axis is exactly that of the two joint centres.
+    """
+    geometric = trunk_axes(centres, _PARTS[segment])
+    length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
+    hanging = hanging_arms(centres)
+    straight = hanging[np.argmax(length[hanging])]
+    turns = recording.world_rotations[:, recording.joint_index(joint_of(recording, segment))]
+    turned = turns @ turns[straight].T @ geometric[straight]
+    return frames(turned[:, :, 2], geometric[:, :, 1], keep_y=True)
+
+
+def guides(
+    recording: Recording, body: BodyModel, centres: Mapping[str, FloatArray],
+    pelvis: FloatArray, thorax: FloatArray,
+) -> Targets:  # fmt: skip
+    """Targets of the turns of pelvis, thorax and head and of the directions of feet and hands.
+
+    Args:
+        recording: The skeleton's motion.
+        body: Our human.
+        centres: (n, 3) joint centres [m].
+        pelvis: (n, 3, 3) from the pelvis' axes to the world's.
+        thorax: (n, 3, 3) from the thorax' axes to the world's.
+    """
+    girdle = np.array(body.segment("left_upper_arm").origin) * [1.0, 0.0, 1.0]
+    found: list[tuple[str, FloatArray, FloatArray]] = [
+        ("pelvis", np.array([0.0, 0.0, ARM]), middle(centres, "thigh") + ARM * pelvis[:, :, 2]),
+        (
+            "thorax",
+            girdle + np.array([ARM, 0.0, 0.0]),
+            middle(centres, "upper_arm") + ARM * thorax[:, :, 0],
+        ),
+    ]
+    found += _head(recording, body, centres, thorax, girdle)
+    for side in ("left", "right"):
+        toes, palm = body.segment(f"{side}_toes").origin, np.array([0.0, 0.0, -1.0])
+        for part, direction in (("foot", np.array(toes)), ("hand", palm)):
+            segment = f"{side}_{part}"
+            far = far_point(recording, joint_of(recording, segment))
+            if far is not None:
+                length = float(np.median(np.linalg.norm(far - centres[segment], axis=1)))
+                found.append((segment, length * direction / np.linalg.norm(direction), far))
+    segments = tuple(segment for segment, _, _ in found)
+    return Targets(
+        tuple(f"{segment} guide" for segment in segments), segments, np.array([p for _, p, _ in found]),
+        np.stack([places for _, _, places in found], axis=1), np.full(len(found), WEIGHT),
+    )  # fmt: skip
+
+
+def _head(
+    recording: Recording, body: BodyModel, centres: Mapping[str, FloatArray], thorax: FloatArray,
+    girdle: FloatArray,
+) -> list[tuple[str, FloatArray, FloatArray]]:  # fmt: skip
+    """Above and before the neck's base, by the line from the neck to the vertex; none without a head."""
+    head = next((name for name in HEADS if name in recording.joint_names), None)
+    neck = next((name for name in NECKS if name in recording.joint_names), None)
+    if head is None or neck is None:
+        return []
+    top = far_point(recording, head)
+    if top is None:
+        top = recording.positions[:, recording.joint_index(head)]
+    up = top - recording.positions[:, recording.joint_index(neck)]
+    turns = recording.world_rotations[:, recording.joint_index(head)]
+    local = Rotation.from_matrix(turns.transpose(0, 2, 1) @ thorax).mean().as_matrix()
+    axes = frames(up, (turns @ local)[:, :, 1], keep_y=False)
+    rise = np.array(body.segment("neck").origin) - girdle
+    base = middle(centres, "upper_arm") + np.einsum("nij,j->ni", thorax, rise)
+    return [
+        ("neck", np.array([0.0, 0.0, ARM]), base + ARM * axes[:, :, 2]),
+        ("neck", np.array([ARM, 0.0, 0.0]), base + ARM * axes[:, :, 0]),
+    ]
