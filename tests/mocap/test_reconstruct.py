@@ -8,8 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from manikin.body import human
+from manikin.body.insect import insect
 from manikin.errors import BodyError, InputError
-from manikin.mocap import Recording, Targets, read_recording, reconstruct
+from manikin.mocap import Recording, Targets, read_bvh, read_recording, reconstruct
 from manikin.mocap.closed_form import closed_form, trunk_axes
 from manikin.mocap.joint_centres import CENTRES, joint_centres
 from manikin.mocap.proportions import segment_lengths
@@ -132,6 +133,22 @@ def test_limits_hold_where_the_recording_breaks_them(person):
     assert 0.02 < found.residual[:, leg].max() < 0.15
 
 
+def test_a_standing_foot_is_level_whatever_its_bone(person):
+    """Toe joints recorded 3 cm higher in the foot: the ankles still stand as they did."""
+    q = np.tile(person.standing_posture(), (3, 1))
+    ours = recorded(person, q)
+    offsets = np.array(ours.offsets)
+    offsets[[ours.joint_index(f"{side}_toes") for side in ("left", "right")], 2] += 0.03
+    other = Recording(
+        "other feet", ours.joint_names, ours.parents, offsets, ours.ends, ours.rotations,
+        ours.root_positions, ours.rate,
+    )  # fmt: skip
+    found = reconstruct(other, person)
+    for side in ("left", "right"):
+        slot = 7 + person.joint_index(f"{side}_ankle_dorsiflexion")
+        np.testing.assert_allclose(found.q[:, slot], q[:, slot], atol=np.deg2rad(0.5))
+
+
 @pytest.mark.parametrize("clip", CLIPS)
 def test_real_clips(recordings_folder, clip):
     """Median of all joints and frames within 2 cm, limits kept, one third of the frames per second."""
@@ -158,9 +175,18 @@ def test_what_cannot_be_reconstructed_is_said(person, bvh_file):
     with pytest.raises(InputError, match="has 1 frame; valid: at least 2"):
         reconstruct(recording.cut(0, 1))
     with pytest.raises(InputError, match="no joint for 'left_thigh'"):
-        reconstruct(read_recording(bvh_file))
+        reconstruct(read_bvh(bvh_file, 0.01))
     with pytest.raises(InputError, match="reconstruction of a list"):
         reconstruct([1])  # type: ignore[arg-type]
+    with pytest.raises(BodyError, match="no segment"):
+        reconstruct(recording, insect())
+    gap = np.array(recording.root_positions)
+    gap[1, 2] = np.nan
+    with pytest.raises(InputError, match="root_positions"):
+        Recording(
+            "gap", recording.joint_names, recording.parents, recording.offsets, {}, recording.rotations, gap,
+            30.0,
+        )  # fmt: skip
     small = Recording(
         "doll", recording.joint_names, recording.parents, 0.2 * recording.offsets, {},
         recording.rotations, recording.root_positions, 30.0,

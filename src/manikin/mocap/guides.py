@@ -2,7 +2,8 @@
 
 Each is expressed by points on our segments, as markers would be. They weigh less than joint centres,
 for they are placed by assumption: where the trunk is most extended, pelvis and thorax are taken to be
-aligned with it; on the mean of a recording the head looks where the chest points.
+aligned with it; on the mean of a recording the head looks where the chest points; a sole is flat where
+its ankle is lowest.
 """
 
 from collections.abc import Mapping
@@ -23,6 +24,12 @@ WEIGHT = 0.05
 
 ARM = 0.2
 """Distance of a guide from the middle of its segment's joints [m]."""
+
+LOWEST_SHARE, LOWEST = 5.0, 0.01
+"""A sole is flat up to this [m] above this percentile of the ankle's height."""
+
+OTHER_FOOT = np.deg2rad(25.0)
+"""A foot's bone differs from ours by less than this when the sole is flat [rad]."""
 
 _PARTS = {"pelvis": "thigh", "thorax": "upper_arm"}
 
@@ -70,18 +77,36 @@ def guides(
     ]
     found += _head(recording, body, centres, thorax, girdle)
     for side in ("left", "right"):
-        toes, palm = body.segment(f"{side}_toes").origin, np.array([0.0, 0.0, -1.0])
-        for part, direction in (("foot", np.array(toes)), ("hand", palm)):
-            segment = f"{side}_{part}"
+        for segment in (f"{side}_foot", f"{side}_hand"):
             far = far_point(recording, joint_of(recording, segment))
             if far is not None:
-                length = float(np.median(np.linalg.norm(far - centres[segment], axis=1)))
-                found.append((segment, length * direction / np.linalg.norm(direction), far))
+                bone = far - centres[segment]
+                length = float(np.median(np.linalg.norm(bone, axis=1)))
+                direction = np.array([0.0, 0.0, -1.0])
+                if segment.endswith("foot"):
+                    rise = _rise_when_flat(body, side, centres[segment], bone)
+                    direction = np.array([np.cos(rise), 0.0, np.sin(rise)])
+                found.append((segment, length * direction, far))
     segments = tuple(segment for segment, _, _ in found)
     return Targets(
         tuple(f"{segment} guide" for segment in segments), segments, np.array([p for _, p, _ in found]),
         np.stack([places for _, _, places in found], axis=1), np.full(len(found), WEIGHT),
     )  # fmt: skip
+
+
+def _rise_when_flat(body: BodyModel, side: str, ankle: FloatArray, bone: FloatArray) -> float:
+    """Angle above the horizontal of a recorded foot's bone when the sole is flat [rad].
+
+    The sole is taken to be flat where the ankle is lowest. An angle that is far from our foot's says
+    that it never is (crawling, lying), and ours is taken.
+    """
+    toes = body.segment(f"{side}_toes").origin
+    ours = float(np.arctan2(toes[2], toes[0]))
+    height = ankle[:, 2]
+    low = height <= np.percentile(height, LOWEST_SHARE) + LOWEST
+    rise = np.arctan2(bone[:, 2], np.linalg.norm(bone[:, :2], axis=1))
+    found = float(np.median(rise[low]))
+    return found if abs(found - ours) < OTHER_FOOT else ours
 
 
 def _head(

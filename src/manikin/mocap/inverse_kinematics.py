@@ -13,6 +13,11 @@ from manikin.spatial import FloatArray
 REST = 1e-3
 """Distance [m] that weighs as much as one radian away from the resting posture."""
 
+STEADY = 3e-3
+"""Distance [m] that weighs as much as one radian away from the start."""
+
+_HOLD = REST**2 + STEADY**2
+
 MOST_STEPS = 30
 LEAST_GAIN = 1e-4
 """A step that lowers the cost by a smaller share is the last one."""
@@ -35,7 +40,8 @@ class InverseKinematics:
     """Levenberg-Marquardt on one posture, projected onto the joints' ranges.
 
     Minimised is the weighted sum of squared distances of points from their targets plus
-    ``(REST * (angle - rest))^2`` of every hinge, which settles what the points leave open. A hinge at
+    ``(REST * (angle - rest))^2 + (STEADY * (angle - start))^2`` of every hinge, which settles what the
+    points leave open without leaps from one instant to the next. A hinge at
     the end of its range that the cost pushes outward is held for the step (Bertsekas, "Projected
     Newton methods for optimization problems with simple constraints", 1982).
     """
@@ -44,7 +50,7 @@ class InverseKinematics:
         """Prepare a body and the points of its segments; the resting posture is the standing one."""
         self._body, self._model = body, body.pinocchio
         self._data = self._model.createData()
-        self._rest = body.standing_posture()[7:]
+        self._rest = self._held = body.standing_posture()[7:]
         self._points = _points(body, targets)
 
     def solve(self, start: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
@@ -58,6 +64,7 @@ class InverseKinematics:
             (nq,) posture and its cost [m^2].
         """
         q, damping = np.array(start), 1e-6
+        self._held = (REST**2 * self._rest + STEADY**2 * q[7:]) / _HOLD
         error = self.places(q) - wanted
         cost = self._cost(q, error)
         for _ in range(MOST_STEPS):
@@ -86,8 +93,8 @@ class InverseKinematics:
         return shifts + np.einsum("kij,kj->ki", turns, self._points.local)
 
     def _cost(self, q: FloatArray, error: FloatArray) -> float:
-        away = REST * (q[7:] - self._rest)
-        return float(self._points.weights @ np.sum(error * error, axis=1) + away @ away)
+        away = q[7:] - self._held
+        return float(self._points.weights @ np.sum(error * error, axis=1) + _HOLD * away @ away)
 
     def _system(self, q: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Gradient (nv,) and Gauss-Newton matrix (nv, nv) of half the cost."""
@@ -98,8 +105,8 @@ class InverseKinematics:
         root = np.sqrt(self._points.weights)[:, None]
         jacobian = (velocities * root[..., None]).transpose(0, 2, 1).reshape(-1, self._model.nv)
         gradient, hessian = jacobian.T @ (error * root).ravel(), jacobian.T @ jacobian
-        gradient[6:] += REST**2 * (q[7:] - self._rest)
-        hessian[np.arange(6, len(hessian)), np.arange(6, len(hessian))] += REST**2
+        gradient[6:] += _HOLD * (q[7:] - self._held)
+        hessian[np.arange(6, len(hessian)), np.arange(6, len(hessian))] += _HOLD
         return gradient, hessian
 
     def _moved(self, q: FloatArray, gradient: FloatArray, hessian: FloatArray, damping: float) -> FloatArray:
