@@ -13,7 +13,7 @@ from manikin.errors import BodyError, InputError
 from manikin.mocap import Recording, Targets, read_bvh, read_recording, reconstruct
 from manikin.mocap.closed_form import closed_form, trunk_axes
 from manikin.mocap.joint_centres import CENTRES, joint_centres
-from manikin.mocap.proportions import segment_lengths
+from manikin.mocap.proportions import hanging_arms, segment_lengths
 
 CLIPS = (
     "accad_male1_bvh/Male1_B3_Walk.bvh",
@@ -103,6 +103,21 @@ def test_lengths_of_a_person_are_measured(person):
     )
     assert body.stature == pytest.approx(1.75 * 1.35 / height, abs=1e-9)
     assert dict(body.lengths) == pytest.approx(dict(person.lengths), abs=1e-9)
+
+
+def test_raised_arms_do_not_lengthen_the_trunk(person):
+    """Instants with a raised arm are left out, unless there are no others."""
+    standing = person.standing_posture()
+    raised = standing.copy()
+    raised[7 + person.joint_index("left_shoulder_flexion")] = np.deg2rad(150.0)
+    centres = joint_centres(recorded(person, np.array([standing, raised, standing])))
+    assert list(hanging_arms(centres)) == [0, 2]
+    assert list(hanging_arms(joint_centres(recorded(person, np.array([raised, raised]))))) == [0, 1]
+    # A girdle that lifts both shoulders by 6 cm with the raised arm.
+    lifted = {name: np.array(places) for name, places in centres.items()}
+    for side in ("left", "right"):
+        lifted[f"{side}_upper_arm"][1, 2] += 0.06
+    assert segment_lengths(lifted)["trunk"] == pytest.approx(person.lengths["trunk"], abs=1e-9)
 
 
 def test_the_closed_form_is_exact_on_a_straight_trunk(person):

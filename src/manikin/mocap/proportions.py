@@ -43,7 +43,9 @@ def segment_lengths(centres: Mapping[str, FloatArray]) -> dict[str, float]:
     found["hips"] = apart("left_thigh", "right_thigh")
     found["shoulders"] = apart("left_upper_arm", "right_upper_arm")
     length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
-    found["trunk"] = float(np.percentile(length[hanging_arms(centres)], UPRIGHT_SHARE))
+    upright = np.percentile(length[hanging_arms(centres)], UPRIGHT_SHARE)
+    # Where arms hang in a crouch only, the trunk is never upright then.
+    found["trunk"] = float(max(upright, np.median(length)))
     return found
 
 

@@ -69,7 +69,9 @@ def reconstruct(
 
     Args:
         recording: Motion of a skeleton, at least two frames.
-        body: Our human; None for one with the lengths of the recorded person.
+        body: Our human; None for one with the lengths of the recorded person. Where other clips of the
+            person exist, take the body of one in which the person stands or walks: the trunk's length
+            is told by extended postures only.
         sex: Table of segment masses where ``body`` is None.
         mass: Body mass where ``body`` is None [kg]; None for a usual one.
 
