@@ -32,8 +32,10 @@ Our choices, for want of one table that fits the others:
   lies in its middle. The ankle is above 26 % of the sole's length from the heel.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from types import MappingProxyType
 
 import numpy as np
 
@@ -67,6 +69,21 @@ NECK_RADIUS = 0.034
 """Radius of the neck, per stature."""
 HIP_JOINT_DISTANCE = 0.100
 """Distance of the hip joint centres, per stature."""
+
+MEASURED_LENGTHS: Mapping[str, tuple[float, float]] = MappingProxyType({
+    "hips": (0.04, 0.40),
+    "thigh": (0.20, 0.70),
+    "shank": (0.20, 0.70),
+    "trunk": (0.25, 0.80),
+    "shoulders": (0.15, 0.60),
+    "upper_arm": (0.12, 0.50),
+    "forearm": (0.12, 0.50),
+})  # fmt: skip
+"""Lengths between joint centres that may be given instead of scaled, and what is accepted [m].
+
+``hips`` and ``shoulders`` are the distances of the left joint from the right one, ``trunk`` is the
+height of the shoulder joints above the hip joints.
+"""
 
 
 class Sex(StrEnum):
@@ -136,6 +153,7 @@ DE_LEVA: dict[Sex, dict[str, SegmentParameters]] = {
 
 _PAIRED = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")
 _VERTICAL = ("head_and_neck", "upper_trunk", "middle_trunk", "lower_trunk", "thigh", "shank")
+_TRUNK = ("upper_trunk", "middle_trunk", "lower_trunk")
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +166,8 @@ class Anthropometry:
         sex: Which table was scaled.
         sole_length: [m].
         sole_width: [m].
+        lengths: Measured lengths [m] by the names of :data:`MEASURED_LENGTHS`; the stature scales the
+            others, and then is no longer exactly sole to vertex.
     """
 
     stature: float
@@ -155,6 +175,7 @@ class Anthropometry:
     sex: Sex
     sole_length: float
     sole_width: float
+    lengths: Mapping[str, float]
 
     def __init__(
         self,
@@ -164,6 +185,7 @@ class Anthropometry:
         *,
         sole_length: float | None = None,
         sole_width: float | None = None,
+        lengths: Mapping[str, float] | None = None,
     ) -> None:
         if sex not in list(Sex):
             raise BodyError(f"body sex is {sex!r}; valid: {', '.join(Sex)}")
@@ -183,6 +205,7 @@ class Anthropometry:
         object.__setattr__(self, "sex", Sex(sex))
         object.__setattr__(self, "sole_length", _within(length, "body sole_length [m]", SOLE_LENGTH_RANGE))
         object.__setattr__(self, "sole_width", _within(width, "body sole_width [m]", SOLE_WIDTH_RANGE))
+        object.__setattr__(self, "lengths", _measured(lengths or {}))
 
     @property
     def table(self) -> dict[str, SegmentParameters]:
@@ -200,7 +223,11 @@ class Anthropometry:
         return (self.stature - self.ankle_height) / sum(self.table[name].length for name in _VERTICAL)
 
     def length(self, name: str) -> float:
-        """Length of a table segment [m], vertical ones fitted to the stature."""
+        """Length of a table segment [m]: as measured, else vertical ones fitted to the stature."""
+        if name in self.lengths:
+            return self.lengths[name]
+        if name in _TRUNK and "trunk" in self.lengths:
+            return self.table[name].length * self.lengths["trunk"] / SHOULDER_HEIGHT[self.sex]
         scale = self.vertical_scale if name in _VERTICAL else self.stature / SAMPLE_STATURE[self.sex]
         return self.table[name].length * scale
 
@@ -221,17 +248,17 @@ class Anthropometry:
     @property
     def shoulder_height(self) -> float:
         """Shoulder joints above the hip joints [m]."""
-        return SHOULDER_HEIGHT[self.sex] * self.vertical_scale
+        return self.lengths.get("trunk", SHOULDER_HEIGHT[self.sex] * self.vertical_scale)
 
     @property
     def shoulder_distance(self) -> float:
         """Distance between the shoulder joint centres [m]."""
-        return SHOULDER_JOINT_DISTANCE[self.sex] * self.stature
+        return self.lengths.get("shoulders", SHOULDER_JOINT_DISTANCE[self.sex] * self.stature)
 
     @property
     def hip_distance(self) -> float:
         """Distance between the hip joint centres [m]."""
-        return HIP_JOINT_DISTANCE * self.stature
+        return self.lengths.get("hips", HIP_JOINT_DISTANCE * self.stature)
 
     @property
     def knuckle_distance(self) -> float:
@@ -247,3 +274,13 @@ class Anthropometry:
 
 def _within(value: object, name: str, limits: tuple[float, float]) -> float:
     return finite_number(value, name, at_least=limits[0], at_most=limits[1], error=BodyError)
+
+
+def _measured(lengths: Mapping[str, float]) -> Mapping[str, float]:
+    unknown = set(lengths) - set(MEASURED_LENGTHS)
+    if unknown:
+        raise BodyError(f"body length of {min(unknown)!r}; valid: {', '.join(MEASURED_LENGTHS)}")
+    return MappingProxyType({
+        name: _within(value, f"body length of {name} [m]", MEASURED_LENGTHS[name])
+        for name, value in lengths.items()
+    })  # fmt: skip

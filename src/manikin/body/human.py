@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from manikin.body.anthropometry import (
     ANKLE_FROM_HEEL,
+    MEASURED_LENGTHS,
     NECK_LENGTH_SHARE,
     NECK_MASS_SHARE,
     NECK_RADIUS,
@@ -63,6 +64,7 @@ def human(
     *,
     sole_length: float | None = None,
     sole_width: float | None = None,
+    lengths: Mapping[str, float] | None = None,
 ) -> BodyModel:
     """Make a human body of 19 segments and 45 degrees of freedom ([Qiu2012]_ Table 2.1, B.1).
 
@@ -95,11 +97,16 @@ def human(
         sex: ``"male"`` or ``"female"``.
         sole_length: Length of the sole [m], 0.15 to 0.40; None for 0.16 of the stature.
         sole_width: Width of the sole [m], 0.05 to 0.16; None for 0.12/1.75 of the stature.
+        lengths: Measured lengths [m] instead of scaled ones, by the names of
+            :data:`manikin.body.anthropometry.MEASURED_LENGTHS`; the stature scales the others, the foot,
+            the head and the flesh.
 
     Raises:
         BodyError: If a value is out of its range.
     """
-    size = Anthropometry(stature, mass, sex, sole_length=sole_length, sole_width=sole_width)
+    size = Anthropometry(
+        stature, mass, sex, sole_length=sole_length, sole_width=sole_width, lengths=lengths
+    )  # fmt: skip
     builder = _HumanBuilder(size)
     return BodyModel(
         name="human",
@@ -113,6 +120,7 @@ def human(
         sole_width=size.sole_width,
         nominal_mass=size.mass,
         limbs=_limbs(),
+        lengths=size.lengths,
     )
 
 
@@ -130,7 +138,10 @@ def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
     if missing:
         raise BodyError(f"body signature has no {missing[0]!r}; valid: {', '.join(wanted)}")
     values: dict[str, Any] = {key: signature[key] for key in wanted}
-    return human(**values)
+    measured: dict[str, Any] = {
+        name: signature[f"{name}_length"] for name in MEASURED_LENGTHS if f"{name}_length" in signature
+    }
+    return human(**values, lengths=measured)
 
 
 def standing_angles() -> dict[str, float]:

@@ -50,6 +50,7 @@ class BodyModel:
         sole_width: Width of the sole rectangles [m], or None.
         nominal_mass: The mass that was asked for [kg]; the segments must add up to it.
         limbs: The limbs with which it makes contacts, see :mod:`manikin.body.limbs`.
+        lengths: Lengths of a human that were measured instead of scaled [m].
     """
 
     name: str
@@ -63,6 +64,7 @@ class BodyModel:
     sole_width: float | None = None
     nominal_mass: float | None = None
     limbs: tuple[Limb, ...] = ()
+    lengths: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         index = segments_by_name(self.segments)
@@ -80,11 +82,12 @@ class BodyModel:
             raise BodyError(f"segments weigh {total!r} kg; valid: {self.nominal_mass!r} kg")
         object.__setattr__(self, "effectors", MappingProxyType(dict(self.effectors)))
         object.__setattr__(self, "standing_angles", MappingProxyType(dict(self.standing_angles)))
+        object.__setattr__(self, "lengths", MappingProxyType(dict(self.lengths)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what describes the body, for other processes; what was computed from it is left out."""
         given = {each.name: getattr(self, each.name) for each in fields(self)}
-        plain = {"effectors": dict(self.effectors), "standing_angles": dict(self.standing_angles)}
+        plain = {name: dict(given[name]) for name in ("effectors", "standing_angles", "lengths")}
         return partial(BodyModel, **(given | plain)), ()
 
     # --- description ---------------------------------------------------------------------
@@ -277,11 +280,12 @@ class BodyModel:
     # --- as plain values -------------------------------------------------------------------
 
     def signature(self) -> dict[str, str | float]:
-        """What a file must keep to build this body again: name, stature, mass, sex, sole."""
+        """What a file must keep to build this body again: name, stature, mass, sex, sole, lengths."""
         values = {
             "model": self.name, "stature": self.stature, "mass": self.mass, "sex": self.sex,
             "sole_length": self.sole_length, "sole_width": self.sole_width,
         }  # fmt: skip
+        values |= {f"{name}_length": value for name, value in self.lengths.items()}
         return {key: value for key, value in values.items() if value is not None}
 
 

@@ -1,6 +1,7 @@
 """Recorded human motion: readers, and the angles of hips and shoulders.
 
 Skeletons are read from BVH and from ASF with AMC, markers from C3D and TRC, force plates from C3D and MOT.
+:func:`reconstruct` makes a motion of our human of a skeleton's.
 """
 
 from manikin.mocap.amc import read_amc
@@ -14,7 +15,9 @@ from manikin.mocap.gaps import Gap
 from manikin.mocap.markers import Event, MarkerRecording
 from manikin.mocap.mot import read_mot
 from manikin.mocap.read import read_recording
+from manikin.mocap.reconstruct import Reconstruction, reconstruct
 from manikin.mocap.recording import Recording
+from manikin.mocap.targets import Targets
 from manikin.mocap.trc import read_trc
 
 __all__ = [
@@ -23,8 +26,10 @@ __all__ = [
     "ForcePlate",
     "Gap",
     "MarkerRecording",
+    "Reconstruction",
     "Recording",
     "Skeleton",
+    "Targets",
     "anatomy_of",
     "ball_joint_angles",
     "read_amc",
@@ -34,4 +39,5 @@ __all__ = [
     "read_mot",
     "read_recording",
     "read_trc",
+    "reconstruct",
 ]
