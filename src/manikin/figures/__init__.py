@@ -17,6 +17,7 @@ from manikin.figures.push_map import push_map_figure
 from manikin.figures.scene import scene_figure
 from manikin.figures.timing import timing_figure
 from manikin.figures.tracking import tracking_figure
+from manikin.figures.walking import walking_paths_figure
 from manikin.figures.write import COMPARISONS, FIGURES, write_comparison, write_figures
 from manikin.figures.zmp import zmp_figure
 
@@ -42,6 +43,7 @@ __all__ = [
     "scene_figure",
     "timing_figure",
     "tracking_figure",
+    "walking_paths_figure",
     "write_comparison",
     "write_figures",
     "zmp_figure",

@@ -1,0 +1,259 @@
+"""Which cost explains recorded walks: the weights of the criterion from several of them at once.
+
+The thesis solves this as a bilevel problem without saying how ([Truong2010]_ 5.2, 5.5.1). Here the outer
+level is a least-squares fit over the logarithms of the weights, and the inner one the programme of the paths.
+How an optimal path moves with a weight follows from the implicit function theorem on its stationarity,
+``dz/da_i = - (d^2 J / dz^2)^-1 dJ_i/dz``, so the outer slopes are exact and cost one linear system.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from manikin.errors import InputError, SolverError
+from manikin.locomotion.objective import TERMS, WalkObjective
+from manikin.locomotion.obstacles import Walker
+from manikin.locomotion.path import WalkingPath, WalkingTask
+from manikin.locomotion.programme import DEGREE, Programme
+from manikin.locomotion.solve import parameters_of, programme_of
+from manikin.spatial import FloatArray, frozen_array
+from manikin.spline import BSpline, basis_matrix
+
+IDENTIFIED = TERMS[1:]
+"""The weights that can be identified; only their ratios to that of time matter to a path."""
+
+FIRST_GUESS = WalkObjective(forward=1.0, lateral=1.0, angular=1.0, goal=1.0)
+"""Where the fit starts: all weights equal."""
+
+HEADING_LENGTH = 0.5
+"""Error of position that weighs as much as an error of heading of one radian [m]."""
+
+_RANGE = (1e-3, 1e3)
+"""Of the weights that are tried."""
+
+_WIDEST = 20.0
+"""Half width of an interval of a logarithm that means nothing is known."""
+
+_EFFECT = 1e-6
+"""Change of a place [m] for a change of a weight by its own size below which the weight has no effect."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedWalk:
+    """A walk from rest to rest, recorded.
+
+    Attributes:
+        time: (n,) increasing, the walk starts at 0 [s].
+        place: (n, 3) x, y [m] and continuous heading [rad].
+        start: (3,) the place started from; if not given, the first recorded one.
+        goal: (3,) the place asked for, its heading within half a turn of the last one; if not given, that.
+    """
+
+    time: FloatArray
+    place: FloatArray
+    start: FloatArray
+    goal: FloatArray
+
+    def __init__(
+        self, time: ArrayLike, place: ArrayLike, start: ArrayLike | None = None, goal: ArrayLike | None = None
+    ) -> None:
+        instants = frozen_array(time, "recorded walk time [s]", (None,))
+        places = frozen_array(place, "recorded walk place [m, m, rad]", (len(instants), 3))
+        if len(instants) < 10 or np.any(np.diff(instants) <= 0) or instants[0] < 0.0:
+            raise InputError(
+                f"recorded walk has {len(instants)} instants from {instants.min(initial=np.inf):g} s; "
+                "valid: at least 10, increasing, none before 0 s"
+            )
+        ends = []
+        for name, value, default in (("start", start, places[0]), ("goal", goal, places[-1])):
+            end = np.array(frozen_array(default if value is None else value, f"recorded walk {name}", (3,)))
+            end[2] += 2.0 * np.pi * np.round((default[2] - end[2]) / (2.0 * np.pi))
+            ends.append(frozen_array(end, f"recorded walk {name}"))
+        if np.hypot(*(ends[1] - ends[0])[:2]) < 0.1:
+            raise InputError("recorded walk ends where it starts; valid: at least 0.1 m away")
+        for key, value in zip(("time", "place", "start", "goal"), (instants, places, *ends), strict=True):
+            object.__setattr__(self, key, value)
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedObjective:
+    """The cost that explains recorded walks best.
+
+    Attributes:
+        objective: With the identified weights; that of time is 1.
+        low: (4,) lower ends of the confidence intervals, in the order of :data:`IDENTIFIED`.
+        high: (4,) upper ends.
+        confidence: Of the intervals. They hold for errors that are independent from sample to sample; errors
+            of people are not, and their intervals are wider.
+        correlation: (4, 4) of the logarithms of the weights.
+        position_errors: (walks,) mean distance between recorded and optimal places at the same instants [m].
+        heading_errors: (walks,) root mean square [rad].
+        paths: Optimal path of each walk.
+        evaluations: Of the outer level.
+    """
+
+    objective: WalkObjective
+    low: FloatArray
+    high: FloatArray
+    confidence: float
+    correlation: FloatArray
+    position_errors: FloatArray
+    heading_errors: FloatArray
+    paths: tuple[WalkingPath, ...]
+    evaluations: int
+
+
+def identify_objective(
+    walks: Sequence[RecordedWalk], first: WalkObjective = FIRST_GUESS, *, confidence: float = 0.95
+) -> IdentifiedObjective:
+    """Find the weights under which the optimal paths are nearest to all recorded walks at once.
+
+    Args:
+        walks: At least one; a single one leaves some weights vague, which the intervals show.
+        first: Where to start, and the ``goal_fade`` that is kept.
+        confidence: Of the intervals, between 0 and 1.
+
+    Raises:
+        InputError: If there is no walk, the confidence is not usable, or no walk depends on some weight.
+        SolverError: If a path cannot be optimised.
+    """
+    if not walks:
+        raise InputError("no recorded walk to identify weights from; valid: at least one")
+    if not 0.0 < confidence < 1.0:
+        raise InputError(f"confidence is {confidence!r}; valid: between 0 and 1")
+    fits = [_Fit(walk, first) for walk in walks]
+    start = np.log(np.clip(first.weights[1:] / first.time, *_RANGE))
+
+    def residuals(logs: FloatArray) -> FloatArray:
+        return np.concatenate([fit.at(_objective(first, logs)).residuals for fit in fits])
+
+    def slopes(logs: FloatArray) -> FloatArray:
+        return np.vstack([fit.at(_objective(first, logs)).slopes for fit in fits])
+
+    _check_effects(slopes(start))
+    exact: Any = slopes  # the stubs know names of difference rules only
+    found = least_squares(residuals, start, exact, tuple(np.log(_RANGE)), xtol=1e-8, ftol=1e-10)
+    freedom = len(found.fun) - len(found.x)
+    covariance = np.linalg.pinv(found.jac.T @ found.jac) * (2.0 * found.cost / freedom)
+    error = np.sqrt(np.diag(covariance))
+    width = np.minimum(error * student.ppf(0.5 + confidence / 2.0, freedom), _WIDEST)
+    objective = _objective(first, found.x)
+    matches = [fit.at(objective) for fit in fits]
+    return IdentifiedObjective(
+        objective=objective,
+        low=np.exp(found.x - width),
+        high=np.exp(found.x + width),
+        confidence=confidence,
+        correlation=covariance / np.maximum(np.outer(error, error), 1e-300),
+        position_errors=np.array([one.position_error for one in matches]),
+        heading_errors=np.array([one.heading_error for one in matches]),
+        paths=tuple(one.path for one in matches),
+        evaluations=int(found.nfev),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Match:
+    """An optimal path beside a recording: (3 n,) errors [m] and (3 n, 4) slopes over the log weights."""
+
+    path: WalkingPath
+    residuals: FloatArray
+    slopes: FloatArray
+
+    @property
+    def position_error(self) -> float:
+        errors = self.residuals.reshape(-1, 3)
+        return float(np.hypot(errors[:, 0], errors[:, 1]).mean())
+
+    @property
+    def heading_error(self) -> float:
+        return float(np.sqrt(np.mean((self.residuals.reshape(-1, 3)[:, 2] / HEADING_LENGTH) ** 2)))
+
+
+class _Fit:
+    """One recorded walk and its optimal path, which is kept to start the next one from."""
+
+    def __init__(self, walk: RecordedWalk, first: WalkObjective) -> None:
+        zero = np.zeros(3)
+        self._walk = walk
+        self._task = WalkingTask(walk.start, walk.goal, first, (), Walker(), 0.0, None, zero, zero)
+        self._programme = programme_of(self._task)
+        self._unknowns = _unknowns_of(walk, self._programme)
+        self._match: _Match | None = None
+
+    def at(self, objective: WalkObjective) -> _Match:
+        """The optimal path under an objective."""
+        if self._match is None or self._match.path.task.objective != objective:
+            self._match = self._solved(objective)
+        return self._match
+
+    def _solved(self, objective: WalkObjective) -> _Match:
+        task, programme = replace(self._task, objective=objective), self._programme
+        values = parameters_of(task, np.zeros(1), task.goal)
+        parameters = programme.pack_parameters(values)
+        solution = programme.solver(x0=self._unknowns, p=parameters)
+        stats = programme.solver.stats()
+        if not stats["success"]:
+            raise SolverError(
+                f"no optimal path to {task.goal.tolist()} for weights {objective.weights.tolist()}: "
+                f"{stats['return_status']}"
+            )
+        self._unknowns = np.asarray(solution["x"], dtype=np.float64).ravel()
+        spline, duration = programme.unpack(self._unknowns, values)
+        path = WalkingPath(
+            task, spline, duration, float(solution["f"]), "recording", int(stats["iter_count"])
+        )
+        hessian, terms = (np.asarray(m) for m in programme.sensitivities(self._unknowns, parameters))
+        moved = -np.linalg.solve(hessian, terms[:, 1:] * objective.weights[1:])
+        return _Match(path, self._errors(path), self._place_slopes(path) @ moved)
+
+    def _errors(self, path: WalkingPath) -> FloatArray:
+        time = np.minimum(self._walk.time, path.duration)
+        errors = path.place_at(time) - self._walk.place
+        return (errors * [1.0, 1.0, HEADING_LENGTH]).ravel()
+
+    def _place_slopes(self, path: WalkingPath) -> FloatArray:
+        """(3 n, unknowns) slopes of the scaled places at the recorded instants over the unknowns."""
+        share = np.minimum(self._walk.time / path.duration, 1.0)
+        basis = basis_matrix(DEGREE, path.spline.knots, share)[:, 2:-2]
+        running = (self._walk.time < path.duration)[:, None]
+        # The last unknown is the logarithm of the duration: a longer walk is at an earlier share of it.
+        later = -np.where(running, share[:, None] * path.spline(share, 1), 0.0)
+        count = basis.shape[1]
+        slopes = np.zeros((len(share), 3, 3 * count + 1))
+        for axis, scale in enumerate((1.0, 1.0, HEADING_LENGTH)):
+            slopes[:, axis, axis * count : (axis + 1) * count] = scale * basis
+            slopes[:, axis, -1] = scale * later[:, axis]
+        return slopes.reshape(3 * len(share), -1)
+
+
+def _check_effects(slopes: FloatArray) -> None:
+    without = [
+        name for name, effect in zip(IDENTIFIED, np.abs(slopes).max(axis=0), strict=True) if effect < _EFFECT
+    ]
+    if without:
+        raise InputError(
+            f"the recorded walks do not depend on the weights {', '.join(without)}; "
+            "valid: walks that also turn and go aside"
+        )
+
+
+def _objective(first: WalkObjective, logs: FloatArray) -> WalkObjective:
+    return replace(first, time=1.0, **dict(zip(IDENTIFIED, np.exp(logs).tolist(), strict=True)))
+
+
+def _unknowns_of(walk: RecordedWalk, programme: Programme) -> FloatArray:
+    """Unknowns of a smooth path through a recording."""
+    knots = programme.structure.knots
+    share = walk.time / walk.time[-1]
+    # A recording may have fewer instants than the spline has pieces.
+    even = np.linspace(0.0, 1.0, 10 * programme.structure.pieces)
+    places = np.column_stack([np.interp(even, share, walk.place[:, axis]) for axis in range(3)])
+    ends = (np.tile(walk.start, (2, 1)), np.tile(walk.goal, (2, 1)))
+    spline = BSpline.fit(DEGREE, knots, even, places, first=ends[0], last=ends[1])
+    return programme.pack(spline.control_points, float(walk.time[-1]))

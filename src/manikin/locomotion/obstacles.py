@@ -1,0 +1,174 @@
+"""What a walker goes around: discs and convex polygons on the floor, at rest or on given tracks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import ConvexHull, QhullError
+
+from manikin.errors import InputError
+from manikin.spatial import FloatArray, finite_number, frozen_array
+
+
+@dataclass(frozen=True)
+class Walker:
+    """The walker seen from above: three discs side by side, one in the middle and one under each shoulder.
+
+    Turned sideways, it passes gaps that are too narrow for its shoulders.
+
+    Attributes:
+        depth: Diameter of the discs [m].
+        width: From the left edge to the right edge [m], at least the depth.
+    """
+
+    depth: float = 0.3
+    width: float = 0.5
+
+    def __post_init__(self) -> None:
+        finite_number(self.depth, "walker depth [m]", above=0.0)
+        finite_number(self.width, "walker width [m]", at_least=self.depth)
+
+    @property
+    def offsets(self) -> tuple[float, ...]:
+        """Places of the discs' centres along the body's y [m]."""
+        side = (self.width - self.depth) / 2
+        return (0.0,) if side == 0.0 else (-side, 0.0, side)
+
+    def centres(self, place: FloatArray) -> FloatArray:
+        """(n, k, 2) centres of the discs at (n, 3) places [m]."""
+        left = np.column_stack([-np.sin(place[:, 2]), np.cos(place[:, 2])])
+        return place[:, None, :2] + np.array(self.offsets)[None, :, None] * left[:, None, :]
+
+
+@dataclass(frozen=True, eq=False)
+class WalkObstacle:
+    """A convex polygon grown by a radius; a disc is a single corner with a radius.
+
+    Attributes:
+        name: What messages call it.
+        corners: (v, 2) counter-clockwise, in the world at rest [m].
+        radius: Distance by which it is grown [m].
+        times: (k,) instants of its track, increasing [s]; the walk starts at 0.
+        displacements: (k, 2) how far it has moved then [m]; in between it moves uniformly, before and after
+            it rests.
+    """
+
+    name: str
+    corners: FloatArray
+    radius: float
+    times: FloatArray
+    displacements: FloatArray
+
+    def __init__(
+        self,
+        name: str,
+        corners: ArrayLike,
+        radius: float = 0.0,
+        *,
+        times: ArrayLike = (0.0,),
+        displacements: ArrayLike = ((0.0, 0.0),),
+    ) -> None:
+        where = f"obstacle {name!r}"
+        instants = frozen_array(times, f"{where} times [s]", (None,))
+        moved = frozen_array(displacements, f"{where} displacements [m]", (len(instants), 2))
+        if len(instants) == 0 or np.any(np.diff(instants) <= 0):
+            raise InputError(f"{where} times are {instants.tolist()}; valid: at least one, increasing")
+        values = {
+            "name": name,
+            "corners": _convex(frozen_array(corners, f"{where} corners [m]", (None, 2)), where),
+            "radius": finite_number(radius, f"{where} radius [m]", at_least=0.0),
+            "times": instants,
+            "displacements": moved,
+        }
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
+
+    @classmethod
+    def disc(cls, name: str, centre: ArrayLike, radius: float) -> Self:
+        """A disc at rest about ``centre`` (2,) [m]."""
+        finite_number(radius, f"obstacle {name!r} radius [m]", above=0.0)
+        return cls(name, frozen_array(centre, f"obstacle {name!r} centre [m]", (2,))[None], radius)
+
+    @classmethod
+    def moving_disc(cls, name: str, times: ArrayLike, centres: ArrayLike, radius: float) -> Self:
+        """A disc, such as another person, that is at (k, 2) ``centres`` [m] at (k,) ``times`` [s]."""
+        path = frozen_array(centres, f"obstacle {name!r} centres [m]", (None, 2))
+        finite_number(radius, f"obstacle {name!r} radius [m]", above=0.0)
+        if len(path) == 0:
+            raise InputError(f"obstacle {name!r} has no centres; valid: at least one")
+        return cls(name, path[:1], radius, times=times, displacements=path - path[0])
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is ever displaced from where it first was."""
+        return bool(np.any(self.displacements != self.displacements[0]))
+
+    @property
+    def reach(self) -> float:
+        """Radius of a circle about the mean of its corners that holds it [m]."""
+        spread = np.linalg.norm(self.corners - self.corners.mean(axis=0), axis=1)
+        return float(spread.max()) + self.radius
+
+    def displacement(self, time: ArrayLike) -> FloatArray:
+        """(..., 2) displacement at (...) times [m]."""
+        t = np.asarray(time, dtype=np.float64)
+        return np.stack([np.interp(t, self.times, self.displacements[:, i]) for i in range(2)], axis=-1)
+
+    def distance(self, points: FloatArray, time: FloatArray) -> FloatArray:
+        """Signed distance of points, negative inside.
+
+        Args:
+            points: (n, k, 2) [m].
+            time: (n,) [s].
+
+        Returns:
+            (n, k) [m].
+        """
+        p = points - self.displacement(time)[:, None, :]
+        squares, inside = [], []
+        for start, edge, normal in zip(self.corners, self._edges, self._normals, strict=True):
+            offset = p - start
+            along = np.clip(offset @ edge / max(float(edge @ edge), 1e-300), 0.0, 1.0)
+            squares.append(np.sum((offset - along[..., None] * edge) ** 2, axis=-1))
+            inside.append(offset @ normal)
+        outside, depth = np.sqrt(np.min(squares, axis=0)), np.max(inside, axis=0)
+        enclosed = (depth < 0.0) & (len(self.corners) > 1)
+        return np.where(enclosed, depth, outside) - self.radius
+
+    @property
+    def _edges(self) -> FloatArray:
+        return np.roll(self.corners, -1, axis=0) - self.corners
+
+    @property
+    def _normals(self) -> FloatArray:
+        """(v, 2) outward unit normals of the edges."""
+        edges = self._edges
+        lengths = np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), 1e-300)
+        return np.column_stack([edges[:, 1], -edges[:, 0]]) / lengths
+
+
+def clearance(
+    obstacles: Sequence[WalkObstacle], walker: Walker, place: FloatArray, time: FloatArray
+) -> FloatArray:
+    """(n, m) distance of the walker at (n, 3) places and (n,) times to each obstacle [m]."""
+    centres = walker.centres(place)
+    return np.column_stack([
+        one.distance(centres, time).min(axis=1) - walker.depth / 2 for one in obstacles
+    ]) if obstacles else np.zeros((len(place), 0))  # fmt: skip
+
+
+def _convex(corners: FloatArray, where: str) -> FloatArray:
+    """The corners of the convex hull, counter-clockwise."""
+    if len(corners) == 1:
+        return corners
+    try:
+        hull = ConvexHull(corners)
+    except (QhullError, ValueError):
+        raise InputError(
+            f"{where} has {len(corners)} corners without area; valid: one, or a polygon"
+        ) from None
+    ordered = corners[hull.vertices].copy()
+    ordered.setflags(write=False)
+    return ordered
