@@ -46,9 +46,9 @@ Both shoulders below {standing:g} m/s: standing, which counts as disagreement. B
 
 """
 STOPS = """
-Straight walks below 95 %: `16_33` and `16_34` come to a stop in the window, where the holonomic frames are; in
-`05_01` and `38_01` both shoulders sway at once, by up to 24°. In
-veering runs both go some 16° to 26° aside of the heading for a while.
+Straight walks below 95 %: `16_33` and `16_34` come to a stop in the window, where the holonomic frames are;
+in `05_01` and `38_01` both shoulders sway at once, by up to 24°. In veering runs both
+go some 16° to 26° aside of the heading for a while.
 """
 DRIFT = """
 ## Turns on the spot

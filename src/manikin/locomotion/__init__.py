@@ -1,5 +1,6 @@
 """How people walk: paths by optimal control, segments of walks ([Truong2010]_ chapters 4 and 5)."""
 
+from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
 from manikin.locomotion.objective import LITERAL_ORDER, PROSE_ORDER, WalkObjective
 from manikin.locomotion.obstacles import Walker, WalkObstacle
 from manikin.locomotion.path import WalkingPath, WalkingResiduals, WalkingTask, walked
@@ -27,7 +28,9 @@ __all__ = [
     "STANDING",
     "START",
     "TEST_TARGETS",
+    "HolonomicEnds",
     "OnlineSegmentation",
+    "PathDeviation",
     "PathSegment",
     "PathSegments",
     "SegmentationRule",
@@ -39,6 +42,8 @@ __all__ = [
     "WalkingResiduals",
     "WalkingTask",
     "experiment_targets",
+    "holonomic_ends",
+    "path_deviation",
     "segment_path",
     "walked",
     "walking_path",
