@@ -170,6 +170,13 @@ def test_walks_that_do_not_begin_at_rest_have_no_boundary():
     assert segment_path(moved(1.0, np.radians(10.0))).share(NONHOLONOMIC) == 1.0
 
 
+def test_between_holonomic_parts_there_is_no_boundary():
+    """Only what lies between two rests is asked whether it keeps its heading."""
+    aside = np.radians(np.repeat([60.0, 10.0, 60.0], [50, 51, 50]))
+    found = segment_path(moved(1.0, aside, duration=1.5))
+    assert [s.kind for s in found.segments] == [HOLONOMIC, NONHOLONOMIC, HOLONOMIC]
+
+
 wandering = st.builds(
     lambda seed, n, rate: _wander(seed, n, rate),
     st.integers(0, 10**6), st.integers(3, 120), st.sampled_from([30.0, 100.0, 120.0]),
