@@ -13,7 +13,7 @@ posture, so rotations between these axes are those between the segments of
 :func:`manikin.body.human`.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,7 +104,7 @@ def anatomy_of(recordings: Sequence[Recording], upright: Recording | None = None
     wrong = [r.name for r in recordings if r.joint_names != first.joint_names]
     if wrong:
         raise InputError(f"recording {wrong[0]!r} has other joints than {first.name!r}; valid: one skeleton")
-    joints = {segment: _joint(first, segment, names) for segment, names in JOINTS.items()}
+    joints = {segment: segment_joint(first, segment) for segment in JOINTS}
     pose = _rest(first) if upright is None else upright
     axes = {
         "pelvis": _trunk(pose, joints, "pelvis", "thigh"),
@@ -116,13 +116,19 @@ def anatomy_of(recordings: Sequence[Recording], upright: Recording | None = None
     return Anatomy(joints, axes)
 
 
-def _joint(recording: Recording, segment: str, names: Iterable[str]) -> int:
-    for name in names:
+def segment_joint(recording: Recording, segment: str) -> int:
+    """Index of the joint at which a segment of :data:`JOINTS` begins.
+
+    Raises:
+        InputError: If the segment is not known, or the recording has none of its names.
+    """
+    if segment not in JOINTS:
+        raise InputError(f"no segment {segment!r}; valid: {', '.join(JOINTS)}")
+    for name in JOINTS[segment]:
         if name in recording.joint_names:
             return recording.joint_names.index(name)
-    raise InputError(
-        f"recording {recording.name!r} has no joint for {segment!r}; valid: one of {', '.join(names)}"
-    )
+    names = ", ".join(JOINTS[segment])
+    raise InputError(f"recording {recording.name!r} has no joint for {segment!r}; valid: one of {names}")
 
 
 def _rest(recording: Recording) -> Recording:

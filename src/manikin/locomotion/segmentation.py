@@ -1,0 +1,272 @@
+"""Where a walk is holonomic and where it is not ([Truong2010]_ 4.2).
+
+People mostly walk where they look: then the motion is *nonholonomic*. Steps to the side or obliquely are
+*holonomic*. Function 1 of the thesis tells them apart by both shoulders: a frame is nonholonomic if one of
+them moves within 15 degrees of the body's heading. So the inner shoulder of a turn may stand or go back.
+
+On-line that is all, known one half step of the tangent later. Off-line, three things are added: the paths are
+low-passed, short holonomic intervals between nonholonomic ones are examined as noise, and walks that are
+straight to the eye are told apart from flat diagonal steps.
+"""
+
+import itertools
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from manikin.errors import InputError
+from manikin.locomotion.shoulders import LEAST_DISTANCE, ShoulderPaths, deviations
+from manikin.spatial import FloatArray, finite_number, frozen_array
+
+HOLONOMIC = "holonomic"
+NONHOLONOMIC = "nonholonomic"
+STANDING = "standing"
+KINDS = (HOLONOMIC, NONHOLONOMIC, STANDING)
+"""Kinds of frames and of segments."""
+
+Labels = NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class SegmentationRule:
+    """Thresholds. Those that the thesis gives are the defaults; it is silent about the others.
+
+    Attributes:
+        tolerance: Angle between heading and a shoulder's motion below which a frame is nonholonomic [rad];
+            15 degrees ([Truong2010]_ 4.2.1).
+        half_step: From an instant to those that its tangent joins [s], at least one frame; one frame at the
+            100 Hz of the thesis. On-line, labels come this much later.
+        standing_speed: Both shoulders slower than this stand [m/s]. Not in the thesis, whose walks begin at
+            the first motion.
+        cutoff: Of the low-pass of the paths, as a share of the Nyquist frequency [-]; 0.5 ([Truong2010]_
+            4.3.4), None without it. Off-line only.
+        noise: Holonomic intervals up to this duration may be noise [s], 0 for none; they are judged by
+            deviations low-passed at ``1 / (2 noise)``. The thesis ([Truong2010]_ 4.2.2.1) names the filter,
+            not its cutoff or how long noise lasts. Off-line only.
+        boundary: Angle below which two headings are the same [rad]; 1 degree ([Truong2010]_ 4.2.2.2), None
+            without this step. Off-line only.
+    """
+
+    tolerance: float = float(np.radians(15.0))
+    half_step: float = 0.01
+    standing_speed: float = 0.1
+    cutoff: float | None = 0.5
+    noise: float = 0.2
+    boundary: float | None = float(np.radians(1.0))
+
+    def __post_init__(self) -> None:
+        where = "segmentation rule"
+        finite_number(self.tolerance, f"{where} tolerance [rad]", above=0.0, at_most=np.pi)
+        finite_number(self.half_step, f"{where} half_step [s]", at_least=0.0)
+        finite_number(self.standing_speed, f"{where} standing_speed [m/s]", at_least=0.0)
+        finite_number(self.noise, f"{where} noise [s]", at_least=0.0)
+        if self.cutoff is not None:
+            finite_number(self.cutoff, f"{where} cutoff [-]", above=0.0, at_most=0.99)
+        if self.boundary is not None:
+            finite_number(self.boundary, f"{where} boundary [rad]", above=0.0, at_most=np.pi)
+
+    def frames(self, rate: float) -> int:
+        """Half step of the tangent in frames, at least one."""
+        return max(1, round(self.half_step * rate))
+
+
+THESIS_RULE = SegmentationRule()
+
+
+@dataclass(frozen=True)
+class PathSegment:
+    """A stretch of one kind.
+
+    Attributes:
+        kind: One of :data:`KINDS`.
+        start: Instant of its first frame [s].
+        end: Instant of the next segment's first frame, or of the last frame of all [s].
+    """
+
+    kind: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class PathSegments:
+    """A walk cut into holonomic, nonholonomic and standing stretches.
+
+    Attributes:
+        paths: The shoulders that were looked at, low-passed where the rule says so.
+        labels: (n,) one of :data:`KINDS` per frame.
+        deviations: (n, 2) heading less direction of the left and the right shoulder [rad]; NaN at rest.
+        segments: Stretches in order, without gaps.
+    """
+
+    paths: ShoulderPaths
+    labels: Labels
+    deviations: FloatArray
+    segments: tuple[PathSegment, ...]
+
+    def share(self, kind: str) -> float:
+        """Share of the frames that are of a kind [-].
+
+        Raises:
+            InputError: If there is no such kind.
+        """
+        if kind not in KINDS:
+            raise InputError(f"kind of a segment is {kind!r}; valid: {', '.join(KINDS)}")
+        return float(np.mean(self.labels == kind))
+
+
+def segment_path(
+    paths: ShoulderPaths, rule: SegmentationRule = THESIS_RULE, *, online: bool = False
+) -> PathSegments:
+    """Cut a walk into segments ([Truong2010]_ Function 1 and 4.2.2).
+
+    The thesis wants walks that are "smaller than the tolerance" throughout split by their initial and final
+    orientation, without saying how. Here such a walk, from standing to standing, is a diagonal step if both
+    headings are the same and the way between both places is not along them; otherwise it is nonholonomic.
+    Walks that are not recorded from rest to rest are left as they are.
+
+    Args:
+        paths: Both shoulders.
+        rule: Thresholds.
+        online: Function 1 alone, as :class:`OnlineSegmentation` gives it frame by frame.
+    """
+    if not online and rule.cutoff is not None:
+        paths = paths.low_passed(rule.cutoff)
+    velocities = paths.velocities(rule.frames(paths.rate))
+    angles = deviations(paths.points, velocities)
+    labels = _function_1(angles, velocities, rule)
+    if not online:
+        labels = _without_noise(labels, angles, paths.rate, rule)
+        labels = _with_diagonal_steps(labels, paths, rule)
+    labels.setflags(write=False)
+    angles.setflags(write=False)
+    return PathSegments(paths, labels, angles, _segments(labels, paths.time))
+
+
+class OnlineSegmentation:
+    """Function 1 frame by frame: each label comes :attr:`delay` frames after its frame.
+
+    The labels are those of ``segment_path(..., online=True)``.
+
+    Args:
+        rate: Frames per second [Hz].
+        rule: Thresholds; ``cutoff``, ``noise`` and ``boundary`` need the future and are not used.
+    """
+
+    def __init__(self, rate: float, rule: SegmentationRule = THESIS_RULE) -> None:
+        self._rate = finite_number(rate, "on-line segmentation rate [Hz]", above=0.0)
+        self._rule = rule
+        self._frames: deque[FloatArray] = deque(maxlen=2 * self.delay + 1)
+
+    @property
+    def delay(self) -> int:
+        """Frames from a frame to its label."""
+        return self._rule.frames(self._rate)
+
+    def step(self, left: ArrayLike, right: ArrayLike) -> str | None:
+        """Take the next frame and label the one :attr:`delay` frames before it; None while there is none.
+
+        Args:
+            left: (2,) left shoulder [m].
+            right: (2,) right shoulder [m].
+
+        Raises:
+            InputError: If a shoulder is not two finite numbers, or the shoulders meet.
+        """
+        points = np.stack(
+            [frozen_array(p, f"{s} shoulder [m]", (2,)) for p, s in ((left, "left"), (right, "right"))]
+        )
+        if np.hypot(*(points[0] - points[1])) < LEAST_DISTANCE:
+            raise InputError(f"shoulders meet; valid: at least {LEAST_DISTANCE} m apart, seen from above")
+        self._frames.append(points)
+        now = len(self._frames) - 1 - self.delay
+        return self._label(now, len(self._frames) - 1) if now >= 0 else None
+
+    def finish(self) -> Iterator[str]:
+        """Labels of the last frames, whose tangents end at the last frame.
+
+        Raises:
+            InputError: If there were fewer than two frames.
+        """
+        last = len(self._frames) - 1
+        if last < 1:
+            raise InputError("on-line segmentation has fewer than 2 frames; valid: at least 2")
+        for now in range(max(0, last + 1 - self.delay), last + 1):
+            yield self._label(now, last)
+
+    def _label(self, now: int, after: int) -> str:
+        before = max(0, now - self.delay)
+        frames = self._frames
+        velocities = (frames[after] - frames[before]) * (self._rate / (after - before))
+        return str(_function_1(deviations(frames[now], velocities), velocities, self._rule))
+
+
+def _function_1(angles: FloatArray, velocities: FloatArray, rule: SegmentationRule) -> Labels:
+    """(...) labels of (..., 2) deviations and (..., 2, 2) velocities."""
+    ahead = np.any(np.abs(angles) < rule.tolerance, axis=-1)
+    standing = np.all(np.hypot(velocities[..., 0], velocities[..., 1]) < rule.standing_speed, axis=-1)
+    return np.where(standing, STANDING, np.where(ahead, NONHOLONOMIC, HOLONOMIC))
+
+
+def _without_noise(labels: Labels, angles: FloatArray, rate: float, rule: SegmentationRule) -> Labels:
+    """Labels with short holonomic intervals made nonholonomic where the low-passed deviation is small."""
+    runs = list(_runs(labels))
+    noisy = np.zeros(len(labels), dtype=bool)
+    for (before, *_), (kind, first, stop), (after, *_) in zip(runs, runs[1:], runs[2:], strict=False):
+        around = before == after == NONHOLONOMIC and kind == HOLONOMIC
+        noisy[first:stop] = around and (stop - first) / rate <= rule.noise
+    cleaned = labels.copy()
+    for joined, first, stop in _runs((labels == NONHOLONOMIC) | noisy):
+        if joined and np.any(noisy[first:stop]):
+            smooth = _smoothed(angles[first:stop], min(0.99, 1.0 / (rule.noise * rate)))
+            small = np.any(np.abs(smooth) < rule.tolerance, axis=1)
+            cleaned[first:stop][noisy[first:stop] & small] = NONHOLONOMIC
+    return cleaned
+
+
+def _smoothed(angles: FloatArray, cutoff: float) -> FloatArray:
+    """(n, 2) angles, low-passed as directions so that whole turns do not matter; NaN counts for nothing."""
+    known = np.isfinite(angles)
+    pointers = np.where(known, np.exp(1j * np.where(known, angles, 0.0)), 0.0)
+    sections = butter(2, cutoff, output="sos")
+    padding = min(9, len(angles) - 1)
+    real, imaginary = (
+        sosfiltfilt(sections, part, axis=0, padlen=padding) for part in (pointers.real, pointers.imag)
+    )
+    return np.where(np.any(known, axis=0), np.arctan2(imaginary, real), np.nan)
+
+
+def _with_diagonal_steps(labels: Labels, paths: ShoulderPaths, rule: SegmentationRule) -> Labels:
+    """Labels with walks made holonomic that keep the heading and go obliquely to it, below the tolerance."""
+    found = labels.copy()
+    runs = list(_runs(labels))
+    if rule.boundary is None:
+        return found
+    for (before, *_), (kind, first, stop), (after, *_) in zip(runs, runs[1:], runs[2:], strict=False):
+        if not (before == after == STANDING and kind == NONHOLONOMIC):
+            continue
+        start, end = first - 1, stop
+        turned = paths.heading[end] - paths.heading[start]
+        way = paths.middle[end] - paths.middle[start]
+        aside = np.arctan2(way[1], way[0]) - paths.heading[start]
+        if abs(turned) < rule.boundary <= abs(np.arctan2(np.sin(aside), np.cos(aside))):
+            found[first:stop] = HOLONOMIC
+    return found
+
+
+def _runs(values: NDArray[np.generic]) -> Iterator[tuple[object, int, int]]:
+    """Value, first index and the one after the last, of stretches of equal values."""
+    borders = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
+    for first, stop in itertools.pairwise(borders):
+        yield values[first].item(), first, stop
+
+
+def _segments(labels: Labels, time: FloatArray) -> tuple[PathSegment, ...]:
+    return tuple(
+        PathSegment(str(kind), float(time[first]), float(time[min(stop, len(time) - 1)]))
+        for kind, first, stop in _runs(labels)
+    )
