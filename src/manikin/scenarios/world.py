@@ -31,9 +31,9 @@ def build_body(values: ScenarioValues) -> BodyModel:
     if values.is_point_mass:
         return point_mass(values.mass)
     data, sole = values.file.body, values.sole
-    soles = {} if sole is None else {"sole_length": sole.length_m, "sole_width": sole.width_m}
+    length, width = (None, None) if sole is None else (sole.length_m, sole.width_m)
     try:
-        body = human(data.stature_m, data.mass_kg, data.sex, **soles)
+        body = human(data.stature_m, data.mass_kg, data.sex, sole_length=length, sole_width=width)
         return with_further_contacts(body, data.further_contacts) if data.further_contacts else body
     except InputError as error:
         path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)
