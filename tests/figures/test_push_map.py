@@ -53,6 +53,12 @@ def test_curves_are_named_by_what_tells_them_apart():
     assert "ankles of 1.3 m g h" in common
 
 
+def test_maps_name_how_far_the_feet_are_apart_and_older_ones_do_without():
+    older = {key: value for key, value in CONDITIONS.items() if key != "feet_apart_m"}
+    _, names = told_apart([older, CONDITIONS | {"feet_apart_m": 0.1}])
+    assert names == ["usual stance", "feet 0.1 m apart"]
+
+
 def test_bounds_are_dashed_with_one_name_and_inside_the_figure():
     high = replace(MAP, bound=(40.0, 70.0, 30.0, 65.0))
     low = replace(MAP, conditions=CONDITIONS | {"locked": ["arms"]}, bound=(35.0, 60.0, 28.0, 55.0))

@@ -37,7 +37,7 @@ def told_apart(maps: Sequence[Mapping[str, Any]]) -> tuple[str, list[str]]:
 def _words(one: Mapping[str, Any]) -> list[str]:
     """One text per condition, the same conditions in every list."""
     locked = " and ".join(one["locked"])
-    apart = one["feet_apart_m"]
+    apart = one.get("feet_apart_m")  # not in maps that were searched before there was a choice
     strength, ankles, steps = one["strength"], one["ankle_stiffness"], one["steps"]
     return [
         _body(one["body"]),
