@@ -1,10 +1,12 @@
 """How people walk: paths by optimal control, segments of walks ([Truong2010]_ chapters 4 and 5)."""
 
 from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
+from manikin.locomotion.floor_plan import floor_plan
 from manikin.locomotion.objective import LITERAL_ORDER, PROSE_ORDER, WalkObjective
 from manikin.locomotion.obstacles import Walker, WalkObstacle
 from manikin.locomotion.path import WalkingPath, WalkingResiduals, WalkingTask, walked
 from manikin.locomotion.plan import walking_path, walking_paths
+from manikin.locomotion.route import WalkRoute, Waypoint, walking_route
 from manikin.locomotion.segmentation import (
     HOLONOMIC,
     KINDS,
@@ -37,15 +39,19 @@ __all__ = [
     "ShoulderPaths",
     "WalkObjective",
     "WalkObstacle",
+    "WalkRoute",
     "Walker",
     "WalkingPath",
     "WalkingResiduals",
     "WalkingTask",
+    "Waypoint",
     "experiment_targets",
+    "floor_plan",
     "holonomic_ends",
     "path_deviation",
     "segment_path",
     "walked",
     "walking_path",
     "walking_paths",
+    "walking_route",
 ]

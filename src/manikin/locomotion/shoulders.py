@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.signal import butter, sosfiltfilt
 
 from manikin.errors import InputError
@@ -78,10 +79,24 @@ class ShoulderPaths:
         Raises:
             InputError: If the breadth is not positive.
         """
+        return cls.of_places(path.place, (len(path.time) - 1) / path.duration, breadth)
+
+    @classmethod
+    def of_places(cls, place: ArrayLike, rate: float, breadth: float = BREADTH) -> Self:
+        """Shoulders on the left and on the right of places.
+
+        Args:
+            place: (n, 3) x, y [m], heading [rad].
+            rate: Places per second [Hz].
+            breadth: Between the shoulders [m].
+
+        Raises:
+            InputError: If the breadth is not positive, or there are fewer than three places.
+        """
         half = finite_number(breadth, "breadth of the shoulders [m]", at_least=LEAST_DISTANCE) / 2
-        left = half * np.column_stack([-np.sin(path.heading), np.cos(path.heading)])
-        rate = (len(path.time) - 1) / path.duration
-        return cls(path.place[:, :2] + left, path.place[:, :2] - left, rate)
+        places = frozen_array(place, "places [m, m, rad]", (None, 3))
+        left = half * np.column_stack([-np.sin(places[:, 2]), np.cos(places[:, 2])])
+        return cls(places[:, :2] + left, places[:, :2] - left, rate)
 
     def __len__(self) -> int:
         """Number of frames."""

@@ -17,6 +17,7 @@ from manikin.scenarios.sections.planning import PlanningSection
 from manikin.scenarios.sections.push import PushSection, RecoverySection
 from manikin.scenarios.sections.supports import SupportsSection
 from manikin.scenarios.sections.task import TaskSection
+from manikin.scenarios.sections.walking import WalkingSection
 from manikin.scenarios.sections.wholebody import WholebodySection
 from manikin.scenarios.validation import Name, Number, Positive, Section, Text, refuse
 
@@ -77,6 +78,10 @@ class ScenarioFile(Section):
         description="instead of a way to go: the body stands where it is, is pushed and keeps its balance; "
         "task may be left out then",
     )
+    walking: WalkingSection | None = Field(
+        default=None,
+        description="the body walks from start to goal over the floor as people do, around what stands there",
+    )
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
         default=0, description="seed of every random choice"
     )
@@ -120,6 +125,7 @@ class ScenarioFile(Section):
         if self.task.act is not None and self.contacts is not None and self.contacts.limbs:
             raise refuse("contacts.limbs", "are given beside task.act; valid: one of them")
         self._check_recovery()
+        self._check_walking()
         self._check_body()
         self._check_wholebody()
         if self.supports is None:
@@ -178,6 +184,29 @@ class ScenarioFile(Section):
                 "push.at_s",
                 f"is {self.push.at_s:g}; valid: before the run ends at {self.recovery.duration_s:g} s",
             )
+
+    def _check_walking(self) -> None:
+        """Refuse a walk beside other ways to go, or of a body that has no recorded walks."""
+        if self.walking is None:
+            return
+        if self.body.model != "human":
+            raise refuse("walking", f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
+        if self.floor_height_m is None:
+            raise refuse("floor_height_m", "is null; valid in a walk: the height of a floor")
+        for key in ("supports", "contacts", "recovery", "push"):
+            if getattr(self, key) is not None:
+                raise refuse(key, "is given beside walking; valid: one of them")
+        if self.task.act is not None:
+            raise refuse("task.act", "is given beside walking; valid: one of them")
+        for end in ("start", "goal"):
+            state = getattr(self.task, end)
+            if state.posture not in (None, "standing"):
+                raise refuse(f"task.{end}.posture", f"is {state.posture}; valid in a walk: standing")
+            if state.height_m is not None and state.height_m != self.floor_height_m:
+                raise refuse(
+                    f"task.{end}.height_m",
+                    f"is {state.height_m:g}; valid in a walk: that of the floor, {self.floor_height_m:g}",
+                )
 
     def _check_wholebody(self) -> None:
         """Refuse what cannot be refined."""

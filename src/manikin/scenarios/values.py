@@ -23,6 +23,7 @@ from manikin.scenarios.sections import (
     RecoverySection,
     SoleSection,
     SupportsSection,
+    WalkingSection,
 )
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.validation import place
@@ -116,6 +117,11 @@ class ScenarioValues:
     def recovery(self) -> RecoverySection | None:
         """How a standing body recovers from its push, or None."""
         return self.file.recovery
+
+    @property
+    def walking(self) -> WalkingSection | None:
+        """How the body walks from start to goal, or None."""
+        return self.file.walking
 
     @property
     def act(self) -> ActSection | None:

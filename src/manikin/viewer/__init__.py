@@ -10,9 +10,11 @@ from manikin.errors import InputError
 
 if TYPE_CHECKING:
     from manikin.contact_planning.live_contacts import LiveContacts
+    from manikin.locomotion import WalkController
     from manikin.motion.file import MotionFile
+    from manikin.scene import Scene
 
-__all__ = ["serve", "serve_contacts"]
+__all__ = ["serve", "serve_contacts", "serve_drive"]
 
 
 def serve(content: MotionFile, port: int = 8080, announce: Callable[[str], None] | None = None) -> None:
@@ -50,6 +52,31 @@ def serve_contacts(
     with _installed():
         from manikin.viewer.contacts import ContactViewer
     session = ContactViewer(live, port)
+    if announce is not None:
+        announce(session.url)
+    session.run()
+
+
+def serve_drive(
+    controller: WalkController,
+    scene: Scene | None = None,
+    port: int = 8080,
+    announce: Callable[[str], None] | None = None,
+) -> None:
+    """Let the user steer a walker with keys and sliders, in real time, until Ctrl-C.
+
+    Args:
+        controller: The walker.
+        scene: Drawn around the walker, who does not look at it.
+        port: Port to listen on; 0 picks a free one.
+        announce: Told the page's address when it can be opened.
+
+    Raises:
+        InputError: If the viewer is not installed or the port is taken.
+    """
+    with _installed():
+        from manikin.viewer.drive import WalkViewer
+    session = WalkViewer(controller, scene, port)
     if announce is not None:
         announce(session.url)
     session.run()

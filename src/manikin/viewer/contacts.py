@@ -10,7 +10,7 @@ from manikin.contact_planning.live_contacts import LiveAnswer, LiveContacts
 from manikin.contact_planning.single_contact import Role
 from manikin.spatial import FloatArray
 from manikin.viewer.page import Page
-from manikin.viewer.stage import BodyShapes, add_scene, side_colour
+from manikin.viewer.stage import BodyShapes, add_scene, look_at, side_colour
 
 FRAME_RATE = 60.0
 """Largest number of updates per second; a change that comes while one is made waits for the next."""
@@ -50,7 +50,7 @@ class ContactViewer(Page):
         self._shapes = BodyShapes(self.server, live.body)
         self._build_handles()
         self._build_controls()
-        self._look_at(live.q[:3])
+        look_at(self.server, live.q[:3])
         self._wanted.set()
         self.latest: LiveAnswer = self.update() or live.answer()
 
@@ -155,11 +155,6 @@ class ContactViewer(Page):
                     arrow.points = _arrow(contact.position, NORMAL * contact.normal)
                 arrow.visible = contact is not None
         self._text.content = "\n".join([f"**{1e3 * answer.wall_s:.1f} ms**", "", *_lines(answer)])
-
-    def _look_at(self, middle: FloatArray) -> None:
-        self.server.initial_camera.look_at = middle
-        self.server.initial_camera.position = middle + np.array([-1.7, -1.9, 0.5])
-        self.server.initial_camera.up = (0.0, 0.0, 1.0)
 
 
 def _lines(answer: LiveAnswer) -> list[str]:

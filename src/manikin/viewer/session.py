@@ -11,7 +11,7 @@ from manikin.motion.derived import effector_positions
 from manikin.motion.file import MotionFile
 from manikin.spatial import FloatArray
 from manikin.viewer.page import Page
-from manikin.viewer.stage import COLOURS, BodyShapes, add_scene, side_colour
+from manikin.viewer.stage import COLOURS, BodyShapes, add_scene, look_at, side_colour
 
 FRAME_RATE = 30.0
 """Pictures per second while playing."""
@@ -126,7 +126,7 @@ class ViewerSession(Page):
                 f"/com/{name}", segments, np.array(COLOURS[name]), thickness=3.0, thickness_units="screen"
             )
         self._draw_contacts()
-        self._look_at_the_motion()
+        look_at(self.server, self.motion.com.mean(axis=0))
 
     def _draw_contacts(self) -> None:
         """Outline of every sole of the schedule."""
@@ -145,12 +145,6 @@ class ViewerSession(Page):
                     thickness=2.0,
                     thickness_units="screen",
                 )
-
-    def _look_at_the_motion(self) -> None:
-        middle = self.motion.com.mean(axis=0)
-        self.server.initial_camera.look_at = middle
-        self.server.initial_camera.position = middle + np.array([-1.7, -1.9, 0.5])
-        self.server.initial_camera.up = (0.0, 0.0, 1.0)
 
     # --- what moves ----------------------------------------------------------------------
 

@@ -73,6 +73,13 @@ def add_scene(server: viser.ViserServer, scene: Scene | None) -> None:
         )
 
 
+def look_at(server: viser.ViserServer, middle: FloatArray) -> None:
+    """Let new visitors look at a point (3,) from the front of its left, from a person's height [m]."""
+    server.initial_camera.look_at = middle
+    server.initial_camera.position = middle + np.array([-1.7, -1.9, 0.5])
+    server.initial_camera.up = (0.0, 0.0, 1.0)
+
+
 class BodyShapes:
     """The shapes of a body on the page.
 

@@ -8,11 +8,11 @@ and centre of mass as one spline, and the result is certified at 1 kHz.
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
-import pinocchio as pin
 
-from manikin.balance import pseudo_wrench, wrench_polytope
+from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytope
 from manikin.body import BodyModel
 from manikin.centroidal import CentroidalTrajectory
 from manikin.motion import Motion
@@ -24,7 +24,7 @@ from manikin.wholebody.failure import WholeBodyFailure
 from manikin.wholebody.fit import FitResult, MotionFit
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
-from manikin.wholebody.forces import plan_forces
+from manikin.wholebody.full_motion import full_motion, margins
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
 from manikin.wholebody.key_postures import KeyPostures
 from manikin.wholebody.knots import phase_knots, refined, sample_times, touch_downs_at_speed
@@ -374,7 +374,7 @@ class _Planner:
             com=self.trajectory.position(time),
             com_weight=np.where(self.trajectory.binds(time), 1.0, LOOSE_COM),
             com_acceleration=self.trajectory.acceleration(time),
-            margin=self._margin(time, self._point_mass_wrench(time)),
+            margin=margins(schedule, self._polytopes, time, self._point_mass_wrench(time)),
             reference=_with_joints(reference, toes),
             reference_scale=scale,
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
@@ -386,39 +386,16 @@ class _Planner:
         schedule = self.trajectory.schedule
         count = max(2, round(float(schedule.instants[-1]) / self.settings.sampling) + 1)
         time = np.linspace(0.0, float(schedule.instants[-1]), count)
-        q, v, a = spline.evaluate(time)
-        forces = plan_forces(self.body, schedule, time, q, v, a)
-        com, momentum, wrench = self._centroidal(q, v, a)
-        names = schedule.sequence.effectors
-        motion = Motion(
-            time=time, q=q, v=v, a=a, tau=forces.tau, com=com, angular_momentum=momentum,
-            margin=self._margin(time, wrench), support=schedule.support(time, names),
-            contact_force=forces.contact_force, contact_names=names, joint_names=self.body.joint_names,
-        )  # fmt: skip
-        return motion, wrench
+        return full_motion(self.body, schedule, self._polytopes, time, *spline.evaluate(time))
 
-    def _centroidal(self, q: FloatArray, v: FloatArray, a: FloatArray) -> tuple[FloatArray, ...]:
-        """Centre of mass (n, 3), angular momentum (n, 3) and whole-body pseudo-wrench (n, 6)."""
-        model, data = self.body.pinocchio, self.body.pinocchio.createData()
-        com, momentum, rate = np.zeros((len(q), 3)), np.zeros((len(q), 3)), np.zeros((len(q), 6))
-        for k in range(len(q)):
-            pin.computeCentroidalMomentumTimeVariation(model, data, q[k], v[k], a[k])
-            com[k], momentum[k], rate[k] = data.com[0], data.hg.angular, data.dhg.vector
-        mass = self.body.mass
-        return com, momentum, pseudo_wrench(mass, com, rate[:, :3] / mass, rate[:, 3:])
+    @cached_property
+    def _polytopes(self) -> list[WrenchPolytope]:
+        """Of each phase, about the world origin."""
+        return [wrench_polytope(phase.stance) for phase in self.trajectory.schedule.sequence]
 
     def _point_mass_wrench(self, time: FloatArray) -> FloatArray:
         trajectory = self.trajectory
         return pseudo_wrench(self.body.mass, trajectory.position(time), trajectory.acceleration(time))
-
-    def _margin(self, time: FloatArray, wrench: FloatArray) -> FloatArray:
-        schedule = self.trajectory.schedule
-        phases = schedule.phase_at(time)
-        margin = np.zeros(len(time))
-        for index, phase in enumerate(schedule.sequence):
-            rows = phases == index
-            margin[rows] = wrench_polytope(phase.stance).margin(wrench[rows])
-        return margin
 
     def _failure(
         self, swings: tuple[PlannedSwing, ...], guide: Guide, certificate: WholeBodyResiduals

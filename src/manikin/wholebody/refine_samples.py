@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
@@ -12,7 +11,7 @@ from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.configuration_spline import ConfigurationSpline
 from manikin.wholebody.contact_slack import contact_slack
-from manikin.wholebody.forces import plan_forces
+from manikin.wholebody.full_motion import full_motion
 from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_certificate import RefineResiduals, certify_refined
 from manikin.wholebody.refine_measures import balance_of, sample_uniformly, whole_body_wrench
@@ -39,17 +38,9 @@ def sampled_motion(
         The motion, and (n,) its physics violation [N].
     """
     time = sample_uniformly(schedule, sampling)
-    q, v, a = spline.evaluate(time)
-    forces = plan_forces(body, schedule, time, q, v, a)
-    wrench = whole_body_wrench(body, q, v, a)
+    polytopes = [room.polytope.at_reference(np.zeros(3)) for room in rooms]
+    motion, wrench = full_motion(body, schedule, polytopes, time, *spline.evaluate(time))
     _, violation = balance_of(schedule, tuple(rooms), time, wrench)
-    names = schedule.sequence.effectors
-    com, momentum = _centroidal(body, q, v)
-    motion = Motion(
-        time=time, q=q, v=v, a=a, tau=forces.tau, com=com, angular_momentum=momentum,
-        margin=_margin(schedule, rooms, time, wrench), support=schedule.support(time, names),
-        contact_force=forces.contact_force, contact_names=names, joint_names=body.joint_names,
-    )  # fmt: skip
     return motion, violation
 
 
@@ -89,25 +80,3 @@ def least_slack(
     slack = contact_slack(schedule, time, wrench)
     worst = int(np.argmin(slack))
     return float(slack[worst]), float(time[worst])
-
-
-def _margin(
-    schedule: ContactSchedule, rooms: Sequence[BalanceRoom], time: FloatArray, wrench: FloatArray
-) -> FloatArray:
-    """(n,) margin about the world origin, as of every motion [N.m]."""
-    phases = schedule.phase_at(time)
-    margin = np.zeros(len(time))
-    for number, room in enumerate(rooms):
-        rows = phases == number
-        margin[rows] = room.polytope.at_reference(np.zeros(3)).margin(wrench[rows])
-    return margin
-
-
-def _centroidal(body: BodyModel, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Centre of mass (n, 3) and angular momentum about it (n, 3)."""
-    model, data = body.pinocchio, body.pinocchio.createData()
-    com, momentum = np.zeros((len(q), 3)), np.zeros((len(q), 3))
-    for k in range(len(q)):
-        pin.computeCentroidalMomentum(model, data, q[k], v[k])
-        com[k], momentum[k] = data.com[0], data.hg.angular
-    return com, momentum

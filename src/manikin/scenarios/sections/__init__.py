@@ -10,6 +10,7 @@ from manikin.scenarios.sections.planning import PlanningSection, WeightsSection
 from manikin.scenarios.sections.push import PushSection, RecoverySection
 from manikin.scenarios.sections.supports import SupportsSection
 from manikin.scenarios.sections.task import ActSection, StateSection, TaskSection
+from manikin.scenarios.sections.walking import StandSection, WalkerSection, WalkingSection, WaypointSection
 from manikin.scenarios.sections.wholebody import WholebodySection
 
 __all__ = [
@@ -28,9 +29,13 @@ __all__ = [
     "RoundSection",
     "SoleSection",
     "SphereSection",
+    "StandSection",
     "StateSection",
     "SupportsSection",
     "TaskSection",
+    "WalkerSection",
+    "WalkingSection",
+    "WaypointSection",
     "WeightsSection",
     "WholebodySection",
 ]

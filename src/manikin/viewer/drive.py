@@ -1,0 +1,174 @@
+"""The walking mode: somebody walks over the page as the keys say."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from manikin.locomotion import WalkController, WalkFrame
+from manikin.scene import Scene
+from manikin.spatial import FloatArray
+from manikin.viewer.page import Page
+from manikin.viewer.stage import COLOURS, BodyShapes, add_scene, look_at
+
+FRAME_RATE = 60.0
+"""Pictures per second."""
+LONGEST_STEP = 0.05
+"""Of the controller [s]; a page that was late makes up for it in several."""
+LONGEST_GAP = 0.5
+"""Real time that is made up for at most [s]; after a longer one the walk goes on from where it is."""
+TRAIL = 600
+"""Places that are kept of the way [frames]."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """What one key does to the directive.
+
+    Attributes:
+        hotkey: The page's name of the key.
+        label: What it is for.
+        change: Of forward, left [m/s] and angular velocity [rad/s]; zeros to go straight on, None to stop.
+    """
+
+    hotkey: str
+    label: str
+    change: tuple[float, float, float] | None
+
+    @property
+    def shown(self) -> str:
+        """The key as people call it."""
+        return self.hotkey.removeprefix("arrow") if self.hotkey != "space" else "space bar"
+
+
+KEYS = (
+    Key("arrowup", "Faster", (0.2, 0.0, 0.0)),
+    Key("arrowdown", "Slower", (-0.2, 0.0, 0.0)),
+    Key("arrowleft", "Turn left", (0.0, 0.0, 0.25)),
+    Key("arrowright", "Turn right", (0.0, 0.0, -0.25)),
+    Key("A", "Sideways to the left", (0.0, 0.1, 0.0)),
+    Key("D", "Sideways to the right", (0.0, -0.1, 0.0)),
+    Key("S", "Straight on", (0.0, 0.0, 0.0)),
+    Key("space", "Stop", None),
+)
+"""Keys of the page; each press changes the directive once more."""
+
+LOWEST, HIGHEST = np.array([-0.8, -0.8, -2.0]), np.array([3.0, 0.8, 2.0])
+"""Limits of the directive, forward, left [m/s] and angular [rad/s]; the walker has its own within them."""
+
+
+class WalkViewer(Page):
+    """Serves a walker that is steered with keys and sliders; every change goes through its methods.
+
+    Attributes:
+        controller: The walker.
+        directive: (3,) wanted forward, left [m/s] and angular velocity [rad/s].
+        notice: What the walker says about the last directive, or None.
+    """
+
+    def __init__(self, controller: WalkController, scene: Scene | None = None, port: int = 8080) -> None:
+        """Start the server and show the walker standing.
+
+        Args:
+            controller: The walker.
+            scene: Drawn, but not looked at by the walker.
+            port: Port to listen on; 0 picks a free one.
+
+        Raises:
+            InputError: If the port is taken.
+        """
+        super().__init__(port, FRAME_RATE)
+        self.controller, self.directive = controller, np.zeros(3)
+        self.notice: str | None = None
+        self._place = np.zeros(3)
+        self._trail: list[FloatArray] = []
+        add_scene(self.server, Scene() if scene is None else scene)
+        self._shapes = BodyShapes(self.server, controller.body)
+        self._build_controls()
+        self.advance(1.0 / FRAME_RATE)
+        look_at(self.server, np.append(self._place[:2], 0.9))
+
+    def press(self, key: Key) -> None:
+        """Change the directive as a key does."""
+        if key.change is None:
+            self.steer(np.zeros(3))
+        elif not any(key.change):
+            self.steer(self.directive * [1.0, 0.0, 0.0])
+        else:
+            self.steer(self.directive + key.change)
+
+    def steer(self, directive: FloatArray) -> None:
+        """Set the directive, held within the limits of the page.
+
+        Args:
+            directive: (3,) forward, left [m/s], angular velocity [rad/s].
+        """
+        with self._lock:
+            # Presses add up to tenths; what is left of them by rounding is no direction.
+            held = np.round(np.clip(directive, LOWEST, HIGHEST), 6)
+            if np.array_equal(held, self.directive):
+                return
+            self.directive = held
+            for handle, value in zip(self._sliders, held, strict=True):
+                handle.value = float(value)
+
+    def advance(self, seconds: float) -> None:
+        """Walk for ``seconds`` of real time [s], as far as they are made up for."""
+        with self._lock:
+            left = min(seconds, LONGEST_GAP)
+            count = max(1, int(np.ceil(left / LONGEST_STEP)))
+            for _ in range(count):
+                frame = self.controller.step(left / count, self.directive)
+            self.notice = frame.notice
+            self._show(frame)
+
+    def _build_controls(self) -> None:
+        gui = self.server.gui
+        with gui.add_folder("Directive"):
+            self._sliders = (
+                gui.add_slider("forward [m/s]", float(LOWEST[0]), float(HIGHEST[0]), 0.05, 0.0),
+                gui.add_slider("left [m/s]", float(LOWEST[1]), float(HIGHEST[1]), 0.05, 0.0),
+                gui.add_slider("turn left [rad/s]", float(LOWEST[2]), float(HIGHEST[2]), 0.05, 0.0),
+            )
+            self._follow = gui.add_checkbox("camera follows", initial_value=True)
+        with gui.add_folder("Keys"):
+            gui.add_markdown("\n".join(f"- **{key.shown}**: {key.label.lower()}" for key in KEYS))
+        with gui.add_folder("Now"):
+            self._text = gui.add_markdown("")
+        for handle in self._sliders:
+            handle.on_update(lambda _: self.steer(np.array([one.value for one in self._sliders])))
+        for key in KEYS:
+            gui.add_command(key.label, hotkey=key.hotkey).on_trigger(partial(self._pressed, key))
+
+    def _pressed(self, key: Key, _event: object) -> None:
+        self.press(key)
+
+    def _show(self, frame: WalkFrame) -> None:
+        moved = frame.place - self._place
+        self._place = frame.place
+        self._trail = [*self._trail[-TRAIL:], np.append(frame.place[:2], 0.004)]
+        with self.server.atomic():
+            self._shapes.place(frame.q)
+            if len(self._trail) > 1:
+                path = np.array(self._trail)
+                self.server.scene.add_line_segments(
+                    "/trail", np.stack([path[:-1], path[1:]], axis=1), np.array(COLOURS["planned"]),
+                    thickness=2.0, thickness_units="screen",
+                )  # fmt: skip
+        if self._follow.value:
+            shift = np.array([moved[0], moved[1], 0.0])
+            for client in self.server.get_clients().values():
+                with client.atomic():
+                    client.camera.position = client.camera.position + shift
+                    client.camera.look_at = client.camera.look_at + shift
+        self._text.content = _lines(frame)
+
+
+def _lines(frame: WalkFrame) -> str:
+    forward, left, angular = frame.velocity
+    standing = [name for name, on in zip(("left", "right"), frame.support, strict=True) if on]
+    lines = [
+        f"- forward {forward:.2f} m/s, left {left:.2f} m/s, turning {angular:.2f} rad/s",
+        f"- on the {' and the '.join(standing) or 'air'}",
+    ]
+    return "\n".join([*lines, *([f"- {frame.notice}"] if frame.notice else [])])
