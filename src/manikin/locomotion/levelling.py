@@ -13,7 +13,7 @@ from manikin.locomotion.turns import rotations
 from manikin.mocap.anatomy import SIDES
 from manikin.spatial import FloatArray
 
-TILT, TILT_SHARE = np.deg2rad(5.0), 0.5
+TILT, TILT_SHARE = np.deg2rad(10.0), 0.5
 """Mean forward tilt of the pelvis under an upright trunk [rad], and its share of the trunk's lean."""
 
 MIDDLE = (0.3, 0.7)

@@ -129,8 +129,8 @@ def build_library(folder: Path, report: Callable[[float, str], None] = lambda _s
         raise InputError(f"{folder / TABLE} names no window with a whole cycle")
     ordered = _by_person(found)
     persons = [_person_of(window) for window, _ in ordered]
-    alike = as_one_person(body, [_symmetric(body, cycle) for _, cycle in ordered], persons)
-    originals = _thinned([_levelled(body, cycle) for cycle in alike])
+    alike = as_one_person(body, [cycle for _, cycle in ordered], persons)
+    originals = _thinned([_levelled(body, _symmetric(body, cycle)) for cycle in alike])
     return _with_mirror_images(body, originals)
 
 

@@ -1,0 +1,47 @@
+"""How far standing feet slide."""
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel
+from manikin.locomotion.foot_placement import Sole
+from manikin.locomotion.leg_kinematics import LegKinematics
+from manikin.mocap.anatomy import SIDES
+from manikin.spatial import FloatArray
+
+
+def stance_slides(
+    body: BodyModel, pelvis: FloatArray, place: FloatArray, angles: FloatArray, standing: NDArray[np.bool_]
+) -> FloatArray:
+    """Largest displacement over the floor in every stance of either foot [m].
+
+    From frame to frame, that of the lower end of the sole, heel or ball of the foot, is added up: a foot that
+    rolls over its ends does not slide.
+
+    Args:
+        body: A human.
+        pelvis: (n, 3, 3) from the pelvis' axes to the world's.
+        place: (n, 3) the pelvis' origin [m].
+        angles: (n, h) of the hinges [rad].
+        standing: (2, n) whether the left and the right foot stand.
+
+    Returns:
+        (stances,).
+    """
+    found = []
+    for side, stands in zip(SIDES, standing, strict=True):
+        leg, sole = LegKinematics(body, side), Sole.of_body(body, side)
+        foot, ankle = leg.foot(pelvis, place, angles[:, leg.slots])
+        below = ankle - sole.depth * foot[:, :, 2]
+        ends = np.stack([below + end * foot[:, :, 0] for end in (sole.heel, sole.ball)], axis=1)
+        moved = np.diff(ends[..., :2], axis=0)
+        lower = (ends[1:, :, 2] + ends[:-1, :, 2]).argmin(axis=1)
+        moved = moved[np.arange(len(lower)), lower]
+        borders = [0, *(np.flatnonzero(np.diff(stands.astype(np.int8))) + 1).tolist(), len(stands)]
+        for first, last in pairwise(borders):
+            if stands[first] and last - first > 1:
+                way = np.cumsum(moved[first : last - 1], axis=0)
+                found.append(float(np.hypot(*way.T).max()))
+    return np.array(found)
