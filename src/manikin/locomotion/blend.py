@@ -19,6 +19,8 @@ INSIDE = 1e-9
 
 MIRRORED = " mirrored"
 
+_REFLECTED = np.array([1.0, -1.0, -1.0])
+
 
 @dataclass(frozen=True, eq=False)
 class Blend:
@@ -86,12 +88,15 @@ class ControlSpace:
             velocity: (n, 3) forward, left [m/s], angular [rad/s].
         """
         wanted = np.asarray(velocity, dtype=np.float64) * self.scale
-        cycles, weights, reached, outside = self._located(wanted)
-        if self._partners is not None:
-            other, shares, _, _ = self._located(reached * [1.0, -1.0, -1.0])
-            cycles = np.hstack([cycles, self._partners[other]])
-            weights = 0.5 * np.hstack([weights, shares])
-        return Blend(cycles, weights, reached / self.scale, outside)
+        if self._partners is None:
+            cycles, weights, reached, outside = self._located(wanted)
+            return Blend(cycles, weights, reached / self.scale, outside)
+        n = len(wanted)
+        cycles, weights, reached, outside = self._located(np.concatenate([wanted, wanted * _REFLECTED]))
+        return Blend(
+            np.hstack([cycles[:n], self._partners[cycles[n:]]]), 0.5 * np.hstack([weights[:n], weights[n:]]),
+            0.5 * (reached[:n] + reached[n:] * _REFLECTED) / self.scale, outside[:n],
+        )  # fmt: skip
 
     def _located(
         self, points: FloatArray
@@ -156,5 +161,5 @@ def _partners(library: MotionLibrary) -> NDArray[np.int64] | None:
     for number, name in enumerate(library.names):
         other = name.removesuffix(MIRRORED) if name.endswith(MIRRORED) else name + MIRRORED
         found[number] = places.get(other, number)
-    reflected = library.velocities[found] * [1.0, -1.0, -1.0]
+    reflected = library.velocities[found] * _REFLECTED
     return found if np.allclose(reflected, library.velocities, rtol=0.0, atol=1e-9) else None

@@ -5,17 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.errors import InputError
 from manikin.locomotion.blend import Blend
-from manikin.locomotion.feet_in_place import FootState, pose_of
+from manikin.locomotion.feet_in_place import FootState
 from manikin.locomotion.gait import Gait
 from manikin.locomotion.library import MotionLibrary, reference_body
 from manikin.locomotion.library_file import load_library
 from manikin.locomotion.model import to_world
-from manikin.locomotion.stance_foot import Legs, pose
+from manikin.locomotion.stance_foot import Legs, corrected, poses
 from manikin.locomotion.steady import travelled
 from manikin.spatial import FloatArray, finite_number, frozen_array
 
@@ -97,7 +96,8 @@ class WalkController:
         self._velocity, self._phase, self._sink = np.zeros(3), FIRST_PHASE, 0.0
         blend = self._gait.blend(np.zeros((1, 3)))
         frames = self._gait.frames(blend, np.array([self._phase]), self._place[None])
-        self._feet = [FootState.at(pose_of(foot)) for foot in self._legs.feet(frames)]
+        self._feet = [FootState.at(pose) for pose in poses(self._legs.feet(frames))[:, 0]]
+        self._asked: tuple[bytes, Blend] | None = None
 
     def step(self, dt: float, directive: ArrayLike) -> WalkFrame:
         """Walk on for a moment.
@@ -111,14 +111,24 @@ class WalkController:
         """
         dt = finite_number(dt, "walking time step [s]", above=0.0, at_most=LONGEST_STEP)
         wanted = frozen_array(directive, "walking directive [m/s, m/s, rad/s]", (3,))
-        asked = self._gait.blend(wanted[None])
-        change = np.clip(asked.velocity[0] - self._velocity, -dt * self._limit, dt * self._limit)
-        blend = self._gait.blend((self._velocity + change)[None])
+        asked = self._blend_of(wanted)
+        change = asked.velocity[0] - self._velocity
+        blend = asked
+        if np.any(np.abs(change) > dt * self._limit):
+            change = np.clip(change, -dt * self._limit, dt * self._limit)
+            blend = self._gait.blend((self._velocity + change)[None])
         before, self._velocity = self._velocity, blend.velocity[0]
         self._advance(dt, 0.5 * (before + self._velocity))
         if not self._rests(asked):
             self._phase = (self._phase + dt / float(self._gait.period(blend)[0])) % 1.0
         return self._frame(blend, dt, _notice(wanted, asked))
+
+    def _blend_of(self, wanted: FloatArray) -> Blend:
+        """Of the directive, which mostly is that of the step before."""
+        key = wanted.tobytes()
+        if self._asked is None or self._asked[0] != key:
+            self._asked = (key, self._gait.blend(wanted[None]))
+        return self._asked[1]
 
     def _advance(self, dt: float, velocity: FloatArray) -> None:
         moved = travelled(velocity, np.array(dt))
@@ -134,18 +144,21 @@ class WalkController:
 
     def _frame(self, blend: Blend, dt: float, notice: str | None) -> WalkFrame:
         frames = self._gait.frames(blend, np.array([self._phase]), self._place[None])
-        footing = self._legs.footing(frames)
-        feet = []
-        for number, (state, wanted) in enumerate(zip(self._feet, footing.wanted, strict=True)):
-            swing = float(footing.swing[number, 0])
-            if swing >= 0.0 and state.standing:
-                state.lifted(swing, self._next_offset(blend, number, frames.events[0]))
-            feet.append(state.update(wanted, swing))
-        needed = float(self._legs.lack(frames, feet)[0])
-        self._sink = max(needed, self._sink * float(np.exp(-dt / RISE_TIME)))
-        place, angles = self._legs.reached(frames, feet, np.array([self._sink]))
-        q = np.concatenate([place[0], Rotation.from_matrix(frames.pelvis[0]).as_quat(), angles[0]])
-        left, right = (bool(standing) for standing in footing.swing[:, 0] < 0.0)
+        swing, wanted = frames.swing(), self._legs.feet(frames)
+        path = poses(wanted)[:, 0]
+        for number, state in enumerate(self._feet):
+            share = float(swing[number, 0])
+            if share >= 0.0 and state.standing:
+                state.lifted(share, self._next_offset(blend, number, frames.events[0]))
+            state.update(path[number], share)
+        offset = np.array([[state.offset] for state in self._feet])
+        distance = np.array([[state.corrected_by] for state in self._feet])
+        feet = corrected(wanted, swing, offset, distance)
+        least = self._sink * float(np.exp(-dt / RISE_TIME))
+        place, angles, sink = self._legs.reached(frames, feet, least)
+        self._sink = float(sink[0])
+        q = np.concatenate([place[0], frames.turn[0], angles[0]])
+        left, right = (bool(standing) for standing in swing[:, 0] < 0.0)
         return WalkFrame(q, self._place, self._velocity, self._phase, (left, right), notice)
 
     def _next_offset(self, blend: Blend, foot: int, events: FloatArray) -> FloatArray:
@@ -161,7 +174,7 @@ class WalkController:
             np.repeat(value, PREDICTED, axis=0)
             for value in (blend.cycles, blend.weights, blend.velocity, blend.outside)
         ))  # fmt: skip
-        path = pose(self._legs.feet(self._gait.frames(several, phase, place))[foot])
+        path = poses(self._legs.feet(self._gait.frames(several, phase, place)))[foot]
         return path.mean(axis=0) - path[0]
 
 

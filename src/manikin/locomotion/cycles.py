@@ -7,10 +7,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import Sole
 from manikin.locomotion.leg_kinematics import LegKinematics
+from manikin.locomotion.stance_foot import borders
 from manikin.mocap.anatomy import SIDES
 from manikin.spatial import FloatArray
 
@@ -94,13 +96,9 @@ def foot_events(body: BodyModel, q: FloatArray, rate: float) -> dict[str, FootEv
 
 def sole_points(body: BodyModel, q: FloatArray) -> dict[str, tuple[FloatArray, FloatArray]]:
     """(n, 3) places of each foot's heel and ball, on the sole [m], by side."""
-    from scipy.spatial.transform import Rotation
-
-    pelvis = Rotation.from_quat(q[:, 3:7]).as_matrix()
+    pelvis, sole = Rotation.from_quat(q[:, 3:7]).as_matrix(), Sole.of_body(body)
     found = {}
-    for side in SIDES:
-        leg, sole = LegKinematics(body, side), Sole.of_body(body, side)
-        foot, ankle = leg.foot(pelvis, q[:, :3], q[:, 7 + leg.slots])
+    for side, foot, ankle in zip(SIDES, *LegKinematics(body).feet(pelvis, q[:, :3], q[:, 7:]), strict=True):
         below = ankle - sole.depth * foot[:, :, 2]
         found[side] = (below + sole.heel * foot[:, :, 0], below + sole.ball * foot[:, :, 0])
     return found
@@ -168,8 +166,7 @@ def _stands(point: FloatArray, rate: float) -> NDArray[np.bool_]:
 def _without_short(values: NDArray[np.bool_], kind: bool, least: int) -> NDArray[np.bool_]:
     """Runs of ``kind`` shorter than this many frames, apart from those at the ends, become the other kind."""
     found = values.copy()
-    borders = [0, *(np.flatnonzero(np.diff(found.astype(np.int8))) + 1).tolist(), len(found)]
-    for first, last in pairwise(borders):
+    for first, last in pairwise(borders(found.copy())):
         if found[first] == kind and last - first < least and first > 0 and last < len(found):
             found[first:last] = not kind
     return found

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manikin.locomotion.foot_placement import FootPlacement
-from manikin.locomotion.stance_foot import corrected, smooth_step
+from manikin.locomotion.stance_foot import smooth_step
 from manikin.spatial import FloatArray
 
 LATE = 0.5
@@ -41,27 +40,23 @@ class FootState:
         self.before = self.offset
         self.after = self.offset if swing > LATE else target
 
-    def update(self, wanted: FootPlacement, swing: float) -> FootPlacement:
-        """The foot at the next instant.
+    def update(self, wanted: FloatArray, swing: float) -> None:
+        """Go on to the next instant.
 
         Args:
-            wanted: (1,) as the gait has it.
+            wanted: (3,) x, y [m], yaw [rad] where the gait has the foot.
             swing: How far it has swung, -1 while it stands.
         """
-        raw = pose_of(wanted)
         if swing >= 0.0:
             share = float(smooth_step(np.array(swing)))
             self.offset = (1.0 - share) * self.before + share * self.after
-            self.pose = raw + self.offset
-        else:
-            if not self.standing:
-                self.pose, self.standing = raw + self.after, True
-            self.offset = self.pose - raw
-            self.offset[2] = (self.offset[2] + np.pi) % (2.0 * np.pi) - np.pi
-        distance = np.hypot(*(self.after - self.before)[:2])
-        return corrected(wanted, np.array([swing]), self.offset[None], np.array([distance]))
+            return
+        if not self.standing:
+            self.pose, self.standing = wanted + self.after, True
+        self.offset = self.pose - wanted
+        self.offset[2] = (self.offset[2] + np.pi) % (2.0 * np.pi) - np.pi
 
-
-def pose_of(foot: FootPlacement) -> FloatArray:
-    """(3,) x, y [m], yaw [rad] of a single foot."""
-    return np.array([*foot.point[0], foot.yaw[0]])
+    @property
+    def corrected_by(self) -> float:
+        """Distance between the corrections of one step and the next [m]."""
+        return float(np.hypot(*(self.after - self.before)[:2]))

@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.errors import InputError
@@ -114,24 +113,20 @@ def walk_along(
     steps = 1.0 / (rate * gait.period(blend))
     phase = FIRST_PHASE + np.concatenate([[0.0], np.cumsum(0.5 * (steps[1:] + steps[:-1]))])
     frames = gait.frames(blend, phase, place)
-    footing = legs.footing(frames)
-    end = _last_frame(footing.swing, time, path.duration, rate)
-    swing = footing.swing.copy()
+    swing = frames.swing()
+    end = _last_frame(swing, time, path.duration)
     swing[:, end:] = -1.0
-    feet = [put_in_place(wanted, share) for wanted, share in zip(footing.wanted, swing, strict=True)]
-    root, angles = legs.reached(frames, feet, legs.lack(frames, feet))
+    root, angles, _ = legs.reached(frames, put_in_place(legs.feet(frames), swing))
     kept = slice(0, min(end + int(STANDING_TIME * rate) + 1, len(time)))
-    turns = Rotation.from_matrix(frames.pelvis).as_quat()
-    turns *= np.where(np.sum(turns * np.roll(turns, 1, axis=0), axis=1) < 0.0, -1.0, 1.0).cumprod()[:, None]
     support = (swing < 0.0)[:, kept]
     return Walk(
-        body, time[kept], np.hstack([root, turns, angles])[kept], place[kept], support.T, blend.outside[kept],
+        body, time[kept], np.hstack([root, frames.turn, angles])[kept], place[kept], support.T, blend.outside[kept],
         stance_slides(body, frames.pelvis[kept], frames.place[kept], frames.angles[kept], support),
         stance_slides(body, frames.pelvis[kept], root[kept], angles[kept], support),
     )  # fmt: skip
 
 
-def _last_frame(swing: FloatArray, time: FloatArray, arrival: float, rate: float) -> int:
+def _last_frame(swing: FloatArray, time: FloatArray, arrival: float) -> int:
     """First frame after the arrival with both feet on the floor."""
     both = np.flatnonzero((swing < 0.0).all(axis=0) & (time >= arrival))
     return int(both[0]) if both.size else len(time) - 1

@@ -9,7 +9,7 @@ from manikin.body import BodyModel
 from manikin.locomotion.blend import Blend, ControlSpace
 from manikin.locomotion.fourier import fourier_basis
 from manikin.locomotion.library import ROOT, MotionLibrary, leg_length
-from manikin.locomotion.turns import rotations
+from manikin.locomotion.turns import quaternions, rotations
 from manikin.spatial import FloatArray
 
 
@@ -21,6 +21,7 @@ class GaitFrames:
         phase: (n,) share of the cycle, any whole number more counts cycles.
         events: (n, 3) as of :class:`MotionLibrary`.
         pelvis: (n, 3, 3) from the pelvis' axes to the world's.
+        turn: (n, 4) the same as xyzw quaternions.
         place: (n, 3) the pelvis' origin [m].
         angles: (n, h) of the hinges [rad].
     """
@@ -28,6 +29,7 @@ class GaitFrames:
     phase: FloatArray
     events: FloatArray
     pelvis: FloatArray
+    turn: FloatArray
     place: FloatArray
     angles: FloatArray
 
@@ -89,15 +91,17 @@ class Gait:
             place[:, 1] + sine * ahead + cosine * left,
             self.scale * root[:, 2],
         ])  # fmt: skip
-        angles = np.clip(signals[:, len(ROOT) :], self.body.lower, self.body.upper)
+        angles = np.minimum(np.maximum(signals[:, len(ROOT) :], self.body.lower), self.body.upper)
         events = np.einsum("nk,nke->ne", blend.weights, self.library.events[blend.cycles])
-        pelvis = rotations(heading + root[:, 5], root[:, 4], root[:, 3])
-        return GaitFrames(phase, events, pelvis, origin, angles)
+        turns = heading + root[:, 5], root[:, 4], root[:, 3]
+        return GaitFrames(phase, events, rotations(*turns), quaternions(*turns), origin, angles)
 
     def _signals(self, blend: Blend, phase: FloatArray) -> FloatArray:
         basis = fourier_basis(phase % 1.0, self.library.harmonics)
+        if len(phase) == 1:
+            mixed = np.tensordot(blend.weights[0], self.library.coefficients[blend.cycles[0]], axes=1)
+            return basis @ mixed
         found = np.zeros((len(phase), self.library.coefficients.shape[2]))
         for cycles, weights in zip(blend.cycles.T, blend.weights.T, strict=True):
             found += weights[:, None] * np.einsum("nk,nks->ns", basis, self.library.coefficients[cycles])
         return found
-

@@ -66,23 +66,25 @@ def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> F
     found = np.array(coefficients)
     landing, off, other = events
     spans = {"left": (landing, 1.0), "right": (other, off)}
-    for side in SIDES:
+    for number, side in enumerate(SIDES):
         first, last = spans[side]
         middle = np.linspace(*(first + share * (last - first) for share in MIDDLE), 16)
-        pitch = float(np.median(_sole(body, found, side, middle).pitch))
+        pitch = float(np.median(_feet(body, found, middle).pitch[number]))
         slot = len(ROOT) + body.joint_index(f"{side}_ankle_dorsiflexion")
         found[0, slot] += np.clip(pitch, -MOST_LEVELLED, MOST_LEVELLED)
-    stances = [_sole(body, found, side, np.linspace(*spans[side], SAMPLES)).clearance for side in SIDES]
+    stances = [
+        _feet(body, found, np.linspace(*spans[side], SAMPLES)).clearance[number]
+        for number, side in enumerate(SIDES)
+    ]
     found[0, _HEIGHT] -= np.median(np.concatenate(stances))
     return found
 
 
-def _sole(body: BodyModel, coefficients: FloatArray, side: str, phase: FloatArray) -> FootPlacement:
-    """A foot of a cycle at phases, as if the walker were on the spot."""
+def _feet(body: BodyModel, coefficients: FloatArray, phase: FloatArray) -> FootPlacement:
+    """(2, n) feet of a cycle at phases, as if the walker were on the spot."""
     signals = fourier_basis(phase, (len(coefficients) - 1) // 2) @ coefficients
     place = np.zeros((len(phase), 3))
     place[:, 2] = signals[:, _HEIGHT]
     pelvis = rotations(signals[:, 5], signals[:, 4], signals[:, 3])
-    leg, sole = LegKinematics(body, side), Sole.of_body(body, side)
     angles = np.clip(signals[:, len(ROOT) :], body.lower, body.upper)
-    return FootPlacement.of_foot(sole, *leg.foot(pelvis, place, angles[:, leg.slots]))
+    return FootPlacement.of_foot(Sole.of_body(body), *LegKinematics(body).feet(pelvis, place, angles))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import Sole
 from manikin.locomotion.leg_kinematics import LegKinematics
-from manikin.mocap.anatomy import SIDES
+from manikin.locomotion.stance_foot import borders
 from manikin.spatial import FloatArray
 
 
@@ -31,16 +31,14 @@ def stance_slides(
         (stances,).
     """
     found = []
-    for side, stands in zip(SIDES, standing, strict=True):
-        leg, sole = LegKinematics(body, side), Sole.of_body(body, side)
-        foot, ankle = leg.foot(pelvis, place, angles[:, leg.slots])
+    sole = Sole.of_body(body)
+    for foot, ankle, stands in zip(*LegKinematics(body).feet(pelvis, place, angles), standing, strict=True):
         below = ankle - sole.depth * foot[:, :, 2]
         ends = np.stack([below + end * foot[:, :, 0] for end in (sole.heel, sole.ball)], axis=1)
         moved = np.diff(ends[..., :2], axis=0)
         lower = (ends[1:, :, 2] + ends[:-1, :, 2]).argmin(axis=1)
         moved = moved[np.arange(len(lower)), lower]
-        borders = [0, *(np.flatnonzero(np.diff(stands.astype(np.int8))) + 1).tolist(), len(stands)]
-        for first, last in pairwise(borders):
+        for first, last in pairwise(borders(stands)):
             if stands[first] and last - first > 1:
                 way = np.cumsum(moved[first : last - 1], axis=0)
                 found.append(float(np.hypot(*way.T).max()))

@@ -1,12 +1,11 @@
 """Feet that do not slide: where they stand, how they get there, and the legs that follow by inverse kinematics.
 
 The thesis leaves this open (6.8). Blended cycles let the standing foot slide, for their steps do not quite fit
-the blended velocity.  Here a foot has one place on the floor from landing to toe-off, over which it rolls
+the blended velocity. Here a foot has one place on the floor from landing to toe-off, over which it rolls
 from heel to ball; in the swing the correction goes over, smoothly, from that of one step to that of the next.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,19 +26,6 @@ LIFT = 0.15
 """A foot is lifted by at least this share of the distance by which its step is corrected."""
 
 
-@dataclass(frozen=True, eq=False)
-class Footing:
-    """The two feet of a gait at n instants.
-
-    Attributes:
-        wanted: Of each foot, as the gait has it.
-        swing: (2, n) how far they have swung, -1 while they stand.
-    """
-
-    wanted: tuple[FootPlacement, FootPlacement]
-    swing: FloatArray
-
-
 def smooth_step(share: FloatArray) -> FloatArray:
     """From 0 to 1 with no slope and no curvature at the ends; outside of them constant."""
     s = np.clip(share, 0.0, 1.0)
@@ -47,103 +33,96 @@ def smooth_step(share: FloatArray) -> FloatArray:
 
 
 class Legs:
-    """Both legs of a body: feet from postures, and postures from feet."""
+    """Both legs of a body: feet from postures, and postures from feet. Arrays of both begin with left, right."""
 
     def __init__(self, body: BodyModel) -> None:
         """Take lengths and soles from a human."""
-        self.body = body
-        self.legs = tuple(LegKinematics(body, side) for side in SIDES)
-        self.soles = tuple(Sole.of_body(body, side) for side in SIDES)
-        self.toes = tuple(body.joint_index(f"{side}_toe_extension") for side in SIDES)
-        assert body.sole_length is not None
-        self.toe_length = self.soles[0].heel + body.sole_length - self.soles[0].ball
+        self._body = body
+        self._legs, self._sole = LegKinematics(body), Sole.of_body(body)
+        self._toes = np.array([body.joint_index(f"{side}_toe_extension") for side in SIDES])
 
-    def feet(self, frames: GaitFrames) -> tuple[FootPlacement, FootPlacement]:
-        """Where the gait has the left and the right foot."""
-        left, right = (
-            FootPlacement.of_foot(sole, *leg.foot(frames.pelvis, frames.place, frames.angles[:, leg.slots]))
-            for leg, sole in zip(self.legs, self.soles, strict=True)
+    def feet(self, frames: GaitFrames) -> FootPlacement:
+        """Where the gait has the feet, (2, n)."""
+        return FootPlacement.of_foot(
+            self._sole, *self._legs.feet(frames.pelvis, frames.place, frames.angles)
         )
-        return left, right
-
-    def footing(self, frames: GaitFrames) -> Footing:
-        """Feet of a gait and whether they stand."""
-        return Footing(self.feet(frames), frames.swing())
-
-    def lack(self, frames: GaitFrames, feet: Sequence[FootPlacement]) -> FloatArray:
-        """(n,) by how much the pelvis must sink for both legs to reach their feet [m]."""
-        needed = np.zeros(len(frames.place))
-        for leg, sole, foot in zip(self.legs, self.soles, feet, strict=True):
-            hip = frames.place + frames.pelvis @ leg.hip
-            ankle = foot.to_foot(sole)[1]
-            flat = np.sum((hip - ankle)[:, :2] ** 2, axis=1)
-            highest = ankle[:, 2] + np.sqrt(np.maximum(leg.length**2 - flat, 0.0))
-            needed = np.maximum(needed, hip[:, 2] - highest)
-        return needed
 
     def reached(
-        self, frames: GaitFrames, feet: Sequence[FootPlacement], sink: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Place of the pelvis (n, 3) and angles (n, h) with the feet where they shall be.
+        self, frames: GaitFrames, feet: FootPlacement, least: FloatArray | float = 0.0
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Postures with the feet where they shall be; the pelvis sinks where a leg is too short.
 
         Args:
-            frames: Of the gait.
-            feet: Where the left and the right foot shall be.
-            sink: (n,) how much lower the pelvis is than the gait has it [m].
+            frames: Of n instants of the gait.
+            feet: (2, n) where the feet shall be.
+            least: By how much the pelvis sinks at least [m].
+
+        Returns:
+            Place of the pelvis (n, 3) [m], angles (n, h) [rad], and by how much the pelvis sinks (n,) [m].
         """
-        place = frames.place - sink[:, None] * [0.0, 0.0, 1.0]
-        angles = frames.angles.copy()
-        for leg, sole, foot, toe in zip(self.legs, self.soles, feet, self.toes, strict=True):
-            turn, ankle = foot.to_foot(sole)
-            angles[:, leg.slots] = leg.angles(frames.pelvis, place, turn, ankle, angles[:, leg.slots[4]])
-            # Toes stay above the floor while the heel is up.
-            free = np.arcsin(np.clip(foot.clearance / self.toe_length, 0.0, 1.0))
-            angles[:, toe] = np.clip(foot.pitch - free, 0.0, self.body.upper[toe])
-        return place, angles
+        foot, ankle = feet.to_foot(self._sole)
+        hips = self._legs.hips(frames.pelvis, frames.place)
+        away = np.sum((hips - ankle)[..., :2] ** 2, axis=-1)
+        highest = ankle[..., 2] + np.sqrt(np.maximum(self._legs.length**2 - away, 0.0))
+        sink = np.maximum((hips[..., 2] - highest).max(axis=0), least)
+        place = frames.place.copy()
+        place[:, 2] -= sink
+        angles = self._legs.angles(frames.pelvis, place, foot, ankle, frames.angles)
+        # Toes stay above the floor while the heel is up.
+        free = np.arcsin(np.clip(feet.clearance / self._sole.toes, 0.0, 1.0))
+        angles[:, self._toes] = np.clip(feet.pitch - free, 0.0, self._body.upper[self._toes[0]]).T
+        return place, angles, sink
 
 
 def corrected(
     wanted: FootPlacement, swing: FloatArray, offset: FloatArray, distance: FloatArray
 ) -> FootPlacement:
-    """A foot moved by its correction, on the floor where it stands.
+    """Feet moved by their corrections, on the floor where they stand.
 
     Args:
-        wanted: (n,) as the gait has it.
-        swing: (n,) how far it has swung, -1 while it stands.
-        offset: (n, 3) x, y [m] and yaw [rad] to add.
-        distance: (n,) by how much the whole step is corrected [m].
+        wanted: (...) as the gait has them.
+        swing: (...) how far they have swung, -1 while they stand.
+        offset: (..., 3) x, y [m] and yaw [rad] to add.
+        distance: (...) by how much the whole step is corrected [m].
     """
     standing = swing < 0.0
     up = np.where(standing, 0.0, smooth_step(swing / EASE) * smooth_step((1.0 - swing) / EASE))
     flat = wanted.pitch - FLAT * np.tanh(wanted.pitch / FLAT)
     return FootPlacement(
-        point=wanted.point + offset[:, :2],
-        yaw=wanted.yaw + offset[:, 2],
+        point=wanted.point + offset[..., :2],
+        yaw=wanted.yaw + offset[..., 2],
         pitch=up * wanted.pitch + (1.0 - up) * flat,
         roll=up * wanted.roll,
         clearance=up * (np.maximum(wanted.clearance, 0.0) + LIFT * distance),
     )
 
 
-def pose(foot: FootPlacement) -> FloatArray:
-    """(n, 3) x, y [m] and continuous yaw [rad]."""
-    return np.column_stack([foot.point, np.unwrap(foot.yaw)])
+def poses(feet: FootPlacement) -> FloatArray:
+    """(..., n, 3) x, y [m] and yaw [rad] of feet at n instants, the yaw continuous."""
+    found = np.empty((*feet.yaw.shape, 3))
+    found[..., :2], found[..., 2] = feet.point, np.unwrap(feet.yaw)
+    return found
 
 
 def put_in_place(wanted: FootPlacement, swing: FloatArray) -> FootPlacement:
-    """One foot of a whole walk: in every stance at the mean of where the gait has it.
+    """The feet of a whole walk: in every stance at the mean of where the gait has them.
 
-    In the first stance it is where it was at the start, in the last one where it comes to rest.
+    In the first stance they are where they were at the start, in the last one where they come to rest.
 
     Args:
-        wanted: (n,) as the gait has it.
-        swing: (n,) how far it has swung, -1 while it stands.
+        wanted: (2, n) as the gait has them.
+        swing: (2, n) how far they have swung, -1 while they stand.
     """
-    path, n = pose(wanted), len(swing)
-    standing = swing < 0.0
-    borders = [0, *(np.flatnonzero(np.diff(standing.astype(np.int8))) + 1).tolist(), n]
+    both = [_steps(path, share) for path, share in zip(poses(wanted), swing, strict=True)]
+    offset, distance = (np.array(values) for values in zip(*both, strict=True))
+    return corrected(wanted, swing, offset, distance)
+
+
+def _steps(path: FloatArray, swing: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Corrections (n, 3) of one foot, and by how much each step is corrected (n,) [m]."""
+    n, standing = len(swing), swing < 0.0
+    spans = list(pairwise(borders(standing)))
     offset, distance = np.zeros((n, 3)), np.zeros(n)
-    spans = list(zip(borders[:-1], borders[1:], strict=True))
     for first, last in spans:
         if standing[first]:
             anchor = path[0] if first == 0 else path[-1] if last == n else path[first:last].mean(axis=0)
@@ -155,4 +134,9 @@ def put_in_place(wanted: FootPlacement, swing: FloatArray) -> FootPlacement:
             share = smooth_step(swing[first:last])[:, None]
             offset[first:last] = (1.0 - share) * before + share * after
             distance[first:last] = np.hypot(*(after - before)[:2])
-    return corrected(wanted, swing, offset, distance)
+    return offset, distance
+
+
+def borders(values: FloatArray) -> list[int]:
+    """Where runs of equal values begin, and the number of values."""
+    return [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
