@@ -1,7 +1,7 @@
 """Which cycles make up a walk of given velocities, and with what weights."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -128,6 +128,12 @@ class ControlSpace:
         best = np.linalg.norm(places - points[:, None], axis=2).argmin(axis=1)
         corners = faces[best][:, [0, 1, 2, 2]].astype(np.int64)
         return corners, np.hstack([shares[np.arange(len(best)), best], np.zeros((len(best), 1))])
+
+
+@lru_cache(maxsize=4)
+def control_space(library: MotionLibrary) -> ControlSpace:
+    """The control space of a library, built once."""
+    return ControlSpace(library)
 
 
 def _nearest_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:

@@ -155,11 +155,10 @@ class WalkController:
         distance = np.array([[state.corrected_by] for state in self._feet])
         feet = corrected(wanted, swing, offset, distance)
         least = self._sink * float(np.exp(-dt / RISE_TIME))
-        place, angles, sink = self._legs.reached(frames, feet, least)
+        q, sink = self._legs.reached(frames, feet, least)
         self._sink = float(sink[0])
-        q = np.concatenate([place[0], frames.turn[0], angles[0]])
         left, right = (bool(standing) for standing in swing[:, 0] < 0.0)
-        return WalkFrame(q, self._place, self._velocity, self._phase, (left, right), notice)
+        return WalkFrame(q[0], self._place, self._velocity, self._phase, (left, right), notice)
 
     def _next_offset(self, blend: Blend, foot: int, events: FloatArray) -> FloatArray:
         """Correction at landing that puts the foot at the mean of where the gait has it in the next stance."""

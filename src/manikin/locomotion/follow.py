@@ -116,13 +116,12 @@ def walk_along(
     swing = frames.swing()
     end = _last_frame(swing, time, path.duration)
     swing[:, end:] = -1.0
-    root, angles, _ = legs.reached(frames, put_in_place(legs.feet(frames), swing))
+    q, _ = legs.reached(frames, put_in_place(legs.feet(frames), swing))
     kept = slice(0, min(end + int(STANDING_TIME * rate) + 1, len(time)))
     support = (swing < 0.0)[:, kept]
     return Walk(
-        body, time[kept], np.hstack([root, frames.turn, angles])[kept], place[kept], support.T, blend.outside[kept],
-        stance_slides(body, frames.pelvis[kept], frames.place[kept], frames.angles[kept], support),
-        stance_slides(body, frames.pelvis[kept], root[kept], angles[kept], support),
+        body, time[kept], q[kept], place[kept], support.T, blend.outside[kept],
+        stance_slides(body, frames.q[kept], support), stance_slides(body, q[kept], support),
     )  # fmt: skip
 
 

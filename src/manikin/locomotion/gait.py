@@ -6,7 +6,7 @@ import numpy as np
 
 from manikin.errors import BodyError
 from manikin.body import BodyModel
-from manikin.locomotion.blend import Blend, ControlSpace
+from manikin.locomotion.blend import Blend, control_space
 from manikin.locomotion.fourier import fourier_basis
 from manikin.locomotion.library import ROOT, MotionLibrary, leg_length
 from manikin.locomotion.turns import quaternions, rotations
@@ -32,6 +32,11 @@ class GaitFrames:
     turn: FloatArray
     place: FloatArray
     angles: FloatArray
+
+    @property
+    def q(self) -> FloatArray:
+        """(n, nq) postures."""
+        return np.hstack([self.place, self.turn, self.angles])
 
     def swing(self) -> FloatArray:
         """(2, n) how far the left and the right foot have swung, 0 to 1; -1 while they stand."""
@@ -60,7 +65,7 @@ class Gait:
         if body.joint_names != library.joint_names:
             raise BodyError(f"body {body.name!r} has not the hinges of the motion library; valid: a human")
         self.library, self.body = library, body
-        self.space = ControlSpace(library)
+        self.space = control_space(library)
         self.scale = leg_length(body) / library.leg
         self._to_velocity = np.array([self.scale, self.scale, 1.0])
 

@@ -13,7 +13,7 @@ HINGES = (
     "ankle_dorsiflexion", "ankle_inversion",
 )  # fmt: skip
 
-LEAST_BEND = np.deg2rad(2.0)
+LEAST_BEND = np.deg2rad(5.0)
 """A leg that cannot reach its foot is stretched to this [rad]; nearly straight knees jerk."""
 
 _AXES = ((0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0))
@@ -59,7 +59,6 @@ class LegKinematics:
         self.hip = np.array([parts[0].origin for parts in sides])
         """(2, 3) hip joints in the pelvis [m]."""
         self.thigh, self.shank = (-float(part.origin[2]) for part in sides[0][1:])
-        self._lower, self._upper = body.lower[self.slots[0]], body.upper[self.slots[0]]
         self.length = float(np.sqrt(
             self.thigh**2 + self.shank**2 + 2.0 * self.thigh * self.shank * np.cos(LEAST_BEND)
         ))  # fmt: skip
@@ -91,7 +90,7 @@ class LegKinematics:
     def angles(
         self, pelvis: FloatArray, place: FloatArray, foot: FloatArray, ankle: FloatArray, angles: FloatArray
     ) -> FloatArray:
-        """Angles within the limits that put the feet there; out of reach, as near as a stretched leg gets.
+        """Angles that put the feet there; out of reach, as near as a stretched leg gets. Limits are not looked at.
 
         Args:
             pelvis: (n, 3, 3) from the pelvis' axes to the world's.
@@ -125,7 +124,7 @@ class LegKinematics:
         found[..., 5] = np.arctan2(ankle_turn[..., 2, 0], ankle_turn[..., 0, 0])
         found[..., 6] = np.arctan2(ankle_turn[..., 1, 2], ankle_turn[..., 1, 1])
         result = angles.copy()
-        result[:, self.slots] = np.clip(found, self._lower, self._upper).transpose(1, 0, 2)
+        result[:, self.slots] = found.transpose(1, 0, 2)
         return result
 
 

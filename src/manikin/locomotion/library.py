@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Self
 
 import numpy as np
@@ -26,6 +26,7 @@ REFERENCE_STATURE = 1.75
 STAND = "stand"
 
 
+@cache
 def reference_body() -> BodyModel:
     """The human that all cycles are kept for."""
     return human(REFERENCE_STATURE)

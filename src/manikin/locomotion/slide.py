@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import Sole
@@ -12,9 +13,7 @@ from manikin.locomotion.stance_foot import borders
 from manikin.spatial import FloatArray
 
 
-def stance_slides(
-    body: BodyModel, pelvis: FloatArray, place: FloatArray, angles: FloatArray, standing: NDArray[np.bool_]
-) -> FloatArray:
+def stance_slides(body: BodyModel, q: FloatArray, standing: NDArray[np.bool_]) -> FloatArray:
     """Largest displacement over the floor in every stance of either foot [m].
 
     From frame to frame, that of the lower end of the sole, heel or ball of the foot, is added up: a foot that
@@ -22,9 +21,7 @@ def stance_slides(
 
     Args:
         body: A human.
-        pelvis: (n, 3, 3) from the pelvis' axes to the world's.
-        place: (n, 3) the pelvis' origin [m].
-        angles: (n, h) of the hinges [rad].
+        q: (n, nq) postures.
         standing: (2, n) whether the left and the right foot stand.
 
     Returns:
@@ -32,7 +29,9 @@ def stance_slides(
     """
     found = []
     sole = Sole.of_body(body)
-    for foot, ankle, stands in zip(*LegKinematics(body).feet(pelvis, place, angles), standing, strict=True):
+    pelvis = Rotation.from_quat(q[:, 3:7]).as_matrix()
+    feet = LegKinematics(body).feet(pelvis, q[:, :3], q[:, 7:])
+    for foot, ankle, stands in zip(*feet, standing, strict=True):
         below = ankle - sole.depth * foot[:, :, 2]
         ends = np.stack([below + end * foot[:, :, 0] for end in (sole.heel, sole.ball)], axis=1)
         moved = np.diff(ends[..., :2], axis=0)

@@ -25,6 +25,10 @@ EASE = 0.2
 LIFT = 0.15
 """A foot is lifted by at least this share of the distance by which its step is corrected."""
 
+STRAIGHTENING = 2.5
+"""Toes are straight again at this height over their length; at 1 they would leave the floor no sooner than
+they must, faster than toes can move."""
+
 
 def smooth_step(share: FloatArray) -> FloatArray:
     """From 0 to 1 with no slope and no curvature at the ends; outside of them constant."""
@@ -40,6 +44,8 @@ class Legs:
         self._body = body
         self._legs, self._sole = LegKinematics(body), Sole.of_body(body)
         self._toes = np.array([body.joint_index(f"{side}_toe_extension") for side in SIDES])
+        self._hips = np.array([body.joint_index(f"{side}_hip_flexion") for side in SIDES])
+        self._lumbar = body.joint_index("lumbar_flexion")
 
     def feet(self, frames: GaitFrames) -> FootPlacement:
         """Where the gait has the feet, (2, n)."""
@@ -49,8 +55,10 @@ class Legs:
 
     def reached(
         self, frames: GaitFrames, feet: FootPlacement, least: FloatArray | float = 0.0
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Postures with the feet where they shall be; the pelvis sinks where a leg is too short.
+    ) -> tuple[FloatArray, FloatArray]:
+        """Postures with the feet where they shall be.
+
+        The pelvis sinks where a leg is too short, and tilts forward where a hip does not extend far enough.
 
         Args:
             frames: Of n instants of the gait.
@@ -58,20 +66,37 @@ class Legs:
             least: By how much the pelvis sinks at least [m].
 
         Returns:
-            Place of the pelvis (n, 3) [m], angles (n, h) [rad], and by how much the pelvis sinks (n,) [m].
+            Postures (n, nq) and by how much the pelvis sinks (n,) [m].
         """
         foot, ankle = feet.to_foot(self._sole)
         hips = self._legs.hips(frames.pelvis, frames.place)
         away = np.sum((hips - ankle)[..., :2] ** 2, axis=-1)
         highest = ankle[..., 2] + np.sqrt(np.maximum(self._legs.length**2 - away, 0.0))
         sink = np.maximum((hips[..., 2] - highest).max(axis=0), least)
-        place = frames.place.copy()
-        place[:, 2] -= sink
-        angles = self._legs.angles(frames.pelvis, place, foot, ankle, frames.angles)
-        # Toes stay above the floor while the heel is up.
-        free = np.arcsin(np.clip(feet.clearance / self._sole.toes, 0.0, 1.0))
-        angles[:, self._toes] = np.clip(feet.pitch - free, 0.0, self._body.upper[self._toes[0]]).T
-        return place, angles, sink
+        q = np.empty((len(sink), self._body.nq))
+        q[:, :3], q[:, 3:7] = frames.place, frames.turn
+        q[:, 2] -= sink
+        angles = self._legs.angles(frames.pelvis, q[:, :3], foot, ankle, frames.angles)
+        # Toes stay above the floor while the heel is up, and straighten as the foot rises.
+        free = np.arcsin(np.clip(feet.clearance / (STRAIGHTENING * self._sole.toes), 0.0, 1.0))
+        angles[:, self._toes] = np.maximum(feet.pitch - free, 0.0).T
+        self._tilt(q, angles)
+        q[:, 7:] = np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
+        return q, sink
+
+    def _tilt(self, q: FloatArray, angles: FloatArray) -> None:
+        """Tilt the pelvis about the line of the hip joints: hips and spine make up for it, nothing else moves."""
+        lower = self._body.lower
+        tilt = np.maximum((lower[self._hips] - angles[:, self._hips]).max(axis=1), 0.0)
+        tilt = np.minimum(tilt, np.maximum(angles[:, self._lumbar] - lower[self._lumbar], 0.0))
+        if np.any(tilt):
+            angles[:, self._hips] += tilt[:, None]
+            angles[:, self._lumbar] -= tilt
+            x, y, z, w = q[:, 3:7].T
+            sine, cosine = np.sin(0.5 * tilt), np.cos(0.5 * tilt)
+            q[:, 3:7] = np.column_stack([
+                x * cosine - z * sine, y * cosine + w * sine, z * cosine + x * sine, w * cosine - y * sine
+            ])  # fmt: skip
 
 
 def corrected(
