@@ -233,17 +233,17 @@ def _by_person(found: list[tuple[Window, MotionLibrary]]) -> list[tuple[Window, 
 
 
 def _symmetric(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
-    """Cycles of straight classes, averaged with their mirror images."""
+    """Cycles of straight classes, averaged with their mirror images half a cycle later."""
     if cycle.kinds[0] not in SYMMETRIC:
         return cycle
-    both = cycle.with_cycles(cycle.mirrored(body))
-    mean = {
-        name: getattr(both, name).mean(axis=0, keepdims=True)
-        for name in ("velocities", "events", "coefficients")
-    }
-    return MotionLibrary(
-        cycle.names, cycle.kinds, mean["velocities"], cycle.periods, mean["events"], mean["coefficients"],
-        cycle.joint_names, cycle.leg, cycle.acknowledgements,
+    landing, off, other = cycle.events[0]
+    reflected = shifted(cycle.mirrored(body).coefficients, 0.5 - off)
+    # The mean of both leaves the floor between their toe-offs, at 0 and at off - 1/2.
+    coefficients = shifted(0.5 * (cycle.coefficients + reflected), 0.5 * (off - 0.5))
+    swing = 0.5 * (landing + other + 1.0 - off)
+    return replace(
+        cycle, velocities=cycle.velocities * [1.0, 0.0, 0.0], coefficients=coefficients,
+        events=np.array([[swing, 0.5, swing - 0.5]]),
     )  # fmt: skip
 
 

@@ -1,7 +1,5 @@
 """The motion library as a file: coefficients in NumPy's ``.npz``, without pickled objects."""
 
-import zipfile
-import zlib
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -84,14 +82,16 @@ def _read(file: Path) -> MotionLibrary:
     try:
         if file.stat().st_size > LARGEST:
             raise InputError(f"{file} is larger than {LARGEST // 1_000_000} MB; valid: a motion library")
-        with np.load(file, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile):
-                raise InputError(f"{file} holds one array; valid: a motion library (.npz)")
+        archive = np.load(file, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise InputError(f"{file} holds one array; valid: a motion library (.npz)")
+        with archive:
             given = {name: archive[name] for name in archive.files}
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}; valid: a motion library") from None
-    except (ValueError, EOFError, KeyError, NotImplementedError, MemoryError, RuntimeError, SyntaxError,
-            zipfile.BadZipFile, zlib.error):  # fmt: skip
+    except Exception:  # numpy, zipfile and zlib raise a dozen kinds for damaged bytes
         raise InputError(f"{file} is damaged or no motion library; valid: a file of this package") from None
     return _library(file, given)
 
