@@ -1,0 +1,278 @@
+"""Building the motion library from recordings ([Truong2010]_ 6.4)."""
+
+import csv
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from manikin.body import BodyModel
+from manikin.errors import InputError
+from manikin.locomotion.cycles import CycleCut, cycle_cuts, foot_events
+from manikin.locomotion.fourier import fourier_coefficients, shifted
+from manikin.locomotion.levelling import levelled, tilted
+from manikin.locomotion.library import ROOT, STAND, MotionLibrary, leg_length, reference_body
+from manikin.locomotion.persons import as_one_person
+from manikin.locomotion.steady import steady_motion
+from manikin.mocap import Recording, read_recording, reconstruct
+from manikin.spatial import FloatArray
+
+TABLE = "clips_locomotion.csv"
+"""Names the windows to use: columns class, file, first_frame0, end_frame0, in the folder of recordings."""
+
+RECORDINGS = "mocap"
+
+SAMPLES = 64
+"""Of a cycle, before its Fourier coefficients are taken."""
+
+ACKNOWLEDGEMENTS = {
+    "cmu": "The data used in this project was obtained from mocap.cs.cmu.edu. "
+    "The database was created with funding from NSF EIA-0196217.",
+    "accad": "Motion capture data: ACCAD / The Ohio State University, Open Motion Project, "
+    "CC BY 3.0 Unported.",
+}
+"""By the beginning of a recording's folder."""
+
+NOT_CLOSED = np.deg2rad(15.0)
+"""Root mean square, over the hinges, of the difference between both ends of a cycle; more is no cycle [rad]."""
+
+USUAL_PERIOD, USUAL_EVENTS = 1.1, (0.4, 0.5, -0.1)
+"""Of standing, which has no cycle of its own: those of a slow walk, in which feet can be put in place."""
+
+NEAR = 0.05
+"""Cycles nearer to another one than this are left out [m/s]; people differ, and blends would flicker."""
+
+TURN_RADIUS = 0.5
+"""An angular velocity counts as the speed at this distance [m]."""
+
+SYMMETRIC = ("walk straight", "run straight", "backward", STAND)
+"""Classes of cycles that are averaged with their mirror images, to go exactly straight."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """A part of a recording to take a cycle from.
+
+    Attributes:
+        kind: Its class.
+        file: The recording, below the folder.
+        first: Frame.
+        last: Frame after the last one.
+    """
+
+    kind: str
+    file: str
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Person:
+    """A recording as a motion of the reference body."""
+
+    q: FloatArray
+    rate: float
+
+
+def read_windows(folder: Path) -> list[Window]:
+    """Windows named by a folder's table.
+
+    Raises:
+        InputError: If it has none, or a row cannot be read.
+    """
+    table = folder / TABLE
+    if not table.is_file():
+        raise InputError(f"{folder} has no {TABLE}; valid: a folder with this table and the recordings")
+    with table.open(newline="", encoding="utf-8") as rows:
+        found = []
+        for number, row in enumerate(csv.DictReader(rows), 2):
+            try:
+                found.append(_window(row))
+            except (KeyError, TypeError, ValueError):
+                raise InputError(
+                    f"{table} line {number} is not usable; valid: class, file, first_frame0, end_frame0"
+                ) from None
+    return found
+
+
+def _window(row: dict[str, str]) -> Window:
+    kind = row["class"].split("(")[0].strip().removesuffix(" core")
+    first, last = int(row["first_frame0"]), int(row["end_frame0"])
+    if not 0 <= first < last:
+        raise ValueError
+    return Window(STAND if kind == "idle" else kind, row["file"], first, last)
+
+
+def build_library(folder: Path, report: Callable[[float, str], None] = lambda _share, _name: None) -> MotionLibrary:
+    """Read, reconstruct and cut the recordings of a folder, and add the mirror images.
+
+    Args:
+        folder: With :data:`TABLE` and, in ``mocap``, the recordings.
+        report: Told the share that is done and the window.
+
+    Raises:
+        InputError: If a file is not usable, or no window holds a cycle.
+    """
+    body, windows = reference_body(), read_windows(folder)
+    person = cache(lambda file: _person(body, folder / RECORDINGS / file))
+    found: list[tuple[Window, MotionLibrary]] = []
+    for number, window in enumerate(windows):
+        report(number / len(windows), window.file)
+        cycle = _cycle(body, window, person(window.file))
+        if cycle is not None:
+            found.append((window, cycle))
+    if not found:
+        raise InputError(f"{folder / TABLE} names no window with a whole cycle")
+    ordered = _by_person(found)
+    persons = [_person_of(window) for window, _ in ordered]
+    alike = as_one_person(body, [cycle for _, cycle in ordered], persons)
+    originals = _thinned([_levelled(body, _symmetric(body, cycle)) for cycle in alike])
+    return _with_mirror_images(body, originals)
+
+
+def _person(body: BodyModel, file: Path) -> _Person:
+    recording = read_recording(file)
+    if not isinstance(recording, Recording):
+        raise InputError(f"{file} holds no skeleton; valid: BVH or AMC")
+    found = reconstruct(recording)
+    q = np.array(found.q)
+    q[:, :3] *= leg_length(body) / leg_length(found.body)
+    return _Person(q, recording.rate)
+
+
+def _cycle(body: BodyModel, window: Window, person: _Person) -> MotionLibrary | None:
+    """The cycle of a window that closes best, or None."""
+    if window.kind == STAND:
+        return _standing(body, window, person)
+    events = foot_events(body, person.q, person.rate)
+    cuts = cycle_cuts(events, window.first / person.rate, window.last / person.rate)
+    time = np.arange(len(person.q)) / person.rate
+    signals = CubicSpline(time, _signals(person.q))
+    inside = [cut for cut in cuts if cut.end <= time[-1]]
+    best = min(inside, key=lambda cut: _gap(signals, cut), default=None)
+    if best is None or _gap(signals, best) > NOT_CLOSED:
+        return None
+    within = (time >= best.start) & (time <= best.end)
+    signals = CubicSpline(time, _signals(tilted(body, person.q, within)))
+    return _coded(body, window, signals, best, person.rate)
+
+
+def _signals(q: FloatArray) -> FloatArray:
+    """(n, 6 + h) x, y, z, roll, pitch, continuous yaw of the root, then the hinges."""
+    turns = Rotation.from_quat(q[:, 3:7]).as_euler("ZYX")
+    turns[:, 0] = np.unwrap(turns[:, 0])
+    return np.hstack([q[:, :3], turns[:, ::-1], q[:, 7:]])
+
+
+def _gap(signals: CubicSpline, cut: CycleCut) -> float:
+    """Root mean square difference of the hinges between both ends of a cycle [rad]."""
+    difference = signals(cut.end)[len(ROOT) :] - signals(cut.start)[len(ROOT) :]
+    return float(np.sqrt(np.mean(difference**2)))
+
+
+def _coded(
+    body: BodyModel, window: Window, signals: CubicSpline, cut: CycleCut, rate: float
+) -> MotionLibrary:
+    """A cycle as coefficients; what does not close is a drift that is taken out evenly."""
+    share = np.linspace(0.0, 1.0, SAMPLES + 1)
+    values = signals(cut.start + cut.period * share)
+    steady = steady_motion(values[:, [0, 1, 5]], cut.period)
+    values[:, [0, 1, 5]] = steady.error
+    values -= (share - 0.5)[:, None] * (values[-1] - values[0])
+    coefficients = fourier_coefficients(values[:-1])
+    events = np.array([cut.landing - cut.start, cut.other_off - cut.start, cut.other_landing - cut.start])
+    events = events / cut.period
+    if cut.foot == "right":
+        # Begun at the right toe-off: the other foot's is the left one's, and becomes the begin.
+        strike, off, other = events
+        coefficients = shifted(coefficients, off)
+        events = np.array([other + 1.0 - off, 1.0 - off, strike - off])
+    first, last = (round(instant * rate) for instant in (cut.start, cut.end))
+    name = f"{Path(window.file).stem} {first}-{last}"
+    return _one(body, window, name, steady.velocity, cut.period, events, coefficients)
+
+
+def _standing(body: BodyModel, window: Window, person: _Person) -> MotionLibrary:
+    """The mean posture of a window, symmetric."""
+    values = _signals(tilted(body, person.q[window.first : window.last])).mean(axis=0)
+    values[[0, 1, 5]] = 0.0
+    coefficients = fourier_coefficients(np.tile(values, (SAMPLES, 1)))
+    name = f"{Path(window.file).stem} {window.first}-{window.last}"
+    return _one(body, window, name, np.zeros(3), USUAL_PERIOD, np.array(USUAL_EVENTS), coefficients)
+
+
+def _one(
+    body: BodyModel, window: Window, name: str, velocity: FloatArray, period: float, events: FloatArray,
+    coefficients: FloatArray,
+) -> MotionLibrary:  # fmt: skip
+    source = next((text for key, text in ACKNOWLEDGEMENTS.items() if window.file.startswith(key)), None)
+    return MotionLibrary(
+        (name,), (window.kind,), velocity[None], np.array([period]), events[None], coefficients[None],
+        body.joint_names, leg_length(body), () if source is None else (source,),
+    )  # fmt: skip
+
+
+def _person_of(window: Window) -> str:
+    """By the begin of the file's name, as both collections have it."""
+    return Path(window.file).stem.split("_")[0]
+
+
+def _levelled(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
+    return replace(cycle, coefficients=levelled(body, cycle.coefficients[0], cycle.events[0])[None])
+
+
+def _by_person(found: list[tuple[Window, MotionLibrary]]) -> list[tuple[Window, MotionLibrary]]:
+    """Those of whom there are most cycles first, by the begin of the file's name."""
+    persons = [_person_of(window) for window, _ in found]
+    order = sorted(range(len(found)), key=lambda i: (-persons.count(persons[i]), i))
+    return [found[i] for i in order]
+
+
+def _symmetric(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
+    """Cycles of straight classes, averaged with their mirror images half a cycle later."""
+    if cycle.kinds[0] not in SYMMETRIC:
+        return cycle
+    landing, off, other = cycle.events[0]
+    reflected = shifted(cycle.mirrored(body).coefficients, 0.5 - off)
+    # The mean of both leaves the floor between their toe-offs, at 0 and at off - 1/2.
+    coefficients = shifted(0.5 * (cycle.coefficients + reflected), 0.5 * (off - 0.5))
+    swing = 0.5 * (landing + other + 1.0 - off)
+    return replace(
+        cycle, velocities=cycle.velocities * [1.0, 0.0, 0.0], coefficients=coefficients,
+        events=np.array([[swing, 0.5, swing - 0.5]]),
+    )  # fmt: skip
+
+
+def scaled_velocities(velocities: FloatArray) -> FloatArray:
+    """(..., 3) velocities with the angular one as the speed at :data:`TURN_RADIUS` [m/s]."""
+    return velocities * [1.0, 1.0, TURN_RADIUS]
+
+
+def _thinned(cycles: list[MotionLibrary]) -> MotionLibrary:
+    """One library of those that are not near to one before."""
+    kept: list[MotionLibrary] = []
+    for cycle in cycles:
+        places = scaled_velocities(cycle.velocities)
+        if all(np.linalg.norm(places - scaled_velocities(other.velocities)) >= NEAR for other in kept):
+            kept.append(cycle)
+    return _joined(kept)
+
+
+def _joined(cycles: list[MotionLibrary]) -> MotionLibrary:
+    found = cycles[0]
+    for cycle in cycles[1:]:
+        found = found.with_cycles(cycle)
+    thanks = tuple(dict.fromkeys(text for cycle in cycles for text in cycle.acknowledgements))
+    return MotionLibrary(
+        found.names, found.kinds, found.velocities, found.periods, found.events, found.coefficients,
+        found.joint_names, found.leg, thanks,
+    )  # fmt: skip
+
+
+def _with_mirror_images(body: BodyModel, library: MotionLibrary) -> MotionLibrary:
+    sided = [i for i, kind in enumerate(library.kinds) if kind not in SYMMETRIC]
+    return library.with_cycles(library.chosen(sided).mirrored(body)) if sided else library

@@ -1,0 +1,167 @@
+"""Feet that do not slide: where they stand, how they get there, and the legs that follow by inverse kinematics.
+
+The thesis leaves this open (6.8). Blended cycles let the standing foot slide, for their steps do not quite fit
+the blended velocity. Here a foot has one place on the floor from landing to toe-off, over which it rolls
+from heel to ball; in the swing the correction goes over, smoothly, from that of one step to that of the next.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.locomotion.foot_placement import FootPlacement, Sole
+from manikin.locomotion.gait import GaitFrames
+from manikin.locomotion.leg_kinematics import LegKinematics
+from manikin.mocap.anatomy import SIDES
+from manikin.spatial import FloatArray
+
+FLAT = np.deg2rad(4.0)
+"""A standing foot pitched by less than this is put flat, more or less [rad]."""
+
+EASE = 0.2
+"""Share of the swing in which a foot leaves, and in which it reaches, the floor."""
+
+LIFT = 0.15
+"""A foot is lifted by at least this share of the distance by which its step is corrected."""
+
+STRAIGHTENING = 2.5
+"""Toes are straight again at this height over their length; at 1 they would leave the floor no sooner than
+they must, faster than toes can move."""
+
+
+def smooth_step(share: FloatArray) -> FloatArray:
+    """From 0 to 1 with no slope and no curvature at the ends; outside of them constant."""
+    s = np.clip(share, 0.0, 1.0)
+    return s**3 * (10.0 + s * (6.0 * s - 15.0))
+
+
+class Legs:
+    """Both legs of a body: feet from postures, and postures from feet. Arrays of both begin with left, right."""
+
+    def __init__(self, body: BodyModel) -> None:
+        """Take lengths and soles from a human."""
+        self._body = body
+        self._legs, self._sole = LegKinematics(body), Sole.of_body(body)
+        self._toes = np.array([body.joint_index(f"{side}_toe_extension") for side in SIDES])
+        self._hips = np.array([body.joint_index(f"{side}_hip_flexion") for side in SIDES])
+        self._lumbar = body.joint_index("lumbar_flexion")
+
+    def feet(self, frames: GaitFrames) -> FootPlacement:
+        """Where the gait has the feet, (2, n)."""
+        return FootPlacement.of_foot(
+            self._sole, *self._legs.feet(frames.pelvis, frames.place, frames.angles)
+        )
+
+    def reached(
+        self, frames: GaitFrames, feet: FootPlacement, least: FloatArray | float = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        """Postures with the feet where they shall be.
+
+        The pelvis sinks where a leg is too short, and tilts forward where a hip does not extend far enough.
+
+        Args:
+            frames: Of n instants of the gait.
+            feet: (2, n) where the feet shall be.
+            least: By how much the pelvis sinks at least [m].
+
+        Returns:
+            Postures (n, nq) and by how much the pelvis sinks (n,) [m].
+        """
+        foot, ankle = feet.to_foot(self._sole)
+        hips = self._legs.hips(frames.pelvis, frames.place)
+        away = np.sum((hips - ankle)[..., :2] ** 2, axis=-1)
+        highest = ankle[..., 2] + np.sqrt(np.maximum(self._legs.length**2 - away, 0.0))
+        sink = np.maximum((hips[..., 2] - highest).max(axis=0), least)
+        q = np.empty((len(sink), self._body.nq))
+        q[:, :3], q[:, 3:7] = frames.place, frames.turn
+        q[:, 2] -= sink
+        angles = self._legs.angles(frames.pelvis, q[:, :3], foot, ankle, frames.angles)
+        # Toes stay above the floor while the heel is up, and straighten as the foot rises.
+        free = np.arcsin(np.clip(feet.clearance / (STRAIGHTENING * self._sole.toes), 0.0, 1.0))
+        angles[:, self._toes] = np.maximum(feet.pitch - free, 0.0).T
+        self._tilt(q, angles)
+        q[:, 7:] = np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
+        return q, sink
+
+    def _tilt(self, q: FloatArray, angles: FloatArray) -> None:
+        """Tilt the pelvis about the line of the hip joints: hips and spine make up for it, nothing else moves."""
+        lower = self._body.lower
+        tilt = np.maximum((lower[self._hips] - angles[:, self._hips]).max(axis=1), 0.0)
+        tilt = np.minimum(tilt, np.maximum(angles[:, self._lumbar] - lower[self._lumbar], 0.0))
+        if np.any(tilt):
+            angles[:, self._hips] += tilt[:, None]
+            angles[:, self._lumbar] -= tilt
+            x, y, z, w = q[:, 3:7].T
+            sine, cosine = np.sin(0.5 * tilt), np.cos(0.5 * tilt)
+            q[:, 3:7] = np.column_stack([
+                x * cosine - z * sine, y * cosine + w * sine, z * cosine + x * sine, w * cosine - y * sine
+            ])  # fmt: skip
+
+
+def corrected(
+    wanted: FootPlacement, swing: FloatArray, offset: FloatArray, distance: FloatArray
+) -> FootPlacement:
+    """Feet moved by their corrections, on the floor where they stand.
+
+    Args:
+        wanted: (...) as the gait has them.
+        swing: (...) how far they have swung, -1 while they stand.
+        offset: (..., 3) x, y [m] and yaw [rad] to add.
+        distance: (...) by how much the whole step is corrected [m].
+    """
+    standing = swing < 0.0
+    up = np.where(standing, 0.0, smooth_step(swing / EASE) * smooth_step((1.0 - swing) / EASE))
+    flat = wanted.pitch - FLAT * np.tanh(wanted.pitch / FLAT)
+    return FootPlacement(
+        point=wanted.point + offset[..., :2],
+        yaw=wanted.yaw + offset[..., 2],
+        pitch=up * wanted.pitch + (1.0 - up) * flat,
+        roll=up * wanted.roll,
+        clearance=up * (np.maximum(wanted.clearance, 0.0) + LIFT * distance),
+    )
+
+
+def poses(feet: FootPlacement) -> FloatArray:
+    """(..., n, 3) x, y [m] and yaw [rad] of feet at n instants, the yaw continuous."""
+    found = np.empty((*feet.yaw.shape, 3))
+    found[..., :2], found[..., 2] = feet.point, np.unwrap(feet.yaw)
+    return found
+
+
+def put_in_place(wanted: FootPlacement, swing: FloatArray) -> FootPlacement:
+    """The feet of a whole walk: in every stance at the mean of where the gait has them.
+
+    In the first stance they are where they were at the start, in the last one where they come to rest.
+
+    Args:
+        wanted: (2, n) as the gait has them.
+        swing: (2, n) how far they have swung, -1 while they stand.
+    """
+    both = [_steps(path, share) for path, share in zip(poses(wanted), swing, strict=True)]
+    offset, distance = (np.array(values) for values in zip(*both, strict=True))
+    return corrected(wanted, swing, offset, distance)
+
+
+def _steps(path: FloatArray, swing: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Corrections (n, 3) of one foot, and by how much each step is corrected (n,) [m]."""
+    n, standing = len(swing), swing < 0.0
+    spans = list(pairwise(borders(standing)))
+    offset, distance = np.zeros((n, 3)), np.zeros(n)
+    for first, last in spans:
+        if standing[first]:
+            anchor = path[0] if first == 0 else path[-1] if last == n else path[first:last].mean(axis=0)
+            offset[first:last] = anchor - path[first:last]
+    for first, last in spans:
+        if not standing[first]:
+            before = offset[first - 1] if first else np.zeros(3)
+            after = offset[last] if last < n else np.zeros(3)
+            share = smooth_step(swing[first:last])[:, None]
+            offset[first:last] = (1.0 - share) * before + share * after
+            distance[first:last] = np.hypot(*(after - before)[:2])
+    return offset, distance
+
+
+def borders(values: FloatArray) -> list[int]:
+    """Where runs of equal values begin, and the number of values."""
+    return [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
