@@ -317,6 +317,28 @@ def test_bad_recordings_are_refused_in_one_line(walk):
         reconstruct(with_positions(walk, stretch))
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_however_little_is_seen_the_answer_is_a_motion_or_one_line(walk, seed):
+    """Random markers, a third to nearly all of their places hidden."""
+    rng = np.random.default_rng(seed)
+    part = walk.cut(0, 12)
+    hidden = rng.random(part.positions.shape[:2]) < rng.uniform(0.3, 0.85)
+    part = with_positions(part, lambda positions: positions.__setitem__(hidden, np.nan))
+    names = [n for n in part.marker_names if "SI" in n or rng.random() < 0.7]
+    refusal, found = "", None
+    try:
+        found = reconstruct(part.chosen(names))
+    except InputError as error:
+        refusal = str(error)
+    assert "\n" not in refusal
+    assert (found is None) == bool(refusal)
+    if found is None:
+        return
+    assert np.all(np.isfinite(found.q))
+    assert found.median < 0.02
+    assert np.all(np.isnan(found.residual) == np.isnan(found.targets.positions[..., 0]))
+
+
 # --- smoothing and motions ---------------------------------------------------------------------
 
 

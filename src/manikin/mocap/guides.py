@@ -106,10 +106,13 @@ def rise_when_flat(ankle: FloatArray, bone: FloatArray, ours: float) -> float:
         bone: (n, 3) from back to front [m].
         ours: Our foot's angle [rad].
     """
-    height = ankle[:, 2]
-    low = height <= np.nanpercentile(height, LOWEST_SHARE) + LOWEST
-    rise = np.arctan2(bone[:, 2], np.linalg.norm(bone[:, :2], axis=1))
-    found = float(np.nanmedian(rise[low]))
+    known = ~np.isnan(ankle[:, 2] + bone[:, 2])
+    if not known.any():
+        return ours
+    height, along = ankle[known, 2], bone[known]
+    low = height <= np.percentile(height, LOWEST_SHARE) + LOWEST
+    rise = np.arctan2(along[:, 2], np.linalg.norm(along[:, :2], axis=1))
+    found = float(np.median(rise[low]))
     return found if abs(found - ours) < OTHER_FOOT else ours
 
 

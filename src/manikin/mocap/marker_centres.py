@@ -140,7 +140,7 @@ def marker_centres(
                 end = np.full_like(outer, np.nan) if end is None else end
                 reach = 0.5 * widths[part] + radius
                 found[f"{side}_{part}"] = _hinge(outer, begin, end, axes[:, :, 1], sign, bend, reach)
-    return found
+    return {name: places for name, places in found.items() if not np.all(np.isnan(places[:, 0]))}
 
 
 def _hinge(
@@ -193,6 +193,8 @@ def _shoulders(marks: Mapping[str, FloatArray], subject: Subject, radius: float)
     if "left_shoulder" not in marks or "right_shoulder" not in marks:
         return {}
     left, right = marks["left_shoulder"], marks["right_shoulder"]
+    if np.all(np.isnan(left[:, 0] + right[:, 0])):
+        return {}
     depth = SHOULDER_SHARE * float(np.nanmedian(np.linalg.norm(left - right, axis=1)))
     if subject.shoulder_offset is not None:
         depth = subject.shoulder_offset + radius

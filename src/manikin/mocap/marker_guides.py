@@ -49,6 +49,8 @@ def placing_targets(
     guides: list[_Guide] = [(name, np.zeros(3), centres[name]) for name in names]
     weights = [1.0] * len(guides)
     up = _trunk_up(marks, centres)
+    if up is not None and not _seen(up + pelvis[:, :, 0]):
+        up = None
     pelvis = _aligned_pelvis(pelvis, up, centres)
     guides.append(("pelvis", np.array([0.0, 0.0, ARM]), middle(centres, "thigh") + ARM * pelvis[:, :, 2]))
     thorax = _thorax(recording, found, centres, pelvis, up)

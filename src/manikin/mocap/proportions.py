@@ -50,12 +50,14 @@ def segment_lengths(centres: Mapping[str, FloatArray]) -> dict[str, float]:
     lengths = {name: [apart(*pair) for pair in both] for name, both in pairs.items()}
     found = {name: float(np.nanmean(both)) for name, both in lengths.items() if not np.all(np.isnan(both))}
     if "hips" in found and "shoulders" in found:
-        found["trunk"] = _trunk(centres)
+        length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
+        if not np.all(np.isnan(length)):
+            found["trunk"] = _trunk(centres, length)
     return found
 
 
-def _trunk(centres: Mapping[str, FloatArray]) -> float:
-    length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
+def _trunk(centres: Mapping[str, FloatArray], length: FloatArray) -> float:
+    """Where it is extended and no arm is raised [m]."""
     upright = np.percentile(length[hanging_arms(centres)], UPRIGHT_SHARE)
     # Where arms hang in a crouch only, the trunk is never upright then.
     return float(max(upright, np.median(length[~np.isnan(length)])))
