@@ -405,8 +405,9 @@ def order(found: Sequence[Clip], all_walks: IdentifiedObjective, tempi: dict[str
     holding = [held(low, high, *both) for (_, low, high), both in zip(ratios, orders, strict=True)]
     texts = [f"{value:.2f} (95 %: {low:.2f} to {high:.2f})" for value, low, high in ratios]
     head = ORDER.format(
-        forward_ratio=texts[0], forward_held=holding[0], angular_ratio=texts[1], angular_held=holding[1], wins=better, count=len(walks),
-        p=binomtest(better, len(walks)).pvalue,
+        forward_ratio=texts[0], forward_held=holding[0],
+        angular_ratio=texts[1], angular_held=holding[1],
+        wins=better, count=len(walks), p=binomtest(better, len(walks)).pvalue,
     )  # fmt: skip
     turns = np.array([one.turns for one in found])
     lines = [*row("walks", "nearer at equal shares", "at the same instants", "sum of squares")]

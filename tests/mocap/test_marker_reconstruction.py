@@ -398,3 +398,11 @@ def test_recorded_people(recordings_folder, file, joints):
         ours = places(found.body, found.q, [segment])[:, 0]
         theirs = recording.marker(name)[found.first_frame :][: len(ours)]
         assert np.nanmedian(np.linalg.norm(ours - theirs, axis=1)) < 0.03, name
+
+
+def test_a_c3d_file_tells_of_its_person(recordings_folder):
+    """PROCESSING of Plug-in Gait, in millimetres: both knees 110 and 120, the shoulder's offset 50."""
+    folder = recordings_folder / "grf" / "btkdata"
+    found = read_recording(folder / "PiG_Motion-FlatFoot-One.c3d").subject
+    assert found == Subject(66.5, 1.79, pytest.approx(0.115), 0.07, 0.08, 0.05, None)
+    assert read_recording(folder / "Gait.c3d").subject == Subject()
