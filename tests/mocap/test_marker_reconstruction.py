@@ -1,6 +1,6 @@
 """Markers followed by our human: synthetic people with known joints, and real recordings."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from itertools import pairwise
 
 import numpy as np
@@ -404,5 +404,6 @@ def test_a_c3d_file_tells_of_its_person(recordings_folder):
     """PROCESSING of Plug-in Gait, in millimetres: both knees 110 and 120, the shoulder's offset 50."""
     folder = recordings_folder / "grf" / "btkdata"
     found = read_recording(folder / "PiG_Motion-FlatFoot-One.c3d").subject
-    assert found == Subject(66.5, 1.79, pytest.approx(0.115), 0.07, 0.08, 0.05, None)
+    assert found.marker_radius is None
+    assert astuple(found)[:6] == pytest.approx((66.5, 1.79, 0.115, 0.07, 0.08, 0.05))
     assert read_recording(folder / "Gait.c3d").subject == Subject()
