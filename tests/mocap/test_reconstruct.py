@@ -214,7 +214,9 @@ def test_targets_are_checked():
     points, seen, one = np.zeros((1, 3)), np.zeros((2, 1, 3)), np.ones(1)
     gap = seen.copy()
     gap[1, 0, 2] = np.nan
-    with pytest.raises(InputError, match="'a' is not seen in frame 1"):
+    assert np.all(np.isnan(Targets(("a",), ("pelvis",), points, gap, one).positions[1]))
+    gap[0, 0, 0] = np.nan
+    with pytest.raises(InputError, match="'a' is never seen"):
         Targets(("a",), ("pelvis",), points, gap, one)
     with pytest.raises(InputError, match="a segment for each"):
         Targets(("a",), (), points, seen, one)

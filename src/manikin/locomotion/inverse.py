@@ -11,17 +11,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from manikin.errors import InputError, SolverError
+from manikin.locomotion.model import to_world
 from manikin.locomotion.objective import TERMS, WalkObjective
 from manikin.locomotion.obstacles import Walker
 from manikin.locomotion.path import WalkingPath, WalkingTask
 from manikin.locomotion.programme import DEGREE, Programme
+from manikin.locomotion.recorded_walk import RecordedWalk
 from manikin.locomotion.solve import parameters_of, programme_of
-from manikin.spatial import FloatArray, frozen_array
+from manikin.spatial import FloatArray
 from manikin.spline import BSpline, basis_matrix
 
 IDENTIFIED = TERMS[1:]
@@ -39,45 +40,10 @@ _RANGE = (1e-3, 1e3)
 _WIDEST = 20.0
 """Half width of an interval of a logarithm that means nothing is known."""
 
+_SHARES = 101
+
 _EFFECT = 1e-6
 """Change of a place [m] for a change of a weight by its own size below which the weight has no effect."""
-
-
-@dataclass(frozen=True, eq=False)
-class RecordedWalk:
-    """A walk from rest to rest, recorded.
-
-    Attributes:
-        time: (n,) increasing, the walk starts at 0 [s].
-        place: (n, 3) x, y [m] and continuous heading [rad].
-        start: (3,) the place started from; if not given, the first recorded one.
-        goal: (3,) the place asked for, its heading within half a turn of the last one; if not given, that.
-    """
-
-    time: FloatArray
-    place: FloatArray
-    start: FloatArray
-    goal: FloatArray
-
-    def __init__(
-        self, time: ArrayLike, place: ArrayLike, start: ArrayLike | None = None, goal: ArrayLike | None = None
-    ) -> None:
-        instants = frozen_array(time, "recorded walk time [s]", (None,))
-        places = frozen_array(place, "recorded walk place [m, m, rad]", (len(instants), 3))
-        if len(instants) < 10 or np.any(np.diff(instants) <= 0) or instants[0] < 0.0:
-            raise InputError(
-                f"recorded walk has {len(instants)} instants from {instants.min(initial=np.inf):g} s; "
-                "valid: at least 10, increasing, none before 0 s"
-            )
-        ends = []
-        for name, value, default in (("start", start, places[0]), ("goal", goal, places[-1])):
-            end = np.array(frozen_array(default if value is None else value, f"recorded walk {name}", (3,)))
-            end[2] += 2.0 * np.pi * np.round((default[2] - end[2]) / (2.0 * np.pi))
-            ends.append(frozen_array(end, f"recorded walk {name}"))
-        if np.hypot(*(ends[1] - ends[0])[:2]) < 0.1:
-            raise InputError("recorded walk ends where it starts; valid: at least 0.1 m away")
-        for key, value in zip(("time", "place", "start", "goal"), (instants, places, *ends), strict=True):
-            object.__setattr__(self, key, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,11 +54,11 @@ class IdentifiedObjective:
         objective: With the identified weights; that of time is 1.
         low: (4,) lower ends of the confidence intervals, in the order of :data:`IDENTIFIED`.
         high: (4,) upper ends.
-        confidence: Of the intervals. They hold for errors that are independent from sample to sample; errors
-            of people are not, and their intervals are wider.
+        confidence: Of the intervals.
         correlation: (4, 4) of the logarithms of the weights.
         position_errors: (walks,) mean distance between recorded and optimal places at the same instants [m].
-        heading_errors: (walks,) root mean square [rad].
+        share_errors: (walks,) mean distance between them at equal shares of their durations [m].
+        heading_errors: (walks,) root mean square at the same instants [rad].
         paths: Optimal path of each walk.
         evaluations: Of the outer level.
     """
@@ -103,13 +69,18 @@ class IdentifiedObjective:
     confidence: float
     correlation: FloatArray
     position_errors: FloatArray
+    share_errors: FloatArray
     heading_errors: FloatArray
     paths: tuple[WalkingPath, ...]
     evaluations: int
 
 
 def identify_objective(
-    walks: Sequence[RecordedWalk], first: WalkObjective = FIRST_GUESS, *, confidence: float = 0.95
+    walks: Sequence[RecordedWalk],
+    first: WalkObjective = FIRST_GUESS,
+    *,
+    confidence: float = 0.95,
+    independent_samples: bool = True,
 ) -> IdentifiedObjective:
     """Find the weights under which the optimal paths are nearest to all recorded walks at once.
 
@@ -117,15 +88,24 @@ def identify_objective(
         walks: At least one; a single one leaves some weights vague, which the intervals show.
         first: Where to start, and the ``goal_fade`` that is kept.
         confidence: Of the intervals, between 0 and 1.
+        independent_samples: Whether the errors of one walk are independent from sample to sample, as noise
+            is. Those of people are not: their intervals are cluster-robust, only the walks are independent
+            (Liang and Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73
+            (1986)). That takes more than four walks.
 
     Raises:
-        InputError: If there is no walk, the confidence is not usable, or no walk depends on some weight.
+        InputError: If there is no walk, or too few, the confidence is not usable, or no walk depends on some
+            weight.
         SolverError: If a path cannot be optimised.
     """
     if not walks:
         raise InputError("no recorded walk to identify weights from; valid: at least one")
     if not 0.0 < confidence < 1.0:
         raise InputError(f"confidence is {confidence!r}; valid: between 0 and 1")
+    if not independent_samples and len(walks) <= len(IDENTIFIED):
+        raise InputError(
+            f"{len(walks)} recorded walks for intervals between walks; valid: more than {len(IDENTIFIED)}"
+        )
     fits = [_Fit(walk, first) for walk in walks]
     start = np.log(np.clip(first.weights[1:] / first.time, *_RANGE))
 
@@ -138,12 +118,11 @@ def identify_objective(
     _check_effects(slopes(start))
     exact: Any = slopes  # the stubs know names of difference rules only
     found = least_squares(residuals, start, exact, tuple(np.log(_RANGE)), xtol=1e-8, ftol=1e-10)
-    freedom = len(found.fun) - len(found.x)
-    covariance = np.linalg.pinv(found.jac.T @ found.jac) * (2.0 * found.cost / freedom)
-    error = np.sqrt(np.diag(covariance))
-    width = np.minimum(error * student.ppf(0.5 + confidence / 2.0, freedom), _WIDEST)
     objective = _objective(first, found.x)
     matches = [fit.at(objective) for fit in fits]
+    covariance, freedom = _covariance(matches, independent_samples)
+    error = np.sqrt(np.diag(covariance))
+    width = np.minimum(error * student.ppf(0.5 + confidence / 2.0, freedom), _WIDEST)
     return IdentifiedObjective(
         objective=objective,
         low=np.exp(found.x - width),
@@ -151,6 +130,7 @@ def identify_objective(
         confidence=confidence,
         correlation=covariance / np.maximum(np.outer(error, error), 1e-300),
         position_errors=np.array([one.position_error for one in matches]),
+        share_errors=share_errors(walks, [one.path for one in matches]),
         heading_errors=np.array([one.heading_error for one in matches]),
         paths=tuple(one.path for one in matches),
         evaluations=int(found.nfev),
@@ -179,9 +159,8 @@ class _Fit:
     """One recorded walk and its optimal path, which is kept to start the next one from."""
 
     def __init__(self, walk: RecordedWalk, first: WalkObjective) -> None:
-        zero = np.zeros(3)
         self._walk = walk
-        self._task = WalkingTask(walk.start, walk.goal, first, (), Walker(), 0.0, None, zero, zero)
+        self._task = task_of(walk, first)
         self._programme = programme_of(self._task)
         self._unknowns = _unknowns_of(walk, self._programme)
         self._match: _Match | None = None
@@ -220,16 +199,71 @@ class _Fit:
     def _place_slopes(self, path: WalkingPath) -> FloatArray:
         """(3 n, unknowns) slopes of the scaled places at the recorded instants over the unknowns."""
         share = np.minimum(self._walk.time / path.duration, 1.0)
-        basis = basis_matrix(DEGREE, path.spline.knots, share)[:, 2:-2]
+        whole = basis_matrix(DEGREE, path.spline.knots, share)
+        basis = whole[:, 2:-2]
         running = (self._walk.time < path.duration)[:, None]
         # The last unknown is the logarithm of the duration: a longer walk is at an earlier share of it.
         later = -np.where(running, share[:, None] * path.spline(share, 1), 0.0)
+        # The control points beside the ends follow from the velocities there, times the duration.
+        step = path.duration / (DEGREE * self._programme.structure.pieces)
+        task = path.task
+        rates = (
+            to_world(task.start[2], task.start_velocity),
+            to_world(task.goal[2], task.goal_velocity),
+        )
+        ends = step * (np.outer(whole[:, 1], rates[0]) - np.outer(whole[:, -2], rates[1]))
         count = basis.shape[1]
         slopes = np.zeros((len(share), 3, 3 * count + 1))
         for axis, scale in enumerate((1.0, 1.0, HEADING_LENGTH)):
             slopes[:, axis, axis * count : (axis + 1) * count] = scale * basis
-            slopes[:, axis, -1] = scale * later[:, axis]
+            slopes[:, axis, -1] = scale * (later[:, axis] + ends[:, axis])
         return slopes.reshape(3 * len(share), -1)
+
+
+def task_of(walk: RecordedWalk, objective: WalkObjective) -> WalkingTask:
+    """What was asked of a recorded walk."""
+    return WalkingTask(
+        walk.start, walk.goal, objective, (), Walker(), 0.0, None, walk.start_velocity, walk.goal_velocity
+    )
+
+
+def predicted(walks: Sequence[RecordedWalk], objective: WalkObjective) -> tuple[WalkingPath, ...]:
+    """Optimal paths of recorded walks under a given objective, searched from the recordings.
+
+    Raises:
+        SolverError: If a path cannot be optimised.
+    """
+    return tuple(_Fit(walk, objective).at(objective).path for walk in walks)
+
+
+def share_errors(walks: Sequence[RecordedWalk], paths: Sequence[WalkingPath]) -> FloatArray:
+    """(walks,) mean distance between recorded and predicted places at equal shares of their durations [m].
+
+    A walk against one predicted path, as [Truong2010]_ (4.8) measures walks against their mean.
+    """
+    return np.array([_share_error(path, walk) for path, walk in zip(paths, walks, strict=True)])
+
+
+def _share_error(path: WalkingPath, walk: RecordedWalk) -> float:
+    share = np.linspace(0.0, 1.0, _SHARES)
+    first, last = walk.time[0], walk.time[-1]
+    recorded = np.column_stack([
+        np.interp(first + share * (last - first), walk.time, walk.place[:, axis]) for axis in range(2)
+    ])  # fmt: skip
+    return float(np.hypot(*(path.place_at(share * path.duration)[:, :2] - recorded).T).mean())
+
+
+def _covariance(matches: Sequence[_Match], independent_samples: bool) -> tuple[FloatArray, int]:
+    """(4, 4) of the logarithms of the weights, and the degrees of freedom of their intervals."""
+    slopes = np.vstack([one.slopes for one in matches])
+    residuals = np.concatenate([one.residuals for one in matches])
+    bread = np.linalg.pinv(slopes.T @ slopes)
+    if independent_samples:
+        freedom = len(residuals) - slopes.shape[1]
+        return bread * (residuals @ residuals / freedom), freedom
+    scores = np.array([one.slopes.T @ one.residuals for one in matches])
+    freedom = len(matches) - slopes.shape[1]
+    return bread @ (scores.T @ scores) @ bread * (len(matches) / freedom), freedom
 
 
 def _check_effects(slopes: FloatArray) -> None:

@@ -142,7 +142,7 @@ class ShoulderPaths:
             cutoff: As a share of half the rate, between 0 and 1 [-].
         """
         sections = butter(2, cutoff, output="sos")
-        padding = min(9, len(self) - 1)
+        padding = min(max(9, int(np.ceil(2.0 / cutoff))), len(self) - 1)
         left, right = (sosfiltfilt(sections, p, axis=0, padlen=padding) for p in (self.left, self.right))
         return ShoulderPaths(left, right, self.rate)
 

@@ -1,7 +1,7 @@
 """Recorded human motion: readers, and the angles of hips and shoulders.
 
 Skeletons are read from BVH and from ASF with AMC, markers from C3D and TRC, force plates from C3D and MOT.
-:func:`reconstruct` makes a motion of our human of a skeleton's.
+:func:`reconstruct` makes a motion of our human of any of them.
 """
 
 from manikin.mocap.amc import read_amc
@@ -15,8 +15,11 @@ from manikin.mocap.gaps import Gap
 from manikin.mocap.markers import Event, MarkerRecording
 from manikin.mocap.mot import read_mot
 from manikin.mocap.read import read_recording
-from manikin.mocap.reconstruct import Reconstruction, reconstruct
+from manikin.mocap.reconstruct import person_of, reconstruct
+from manikin.mocap.reconstruction import Reconstruction
+from manikin.mocap.recorded_motion import motion_of, smoothed
 from manikin.mocap.recording import Recording
+from manikin.mocap.subject import Subject
 from manikin.mocap.targets import Targets
 from manikin.mocap.trc import read_trc
 
@@ -29,9 +32,12 @@ __all__ = [
     "Reconstruction",
     "Recording",
     "Skeleton",
+    "Subject",
     "Targets",
     "anatomy_of",
     "ball_joint_angles",
+    "motion_of",
+    "person_of",
     "read_amc",
     "read_asf",
     "read_bvh",
@@ -40,4 +46,5 @@ __all__ = [
     "read_recording",
     "read_trc",
     "reconstruct",
+    "smoothed",
 ]

@@ -17,6 +17,7 @@ from manikin.mocap.axes import metres_per, rotation_to_z_up
 from manikin.mocap.c3d_layout import C3dLayout, c3d_layout
 from manikin.mocap.force_plate import ForcePlate, wrench_at_world_origin
 from manikin.mocap.markers import Event, MarkerRecording, unique_names, without_unseen
+from manikin.mocap.subject import Subject
 from manikin.mocap.text import LARGEST
 from manikin.spatial import FloatArray
 
@@ -62,7 +63,7 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     return MarkerRecording(
         Path(path).name, names, without_unseen(positions), rate, start,
         _plates(found["data"]["platform"], layout, unit, turn, rate, start) if with_plates else (),
-        _events(parameters, layout),
+        _events(parameters, layout), _subject(parameters, unit),
     )  # fmt: skip
 
 
@@ -116,6 +117,29 @@ def _markers(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[tuple[st
     if not kept:
         raise layout.error("no point is a place", "at least one marker")
     return unique_names([labels[place] for place in kept]), kept
+
+
+def _subject(parameters: Mapping[str, Any], unit: float) -> Subject:
+    """Measures that Plug-in Gait leaves in ``PROCESSING``, in the unit of the points, means of both sides."""
+    given = {key.lower().replace(" ", ""): value for key, value in parameters.get("PROCESSING", {}).items()}
+
+    def measure(*names: str) -> float | None:
+        cells = [np.ravel(given[name].get("value", [])) for name in names if name in given]
+        found = [float(cell[0]) for cell in cells if cell.size and np.issubdtype(cell.dtype, np.number)]
+        found = [value for value in found if 0.0 < value < LARGEST]
+        return float(np.mean(found)) if found else None
+
+    def length(*names: str) -> float | None:
+        found = measure(*names)
+        return None if found is None else unit * found
+
+    diameter = length("markerdiameter")
+    offset = length("lshoulderoffset", "rshoulderoffset")
+    return Subject(
+        measure("bodymass"), length("height"), length("lkneewidth", "rkneewidth"),
+        length("lanklewidth", "ranklewidth"), length("lelbowwidth", "relbowwidth"), offset,
+        None if diameter is None else 0.5 * diameter,
+    )  # fmt: skip
 
 
 def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ...]:

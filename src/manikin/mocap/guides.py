@@ -84,7 +84,8 @@ def guides(
                 length = float(np.median(np.linalg.norm(bone, axis=1)))
                 direction = np.array([0.0, 0.0, -1.0])
                 if segment.endswith("foot"):
-                    rise = _rise_when_flat(body, side, centres[segment], bone)
+                    toes = body.segment(f"{side}_toes").origin
+                    rise = rise_when_flat(centres[segment], bone, float(np.arctan2(toes[2], toes[0])))
                     direction = np.array([np.cos(rise), 0.0, np.sin(rise)])
                 found.append((segment, length * direction, far))
     segments = tuple(segment for segment, _, _ in found)
@@ -94,17 +95,23 @@ def guides(
     )  # fmt: skip
 
 
-def _rise_when_flat(body: BodyModel, side: str, ankle: FloatArray, bone: FloatArray) -> float:
+def rise_when_flat(ankle: FloatArray, bone: FloatArray, ours: float) -> float:
     """Angle above the horizontal of a recorded foot's bone when the sole is flat [rad].
 
     The sole is taken to be flat where the ankle is lowest. An angle that is far from our foot's says
     that it never is (crawling, lying), and ours is taken.
+
+    Args:
+        ankle: (n, 3) [m]; frames that are NaN are left out.
+        bone: (n, 3) from back to front [m].
+        ours: Our foot's angle [rad].
     """
-    toes = body.segment(f"{side}_toes").origin
-    ours = float(np.arctan2(toes[2], toes[0]))
-    height = ankle[:, 2]
+    known = ~np.isnan(ankle[:, 2] + bone[:, 2])
+    if not known.any():
+        return ours
+    height, along = ankle[known, 2], bone[known]
     low = height <= np.percentile(height, LOWEST_SHARE) + LOWEST
-    rise = np.arctan2(bone[:, 2], np.linalg.norm(bone[:, :2], axis=1))
+    rise = np.arctan2(along[:, 2], np.linalg.norm(along[:, :2], axis=1))
     found = float(np.median(rise[low]))
     return found if abs(found - ours) < OTHER_FOOT else ours
 

@@ -58,24 +58,27 @@ class InverseKinematics:
 
         Args:
             start: (nq,) posture within the limits.
-            wanted: (k, 3) places of the targets [m].
+            wanted: (k, 3) places of the targets [m]; NaN where one is not seen.
 
         Returns:
             (nq,) posture and its cost [m^2].
         """
         q, damping = np.array(start), 1e-6
         self._held = (REST**2 * self._rest + STEADY**2 * q[7:]) / _HOLD
+        seen = ~np.isnan(wanted[:, 0])
+        wanted = np.where(seen[:, None], wanted, 0.0)
+        weights = self._points.weights * seen
         error = self.places(q) - wanted
-        cost = self._cost(q, error)
+        cost = self._cost(q, error, weights)
         for _ in range(MOST_STEPS):
             if cost < LEAST_COST:
                 break
-            gradient, hessian = self._system(q, error)
+            gradient, hessian = self._system(q, error, weights)
             before = cost
             while damping < 1e3:
                 trial = self._moved(q, gradient, hessian, damping)
                 trial_error = self.places(trial) - wanted
-                trial_cost = self._cost(trial, trial_error)
+                trial_cost = self._cost(trial, trial_error, weights)
                 if trial_cost < cost:
                     q, error, cost, damping = trial, trial_error, trial_cost, max(0.1 * damping, 1e-8)
                     break
@@ -92,17 +95,17 @@ class InverseKinematics:
         shifts = np.array([frame.translation for frame in frames])
         return shifts + np.einsum("kij,kj->ki", turns, self._points.local)
 
-    def _cost(self, q: FloatArray, error: FloatArray) -> float:
+    def _cost(self, q: FloatArray, error: FloatArray, weights: FloatArray) -> float:
         away = q[7:] - self._held
-        return float(self._points.weights @ np.sum(error * error, axis=1) + _HOLD * away @ away)
+        return float(weights @ np.sum(error * error, axis=1) + _HOLD * away @ away)
 
-    def _system(self, q: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _system(self, q: FloatArray, error: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Gradient (nv,) and Gauss-Newton matrix (nv, nv) of half the cost."""
         places = self.places(q)
         columns: Any = pin.computeJointJacobians(self._model, self._data, q)
         linear, angular = columns[:3].T, columns[3:].T
         velocities = (linear + np.cross(angular, places[:, None])) * self._points.moved[..., None]
-        root = np.sqrt(self._points.weights)[:, None]
+        root = np.sqrt(weights)[:, None]
         jacobian = (velocities * root[..., None]).transpose(0, 2, 1).reshape(-1, self._model.nv)
         gradient, hessian = jacobian.T @ (error * root).ravel(), jacobian.T @ jacobian
         gradient[6:] += _HOLD * (q[7:] - self._held)

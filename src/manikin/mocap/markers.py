@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from manikin.errors import InputError
 from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.gaps import LONGEST_GAP, Gap, filled, gaps_of
+from manikin.mocap.subject import UNKNOWN, Subject
 from manikin.spatial import FloatArray, finite_number, frozen_array
 
 
@@ -40,6 +41,7 @@ class MarkerRecording:
         start: Instant of the first frame on the recording's clock [s].
         plates: Force plates, on the same clock.
         events: In the order of time.
+        subject: What the file says about the person.
     """
 
     name: str
@@ -49,6 +51,7 @@ class MarkerRecording:
     start: float = 0.0
     plates: tuple[ForcePlate, ...] = ()
     events: tuple[Event, ...] = ()
+    subject: Subject = UNKNOWN
 
     def __post_init__(self) -> None:
         where = f"recording {self.name!r}"

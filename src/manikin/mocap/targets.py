@@ -19,7 +19,7 @@ class Targets:
         names: (k,) names of the points, for messages and reports.
         segments: (k,) the body's segment that carries each point.
         points: (k, 3) the points in the frames of their segments [m].
-        positions: (n, k, 3) where they were recorded, in the world [m].
+        positions: (n, k, 3) where they were recorded, in the world [m]; NaN where one was not seen.
         weights: (k,) how much each counts in the sum of squares.
     """
 
@@ -30,14 +30,18 @@ class Targets:
     weights: FloatArray
 
     def __post_init__(self) -> None:
-        k, places = len(self.names), np.asarray(self.positions, dtype=np.float64)
+        k, places = len(self.names), np.array(self.positions, dtype=np.float64)
         if k == 0 or len(self.segments) != k:
             raise InputError(f"{k} targets on {len(self.segments)} segments; valid: a segment for each")
-        if places.ndim == 3 and places.shape[1:] == (k, 3) and not np.all(np.isfinite(places)):
-            frame, point = np.argwhere(~np.isfinite(places))[0, :2]
-            raise InputError(f"target {self.names[point]!r} is not seen in frame {frame}; valid: no gap")
+        if places.ndim != 3 or places.shape[1:] != (k, 3) or np.any(np.isinf(places)):
+            raise InputError(f"target positions have shape {places.shape}; valid: (n, {k}, 3), not infinite")
+        places[np.any(np.isnan(places), axis=2)] = np.nan
+        never = np.flatnonzero(np.all(np.isnan(places[..., 0]), axis=0))
+        if never.size:
+            raise InputError(f"target {self.names[never[0]]!r} is never seen; valid: in at least one frame")
+        places.setflags(write=False)
         object.__setattr__(self, "points", frozen_array(self.points, "target points", (k, 3)))
-        object.__setattr__(self, "positions", frozen_array(places, "target positions", (None, k, 3)))
+        object.__setattr__(self, "positions", places)
         object.__setattr__(self, "weights", frozen_array(self.weights, "target weights", (k,)))
         if np.any(self.weights <= 0.0):
             raise InputError("a target weighs nothing or less; valid: above 0")

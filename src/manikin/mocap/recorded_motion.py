@@ -1,0 +1,94 @@
+"""A reconstruction without the noise of its recording, and with velocities and accelerations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+from scipy.signal import butter, sosfiltfilt
+
+from manikin.errors import InputError
+from manikin.mocap.inverse_kinematics import InverseKinematics
+from manikin.mocap.reconstruction import Reconstruction
+from manikin.motion.motion import Motion
+from manikin.spatial import FloatArray, finite_number
+
+CUTOFF = 6.0
+"""Frequency above which a walk has little but noise [Hz] (Winter, Biomechanics and Motor Control, 2.2.4)."""
+
+FEWEST_FRAMES = 4
+
+
+def smoothed(found: Reconstruction, cutoff: float = CUTOFF) -> Reconstruction:
+    """The same without fast changes: Butterworth of second order, forward and backward, so without delay.
+
+    Filtered are place, hinges, and the turn of the pelvis as a quaternion of continuous sign, set to length 1
+    again; hinges are kept to their limits. Residuals are those of the filtered postures.
+
+    Args:
+        found: At least four instants at an even rate.
+        cutoff: Where each of the two passes halves the power [Hz].
+
+    Raises:
+        InputError: If there are too few instants, or the cutoff is not below half their rate.
+    """
+    rate = _rate(found)
+    finite_number(cutoff, "cutoff [Hz]", above=0.0)
+    if cutoff >= 0.5 * rate:
+        raise InputError(f"cutoff is {cutoff:g} Hz; valid: below half the rate, {0.5 * rate:g} Hz")
+    sections = butter(2, cutoff, fs=rate, output="sos")
+    q = np.array(found.q)
+    flips = np.cumprod(np.where(np.sum(q[1:, 3:7] * q[:-1, 3:7], axis=1) < 0.0, -1.0, 1.0))
+    q[1:, 3:7] *= flips[:, None]
+    padding = min(len(q) - 1, int(np.ceil(2.0 * rate / cutoff)))
+    q = sosfiltfilt(sections, q, axis=0, padlen=padding)
+    q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+    q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
+    places = InverseKinematics(found.body, found.targets).places
+    residual = [
+        np.linalg.norm(places(one) - there, axis=1)
+        for one, there in zip(q, found.targets.positions, strict=True)
+    ]
+    return replace(found, q=q, residual=np.array(residual))
+
+
+def motion_of(found: Reconstruction, cutoff: float | None = CUTOFF) -> Motion:
+    """A motion of the recorded postures, smoothed, with velocities and accelerations by central differences.
+
+    Differences are taken on the configuration space: the pelvis' parts are in its own frame. Contacts and
+    forces are not known of a recording: there are none, and ``tau`` and ``margin`` are NaN.
+
+    Args:
+        found: At least four instants at an even rate.
+        cutoff: Of :func:`smoothed` [Hz]; None for the postures as they are.
+
+    Raises:
+        InputError: As :func:`smoothed`.
+    """
+    rate = _rate(found)
+    q = found.q if cutoff is None else smoothed(found, cutoff).q
+    v = _velocities(found, q) * rate
+    a = np.gradient(v, 1.0 / rate, axis=0, edge_order=2)
+    model, data, n = found.body.pinocchio, found.body.pinocchio.createData(), len(q)
+    com, spin = np.empty((n, 3)), np.empty((n, 3))
+    for frame in range(n):
+        momentum = pin.computeCentroidalMomentum(model, data, q[frame], v[frame])
+        com[frame], spin[frame] = data.com[0], momentum.angular
+    return Motion(
+        time=found.time, q=q, v=v, a=a, tau=np.full_like(v, np.nan), com=com, angular_momentum=spin,
+        margin=np.full(n, np.nan), support=np.zeros((n, 0), dtype=bool), contact_force=np.zeros((n, 0, 6)),
+        contact_names=(), joint_names=tuple(found.body.joint_names),
+    )  # fmt: skip
+
+
+def _velocities(found: Reconstruction, q: FloatArray) -> FloatArray:
+    """(n, nv) change per frame; at both ends the one that continues the line of the next two."""
+    model = found.body.pinocchio
+    inner = [0.5 * pin.difference(model, before, after) for before, after in zip(q[:-2], q[2:], strict=True)]
+    first, last = pin.difference(model, q[0], q[1]), pin.difference(model, q[-2], q[-1])
+    return np.vstack([2.0 * first - inner[0], inner, 2.0 * last - inner[-1]])
+
+
+def _rate(found: Reconstruction) -> float:
+    if len(found.time) < FEWEST_FRAMES:
+        raise InputError(f"reconstruction has {len(found.time)} instants; valid: at least {FEWEST_FRAMES}")
+    return (len(found.time) - 1) / float(found.time[-1] - found.time[0])
