@@ -5,6 +5,7 @@
     DIR/scenario.yaml      the scenario with every default and override, ready to run again
     DIR/stages/*.json      what each stage found, written as soon as it is known
     DIR/motion.h5          planned motion, then planned and executed (manikin.motion.file)
+    DIR/motion-NAME.h5     planned motion of somebody else who walks there
     DIR/summary.json       written when every stage is done
     DIR/motion.bvh         drawn from the files above, for animation programs
     DIR/figures/*.png      drawn from the files above
@@ -27,9 +28,15 @@ from manikin.errors import MotionFileError
 SCENARIO = "scenario.yaml"
 MOTION = "motion.h5"
 BVH = "motion.bvh"
+OTHERS = "motion-*.h5"
 SUMMARY = "summary.json"
 FIGURES = "figures"
 STAGES = "stages"
+
+
+def other_motion(name: str) -> str:
+    """File of the motion of somebody else who walks there."""
+    return OTHERS.replace("*", name)
 
 
 class RunDirectory:
@@ -101,7 +108,7 @@ class RunDirectory:
         for name in (SUMMARY, MOTION, BVH):
             (self.path / name).unlink(missing_ok=True)
         # What a killed run was about to write stays behind as a hidden .NAME.*.tmp file.
-        for pattern in (f"{STAGES}/*.json", f"{FIGURES}/*.png", ".*.tmp", "*/.*.tmp"):
+        for pattern in (f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS, ".*.tmp", "*/.*.tmp"):
             for file in self.path.glob(pattern):
                 file.unlink()
 

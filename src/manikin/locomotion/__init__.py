@@ -1,7 +1,9 @@
 """How people walk: paths by optimal control, segments of walks ([Truong2010]_ chapters 4 and 5)."""
 
+from manikin.locomotion.controller import WalkController, WalkFrame
 from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
 from manikin.locomotion.floor_plan import floor_plan
+from manikin.locomotion.follow import Walk, walk_along
 from manikin.locomotion.objective import LITERAL_ORDER, PROSE_ORDER, WalkObjective
 from manikin.locomotion.obstacles import Walker, WalkObstacle
 from manikin.locomotion.path import WalkingPath, WalkingResiduals, WalkingTask, walked
@@ -37,6 +39,9 @@ __all__ = [
     "PathSegments",
     "SegmentationRule",
     "ShoulderPaths",
+    "Walk",
+    "WalkController",
+    "WalkFrame",
     "WalkObjective",
     "WalkObstacle",
     "WalkRoute",
@@ -50,6 +55,7 @@ __all__ = [
     "holonomic_ends",
     "path_deviation",
     "segment_path",
+    "walk_along",
     "walked",
     "walking_path",
     "walking_paths",

@@ -13,6 +13,7 @@ from manikin.locomotion.gait import Gait
 from manikin.locomotion.library import MotionLibrary, reference_body
 from manikin.locomotion.library_file import load_library
 from manikin.locomotion.path import WalkingPath
+from manikin.locomotion.route import WalkRoute
 from manikin.locomotion.slide import stance_slides
 from manikin.locomotion.stance_foot import Legs, put_in_place
 from manikin.mocap.anatomy import SIDES
@@ -54,6 +55,11 @@ class Walk:
     slides_before: FloatArray
     slides: FloatArray
 
+    @property
+    def feet(self) -> tuple[str, ...]:
+        """Effectors that walk, in the order of ``support``."""
+        return tuple(f"{side}_foot" for side in SIDES)
+
     @cached_property
     def motion(self) -> Motion:
         """With velocities, centre of mass and angular momentum; torques, forces and margin are not known (NaN)."""
@@ -71,13 +77,13 @@ class Walk:
         return Motion(
             time=self.time, q=self.q, v=v, a=np.gradient(v, dt, axis=0), tau=tau, com=com,
             angular_momentum=momentum, margin=np.full(n, np.nan), support=self.support,
-            contact_force=np.full((n, 2, 6), np.nan), contact_names=tuple(f"{side}_foot" for side in SIDES),
+            contact_force=np.full((n, 2, 6), np.nan), contact_names=self.feet,
             joint_names=body.joint_names,
         )  # fmt: skip
 
 
 def walk_along(
-    path: WalkingPath,
+    path: WalkingPath | WalkRoute,
     body: BodyModel | None = None,
     library: MotionLibrary | None = None,
     *,
@@ -90,7 +96,7 @@ def walk_along(
     is finished and the body stands.
 
     Args:
-        path: A result of :func:`manikin.locomotion.walking_path`.
+        path: A result of :func:`manikin.locomotion.walking_path` or :func:`manikin.locomotion.walking_route`.
         body: A human; that of the library if omitted.
         library: Cycles; those that come with this package if omitted.
         rate: Frames per second [Hz], 20 to 1000.
@@ -98,8 +104,8 @@ def walk_along(
     Raises:
         InputError: If the path is none, failed, or the rate is not usable.
     """
-    if not isinstance(path, WalkingPath):
-        raise InputError(f"path to walk is a {type(path).__name__}; valid: a WalkingPath")
+    if not isinstance(path, WalkingPath | WalkRoute):
+        raise InputError(f"path to walk is a {type(path).__name__}; valid: a WalkingPath or a WalkRoute")
     if not path.succeeded:
         raise InputError(f"path to walk is none: {path.failure}; valid: one that succeeded")
     rate = finite_number(rate, "walking rate [Hz]", at_least=20.0, at_most=1000.0)

@@ -9,7 +9,7 @@ from typing import Any
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
-from manikin.output import MOTION, RunDirectory
+from manikin.output import MOTION, RunDirectory, other_motion
 from manikin.scenarios import Scenario
 from manikin.stages.context import RunContext
 
@@ -72,7 +72,7 @@ class Report:
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
             "succeeded": False, "failure": None,
             "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None,
-            "push": None,
+            "push": None, "walk": None,
             "wall_s": 0.0,
         }  # fmt: skip
 
@@ -115,6 +115,12 @@ class Report:
             body, scene = self._context.body, self._context.scene
             content = MotionFile(planned, executed, body, scene, schedule)
             write_motions(self._directory.path / MOTION, content)
+
+    def keep_other(self, name: str, schedule: ContactSchedule, planned: Motion) -> None:
+        """Keep the motion of somebody else, who has the same body."""
+        if self._directory is not None:
+            content = MotionFile(planned, None, self._context.body, self._context.scene, schedule)
+            write_motions(self._directory.path / other_motion(name), content)
 
     def close(self) -> dict[str, Any]:
         """Complete the summary, write it and return it."""

@@ -3,6 +3,7 @@
 import math
 import time as clock
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,19 +11,25 @@ from manikin.errors import InputError
 from manikin.locomotion import (
     LITERAL_ORDER,
     PROSE_ORDER,
+    Walk,
     Walker,
     WalkObjective,
     WalkObstacle,
     WalkRoute,
     Waypoint,
     floor_plan,
+    walk_along,
     walking_route,
 )
+from manikin.locomotion.obstacles import clearance
+from manikin.motion import Motion
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections import StandSection, WalkingSection, WaypointSection
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.spatial import FloatArray
 from manikin.stages.context import RunContext
+from manikin.stages.report import Report
+from manikin.stages.walked_motion import walked_motion
 
 STAGE = "walk"
 
@@ -46,6 +53,37 @@ class PlannedWalks:
     wall_s: float
 
 
+def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
+    """Find the ways of all who walk in a scenario, and walk them; None where there is no way.
+
+    Args:
+        context: Of a scenario with a ``walking`` section.
+        report: Takes the ``walk`` block, and the failure where there is no way.
+    """
+    plan = plan_walks(context)
+    report.progress(STAGE, 0.5)
+    height, block = context.scene.floor_height or 0.0, _path_block(plan)
+    for name, route in plan.others.items():
+        if not route.succeeded:
+            report.fail(STAGE, f"way of {name}: {route.failure}", where=name)
+    if not plan.route.succeeded:
+        report.fail(STAGE, plan.route.failure or "", plan.route.begins[-1], "way of the body")
+    if report.failure is not None:
+        report.finish(STAGE, block)
+        return None
+    began = clock.perf_counter()
+    walk = walk_along(plan.route, context.body)
+    block |= _walk_block(walk, clock.perf_counter() - began)
+    schedule, motion = walked_motion(walk, height)
+    report.finish(STAGE, block | _balance_block(motion))
+    report.keep_motions(schedule, motion)
+    for number, (name, route) in enumerate(plan.others.items()):
+        report.keep_other(name, *walked_motion(walk_along(route, context.body), height))
+        report.progress(STAGE, 0.6 + 0.4 * (number + 1) / len(plan.others))
+    report.progress(STAGE, 1.0)
+    return motion
+
+
 def plan_walks(context: RunContext) -> PlannedWalks:
     """Find a way for everyone, each around those before.
 
@@ -57,7 +95,7 @@ def plan_walks(context: RunContext) -> PlannedWalks:
     """
     scenario, section = context.scenario, _section(context.scenario)
     try:
-        standing = floor_plan(context.scene, context.body.stature)
+        standing = floor_plan(context.scene, context.body.stature or 2.0)
     except InputError as error:
         raise scenario.refused(("scene",), error) from None
     objective, radius = OBJECTIVES[section.weights], Walker().width / 2
@@ -117,3 +155,49 @@ def _place(stand: StandSection) -> FloatArray:
 
 def _waypoint(section: WaypointSection) -> Waypoint:
     return Waypoint(_place(section), section.speed_m_s, section.wait_s)
+
+
+def _path_block(plan: PlannedWalks) -> dict[str, Any]:
+    route, forward, left = plan.route, *np.abs(plan.route.velocity[:, :2]).max(axis=0)
+    return {
+        "duration_s": route.duration,
+        "path_length_m": route.length,
+        "cost": route.cost,
+        "max_forward_mps": float(forward),
+        "max_left_mps": float(left),
+        "segments": [
+            {"kind": one.kind, "start_s": one.start, "end_s": one.end} for one in route.segments().segments
+        ],
+        "min_room_m": _room(plan),
+        "others": {
+            name: {"duration_s": other.duration, "path_length_m": other.length}
+            for name, other in plan.others.items()
+        },
+        "path_wall_ms": 1e3 * plan.wall_s,
+    }
+
+
+def _room(plan: PlannedWalks) -> float | None:
+    """Least distance of the walker's discs from anything [m], measured densely; None where nothing is."""
+    room = clearance(plan.obstacles, Walker(), plan.route.place, plan.route.time)
+    return float(room.min()) if room.size else None
+
+
+def _walk_block(walk: Walk, wall: float) -> dict[str, Any]:
+    return {
+        "steps": int(np.sum(np.diff(walk.support.astype(np.int64), axis=0) == 1)),
+        "max_stance_slide_m": float(walk.slides.max(initial=0.0)),
+        "max_stance_slide_before_m": float(walk.slides_before.max(initial=0.0)),
+        "outside_library_share": float(np.mean(walk.outside)),
+        "motion_wall_ms": 1e3 * wall,
+    }
+
+
+def _balance_block(motion: Motion) -> dict[str, Any]:
+    over = np.abs(motion.tau[:, :6])
+    return {
+        "min_margin": float(motion.margin.min()),
+        "margin_unit": motion.margin_unit,
+        "balanced_share": float(np.mean(motion.margin >= 0.0)),
+        "max_missing_force_N": float(over[:, :3].max()),
+    }

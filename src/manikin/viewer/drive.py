@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from manikin.scene import Scene
 from manikin.spatial import FloatArray
 from manikin.viewer.page import Page
 from manikin.viewer.stage import COLOURS, BodyShapes, add_scene, look_at
+
+if TYPE_CHECKING:
+    from viser._messages import HotkeyKey
 
 FRAME_RATE = 60.0
 """Pictures per second."""
@@ -31,7 +35,7 @@ class Key:
         change: Of forward, left [m/s] and angular velocity [rad/s]; zeros to go straight on, None to stop.
     """
 
-    hotkey: str
+    hotkey: "HotkeyKey"
     label: str
     change: tuple[float, float, float] | None
 

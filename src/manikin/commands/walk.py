@@ -1,0 +1,120 @@
+"""``manikin walk``: the way a person walks to a place, with the whole body; or steer somebody with the keys."""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from manikin.commands.console import DONE, FAILED, JsonOption, print_json, print_table, refuse
+from manikin.commands.job import print_ending, run_job
+from manikin.errors import InputError
+
+SHOWN = (
+    "duration_s", "path_length_m", "cost", "max_forward_mps", "max_left_mps", "steps", "max_stance_slide_m",
+    "min_room_m", "path_wall_ms", "motion_wall_ms",
+)  # fmt: skip
+"""What people are told about a walk; everything is in the JSON."""
+
+Place = tuple[float, float, float]
+
+
+def walk(
+    context: typer.Context,
+    to: Annotated[
+        Place | None,
+        typer.Option(metavar="X Y HEADING_DEG", help="Goal [m, m, deg, counter-clockwise from x]."),
+    ] = None,
+    start: Annotated[
+        Place, typer.Option("--from", metavar="X Y HEADING_DEG", help="Start [m, m, deg].")
+    ] = (0.0, 0.0, 0.0),
+    scene: Annotated[
+        str | None,
+        typer.Option("--in", metavar="NAME|FILE.yaml", help="Scenario whose obstacles stand in the way."),
+    ] = None,
+    max_speed: Annotated[
+        float | None, typer.Option(metavar="M/S", help="Limit of the speed. Default: 1.6.")
+    ] = None,
+    weights: Annotated[
+        str | None,
+        typer.Option(metavar="prose|literal", help="Reading of the thesis' weights. Default: prose."),
+    ] = None,
+    stature: Annotated[float, typer.Option(metavar="M", help="Stature [m].")] = 1.75,
+    mass: Annotated[float, typer.Option(metavar="KG", help="Mass [kg].")] = 70.0,
+    sex: Annotated[str, typer.Option(metavar="male|female", help="Sex.")] = "male",
+    drive: Annotated[
+        bool, typer.Option("--drive", help="Steer a walker in the browser with keys and sliders instead.")
+    ] = False,
+    port: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=0, max=65535, help="With --drive: port; 0 picks a free one."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Run directory. Default: one in runs; none with --json."),
+    ] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the figures into the directory.")] = True,
+    json: JsonOption = False,
+) -> int:
+    """Walk to a place as people do: path by optimal control, whole body from recorded walks."""
+    body: dict[str, Any] = {"model": "human", "stature_m": stature, "mass_kg": mass, "sex": sex}
+    if drive:
+        given: dict[str, Any] = {
+            "--to": to, "--max-speed": max_speed, "--weights": weights, "--out": out, "--json": json or None,
+        }  # fmt: skip
+        for option, value in given.items():
+            refuse(value is not None, option, "it does not go with --drive")
+        return _drive(body, start, scene, 8080 if port is None else port)
+    refuse(port is not None, "--port", "it is for --drive")
+    if to is None:
+        raise InputError("--to is missing; valid: X Y HEADING_DEG, or --drive")
+    from manikin.scenarios import load_scenario
+    from manikin.scenarios.scenario import Scenario
+    from manikin.scenarios.schema import ScenarioFile
+    from manikin.scenarios.validation import validate
+
+    name = "walk-to-" + "-".join(f"{value:g}" for value in to)
+    section = {"max_speed_m_s": max_speed, "weights": weights}
+    data: dict[str, Any] = {
+        "name": name,
+        "body": body,
+        "walking": {key: value for key, value in section.items() if value is not None},
+        "task": {"start": _state(start), "goal": _state(to)},
+    }
+    folder = Path()
+    if scene is not None:
+        around = load_scenario(scene)
+        kept = around.file.model_dump(mode="json", exclude_none=True)
+        data |= {"scene": kept["scene"], "floor_height_m": around.file.floor_height_m}
+        folder = around.folder
+    job = Scenario(validate(ScenarioFile, data, "manikin walk"), "manikin walk", folder, {})
+    directory = out if out is not None else None if json else Path("runs") / name
+    summary = run_job(job, directory, context.obj, draw=figures)
+    if json:
+        print_json(summary)
+    else:
+        print_table({key: summary["walk"].get(key) for key in SHOWN})
+        print_ending(summary, directory)
+    return DONE if summary["succeeded"] else FAILED
+
+
+def _state(place: Place) -> dict[str, Any]:
+    return {"at": list(place[:2]), "heading_deg": place[2]}
+
+
+def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> int:
+    """Serve the page until Ctrl-C."""
+    from manikin.body import human
+    from manikin.locomotion import WalkController
+    from manikin.scenarios import load_scenario
+    from manikin.viewer import serve_drive
+
+    person = human(body["stature_m"], body["mass_kg"], body["sex"])
+    around = None if scene is None else load_scenario(scene).build_scene()
+    place = (start[0], start[1], math.radians(start[2]))
+    serve_drive(WalkController(person, place=place), around, port, _announce)
+    return DONE
+
+
+def _announce(url: str) -> None:
+    typer.echo(f"viewer at {url} (Ctrl-C ends it)", err=True)
