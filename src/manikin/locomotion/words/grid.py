@@ -71,9 +71,8 @@ class WordGrid:
         return {"x_m": list(self.x), "y_m": list(self.y), "step_m": self.step}
 
     def _nodes(self, low: float, high: float) -> FloatArray:
-        return np.round(
-            low + self.step * np.arange(1.0 * int(np.floor((high - low) / self.step + 1e-9)) + 1), 9
-        )
+        count = int(np.floor((high - low) / self.step + 1e-9)) + 1
+        return np.round(low + self.step * np.arange(float(count)), 9)
 
 
 THESIS_GRID = WordGrid()

@@ -83,7 +83,7 @@ class WordSlice:
         return float(max(np.max(np.abs(part)) for part in parts))
 
     def jumps(self) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-        """Pairs of neighbours (row, column) whose paths are of two branches: one does not bend into the other.
+        """Pairs of neighbours (row, column) whose paths are of two branches: none bends into the other.
 
         The path of either is bent to the other's goal; if it costs more there than the path that was found
         for it, there is a goal between them with two best paths.

@@ -186,16 +186,16 @@ def _step(
     system[:, index, index] += damping[:, None] * own
     system[:, :n, n] = system[:, n, :n] = normal
     right = np.concatenate([-values.gradient, -values.q[:, None]], axis=1)
-    solved = np.linalg.solve(system, right[..., None])[..., 0]
+    solved = np.asarray(np.linalg.solve(system, right[..., None])[..., 0], np.float64)
     step = np.concatenate([np.zeros((size, 1)), solved[:, :n]], axis=1)
     # Coefficients of higher degrees bend less: compare gradients in the measure of the cost itself.
     rest = np.abs(values.gradient + now[:, None] * normal)
-    residual = np.max(rest / np.sqrt(own), axis=1) / np.sqrt(values.cost)
+    residual: FloatArray = np.max(rest / np.sqrt(own), axis=1) / np.sqrt(values.cost)
     return step, solved[:, n], residual, hessian
 
 
 def _hessian(goals: Goals, b: FloatArray, multiplier: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(k, n, n) Hessian of the Lagrangian by the free coefficients, and (k, n) that of the cost at fixed p."""
+    """(k, n, n) Hessian of the Lagrangian by the free coefficients; (k, n) that of the cost at fixed p."""
     size, degree = b.shape
     cosine, sine = _integrals(goals, b)
     weights = squares(degree)
@@ -240,9 +240,7 @@ def _only(values: _Values, index: NDArray[np.bool_]) -> _Values:
 def _either(better: NDArray[np.bool_], one: _Values, other: _Values) -> _Values:
     """One where it is better, and else the other."""
     parts = {name: (getattr(one, name), getattr(other, name)) for name in one.__dataclass_fields__}
-    return replace(
-        one,
-        **{
-            name: np.where(better if a.ndim == 1 else better[:, None], a, b) for name, (a, b) in parts.items()
-        },
-    )
+    chosen = {
+        name: np.where(better if a.ndim == 1 else better[:, None], a, b) for name, (a, b) in parts.items()
+    }
+    return replace(one, **chosen)
