@@ -21,6 +21,7 @@ from manikin.figures.walking import walking_paths_figure
 from manikin.figures.words import equal_paths_figure, words_figure
 from manikin.figures.write import COMPARISONS, FIGURES, write_comparison, write_figures
 from manikin.figures.zmp import zmp_figure
+from manikin.figures.zone import holonomic_ends_figure, holonomic_zone_figure
 
 __all__ = [
     "COMPARISONS",
@@ -38,6 +39,8 @@ __all__ = [
     "equal_paths_figure",
     "flights_figure",
     "footprint_figure",
+    "holonomic_ends_figure",
+    "holonomic_zone_figure",
     "margin_figure",
     "planes_figure",
     "postures_figure",

@@ -1,5 +1,6 @@
 """How people walk: paths by optimal control, segments of walks ([Truong2010]_ chapters 4 and 5)."""
 
+from manikin.locomotion.categories import CategoryStatistics, Spread, category_of, category_statistics
 from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
 from manikin.locomotion.objective import LITERAL_ORDER, PROSE_ORDER, WalkObjective
 from manikin.locomotion.obstacles import Walker, WalkObstacle
@@ -18,6 +19,7 @@ from manikin.locomotion.segmentation import (
 )
 from manikin.locomotion.shoulders import ShoulderPaths
 from manikin.locomotion.targets import START, TEST_TARGETS, experiment_targets
+from manikin.locomotion.zone import HolonomicZone, holonomic_zone
 
 __all__ = [
     "HOLONOMIC",
@@ -28,21 +30,27 @@ __all__ = [
     "STANDING",
     "START",
     "TEST_TARGETS",
+    "CategoryStatistics",
     "HolonomicEnds",
+    "HolonomicZone",
     "OnlineSegmentation",
     "PathDeviation",
     "PathSegment",
     "PathSegments",
     "SegmentationRule",
     "ShoulderPaths",
+    "Spread",
     "WalkObjective",
     "WalkObstacle",
     "Walker",
     "WalkingPath",
     "WalkingResiduals",
     "WalkingTask",
+    "category_of",
+    "category_statistics",
     "experiment_targets",
     "holonomic_ends",
+    "holonomic_zone",
     "path_deviation",
     "segment_path",
     "walked",
