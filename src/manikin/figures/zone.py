@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from manikin.errors import FigureError
-from manikin.figures.style import COLOURS, dress, new_figure, new_grid
+from manikin.figures.style import COLOURS, dress, legend_in_title, new_figure, new_grid
 from manikin.figures.walking import KINDS
 from manikin.locomotion import CategoryStatistics, HolonomicZone
 from manikin.locomotion.zone import THESIS_RADIUS
@@ -87,5 +87,5 @@ def holonomic_ends_figure(statistics: Mapping[str, CategoryStatistics]) -> Figur
             axes.bar(places + 0.27 * (number - 1), heights, 0.25, color=colour, label=kind)
         axes.set_xticks(places, list(statistics))
         dress(axes, label)
-    figure.axes[0].legend(fontsize=8.5, frameon=False, ncols=3, loc="upper right")
+    legend_in_title(figure, figure.axes[0])
     return figure

@@ -51,10 +51,10 @@ def seen_from(goals: ArrayLike, start: ArrayLike = START) -> FloatArray:
 def category_of(goal: ArrayLike, start: ArrayLike = START) -> str | None:
     """Category of a goal, or None if its heading is that of no category of its zone.
 
-    F is in front, S at the side, B behind. LC, MC, HC are low, medium and high curvature of the way: it is bent
-    least by a final heading in its own direction. The thesis gives the headings once, which makes sense for
-    goals to the right; for goals to the left they are mirrored here. Goals straight ahead or behind count as
-    being to the right.
+    F is in front, S at the side, B behind. LC, MC, HC are low, medium and high curvature of the way: it is
+    bent least by a final heading in its own direction. The thesis gives the headings once, which makes sense
+    for goals to the right; for goals to the left they are mirrored here. Goals straight ahead or behind count
+    as being to the right.
 
     Args:
         goal: (3,) x, y [m], heading [rad].

@@ -81,8 +81,8 @@ def holonomic_zone(
 ) -> HolonomicZone:
     """The zone around a start in which goals are reached holonomically, from segmented walks.
 
-    As in the thesis, goals behind the start are not considered, nor those straight ahead, to which people just
-    walk. The thesis says that large turns prevent a single step, but not from which on.
+    As in the thesis, goals behind the start are not considered, nor those straight ahead, to which people
+    just walk. The thesis says that large turns prevent a single step, but not from which on.
 
     Args:
         goals: (k, 3) x, y [m], heading [rad] of every walk's goal.

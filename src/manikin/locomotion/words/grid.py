@@ -31,7 +31,7 @@ class WordGrid:
     step: float = 0.2
 
     def __post_init__(self) -> None:
-        finite_number(self.step, "step of the grid of words [m]", at_least=0.01, at_most=10.0)
+        finite_number(self.step, "step of the grid of words [m]", at_least=0.05, at_most=10.0)
         for name in ("x", "y"):
             low, high = (
                 finite_number(end, f"{name} of the grid of words [m]") for end in getattr(self, name)
