@@ -36,7 +36,7 @@ def test_categories_of_the_thesis(name):
 
 
 def test_low_curvature_bends_the_way_least():
-    """Of the goals ahead to the right, the way to the one of LC turns on, that to the one of HC turns back."""
+    """Of the goals ahead to the right, LC goes on in the direction of the way, HC turns back."""
     way = np.arctan2(1.0, 1.0)
     away = [
         abs(np.angle(np.exp(1j * (np.radians(HEADINGS_DEG[f"{kind}F"]) - way))))
@@ -77,7 +77,7 @@ def test_statistics_of_known_walks():
     """Lengths known to a frame at each corner, 1 cm; two parallel walks are 5 cm from their mean."""
     goal = (0.5, 2.0, np.pi / 2)
     one, other = walk((0, 0.3), (90, 2.0), (0, 0.2)), walk((0, 0.4), (90, 2.0), (0, 0.1))
-    shifted = ShoulderPaths(one.left + [0.0, 0.1], one.right + [0.0, 0.1], RATE)
+    shifted = ShoulderPaths(one.left + np.array([0.0, 0.1]), one.right + np.array([0.0, 0.1]), RATE)
     found = category_statistics(
         [(goal, [one, shifted]), ((-1.0, 1.0, np.pi / 2), [other]), ((1.0, 0.0, np.pi / 2), [walk((0, 1.0))]),
          ((1.0, 1.0, np.pi), [one])]

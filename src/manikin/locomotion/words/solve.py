@@ -8,11 +8,12 @@ length,
 The thesis ([Truong2010]_ 3.3) speaks of "the minimization of the curvature derivative" and of clothoid arcs
 with :math:`u_2 = \pm c`. Without a price of the length there is no optimum: loops as large as one likes lead
 to any goal, and scaling a loop by :math:`\lambda` divides :math:`\int \dot\kappa^2` by :math:`\lambda^3` and
-:math:`\max |\dot\kappa|` by :math:`\lambda^2`. Paths on which :math:`\max |\dot\kappa|` cannot be made
-smaller by a small change do consist of arcs with :math:`\pm c`, but spell two words only, IDI and DID
-(:mod:`manikin.locomotion.words.largest`). The norm of the control is the criterion of the work that the
-thesis summarises there; with it an optimum exists. Its arcs are no exact clothoids: as in the thesis, words
-are read off the local extrema of the curvature.
+:math:`\max |\dot\kappa|` by :math:`\lambda^2`. The least :math:`c` therefore is none, and where a path exists
+that no small change improves, it spells IDI or DID only (:mod:`manikin.locomotion.words.largest`). The norm
+of the control is the criterion of the work that the thesis summarises there [Arechavaleta 2008b]; with it an
+optimum exists and spells the six words. Its arcs are no exact clothoids: as in the thesis, words are read off
+the local extrema of the curvature. Both controls weigh the same in metres, which is a choice of a length
+scale.
 
 Headings are the same modulo :math:`2 \pi`. Considered are all turns of at most one whole turn to either side.
 """
