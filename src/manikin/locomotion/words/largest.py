@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from manikin.locomotion.targets import START
 from manikin.spatial import FloatArray, frozen_array
@@ -96,8 +96,9 @@ def _words(word: str, turn: float, way: FloatArray, heading: float) -> Iterator[
     looked_at = least + _MOST * np.linspace(1e-4, 1.0, _LOOKED_AT)
     angles = missed(looked_at)
     for i in np.flatnonzero((angles[1:] * angles[:-1] < 0.0) & (np.abs(angles[1:] - angles[:-1]) < 1.0)):
-        root = brentq(
-            lambda one: float(missed(np.array([one]))[0]), looked_at[i], looked_at[i + 1], xtol=1e-14
+        bracket = (looked_at[i], looked_at[i + 1])
+        root = float(
+            root_scalar(lambda one: float(missed(np.array([one]))[0]), bracket=bracket, xtol=1e-14).root
         )
         scale = float(np.hypot(*way) / np.hypot(*end(np.array([root]))[0]))
         first, last = np.sqrt(root), np.sqrt(max(root - sign * turn, 0.0))
