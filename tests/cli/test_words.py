@@ -1,6 +1,10 @@
 """``manikin words``: counts by word, a partition that goes on where it was, one line for mistakes."""
 
 import json
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import pytest
 
@@ -92,3 +96,51 @@ def test_mistakes_are_told_in_one_line(arguments, says, capsys):
     assert says in captured.err
     assert captured.err.count("\n") == 1
     assert not captured.out
+
+
+def children_of(process):
+    file = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    return [int(word) for word in file.read_text().split()] if file.exists() else []
+
+
+def running(pid):
+    """Whether a process is there and not a zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks for processes in /proc")
+def test_a_killed_run_leaves_no_process_and_is_gone_on_with(tmp_path):
+    """Killed while its two workers are busy; they end by themselves, and a rerun needs the rest only."""
+    out = tmp_path / "w"
+    command = [
+        sys.executable,
+        "-m",
+        "manikin",
+        "words",
+        "--slices",
+        "0,10,20,30",
+        "--jobs",
+        "2",
+        "--no-figures",
+    ]
+    process = subprocess.Popen([*command, "--out", str(out)], stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 300
+    while not list(out.glob("slices/0*.npz")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    workers = children_of(process)
+    process.kill()
+    process.wait()
+    assert len(workers) >= 2
+    while any(running(pid) for pid in workers) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(running(pid) for pid in workers)
+    done = {file.name for file in out.glob("slices/*.npz")}
+    assert done < {f"0{heading}0.npz" for heading in range(4)}
+    before = {name: (out / "slices" / name).stat().st_mtime_ns for name in done}
+    again = subprocess.run([*command, "--out", str(out), "--json"], capture_output=True, check=True)
+    assert json.loads(again.stdout)["complete"]
+    assert {name: (out / "slices" / name).stat().st_mtime_ns for name in done} == before
