@@ -58,9 +58,9 @@ The integral of 1 + u² along the path, with u = dκ/ds in 1/m², free length, a
 the squared norm of both controls of the system (3.2) with the speed 1. [Why not the derivative of the
 curvature alone, or its largest value](api/locomotion.md): neither has an optimum, because loops may be as
 large as one likes. Of {clothoids} random goals of the grid, {extremal} have a word of three exact clothoid
-arcs, IDI or DID, that satisfies the maximum principle; large loops improve all. The price of the length makes the
-problem one with an optimum, and brings the longer words. Its arcs are monotone in the curvature, but no
-exact clothoids.
+arcs, IDI or DID, that satisfies the maximum principle; large loops improve all. The price of the length
+makes the problem one with an optimum, and brings the longer words. Its arcs are monotone in the curvature,
+but no exact clothoids.
 
 Headings may end up to one whole turn to either side. Each goal is solved by Newton's method from {guesses}
 guesses for each turn, then from the paths of its neighbours, until none gets cheaper.
@@ -75,6 +75,9 @@ Together the six words of the thesis have {six}. None has more than five arcs. I
 does not list, lie in thin cells where the turn is nearly symmetric and the first or the last arc of a
 longer word vanishes; *straight* are the goals straight ahead. The problem is symmetric: mirrored goals have
 mirrored words. Goals on the axis of symmetry have two mirrored best paths and are counted once.
+
+Farther away more arcs appear (six from 12 m on): the ends of long paths swing about the straight way between
+them, less and less.
 
 Checked afresh: the system integrated in 3000 steps under u ends within {position:.0e} m of each goal; u
 differs from the adjoint of the maximum principle by at most {adjoint:.0e} of its largest value, and the
@@ -262,7 +265,8 @@ def main() -> None:
     after = AFTER_WORDS.format(
         six=f"{100 * sum(summary['shares'][word] for word in THESIS_WORDS):.2f} %",
         position=worst["position_m"], adjoint=worst["adjoint"], hamiltonian=worst["hamiltonian"],
-        checked=CHECKED, random=RANDOM, better=cheaper(CHECKED, RANDOM) or "no", pairs=lines(pair_table(pairs)),
+        checked=CHECKED, random=RANDOM, better=cheaper(CHECKED, RANDOM) or "no",
+        pairs=lines(pair_table(pairs)),
     )  # fmt: skip
     ends = AFTER_ENDS.format(zones=lines(zone_table(found)))
     PAGE.write_text(

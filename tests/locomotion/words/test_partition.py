@@ -91,7 +91,8 @@ def test_several_processes_find_the_same(small):
     [
         ({"step": 0.0}, ">= 0.05"),
         ({"x": (1.0, -1.0)}, "ascending"),
-        ({"y": (0.0, 1.0)}, "at least 0.5 m"),
+        ({"y": (0.0, 1.0)}, "0.5 to 15 m"),
+        ({"y": (3.0, 16.0)}, "3 to 16.* m from the start"),
         ({"x": (np.nan, 1.0)}, "finite"),
     ],
 )

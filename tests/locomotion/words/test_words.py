@@ -9,8 +9,9 @@ from scipy.integrate import solve_ivp
 
 from manikin.errors import InputError
 from manikin.locomotion import START
-from manikin.locomotion.words import STRAIGHT, WordPath, residuals, word_path, word_paths
+from manikin.locomotion.words import STRAIGHT, WordPath, programme, residuals, word_path, word_paths
 from manikin.locomotion.words.basis import DEGREE, basis
+from manikin.locomotion.words.path import words_of
 from manikin.locomotion.words.solve import cheapest, guesses
 
 BEGIN = np.array(START)
@@ -164,6 +165,14 @@ def test_direct_transcription_reaches_the_same_cost(seed):
     assert transcribed(path) == pytest.approx(path.cost, rel=1e-5)
 
 
+def test_polynomials_of_higher_degree_change_nothing():
+    paths = word_paths(grid_goals(np.random.default_rng(6), 40))
+    goals = programme.Goals.of(BEGIN, np.array([path.goal for path in paths]))
+    finer = programme.minimise(goals, np.array([[*path.shape, *np.zeros(12)] for path in paths]))
+    assert np.allclose(finer.cost, [path.cost for path in paths], rtol=0.0, atol=1e-8)
+    assert words_of(finer.shapes, finer.length) == [path.word for path in paths]
+
+
 def test_more_guesses_find_nothing_cheaper():
     """Sixty random guesses for each turn, beside the fifteen that are used."""
     rng = np.random.default_rng(8)
@@ -176,7 +185,7 @@ def test_more_guesses_find_nothing_cheaper():
 @pytest.mark.parametrize(
     ("goal", "message"),
     [
-        ((0.1, 0.2, 0.0), "0.5 to 30 m"),
+        ((0.1, 0.2, 0.0), "0.5 to 15 m"),
         ((np.nan, 1.0, 0.0), "finite"),
         ((1.0, 2.0), "shape"),
         ((0, 40, 0), "40 m"),
@@ -185,3 +194,10 @@ def test_more_guesses_find_nothing_cheaper():
 def test_goals_that_are_not_usable_are_refused(goal, message):
     with pytest.raises(InputError, match=message):
         word_path(goal)
+
+
+def test_a_singular_system_spoils_no_other():
+    systems = np.array([np.eye(2), np.zeros((2, 2)), 2.0 * np.eye(2)])
+    found = programme._solved(systems, np.ones((3, 2)))
+    assert np.allclose(found[[0, 2]], [[1.0, 1.0], [0.5, 0.5]])
+    assert np.isnan(found[1]).all()

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from manikin.errors import InputError
-from manikin.locomotion.words.solve import NEAREST
+from manikin.locomotion.words.solve import FARTHEST, NEAREST
 from manikin.spatial import FloatArray, finite_number
 
 HEADING_STEP = 10
@@ -40,10 +40,12 @@ class WordGrid:
                 raise InputError(
                     f"{name} of the grid of words is {low:g} to {high:g} m; valid: -20 to 20, ascending"
                 )
-        nearest = min(float(np.hypot(a, b)) for a in self.columns for b in self.rows)
-        if nearest < NEAREST:
+        distances = np.hypot(self.columns[None], self.rows[:, None])
+        nearest, farthest = float(distances.min()), float(distances.max())
+        if nearest < NEAREST or farthest > FARTHEST:
             raise InputError(
-                f"a goal of the grid of words is {nearest:g} m from the start; valid: at least {NEAREST:g} m"
+                f"goals of the grid of words are {nearest:g} to {farthest:g} m from the start; "
+                f"valid: {NEAREST:g} to {FARTHEST:g} m"
             )
 
     @property

@@ -186,12 +186,23 @@ def _step(
     system[:, index, index] += damping[:, None] * own
     system[:, :n, n] = system[:, n, :n] = normal
     right = np.concatenate([-values.gradient, -values.q[:, None]], axis=1)
-    solved = np.asarray(np.linalg.solve(system, right[..., None])[..., 0], np.float64)
+    solved = _solved(system, right)
     step = np.concatenate([np.zeros((size, 1)), solved[:, :n]], axis=1)
     # Coefficients of higher degrees bend less: compare gradients in the measure of the cost itself.
     rest = np.abs(values.gradient + now[:, None] * normal)
     residual: FloatArray = np.max(rest / np.sqrt(own), axis=1) / np.sqrt(values.cost)
     return step, solved[:, n], residual, hessian
+
+
+def _solved(system: FloatArray, right: FloatArray) -> FloatArray:
+    """Solutions of (k, n, n) systems; NaN, with which no step is taken, where one is singular."""
+    try:
+        return np.asarray(np.linalg.solve(system, right[..., None])[..., 0], np.float64)
+    except np.linalg.LinAlgError:  # one of many: the others are solved by themselves
+        if len(system) == 1:
+            return np.full_like(right, np.nan)
+        half = len(system) // 2
+        return np.concatenate([_solved(system[:half], right[:half]), _solved(system[half:], right[half:])])
 
 
 def _hessian(goals: Goals, b: FloatArray, multiplier: FloatArray) -> tuple[FloatArray, FloatArray]:

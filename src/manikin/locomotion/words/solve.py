@@ -30,8 +30,8 @@ from manikin.locomotion.words.path import WordPath
 from manikin.locomotion.words.programme import Goals, Minima, minimise
 from manikin.spatial import FloatArray, frozen_array
 
-NEAREST, FARTHEST = 0.5, 30.0
-"""Distances of goals that can be asked [m]."""
+NEAREST, FARTHEST = 0.5, 15.0
+"""Distances of goals that can be asked [m]; farther away the polynomials do not resolve the ends of paths."""
 
 SECOND = (-2.0, -1.0, 0.0, 1.0, 2.0)
 """Turns aside and back of the guesses [rad]: the largest heading of the second polynomial."""
@@ -47,7 +47,7 @@ def word_paths(goals: ArrayLike, start: ArrayLike = START) -> list[WordPath]:
     """Best paths to goals, each the cheapest local minimum that any guess led to.
 
     Args:
-        goals: (k, 3) x, y [m], heading [rad] modulo whole turns; 0.5 to 30 m from the start.
+        goals: (k, 3) x, y [m], heading [rad] modulo whole turns; 0.5 to 15 m from the start.
         start: (3,) the same; that of the thesis looks along y.
 
     Raises:
@@ -124,7 +124,7 @@ def guessed_shape(amplitudes: Sequence[float]) -> FloatArray:
 def _turns(start: FloatArray, goals: FloatArray) -> Iterator[tuple[NDArray[np.intp], FloatArray]]:
     """Indices of goals, and the goals with a heading at most a whole turn from the start's."""
     turn = np.mod(goals[:, 2] - start[2], 2.0 * np.pi)
-    for whole in (0, -1, 1, -2):
+    for whole in (0, -1, 1):
         some = np.flatnonzero(np.abs(turn + 2.0 * np.pi * whole) <= 2.0 * np.pi + 1e-9)
         if some.size:
             ends = goals[some].copy()
