@@ -8,7 +8,7 @@ from numpy.polynomial import Legendre
 from manikin.spatial import FloatArray
 
 DEGREE = 20
-"""Highest degree of the derivative of the curvature; 32 changes no word of the grid, and no cost by 1e-9 m."""
+"""Highest degree of the derivative of the curvature; 32 changes no word of the grid, no cost by 1e-9 m."""
 
 _NODES = 48
 """Of the quadrature along the path."""
