@@ -14,12 +14,15 @@ from manikin.export import export_motion
 from manikin.figures import (
     ChoicePanel,
     contact_choice_figure,
+    equal_paths_figure,
     push_map_figure,
+    words_figure,
     write_comparison,
     write_figures,
 )
 from manikin.figures.style import readable
 from manikin.figures.write import save_figure
+from manikin.locomotion.words import WordSlice, equal_paths
 from manikin.output import FIGURES, to_json
 from manikin.record import read_run
 from manikin.scene import Scene
@@ -27,6 +30,10 @@ from manikin.simulation import PushMap, PushTrials
 
 COMPARISON = "comparison.json"
 PUSH_MAP = "push_map"
+WORDS = "words"
+EQUAL_PATHS = "equal_paths"
+SHOWN_SLICES = (340, 150)
+"""Headings of the slices that are drawn if they are there, those of [Truong2010]_ Fig. 3.6 [deg]."""
 
 
 def write_products(directory: str | Path, progress: Callable[[str, float], None] | None = None) -> list[Path]:
@@ -125,6 +132,33 @@ def write_push_map_figure(maps: Sequence[PushMap], trials: PushTrials, folder: P
     file = folder / f"{PUSH_MAP}.png"
     save_figure(push_map_figure(maps, trials.soles()), file)
     return file
+
+
+def write_words_figures(slices: Sequence[WordSlice], folder: Path) -> list[Path]:
+    """Draw slices of a partition into words, and two paths of equal cost on a border of theirs.
+
+    Args:
+        slices: Of the partition; drawn are those of :data:`SHOWN_SLICES`, else the first two.
+        folder: Existing folder.
+
+    Returns:
+        The files written; without the equal paths if the slices have no such border.
+
+    Raises:
+        FigureError: If there is no slice.
+        MotionFileError: If a file cannot be written.
+    """
+    chosen = [one for heading in SHOWN_SLICES for one in slices if round(one.heading_deg) == heading]
+    chosen = chosen or list(slices[:2])
+    files = [folder / f"{WORDS}.png"]
+    save_figure(words_figure(chosen), files[0])
+    pairs = [
+        equal_paths(*(one.path(*place) for place in jumps[0])) for one in chosen if (jumps := one.jumps())
+    ]
+    if pairs:
+        files.append(folder / f"{EQUAL_PATHS}.png")
+        save_figure(equal_paths_figure(pairs), files[1])
+    return files
 
 
 def _silent(_stage: str, _share: float) -> None:

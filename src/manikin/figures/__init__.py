@@ -18,8 +18,10 @@ from manikin.figures.scene import scene_figure
 from manikin.figures.timing import timing_figure
 from manikin.figures.tracking import tracking_figure
 from manikin.figures.walking import walking_paths_figure
+from manikin.figures.words import equal_paths_figure, words_figure
 from manikin.figures.write import COMPARISONS, FIGURES, write_comparison, write_figures
 from manikin.figures.zmp import zmp_figure
+from manikin.figures.zone import holonomic_ends_figure, holonomic_zone_figure
 
 __all__ = [
     "COMPARISONS",
@@ -34,8 +36,11 @@ __all__ = [
     "contact_choice_figure",
     "contacts_figure",
     "effectors_figure",
+    "equal_paths_figure",
     "flights_figure",
     "footprint_figure",
+    "holonomic_ends_figure",
+    "holonomic_zone_figure",
     "margin_figure",
     "planes_figure",
     "postures_figure",
@@ -44,6 +49,7 @@ __all__ = [
     "timing_figure",
     "tracking_figure",
     "walking_paths_figure",
+    "words_figure",
     "write_comparison",
     "write_figures",
     "zmp_figure",

@@ -1,5 +1,6 @@
 """How people walk: paths by optimal control, segments of walks ([Truong2010]_ chapters 4 and 5)."""
 
+from manikin.locomotion.categories import CategoryStatistics, Spread, category_of, category_statistics
 from manikin.locomotion.controller import WalkController, WalkFrame
 from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
 from manikin.locomotion.floor_plan import floor_plan
@@ -22,6 +23,7 @@ from manikin.locomotion.segmentation import (
 )
 from manikin.locomotion.shoulders import ShoulderPaths
 from manikin.locomotion.targets import START, TEST_TARGETS, experiment_targets
+from manikin.locomotion.zone import HolonomicZone, holonomic_zone
 
 __all__ = [
     "HOLONOMIC",
@@ -32,13 +34,16 @@ __all__ = [
     "STANDING",
     "START",
     "TEST_TARGETS",
+    "CategoryStatistics",
     "HolonomicEnds",
+    "HolonomicZone",
     "OnlineSegmentation",
     "PathDeviation",
     "PathSegment",
     "PathSegments",
     "SegmentationRule",
     "ShoulderPaths",
+    "Spread",
     "Walk",
     "WalkController",
     "WalkFrame",
@@ -50,9 +55,12 @@ __all__ = [
     "WalkingResiduals",
     "WalkingTask",
     "Waypoint",
+    "category_of",
+    "category_statistics",
     "experiment_targets",
     "floor_plan",
     "holonomic_ends",
+    "holonomic_zone",
     "path_deviation",
     "segment_path",
     "walk_along",

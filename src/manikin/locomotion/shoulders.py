@@ -157,7 +157,7 @@ def heading_of(points: FloatArray) -> FloatArray:
 
 
 def deviations(points: FloatArray, velocities: FloatArray) -> FloatArray:
-    """(..., 2) body heading less direction of each shoulder's motion, in [-pi, pi] [rad]; NaN at rest.
+    """(..., 2) body heading less direction of each shoulder's motion, within pi of zero [rad]; NaN at rest.
 
     Args:
         points: (..., 2, 2) left and right shoulder [m].
