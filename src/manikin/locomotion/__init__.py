@@ -1,6 +1,10 @@
-"""How people walk: paths by optimal control, segments of walks ([Truong2010]_ chapters 4 and 5)."""
+"""How people walk: paths, segments of walks, whole-body walks ([Truong2010]_ chapters 4 to 6)."""
 
+from manikin.locomotion.controller import WalkController, WalkFrame
 from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
+from manikin.locomotion.follow import Walk, walk_along
+from manikin.locomotion.library import MotionLibrary
+from manikin.locomotion.library_file import load_library, save_library
 from manikin.locomotion.objective import LITERAL_ORDER, PROSE_ORDER, WalkObjective
 from manikin.locomotion.obstacles import Walker, WalkObstacle
 from manikin.locomotion.path import WalkingPath, WalkingResiduals, WalkingTask, walked
@@ -29,12 +33,16 @@ __all__ = [
     "START",
     "TEST_TARGETS",
     "HolonomicEnds",
+    "MotionLibrary",
     "OnlineSegmentation",
     "PathDeviation",
     "PathSegment",
     "PathSegments",
     "SegmentationRule",
     "ShoulderPaths",
+    "Walk",
+    "WalkController",
+    "WalkFrame",
     "WalkObjective",
     "WalkObstacle",
     "Walker",
@@ -43,8 +51,11 @@ __all__ = [
     "WalkingTask",
     "experiment_targets",
     "holonomic_ends",
+    "load_library",
     "path_deviation",
+    "save_library",
     "segment_path",
+    "walk_along",
     "walked",
     "walking_path",
     "walking_paths",

@@ -152,7 +152,9 @@ def _cut(
     before = other.on[(other.on < other_off) & (other.on > other_off - (end - start))]
     # A recording that begins in the other foot's stance: both feet are taken to swing equally long.
     landed = before[-1] if len(before) else landing + other_off - end
-    return CycleCut(*(float(v) for v in (start, end)), foot, *(float(v) for v in (landing, other_off, landed)))
+    return CycleCut(
+        *(float(v) for v in (start, end)), foot, *(float(v) for v in (landing, other_off, landed))
+    )
 
 
 def _stands(point: FloatArray, rate: float) -> NDArray[np.bool_]:

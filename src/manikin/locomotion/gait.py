@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manikin.errors import BodyError
 from manikin.body import BodyModel
+from manikin.errors import BodyError
 from manikin.locomotion.blend import Blend, control_space
 from manikin.locomotion.fourier import fourier_basis
 from manikin.locomotion.library import ROOT, MotionLibrary, leg_length

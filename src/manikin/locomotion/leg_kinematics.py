@@ -68,7 +68,9 @@ class LegKinematics:
         """(2, n, 3) places of the hip joints of (n, 3, 3) turns and (n, 3) origins of the pelvis [m]."""
         return place + np.einsum("nij,kj->kni", pelvis, self.hip)
 
-    def feet(self, pelvis: FloatArray, place: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def feet(
+        self, pelvis: FloatArray, place: FloatArray, angles: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Orientations and origins (ankles) of the feet.
 
         Args:

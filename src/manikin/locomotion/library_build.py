@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.errors import InputError
+from manikin.locomotion.blend import TURN_RADIUS
 from manikin.locomotion.cycles import CycleCut, cycle_cuts, foot_events
 from manikin.locomotion.fourier import fourier_coefficients, shifted
 from manikin.locomotion.levelling import levelled, tilted
@@ -45,9 +46,6 @@ USUAL_PERIOD, USUAL_EVENTS = 1.1, (0.4, 0.5, -0.1)
 
 NEAR = 0.05
 """Cycles nearer to another one than this are left out [m/s]; people differ, and blends would flicker."""
-
-TURN_RADIUS = 0.5
-"""An angular velocity counts as the speed at this distance [m]."""
 
 SYMMETRIC = ("walk straight", "run straight", "backward", STAND)
 """Classes of cycles that are averaged with their mirror images, to go exactly straight."""
@@ -87,15 +85,18 @@ def read_windows(folder: Path) -> list[Window]:
     table = folder / TABLE
     if not table.is_file():
         raise InputError(f"{folder} has no {TABLE}; valid: a folder with this table and the recordings")
-    with table.open(newline="", encoding="utf-8") as rows:
-        found = []
-        for number, row in enumerate(csv.DictReader(rows), 2):
-            try:
-                found.append(_window(row))
-            except (KeyError, TypeError, ValueError):
-                raise InputError(
-                    f"{table} line {number} is not usable; valid: class, file, first_frame0, end_frame0"
-                ) from None
+    try:
+        rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{table} cannot be read: {error}; valid: a table in UTF-8") from None
+    found = []
+    for number, row in enumerate(rows, 2):
+        try:
+            found.append(_window(row))
+        except (KeyError, TypeError, ValueError, AttributeError):
+            raise InputError(
+                f"{table} line {number} is not usable; valid: class, file, first_frame0, end_frame0"
+            ) from None
     return found
 
 
@@ -107,7 +108,24 @@ def _window(row: dict[str, str]) -> Window:
     return Window(STAND if kind == "idle" else kind, row["file"], first, last)
 
 
-def build_library(folder: Path, report: Callable[[float, str], None] = lambda _share, _name: None) -> MotionLibrary:
+@dataclass(frozen=True, eq=False)
+class LibraryBuild:
+    """A library and what was not used for it.
+
+    Attributes:
+        library: With the mirror images.
+        without_cycle: Windows in which no cycle was found, or none that closes.
+        near_others: Windows whose cycle is as fast as one that was taken.
+    """
+
+    library: MotionLibrary
+    without_cycle: tuple[Window, ...]
+    near_others: tuple[Window, ...]
+
+
+def build_library(
+    folder: Path, report: Callable[[float, str], None] = lambda _share, _name: None
+) -> LibraryBuild:
     """Read, reconstruct and cut the recordings of a folder, and add the mirror images.
 
     Args:
@@ -120,18 +138,25 @@ def build_library(folder: Path, report: Callable[[float, str], None] = lambda _s
     body, windows = reference_body(), read_windows(folder)
     person = cache(lambda file: _person(body, folder / RECORDINGS / file))
     found: list[tuple[Window, MotionLibrary]] = []
+    without: list[Window] = []
     for number, window in enumerate(windows):
         report(number / len(windows), window.file)
         cycle = _cycle(body, window, person(window.file))
-        if cycle is not None:
+        if cycle is None:
+            without.append(window)
+        else:
             found.append((window, cycle))
+    report(1.0, f"{len(found)} cycles")
     if not found:
         raise InputError(f"{folder / TABLE} names no window with a whole cycle")
     ordered = _by_person(found)
     persons = [_person_of(window) for window, _ in ordered]
     alike = as_one_person(body, [cycle for _, cycle in ordered], persons)
-    originals = _thinned([_levelled(body, _symmetric(body, cycle)) for cycle in alike])
-    return _with_mirror_images(body, originals)
+    level = [_levelled(body, _symmetric(body, cycle)) for cycle in alike]
+    kept = _apart(level)
+    library = _with_mirror_images(body, _joined([level[i] for i in kept]))
+    near = tuple(window for i, (window, _) in enumerate(ordered) if i not in kept)
+    return LibraryBuild(library, tuple(without), near)
 
 
 def _person(body: BodyModel, file: Path) -> _Person:
@@ -145,7 +170,15 @@ def _person(body: BodyModel, file: Path) -> _Person:
 
 
 def _cycle(body: BodyModel, window: Window, person: _Person) -> MotionLibrary | None:
-    """The cycle of a window that closes best, or None."""
+    """The cycle of a window that closes best, or None.
+
+    Raises:
+        InputError: If the recording ends before the window does.
+    """
+    if window.last > len(person.q):
+        raise InputError(
+            f"{window.file} has {len(person.q)} frames; valid: at least {window.last}, by {TABLE}"
+        )
     if window.kind == STAND:
         return _standing(body, window, person)
     events = foot_events(body, person.q, person.rate)
@@ -247,19 +280,14 @@ def _symmetric(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
     )  # fmt: skip
 
 
-def scaled_velocities(velocities: FloatArray) -> FloatArray:
-    """(..., 3) velocities with the angular one as the speed at :data:`TURN_RADIUS` [m/s]."""
-    return velocities * [1.0, 1.0, TURN_RADIUS]
-
-
-def _thinned(cycles: list[MotionLibrary]) -> MotionLibrary:
-    """One library of those that are not near to one before."""
-    kept: list[MotionLibrary] = []
-    for cycle in cycles:
-        places = scaled_velocities(cycle.velocities)
-        if all(np.linalg.norm(places - scaled_velocities(other.velocities)) >= NEAR for other in kept):
-            kept.append(cycle)
-    return _joined(kept)
+def _apart(cycles: list[MotionLibrary]) -> list[int]:
+    """Cycles that are not near to one before."""
+    scale, kept = np.array([1.0, 1.0, TURN_RADIUS]), list[int]()
+    for i, cycle in enumerate(cycles):
+        away = [np.linalg.norm((cycle.velocities - cycles[j].velocities) * scale) for j in kept]
+        if all(distance >= NEAR for distance in away):
+            kept.append(i)
+    return kept
 
 
 def _joined(cycles: list[MotionLibrary]) -> MotionLibrary:

@@ -19,7 +19,9 @@ DOUBT, TREND_DOUBT = 0.05, 0.01
 _FIRST = ROOT.index("roll")
 
 
-def as_one_person(body: BodyModel, cycles: Sequence[MotionLibrary], persons: Sequence[str]) -> list[MotionLibrary]:
+def as_one_person(
+    body: BodyModel, cycles: Sequence[MotionLibrary], persons: Sequence[str]
+) -> list[MotionLibrary]:
     """Cycles with the mean postures of the person who has most of them, equal on both sides.
 
     People hold arms, back and head in their own ways, and skeletons are fitted to them in different ways;

@@ -49,9 +49,7 @@ class Legs:
 
     def feet(self, frames: GaitFrames) -> FootPlacement:
         """Where the gait has the feet, (2, n)."""
-        return FootPlacement.of_foot(
-            self._sole, *self._legs.feet(frames.pelvis, frames.place, frames.angles)
-        )
+        return FootPlacement.of_foot(self._sole, *self._legs.feet(frames.pelvis, frames.place, frames.angles))
 
     def reached(
         self, frames: GaitFrames, feet: FootPlacement, least: FloatArray | float = 0.0
