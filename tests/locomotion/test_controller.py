@@ -69,7 +69,7 @@ def test_directives_are_walked():
 
 
 def test_phase_goes_on():
-    """p + dt / T at every step, whatever the directive does; the posture makes no leap."""
+    """P + dt / T at every step, whatever the directive does; the posture makes no leap."""
     controller = WalkController()
     frames = drive(controller, ((1.2, 0.0, 0.0), 2.0), ((2.5, 0.0, 0.0), 2.0), ((0.8, 0.0, -0.8), 2.0))
     phase = np.array([f.phase for f in frames])
@@ -126,7 +126,9 @@ def test_a_walk_as_a_motion():
     motion = found.motion
     assert motion.contact_names == ("left_foot", "right_foot")
     speed = np.gradient(motion.com[:, 0], motion.time)
-    np.testing.assert_allclose(np.trapezoid(speed, motion.time), motion.com[-1, 0] - motion.com[0, 0], atol=1e-2)
+    np.testing.assert_allclose(
+        np.trapezoid(speed, motion.time), motion.com[-1, 0] - motion.com[0, 0], atol=1e-2
+    )
     assert motion.com[-1, 0] == pytest.approx(2.0, abs=0.1)
     body_velocity = motion.v[:, 0]
     assert body_velocity.max() == pytest.approx(path.velocity[:, 0].max(), rel=0.35)

@@ -51,7 +51,9 @@ def test_feet_are_put_where_they_shall_be():
     pelvis, feet, ankles = placed(q)
     start = q[:, 7:].copy()
     for side in range(2):
-        others = [slot for slot, name in zip(LEGS.slots[side], HINGES, strict=True) if name != "knee_rotation"]
+        others = [
+            slot for slot, name in zip(LEGS.slots[side], HINGES, strict=True) if name != "knee_rotation"
+        ]
         start[:, others] = 0.3
     found = LEGS.angles(pelvis, q[:, :3], feet, ankles, start)
     np.testing.assert_allclose(found[:, LEGS.slots], q[:, 7:][:, LEGS.slots], atol=1e-7)

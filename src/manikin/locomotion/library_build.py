@@ -12,13 +12,15 @@ from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.errors import InputError
-from manikin.locomotion.blend import TURN_RADIUS
+from manikin.locomotion.blend import TURN_RADIUS, Blend
 from manikin.locomotion.cycles import CycleCut, cycle_cuts, foot_events
 from manikin.locomotion.fourier import fourier_coefficients, shifted
+from manikin.locomotion.gait import Gait
 from manikin.locomotion.levelling import levelled, tilted
 from manikin.locomotion.library import ROOT, STAND, MotionLibrary, leg_length, reference_body
 from manikin.locomotion.persons import as_one_person
-from manikin.locomotion.steady import steady_motion
+from manikin.locomotion.slide import stance_slides
+from manikin.locomotion.steady import steady_motion, travelled
 from manikin.mocap import Recording, read_recording, reconstruct
 from manikin.spatial import FloatArray
 
@@ -40,6 +42,9 @@ ACKNOWLEDGEMENTS = {
 
 NOT_CLOSED = np.deg2rad(15.0)
 """Root mean square, over the hinges, of the difference between both ends of a cycle; more is no cycle [rad]."""
+
+MOST_SLIDE = 0.3
+"""A cycle in which a standing foot slides by more has its landings or toe-offs found wrongly [m]."""
 
 USUAL_PERIOD, USUAL_EVENTS = 1.1, (0.4, 0.5, -0.1)
 """Of standing, which has no cycle of its own: those of a slow walk, in which feet can be put in place."""
@@ -114,7 +119,7 @@ class LibraryBuild:
 
     Attributes:
         library: With the mirror images.
-        without_cycle: Windows in which no cycle was found, or none that closes.
+        without_cycle: Windows in which no cycle was found, or none that closes and whose feet stand.
         near_others: Windows whose cycle is as fast as one that was taken.
     """
 
@@ -142,7 +147,7 @@ def build_library(
     for number, window in enumerate(windows):
         report(number / len(windows), window.file)
         cycle = _cycle(body, window, person(window.file))
-        if cycle is None:
+        if cycle is None or _slide(body, cycle) > MOST_SLIDE:
             without.append(window)
         else:
             found.append((window, cycle))
@@ -227,6 +232,16 @@ def _coded(
     first, last = (round(instant * rate) for instant in (cut.start, cut.end))
     name = f"{Path(window.file).stem} {first}-{last}"
     return _one(body, window, name, steady.velocity, cut.period, events, coefficients)
+
+
+def _slide(body: BodyModel, cycle: MotionLibrary) -> float:
+    """Largest slide of a standing foot in some steps of a single cycle [m]."""
+    phase, period = np.arange(3 * SAMPLES + 1) / SAMPLES, cycle.periods[0]
+    one, n = np.zeros((len(phase), 1), dtype=np.int64), len(phase)
+    velocity = np.tile(cycle.velocities, (n, 1))
+    blend = Blend(one, np.ones((n, 1)), velocity, np.zeros(n, dtype=np.bool_))
+    frames = Gait(cycle, body).frames(blend, phase, travelled(velocity, phase * period))
+    return float(stance_slides(body, frames.q, frames.swing() < 0.0).max())
 
 
 def _standing(body: BodyModel, window: Window, person: _Person) -> MotionLibrary:

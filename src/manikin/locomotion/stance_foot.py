@@ -5,6 +5,7 @@ the blended velocity. Here a foot has one place on the floor from landing to toe
 from heel to ball; in the swing the correction goes over, smoothly, from that of one step to that of the next.
 """
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import FootPlacement, Sole
 from manikin.locomotion.gait import GaitFrames
-from manikin.locomotion.leg_kinematics import LegKinematics
+from manikin.locomotion.leg_kinematics import HINGES, LegKinematics
 from manikin.mocap.anatomy import SIDES
 from manikin.spatial import FloatArray
 
@@ -28,6 +29,11 @@ LIFT = 0.15
 STRAIGHTENING = 2.5
 """Toes are straight again at this height over their length; at 1 they would leave the floor no sooner than
 they must, faster than toes can move."""
+
+YIELDS = 2
+"""How often feet yield to joints at the ends of their ranges."""
+
+_YIELDING = ("hip_rotation", "ankle_dorsiflexion", "ankle_inversion")
 
 
 def smooth_step(share: FloatArray) -> FloatArray:
@@ -56,7 +62,8 @@ class Legs:
     ) -> tuple[FloatArray, FloatArray]:
         """Postures with the feet where they shall be.
 
-        The pelvis sinks where a leg is too short, and tilts forward where a hip does not extend far enough.
+        The pelvis sinks where a leg is too short, and tilts forward where a hip does not extend far enough. A foot
+        whose ankle or hip turns no further rolls over its edge or end.
 
         Args:
             frames: Of n instants of the gait.
@@ -66,21 +73,53 @@ class Legs:
         Returns:
             Postures (n, nq) and by how much the pelvis sinks (n,) [m].
         """
-        foot, ankle = feet.to_foot(self._sole)
-        hips = self._legs.hips(frames.pelvis, frames.place)
-        away = np.sum((hips - ankle)[..., :2] ** 2, axis=-1)
-        highest = ankle[..., 2] + np.sqrt(np.maximum(self._legs.length**2 - away, 0.0))
-        sink = np.maximum((hips[..., 2] - highest).max(axis=0), least)
+        angles = frames.angles
+        for last in (False,) * YIELDS + (True,):
+            angles, sink = self._legs_to(frames, feet, angles, least)
+            excess = angles - np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
+            excess[:, self._hips] = 0.0
+            if last or not np.any(excess[:, self._legs.slots]):
+                break
+            feet, angles = self._yielding(feet, angles, excess)
         q = np.empty((len(sink), self._body.nq))
         q[:, :3], q[:, 3:7] = frames.place, frames.turn
         q[:, 2] -= sink
-        angles = self._legs.angles(frames.pelvis, q[:, :3], foot, ankle, frames.angles)
         # Toes stay above the floor while the heel is up, and straighten as the foot rises.
         free = np.arcsin(np.clip(feet.clearance / (STRAIGHTENING * self._sole.toes), 0.0, 1.0))
         angles[:, self._toes] = np.maximum(feet.pitch - free, 0.0).T
         self._tilt(q, angles)
         q[:, 7:] = np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
         return q, sink
+
+    def _legs_to(
+        self, frames: GaitFrames, feet: FootPlacement, angles: FloatArray, least: FloatArray | float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Angles (n, h), within the limits or not, and by how much the pelvis sinks (n,) [m]."""
+        foot, ankle = feet.to_foot(self._sole)
+        hips = self._legs.hips(frames.pelvis, frames.place)
+        away = np.sum((hips - ankle)[..., :2] ** 2, axis=-1)
+        highest = ankle[..., 2] + np.sqrt(np.maximum(self._legs.length**2 - away, 0.0))
+        sink = np.maximum((hips[..., 2] - highest).max(axis=0), least)
+        place = frames.place.copy()
+        place[:, 2] -= sink
+        return self._legs.angles(frames.pelvis, place, foot, ankle, angles), sink
+
+    def _yielding(
+        self, feet: FootPlacement, angles: FloatArray, excess: FloatArray
+    ) -> tuple[FootPlacement, FloatArray]:
+        """Feet and knee rotations that ask less of joints at the ends of their ranges.
+
+        A foot rolls over its edge, heel or ball where the ankle turns no further; the knee takes over what the
+        hip cannot rotate.
+        """
+        over = np.moveaxis(excess[:, self._legs.slots], 0, 1)
+        hip, ankle, inversion = (over[..., HINGES.index(name)] for name in _YIELDING)
+        angles = angles.copy()
+        knees = self._legs.slots[:, HINGES.index("knee_rotation")]
+        wanted = angles[:, knees] + hip.T
+        angles[:, knees] = np.clip(wanted, self._body.lower[knees], self._body.upper[knees])
+        rolled = feet.roll + inversion * [[1.0], [-1.0]]
+        return replace(feet, pitch=feet.pitch + ankle, roll=rolled), angles
 
     def _tilt(self, q: FloatArray, angles: FloatArray) -> None:
         """Tilt the pelvis about the line of the hip joints: hips and spine make up for it, nothing else moves."""
