@@ -41,7 +41,7 @@ ACKNOWLEDGEMENTS = {
 """By the beginning of a recording's folder."""
 
 NOT_CLOSED = np.deg2rad(15.0)
-"""Root mean square, over the hinges, of the difference between both ends of a cycle; more is no cycle [rad]."""
+"""Root mean square difference of the hinges between both ends of a cycle; more is no cycle [rad]."""
 
 MOST_SLIDE = 0.3
 """A cycle in which a standing foot slides by more has its landings or toe-offs found wrongly [m]."""
