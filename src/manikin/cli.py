@@ -1,4 +1,4 @@
-"""The command line: ``manikin scenarios | run | push | words | compare | view | balance | contact | export``.
+"""The command line: ``manikin scenarios | run | push | walk | words | view | contact | export | ...``.
 
 Exit status: 0 done, 2 bad input (one line on standard error), 3 a run that ended in an
 explained failure, 130 interrupted.  With ``--json`` standard output holds exactly one
@@ -27,7 +27,9 @@ from manikin.commands.console import (
     stdout_kept_clean,
 )
 from manikin.commands.job import print_summary, run_job
+from manikin.commands.library import library
 from manikin.commands.push import push
+from manikin.commands.walk import walk
 from manikin.commands.words import words
 from manikin.errors import InputError, ManikinError
 from manikin.interruption import Interruption
@@ -173,7 +175,9 @@ def run(
 
 
 app.command()(push)
+app.command()(walk)
 app.command()(words)
+app.add_typer(library, name="library")
 
 
 @app.command()

@@ -46,7 +46,7 @@ def test_standing_is_still():
 
 
 def test_directives_are_walked():
-    """Velocities are reached with the accelerations allowed, the place is their integral, feet do not slide."""
+    """Velocities are reached with the accelerations allowed, feet do not slide, it ends standing."""
     controller = WalkController()
     orders = [((1.2, 0.0, 0.0), 3.0), ((1.0, 0.0, 0.5), 2.0), ((0.3, 0.0, 0.0), 2.0), ((0.0, 0.4, 0.0), 3.0),
               ((0.0, 0.0, 1.2), 2.0), ((-0.6, 0.0, 0.0), 3.0), ((0.0, 0.0, 0.0), 3.0)]  # fmt: skip
@@ -69,7 +69,7 @@ def test_directives_are_walked():
 
 
 def test_phase_goes_on():
-    """p + dt / T at every step, whatever the directive does; the posture makes no leap."""
+    """P + dt / T at every step, whatever the directive does; the posture makes no leap."""
     controller = WalkController()
     frames = drive(controller, ((1.2, 0.0, 0.0), 2.0), ((2.5, 0.0, 0.0), 2.0), ((0.8, 0.0, -0.8), 2.0))
     phase = np.array([f.phase for f in frames])
@@ -89,7 +89,8 @@ def test_beyond_the_library_there_is_a_notice():
 
 @pytest.mark.parametrize(
     ("dt", "directive"),
-    [(0.0, (1, 0, 0)), (1.0, (1, 0, 0)), (np.nan, (1, 0, 0)), (0.01, (1, 0)), (0.01, (np.inf, 0, 0)), (0.01, "fast")],
+    [(0.0, (1, 0, 0)), (1.0, (1, 0, 0)), (np.nan, (1, 0, 0)), (0.01, (1, 0)), (0.01, (np.inf, 0, 0)),
+     (0.01, "fast")],
 )  # fmt: skip
 def test_bad_directives(dt, directive):
     with pytest.raises(InputError):
@@ -126,7 +127,9 @@ def test_a_walk_as_a_motion():
     motion = found.motion
     assert motion.contact_names == ("left_foot", "right_foot")
     speed = np.gradient(motion.com[:, 0], motion.time)
-    np.testing.assert_allclose(np.trapezoid(speed, motion.time), motion.com[-1, 0] - motion.com[0, 0], atol=1e-2)
+    np.testing.assert_allclose(
+        np.trapezoid(speed, motion.time), motion.com[-1, 0] - motion.com[0, 0], atol=1e-2
+    )
     assert motion.com[-1, 0] == pytest.approx(2.0, abs=0.1)
     body_velocity = motion.v[:, 0]
     assert body_velocity.max() == pytest.approx(path.velocity[:, 0].max(), rel=0.35)

@@ -51,7 +51,9 @@ def test_feet_are_put_where_they_shall_be():
     pelvis, feet, ankles = placed(q)
     start = q[:, 7:].copy()
     for side in range(2):
-        others = [slot for slot, name in zip(LEGS.slots[side], HINGES, strict=True) if name != "knee_rotation"]
+        others = [
+            slot for slot, name in zip(LEGS.slots[side], HINGES, strict=True) if name != "knee_rotation"
+        ]
         start[:, others] = 0.3
     found = LEGS.angles(pelvis, q[:, :3], feet, ankles, start)
     np.testing.assert_allclose(found[:, LEGS.slots], q[:, 7:][:, LEGS.slots], atol=1e-7)
@@ -80,7 +82,7 @@ def test_placement_and_back():
 
 
 def test_a_rolling_foot_stays():
-    """Toes up about the heel, heel up about the ball: the point on the floor is the same, nothing below it."""
+    """Toes up about the heel, heel up about the ball: one point on the floor, nothing below it."""
     pitch = np.deg2rad(np.linspace(-30.0, 50.0, 33))
     n = len(pitch)
     rolling = FootPlacement(np.tile([0.4, -0.2], (n, 1)), np.full(n, 0.7), pitch, np.zeros(n), np.zeros(n))

@@ -1,10 +1,12 @@
-"""How people walk: paths by optimal control, segments of walks ([Truong2010]_ chapters 4 and 5)."""
+"""How people walk: paths, segments of walks, whole-body walks ([Truong2010]_ chapters 4 to 6)."""
 
 from manikin.locomotion.categories import CategoryStatistics, Spread, category_of, category_statistics
 from manikin.locomotion.controller import WalkController, WalkFrame
 from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
 from manikin.locomotion.floor_plan import floor_plan
 from manikin.locomotion.follow import Walk, walk_along
+from manikin.locomotion.library import MotionLibrary
+from manikin.locomotion.library_file import load_library, save_library
 from manikin.locomotion.objective import LITERAL_ORDER, PROSE_ORDER, WalkObjective
 from manikin.locomotion.obstacles import Walker, WalkObstacle
 from manikin.locomotion.path import WalkingPath, WalkingResiduals, WalkingTask, walked
@@ -37,6 +39,7 @@ __all__ = [
     "CategoryStatistics",
     "HolonomicEnds",
     "HolonomicZone",
+    "MotionLibrary",
     "OnlineSegmentation",
     "PathDeviation",
     "PathSegment",
@@ -61,7 +64,9 @@ __all__ = [
     "floor_plan",
     "holonomic_ends",
     "holonomic_zone",
+    "load_library",
     "path_deviation",
+    "save_library",
     "segment_path",
     "walk_along",
     "walked",

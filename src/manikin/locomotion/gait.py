@@ -1,12 +1,13 @@
 """Postures of a blended gait, before its feet are put on the floor."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from manikin.errors import BodyError
 from manikin.body import BodyModel
-from manikin.locomotion.blend import Blend, control_space
+from manikin.errors import BodyError
+from manikin.locomotion.blend import Blend, ControlSpace, control_space
 from manikin.locomotion.fourier import fourier_basis
 from manikin.locomotion.library import ROOT, MotionLibrary, leg_length
 from manikin.locomotion.turns import quaternions, rotations
@@ -60,14 +61,21 @@ class Gait:
 
         Raises:
             BodyError: If the hinges are not those of the library.
-            InputError: If the library's velocities span no volume.
         """
         if body.joint_names != library.joint_names:
             raise BodyError(f"body {body.name!r} has not the hinges of the motion library; valid: a human")
         self.library, self.body = library, body
-        self.space = control_space(library)
         self.scale = leg_length(body) / library.leg
         self._to_velocity = np.array([self.scale, self.scale, 1.0])
+
+    @cached_property
+    def space(self) -> ControlSpace:
+        """Of the library.
+
+        Raises:
+            InputError: If the library's velocities span no volume.
+        """
+        return control_space(self.library)
 
     def blend(self, velocity: FloatArray) -> Blend:
         """Weights for (n, 3) velocities of this body, forward, left [m/s] and angular [rad/s]."""

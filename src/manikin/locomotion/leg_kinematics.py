@@ -68,7 +68,9 @@ class LegKinematics:
         """(2, n, 3) places of the hip joints of (n, 3, 3) turns and (n, 3) origins of the pelvis [m]."""
         return place + np.einsum("nij,kj->kni", pelvis, self.hip)
 
-    def feet(self, pelvis: FloatArray, place: FloatArray, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def feet(
+        self, pelvis: FloatArray, place: FloatArray, angles: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Orientations and origins (ankles) of the feet.
 
         Args:
@@ -90,7 +92,7 @@ class LegKinematics:
     def angles(
         self, pelvis: FloatArray, place: FloatArray, foot: FloatArray, ankle: FloatArray, angles: FloatArray
     ) -> FloatArray:
-        """Angles that put the feet there; out of reach, as near as a stretched leg gets. Limits are not looked at.
+        """Angles, within limits or not, that put the feet there; out of reach, as near as a leg gets.
 
         Args:
             pelvis: (n, 3, 3) from the pelvis' axes to the world's.

@@ -15,8 +15,8 @@ from manikin.locomotion.fourier import shifted
 from manikin.spatial import FloatArray, frozen_array
 
 ROOT = ("ahead", "left", "height", "roll", "pitch", "yaw")
-"""Signals of the root: its error around the line or circle, and its height [m]; its turns, yaw being the error
-of the heading [rad]. The hinges' angles follow."""
+"""Signals of the root: its error around the line or circle, and its height [m]; its turns, yaw being the
+error of the heading [rad]. The hinges' angles follow."""
 
 _ROOT_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
@@ -83,8 +83,17 @@ class MotionLibrary:
         if c == 0 or self.periods.min() <= 0.0 or not self.leg > 0.0:
             raise InputError("motion library has no cycle, or no duration or leg length; valid: all > 0")
         landing, off, other = self.events.T
-        if not np.all((landing > 0.0) & (landing < 1.0) & (off > 0.0) & (off < 1.0) & (other < off) & (other > off - 1.0)):
-            raise InputError("motion library has events out of order; valid: 0 < landing, off < 1, other before off")
+        if not np.all(
+            (landing > 0.0)
+            & (landing < 1.0)
+            & (off > 0.0)
+            & (off < 1.0)
+            & (other < off)
+            & (other > off - 1.0)
+        ):
+            raise InputError(
+                "motion library has events out of order; valid: 0 < landing, off < 1, other before off"
+            )
 
     def __len__(self) -> int:
         return len(self.names)

@@ -1,6 +1,5 @@
 """Building the motion library from recordings ([Truong2010]_ 6.4)."""
 
-import csv
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -12,17 +11,18 @@ from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.errors import InputError
+from manikin.locomotion.blend import TURN_RADIUS, Blend
 from manikin.locomotion.cycles import CycleCut, cycle_cuts, foot_events
 from manikin.locomotion.fourier import fourier_coefficients, shifted
+from manikin.locomotion.gait import Gait
 from manikin.locomotion.levelling import levelled, tilted
 from manikin.locomotion.library import ROOT, STAND, MotionLibrary, leg_length, reference_body
+from manikin.locomotion.library_windows import TABLE, Window, read_windows
 from manikin.locomotion.persons import as_one_person
-from manikin.locomotion.steady import steady_motion
+from manikin.locomotion.slide import stance_slides
+from manikin.locomotion.steady import steady_motion, travelled
 from manikin.mocap import Recording, read_recording, reconstruct
 from manikin.spatial import FloatArray
-
-TABLE = "clips_locomotion.csv"
-"""Names the windows to use: columns class, file, first_frame0, end_frame0, in the folder of recordings."""
 
 RECORDINGS = "mocap"
 
@@ -38,7 +38,10 @@ ACKNOWLEDGEMENTS = {
 """By the beginning of a recording's folder."""
 
 NOT_CLOSED = np.deg2rad(15.0)
-"""Root mean square, over the hinges, of the difference between both ends of a cycle; more is no cycle [rad]."""
+"""Root mean square difference of the hinges between both ends of a cycle; more is no cycle [rad]."""
+
+MOST_SLIDE = 0.3
+"""A cycle in which a standing foot slides by more has its landings or toe-offs found wrongly [m]."""
 
 USUAL_PERIOD, USUAL_EVENTS = 1.1, (0.4, 0.5, -0.1)
 """Of standing, which has no cycle of its own: those of a slow walk, in which feet can be put in place."""
@@ -46,28 +49,8 @@ USUAL_PERIOD, USUAL_EVENTS = 1.1, (0.4, 0.5, -0.1)
 NEAR = 0.05
 """Cycles nearer to another one than this are left out [m/s]; people differ, and blends would flicker."""
 
-TURN_RADIUS = 0.5
-"""An angular velocity counts as the speed at this distance [m]."""
-
 SYMMETRIC = ("walk straight", "run straight", "backward", STAND)
 """Classes of cycles that are averaged with their mirror images, to go exactly straight."""
-
-
-@dataclass(frozen=True)
-class Window:
-    """A part of a recording to take a cycle from.
-
-    Attributes:
-        kind: Its class.
-        file: The recording, below the folder.
-        first: Frame.
-        last: Frame after the last one.
-    """
-
-    kind: str
-    file: str
-    first: int
-    last: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,36 +61,24 @@ class _Person:
     rate: float
 
 
-def read_windows(folder: Path) -> list[Window]:
-    """Windows named by a folder's table.
+@dataclass(frozen=True, eq=False)
+class LibraryBuild:
+    """A library and what was not used for it.
 
-    Raises:
-        InputError: If it has none, or a row cannot be read.
+    Attributes:
+        library: With the mirror images.
+        without_cycle: Windows in which no cycle was found, or none that closes and whose feet stand.
+        near_others: Windows whose cycle is as fast as one that was taken.
     """
-    table = folder / TABLE
-    if not table.is_file():
-        raise InputError(f"{folder} has no {TABLE}; valid: a folder with this table and the recordings")
-    with table.open(newline="", encoding="utf-8") as rows:
-        found = []
-        for number, row in enumerate(csv.DictReader(rows), 2):
-            try:
-                found.append(_window(row))
-            except (KeyError, TypeError, ValueError):
-                raise InputError(
-                    f"{table} line {number} is not usable; valid: class, file, first_frame0, end_frame0"
-                ) from None
-    return found
+
+    library: MotionLibrary
+    without_cycle: tuple[Window, ...]
+    near_others: tuple[Window, ...]
 
 
-def _window(row: dict[str, str]) -> Window:
-    kind = row["class"].split("(")[0].strip().removesuffix(" core")
-    first, last = int(row["first_frame0"]), int(row["end_frame0"])
-    if not 0 <= first < last:
-        raise ValueError
-    return Window(STAND if kind == "idle" else kind, row["file"], first, last)
-
-
-def build_library(folder: Path, report: Callable[[float, str], None] = lambda _share, _name: None) -> MotionLibrary:
+def build_library(
+    folder: Path, report: Callable[[float, str], None] = lambda _share, _name: None
+) -> LibraryBuild:
     """Read, reconstruct and cut the recordings of a folder, and add the mirror images.
 
     Args:
@@ -120,18 +91,25 @@ def build_library(folder: Path, report: Callable[[float, str], None] = lambda _s
     body, windows = reference_body(), read_windows(folder)
     person = cache(lambda file: _person(body, folder / RECORDINGS / file))
     found: list[tuple[Window, MotionLibrary]] = []
+    without: list[Window] = []
     for number, window in enumerate(windows):
         report(number / len(windows), window.file)
         cycle = _cycle(body, window, person(window.file))
-        if cycle is not None:
+        if cycle is None or _slide(body, cycle) > MOST_SLIDE:
+            without.append(window)
+        else:
             found.append((window, cycle))
+    report(1.0, f"{len(found)} cycles")
     if not found:
         raise InputError(f"{folder / TABLE} names no window with a whole cycle")
     ordered = _by_person(found)
     persons = [_person_of(window) for window, _ in ordered]
     alike = as_one_person(body, [cycle for _, cycle in ordered], persons)
-    originals = _thinned([_levelled(body, _symmetric(body, cycle)) for cycle in alike])
-    return _with_mirror_images(body, originals)
+    level = [_levelled(body, _symmetric(body, cycle)) for cycle in alike]
+    kept = _apart(level)
+    library = _with_mirror_images(body, _joined([level[i] for i in kept]))
+    near = tuple(window for i, (window, _) in enumerate(ordered) if i not in kept)
+    return LibraryBuild(library, tuple(without), near)
 
 
 def _person(body: BodyModel, file: Path) -> _Person:
@@ -145,7 +123,15 @@ def _person(body: BodyModel, file: Path) -> _Person:
 
 
 def _cycle(body: BodyModel, window: Window, person: _Person) -> MotionLibrary | None:
-    """The cycle of a window that closes best, or None."""
+    """The cycle of a window that closes best, or None.
+
+    Raises:
+        InputError: If the recording ends before the window does.
+    """
+    if window.last > len(person.q):
+        raise InputError(
+            f"{window.file} has {len(person.q)} frames; valid: at least {window.last}, by {TABLE}"
+        )
     if window.kind == STAND:
         return _standing(body, window, person)
     events = foot_events(body, person.q, person.rate)
@@ -194,6 +180,16 @@ def _coded(
     first, last = (round(instant * rate) for instant in (cut.start, cut.end))
     name = f"{Path(window.file).stem} {first}-{last}"
     return _one(body, window, name, steady.velocity, cut.period, events, coefficients)
+
+
+def _slide(body: BodyModel, cycle: MotionLibrary) -> float:
+    """Largest slide of a standing foot in some steps of a single cycle [m]."""
+    phase, period = np.arange(3 * SAMPLES + 1) / SAMPLES, cycle.periods[0]
+    one, n = np.zeros((len(phase), 1), dtype=np.int64), len(phase)
+    velocity = np.tile(cycle.velocities, (n, 1))
+    blend = Blend(one, np.ones((n, 1)), velocity, np.zeros(n, dtype=np.bool_))
+    frames = Gait(cycle, body).frames(blend, phase, travelled(velocity, phase * period))
+    return float(stance_slides(body, frames.q, frames.swing() < 0.0).max())
 
 
 def _standing(body: BodyModel, window: Window, person: _Person) -> MotionLibrary:
@@ -247,19 +243,14 @@ def _symmetric(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
     )  # fmt: skip
 
 
-def scaled_velocities(velocities: FloatArray) -> FloatArray:
-    """(..., 3) velocities with the angular one as the speed at :data:`TURN_RADIUS` [m/s]."""
-    return velocities * [1.0, 1.0, TURN_RADIUS]
-
-
-def _thinned(cycles: list[MotionLibrary]) -> MotionLibrary:
-    """One library of those that are not near to one before."""
-    kept: list[MotionLibrary] = []
-    for cycle in cycles:
-        places = scaled_velocities(cycle.velocities)
-        if all(np.linalg.norm(places - scaled_velocities(other.velocities)) >= NEAR for other in kept):
-            kept.append(cycle)
-    return _joined(kept)
+def _apart(cycles: list[MotionLibrary]) -> list[int]:
+    """Cycles that are not near to one before."""
+    scale, kept = np.array([1.0, 1.0, TURN_RADIUS]), list[int]()
+    for i, cycle in enumerate(cycles):
+        away = [np.linalg.norm((cycle.velocities - cycles[j].velocities) * scale) for j in kept]
+        if all(distance >= NEAR for distance in away):
+            kept.append(i)
+    return kept
 
 
 def _joined(cycles: list[MotionLibrary]) -> MotionLibrary:

@@ -90,7 +90,9 @@ def _read(file: Path) -> MotionLibrary:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(f"{file} cannot be read: {error.strerror or error}; valid: a motion library") from None
+        raise InputError(
+            f"{file} cannot be read: {error.strerror or error}; valid: a motion library"
+        ) from None
     except Exception:  # numpy, zipfile and zlib raise a dozen kinds for damaged bytes
         raise InputError(f"{file} is damaged or no motion library; valid: a file of this package") from None
     return _library(file, given)
@@ -127,5 +129,7 @@ def _library(file: Path, given: dict[str, Any]) -> MotionLibrary:
 def _body(file: Path, joint_names: tuple[str, ...]) -> BodyModel:
     body = reference_body()
     if joint_names != body.joint_names:
-        raise InputError(f"{file} is for other hinges than those of our human; valid: a library of this version")
+        raise InputError(
+            f"{file} is for other hinges than those of our human; valid: a library of this version"
+        )
     return body

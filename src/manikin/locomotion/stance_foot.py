@@ -1,18 +1,21 @@
-"""Feet that do not slide: where they stand, how they get there, and the legs that follow by inverse kinematics.
+"""Feet that do not slide: where they stand, how they get there, and the legs that follow.
 
-The thesis leaves this open (6.8). Blended cycles let the standing foot slide, for their steps do not quite fit
-the blended velocity. Here a foot has one place on the floor from landing to toe-off, over which it rolls
-from heel to ball; in the swing the correction goes over, smoothly, from that of one step to that of the next.
+The thesis leaves this open (6.8). Blended cycles let the standing foot slide, for their steps do not quite
+fit the blended velocity. Here a foot has one place on the floor from landing to toe-off, over which it rolls
+from heel to ball; in the swing the correction goes over, smoothly, from that of one step to that of the
+next. Legs follow by inverse kinematics in closed form.
 """
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import FootPlacement, Sole
 from manikin.locomotion.gait import GaitFrames
-from manikin.locomotion.leg_kinematics import LegKinematics
+from manikin.locomotion.leg_kinematics import HINGES, LegKinematics
 from manikin.mocap.anatomy import SIDES
 from manikin.spatial import FloatArray
 
@@ -29,6 +32,11 @@ STRAIGHTENING = 2.5
 """Toes are straight again at this height over their length; at 1 they would leave the floor no sooner than
 they must, faster than toes can move."""
 
+YIELDS = 2
+"""How often feet yield to joints at the ends of their ranges."""
+
+_YIELDING = ("hip_rotation", "ankle_dorsiflexion", "ankle_inversion")
+
 
 def smooth_step(share: FloatArray) -> FloatArray:
     """From 0 to 1 with no slope and no curvature at the ends; outside of them constant."""
@@ -37,7 +45,7 @@ def smooth_step(share: FloatArray) -> FloatArray:
 
 
 class Legs:
-    """Both legs of a body: feet from postures, and postures from feet. Arrays of both begin with left, right."""
+    """Both legs of a body: feet from postures, and postures from feet; left first, then right."""
 
     def __init__(self, body: BodyModel) -> None:
         """Take lengths and soles from a human."""
@@ -49,9 +57,7 @@ class Legs:
 
     def feet(self, frames: GaitFrames) -> FootPlacement:
         """Where the gait has the feet, (2, n)."""
-        return FootPlacement.of_foot(
-            self._sole, *self._legs.feet(frames.pelvis, frames.place, frames.angles)
-        )
+        return FootPlacement.of_foot(self._sole, *self._legs.feet(frames.pelvis, frames.place, frames.angles))
 
     def reached(
         self, frames: GaitFrames, feet: FootPlacement, least: FloatArray | float = 0.0
@@ -59,6 +65,7 @@ class Legs:
         """Postures with the feet where they shall be.
 
         The pelvis sinks where a leg is too short, and tilts forward where a hip does not extend far enough.
+        A foot whose ankle turns no further rolls over its edge, heel or ball.
 
         Args:
             frames: Of n instants of the gait.
@@ -68,15 +75,17 @@ class Legs:
         Returns:
             Postures (n, nq) and by how much the pelvis sinks (n,) [m].
         """
-        foot, ankle = feet.to_foot(self._sole)
-        hips = self._legs.hips(frames.pelvis, frames.place)
-        away = np.sum((hips - ankle)[..., :2] ** 2, axis=-1)
-        highest = ankle[..., 2] + np.sqrt(np.maximum(self._legs.length**2 - away, 0.0))
-        sink = np.maximum((hips[..., 2] - highest).max(axis=0), least)
+        angles = frames.angles
+        for last in (False,) * YIELDS + (True,):
+            angles, sink = self._legs_to(frames, feet, angles, least)
+            excess = angles - np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
+            excess[:, self._hips] = 0.0
+            if last or not np.any(excess[:, self._legs.slots]):
+                break
+            feet, angles = self._yielding(feet, angles, excess)
         q = np.empty((len(sink), self._body.nq))
         q[:, :3], q[:, 3:7] = frames.place, frames.turn
         q[:, 2] -= sink
-        angles = self._legs.angles(frames.pelvis, q[:, :3], foot, ankle, frames.angles)
         # Toes stay above the floor while the heel is up, and straighten as the foot rises.
         free = np.arcsin(np.clip(feet.clearance / (STRAIGHTENING * self._sole.toes), 0.0, 1.0))
         angles[:, self._toes] = np.maximum(feet.pitch - free, 0.0).T
@@ -84,8 +93,38 @@ class Legs:
         q[:, 7:] = np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
         return q, sink
 
+    def _legs_to(
+        self, frames: GaitFrames, feet: FootPlacement, angles: FloatArray, least: FloatArray | float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Angles (n, h), within the limits or not, and by how much the pelvis sinks (n,) [m]."""
+        foot, ankle = feet.to_foot(self._sole)
+        hips = self._legs.hips(frames.pelvis, frames.place)
+        away = np.sum((hips - ankle)[..., :2] ** 2, axis=-1)
+        highest = ankle[..., 2] + np.sqrt(np.maximum(self._legs.length**2 - away, 0.0))
+        sink = np.maximum((hips[..., 2] - highest).max(axis=0), least)
+        place = frames.place.copy()
+        place[:, 2] -= sink
+        return self._legs.angles(frames.pelvis, place, foot, ankle, angles), sink
+
+    def _yielding(
+        self, feet: FootPlacement, angles: FloatArray, excess: FloatArray
+    ) -> tuple[FootPlacement, FloatArray]:
+        """Feet and knee rotations that ask less of joints at the ends of their ranges.
+
+        A foot rolls over its edge, heel or ball where the ankle turns no further; the knee takes over what
+        the hip cannot rotate.
+        """
+        over = np.moveaxis(excess[:, self._legs.slots], 0, 1)
+        hip, ankle, inversion = (over[..., HINGES.index(name)] for name in _YIELDING)
+        angles = angles.copy()
+        knees = self._legs.slots[:, HINGES.index("knee_rotation")]
+        wanted = angles[:, knees] + hip.T
+        angles[:, knees] = np.clip(wanted, self._body.lower[knees], self._body.upper[knees])
+        rolled = feet.roll + inversion * [[1.0], [-1.0]]
+        return replace(feet, pitch=feet.pitch + ankle, roll=rolled), angles
+
     def _tilt(self, q: FloatArray, angles: FloatArray) -> None:
-        """Tilt the pelvis about the line of the hip joints: hips and spine make up for it, nothing else moves."""
+        """Tilt the pelvis about the line of the hip joints; hips and spine make up for it."""
         lower = self._body.lower
         tilt = np.maximum((lower[self._hips] - angles[:, self._hips]).max(axis=1), 0.0)
         tilt = np.minimum(tilt, np.maximum(angles[:, self._lumbar] - lower[self._lumbar], 0.0))
@@ -162,6 +201,6 @@ def _steps(path: FloatArray, swing: FloatArray) -> tuple[FloatArray, FloatArray]
     return offset, distance
 
 
-def borders(values: FloatArray) -> list[int]:
+def borders(values: NDArray[np.bool_]) -> list[int]:
     """Where runs of equal values begin, and the number of values."""
     return [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
