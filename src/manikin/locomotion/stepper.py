@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -33,8 +33,9 @@ class StepRule:
         turn_step: Turn of the body in a step [rad].
         width: Between the soles' middles in walking, across the heading [m].
         standing_width: The same at the start and the end [m].
-        narrowest: Least distance of a landing foot from the other one, across their mean heading [m]; feet do
-            not cross.
+        narrowest: Least distance of a landing foot from a parallel one, across their mean heading [m]; feet do
+            not cross. Turned feet keep what their soles need beyond that.
+        sole_length: Of the soles [m].
         widest: Largest [m].
         longest: Largest distance along their mean heading [m].
         toes_in: A landing foot is turned inwards from the other one by at most this [rad].
@@ -51,6 +52,7 @@ class StepRule:
     width: float = 0.15
     standing_width: float = 0.2
     narrowest: float = 0.15
+    sole_length: float = 0.28
     widest: float = 0.5
     longest: float = 0.7
     toes_in: float = np.radians(12.0)
@@ -61,14 +63,31 @@ class StepRule:
     standing: float = 0.3
 
     def __post_init__(self) -> None:
-        for name in ("walk_ratio", "side_step", "turn_step", "narrowest", "longest", "single", "double",
-                     "standing"):  # fmt: skip
+        for name in ("walk_ratio", "side_step", "turn_step", "narrowest", "sole_length", "longest",
+                     "single", "double", "standing"):  # fmt: skip
             finite_number(getattr(self, name), f"step rule {name}", above=0.0)
         for name in ("width", "standing_width", "widest"):
             finite_number(getattr(self, name), f"step rule {name} [m]", at_least=self.narrowest)
         for name in ("toes_in", "toes_out"):
             finite_number(getattr(self, name), f"step rule {name} [rad]", at_least=0.0, at_most=np.pi / 2)
         finite_number(self.double_share, "step rule double_share", above=0.0, at_most=0.9)
+
+    def scaled(self, stature: float) -> "StepRule":
+        """The rule of a body of another stature: lengths grow with it, times with its square root.
+
+        Args:
+            stature: [m].
+        """
+        length = finite_number(stature, "stature [m]", above=0.0) / 1.75
+        time = np.sqrt(length)
+        lengths = ("side_step", "width", "standing_width", "narrowest", "sole_length", "widest", "longest")
+        times = ("single", "double", "standing")
+        return replace(
+            self,
+            walk_ratio=self.walk_ratio * length * time,
+            **{name: getattr(self, name) * length for name in lengths},
+            **{name: getattr(self, name) * time for name in times},
+        )
 
     def frequency(self, velocity: FloatArray) -> FloatArray:
         """(...) steps per second at (..., 3) forward, left [m/s] and angular velocities [rad/s]."""
@@ -171,7 +190,8 @@ def _within_reach(wanted: FloatArray, other: FloatArray, side: float, rule: Step
     ahead, left = np.array([np.cos(mean), np.sin(mean)]), np.array([-np.sin(mean), np.cos(mean)])
     offset = wanted[:2] - other[:2]
     along = float(np.clip(offset @ ahead, -rule.longest, rule.longest))
-    across = float(np.clip(side * (offset @ left), rule.narrowest, rule.widest))
+    least = rule.narrowest + rule.sole_length * np.sin(abs(outwards) / 2)
+    across = float(np.clip(side * (offset @ left), least, max(least, rule.widest)))
     return np.array([*(other[:2] + along * ahead + side * across * left), yaw])
 
 
