@@ -35,7 +35,7 @@ def test_gram_matrix_integrates_products():
     assert np.allclose(bernstein_gram(4), basis.T @ basis / len(s), atol=1e-7)
 
 
-@pytest.mark.parametrize("style", (PENDULUM, *GUESS_STYLES))
+@pytest.mark.parametrize("style", [PENDULUM, *GUESS_STYLES])
 def test_guesses_meet_the_ends_and_the_durations(platform, style):
     for problem in (platform(), platform(max_duration=2.7)):
         bezier, durations = guess(problem, style, polytopes_of(problem))

@@ -48,7 +48,7 @@ def test_a_walk_goes_on_where_another_ends():
     assert whole.duration == pytest.approx(walk.duration + later.duration)
     durations = [seconds for _, seconds in whole.phases()]
     assert durations == pytest.approx([0.5, 0.4, 0.2, 0.5, 0.4 + 0.5, 0.4, 0.2, 0.5, 0.4])
-    with pytest.raises(InputError, match="0.4 m"):
+    with pytest.raises(InputError, match="from where left_foot stands"):
         walk.followed_by(walk)
 
 

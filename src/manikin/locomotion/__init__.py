@@ -1,6 +1,7 @@
-"""How people walk: paths by optimal control, segments of walks ([Truong2010]_ chapters 4 and 5)."""
+"""How people walk: paths by optimal control, footprints, segments ([Truong2010]_ chapters 4 and 5)."""
 
 from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
+from manikin.locomotion.footprints import Footprint, Footprints
 from manikin.locomotion.objective import LITERAL_ORDER, PROSE_ORDER, WalkObjective
 from manikin.locomotion.obstacles import Walker, WalkObstacle
 from manikin.locomotion.path import WalkingPath, WalkingResiduals, WalkingTask, walked
@@ -17,6 +18,7 @@ from manikin.locomotion.segmentation import (
     segment_path,
 )
 from manikin.locomotion.shoulders import ShoulderPaths
+from manikin.locomotion.stepper import StepRule, place_footprints
 from manikin.locomotion.targets import START, TEST_TARGETS, experiment_targets
 
 __all__ = [
@@ -28,6 +30,8 @@ __all__ = [
     "STANDING",
     "START",
     "TEST_TARGETS",
+    "Footprint",
+    "Footprints",
     "HolonomicEnds",
     "OnlineSegmentation",
     "PathDeviation",
@@ -35,6 +39,7 @@ __all__ = [
     "PathSegments",
     "SegmentationRule",
     "ShoulderPaths",
+    "StepRule",
     "WalkObjective",
     "WalkObstacle",
     "Walker",
@@ -44,6 +49,7 @@ __all__ = [
     "experiment_targets",
     "holonomic_ends",
     "path_deviation",
+    "place_footprints",
     "segment_path",
     "walked",
     "walking_path",

@@ -41,9 +41,7 @@ class Footprint:
     lands: float
     leaves: float
 
-    def __init__(
-        self, effector: str, position: ArrayLike, yaw: float, lands: float, leaves: float
-    ) -> None:
+    def __init__(self, effector: str, position: ArrayLike, yaw: float, lands: float, leaves: float) -> None:
         if effector not in FEET:
             raise InputError(f"footprint effector is {effector!r}; valid: {', '.join(FEET)}")
         lands = finite_number(lands, f"footprint of {effector} lands [s]")
@@ -138,9 +136,7 @@ class Footprints:
             normal_force_cap: Of each stance [N].
         """
         made: dict[Footprint, Contact] = {
-            step: sole(
-                step.effector, step.position, step.yaw, length=length, width=width, friction=friction
-            )
+            step: sole(step.effector, step.position, step.yaw, length=length, width=width, friction=friction)
             for step in self.steps
         }
         phases = [
@@ -174,9 +170,7 @@ class Footprints:
         for step in other.steps:
             if step is not first[step.effector]:
                 joined.append(
-                    Footprint(
-                        step.effector, step.position, step.yaw, step.lands + shift, step.leaves + shift
-                    )
+                    Footprint(step.effector, step.position, step.yaw, step.lands + shift, step.leaves + shift)
                 )
         return Footprints(joined)
 

@@ -24,7 +24,7 @@ class StepRule:
     """Where and when feet are set down, of a person of 1.75 m.
 
     Step length and frequency grow together: their quotient, the walk ratio, is the same at all speeds, about
-    0.0065 m per step and minute ([Sekiya1996]_; at slow speeds people's is larger, [Murakami2017]_).
+    0.0065 m per step and minute ([Murakami2017]_, who find it larger below 1 m/s).
     The other numbers are our choice, within hips that turn about 40 degrees out and less in.
 
     Attributes:
@@ -33,8 +33,8 @@ class StepRule:
         turn_step: Turn of the body in a step [rad].
         width: Between the soles' middles in walking, across the heading [m].
         standing_width: The same at the start and the end [m].
-        narrowest: Least distance of a landing foot from a parallel one, across their mean heading [m]; feet do
-            not cross. Turned feet keep what their soles need beyond that.
+        narrowest: Least distance of a landing foot from a parallel one, across their mean heading [m]; feet
+            do not cross. Turned feet keep what their soles need beyond that.
         sole_length: Of the soles [m].
         widest: Largest [m].
         longest: Largest distance along their mean heading [m].
@@ -42,7 +42,7 @@ class StepRule:
         toes_out: The same, outwards [rad].
         single: Least time on one foot [s].
         double: Least time on both feet between steps [s].
-        double_share: Share of a step that is spent on both feet ([Whittle2007]_: 0.2 to 0.3, more when slow).
+        double_share: Share of a step that is spent on both feet.
         standing: Least time on both feet at the start and the end [s].
     """
 

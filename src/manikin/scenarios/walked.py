@@ -86,7 +86,7 @@ def walk_before(footprints: Footprints, scenario: Scenario) -> Scenario:
     """A scenario with a walk before its own supports, all in one motion.
 
     The walk ends on the first stance of the supports, and the plan goes on from there without a stop being
-    asked for. The constraints on the centre of mass stay; it starts as high above the feet as in the scenario.
+    asked for. The constraints on the centre of mass stay; it starts as high as in the scenario.
 
     Args:
         footprints: Of a walk that ends on the feet of the scenario's first phase.
@@ -97,13 +97,14 @@ def walk_before(footprints: Footprints, scenario: Scenario) -> Scenario:
         InputError: If the walk ends elsewhere.
     """
     own = scenario.explicit_supports()
-    stance = flat_sequence(scenario)[0].stance
+    stance = {contact.effector: contact for contact in flat_sequence(scenario)[0].stance}
     last = footprints.last()
     for foot in FEET:
-        _check_end(last[foot], stance[foot] if foot in stance else None)
-    reached = _middle(last)
-    start = _middle(footprints.first()) + np.array(scenario.file.task.start.com) - reached
-    start[:2] = _middle(footprints.first())[:2]
+        _check_end(last[foot], stance.get(foot))
+    start = _middle(footprints.first())
+    start[2] += scenario.start_com[2] - scenario.start_level
+    if scenario.file.reference_stature_m is not None:
+        start[2] = scenario.start_level + (start[2] - scenario.start_level) / scenario.stature_scale
     phases = [phase.model_dump(mode="json", exclude_none=True) for phase in own.phases]
     task = scenario.file.task.model_dump(mode="json", exclude_none=True)
     planning = scenario.planning.model_dump(mode="json", exclude_none=True)
@@ -160,9 +161,7 @@ def _entry(step: Footprint) -> dict[str, Any]:
 def _ending_on(seam: Mapping[str, Any], phases: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The phases with the last place of each foot replaced by that at the seam."""
     for foot in FEET:
-        landing = max(
-            number for number, phase in enumerate(phases) if phase.get(foot) not in (None, "same")
-        )
+        landing = max(number for number, phase in enumerate(phases) if phase.get(foot) not in (None, "same"))
         phases[landing][foot] = seam[foot]
     return phases
 
@@ -175,8 +174,8 @@ def _check_end(step: Footprint, contact: Contact | None) -> None:
     turn = abs(math.remainder(step.yaw - contact.yaw, 2.0 * math.pi))
     if max(gap, turn) > _SAME_PLACE:
         raise InputError(
-            f"footprints end with {step.effector} {gap:.3g} m and {math.degrees(turn):.3g} degrees from where "
-            "the plan goes on; valid: on the same place"
+            f"footprints end with {step.effector} {gap:.3g} m and {math.degrees(turn):.3g} degrees from "
+            "where the plan goes on; valid: on the same place"
         )
 
 

@@ -264,8 +264,10 @@ def _first_clear(
 def _least_slack(
     curve: SwingCurve, clearance: Clearance, limits: SwingLimits, enough: float, order: list[int]
 ) -> float:
-    """Smallest slack over a few instants [m], or the first that is below ``enough``, whose instant moves to
-    the front of the order."""
+    """Smallest slack over a few instants [m].
+
+    Where one is below ``enough`` the search ends there, and that instant moves to the front of the order.
+    """
     state = curve.evaluate(_instants(curve, limits, COARSE))
 
     def distance(index: int) -> float:
