@@ -242,45 +242,54 @@ def _first_clear(
 ) -> tuple[SwingCurve, SwingCheck, int]:
     """First curve that keeps the limits, or else the first of those nearest to clear; how many were tried.
 
-    A curve is given up as soon as one instant is nearer than the best curve before it ever is: that one would
-    be preferred anyway. Instants at which curves were given up are looked at first.
+    A curve is given up at the first instant at which it is too near and no better than the best one before
+    it. Instants at which curves were given up are looked at first.
     """
     best, least, tried = None, -np.inf, 0
-    order = list(range(1, COARSE - 1))
+    coarse, dense = _Slack(clearance, limits, COARSE), _Slack(clearance, limits)
     for curve in family:
         tried += 1
-        slack = _least_slack(curve, clearance, limits, least, order)
+        slack = coarse.least(curve, least)
         if slack >= -TOLERANCE and _hurry(curve, limits) is None:
-            check = check_swing(curve, clearance, limits)
-            if check.kept:
-                return curve, check, tried
-            slack = check.slack
+            slack = dense.least(curve, least)
+            if slack >= -TOLERANCE:
+                return curve, check_swing(curve, clearance, limits), tried
         if best is None or min(slack, 0.0) > least:
             best, least = curve, min(slack, 0.0)
     assert best is not None  # a family has members
     return best, check_swing(best, clearance, limits), tried
 
 
-def _least_slack(
-    curve: SwingCurve, clearance: Clearance, limits: SwingLimits, enough: float, order: list[int]
-) -> float:
-    """Smallest slack over a few instants [m].
+class _Slack:
+    """Smallest slack of curves over the same instants, those first that were the nearest before.
 
-    Where one is below ``enough`` the search ends there, and that instant moves to the front of the order.
+    Args:
+        clearance: Signed distance of the effector at a time and pose [m].
+        limits: What to keep.
+        count: Of the instants; every ``limits.time_step`` when omitted.
     """
-    state = curve.evaluate(_instants(curve, limits, COARSE))
 
-    def distance(index: int) -> float:
-        return clearance(float(state.time[index]), Pose(state.position[index], state.rotation[index]))
+    def __init__(self, clearance: Clearance, limits: SwingLimits, count: int | None = None) -> None:
+        self._clearance, self._limits, self._count = clearance, limits, count
+        self._order: list[int] = []
 
-    required = _required(curve, state, (distance(0), distance(COARSE - 1)), limits)
-    smallest = np.inf
-    for place, index in enumerate(order):
-        smallest = min(smallest, distance(index) - required[index])
-        if smallest < enough:
-            order.insert(0, order.pop(place))
-            break
-    return float(smallest)
+    def least(self, curve: SwingCurve, known: float) -> float:
+        """Smallest slack [m]; of what is neither clear nor better than ``known``, the first that shows it."""
+        state = curve.evaluate(_instants(curve, self._limits, self._count))
+        last = len(state.time) - 1
+        self._order = self._order or list(range(1, last))
+        at_contact = self._distance(state, 0), self._distance(state, last)
+        required = _required(curve, state, at_contact, self._limits)
+        smallest, enough = np.inf, min(known + TOLERANCE, -TOLERANCE)
+        for place, index in enumerate(self._order):
+            smallest = min(smallest, self._distance(state, index) - float(required[index]))
+            if smallest < enough:
+                self._order.insert(0, self._order.pop(place))
+                break
+        return smallest
+
+    def _distance(self, state: SwingState, index: int) -> float:
+        return self._clearance(float(state.time[index]), Pose(state.position[index], state.rotation[index]))
 
 
 def _choices(heights: Sequence[float]) -> list[tuple[float, float, float]]:
