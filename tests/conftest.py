@@ -58,3 +58,19 @@ def finished_run():
     planned = carried(scenario, body, schedule, np.linspace(0.0, 4.193, 420))
     executed = carried(scenario, body, schedule, np.arange(0.0, 5.193, 0.005), offset=0.003)
     return MotionFile(planned, executed, body, scene, schedule)
+
+
+@pytest.fixture(scope="session")
+def aside():
+    """A walking path of 1.2 m to the left that keeps its heading, in 6 s from rest to rest."""
+    from dataclasses import replace
+
+    from manikin.locomotion import walking_path
+    from manikin.spline import BSpline
+
+    path = walking_path((0, 0, 0), (0, 1.2, 0), max_speed=0.6)
+    share = np.linspace(0.0, 1.0, 200)
+    way = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    places = np.column_stack([0.0 * share, 1.2 * way, 0.0 * share])
+    spline = BSpline.fit(path.spline.degree, path.spline.knots, share, places)
+    return replace(path, spline=spline, duration=6.0)

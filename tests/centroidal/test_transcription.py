@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from manikin.centroidal.facets import facet_distances, nearest_facets, with_violated
 from manikin.centroidal.feasibility import polytopes_of
-from manikin.centroidal.initial_guess import GUESS_STYLES, guess
+from manikin.centroidal.initial_guess import GUESS_STYLES, PENDULUM, guess
 from manikin.centroidal.optimise import Targets, build_programme, optimise, trajectory_of
 from manikin.centroidal.transcription import bernstein_gram, spline_from_bezier
 from manikin.spline import BSpline, bernstein_matrix, clamped_knots
@@ -35,7 +35,7 @@ def test_gram_matrix_integrates_products():
     assert np.allclose(bernstein_gram(4), basis.T @ basis / len(s), atol=1e-7)
 
 
-@pytest.mark.parametrize("style", GUESS_STYLES)
+@pytest.mark.parametrize("style", [PENDULUM, *GUESS_STYLES])
 def test_guesses_meet_the_ends_and_the_durations(platform, style):
     for problem in (platform(), platform(max_duration=2.7)):
         bezier, durations = guess(problem, style, polytopes_of(problem))
@@ -53,7 +53,7 @@ def programme_values(problem, bezier, durations, margin):
     programme = build_programme(problem, facets)
     from manikin.centroidal.optimise import _parameters
 
-    unknowns = programme.pack_unknowns(bezier, durations, margin, 0.0)
+    unknowns = programme.pack_unknowns(bezier, durations, float(durations.sum()), margin, 0.0)
     values = programme.pack_parameters(_parameters(problem, polytopes, facets, Targets.of(problem)))
     oracle = programme.solver.get_function("nlp_f"), programme.solver.get_function("nlp_g")
     objective, rows = (np.asarray(function(unknowns, values)).ravel() for function in oracle)

@@ -1,4 +1,4 @@
-"""First trajectory for the optimisation: through the centres of the shared supports."""
+"""First trajectory for the optimisation: of a pendulum on the supports, or through their centres."""
 
 import itertools
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ from scipy.optimize import linprog
 
 from manikin.balance import WrenchPolytope
 from manikin.centroidal.problem import CentroidalProblem
-from manikin.contact import Stance
-from manikin.spatial import GRAVITY_VECTOR, FloatArray, skew
+from manikin.contact import ContactKind, Stance
+from manikin.spatial import GRAVITY, GRAVITY_VECTOR, FloatArray, skew
 from manikin.spline import BSpline, clamped_knots, end_control_points, start_control_points
 
 
@@ -20,11 +20,12 @@ class GuessStyle:
     """One way of guessing; several are tried in order.
 
     Attributes:
-        pull: 0 follows the straight line from start to goal, 1 goes over the supports.
+        pull: 0 follows the straight line from start to goal, 1 goes over the supports. None is the motion of
+            a linear inverted pendulum on the supports.
         stretch: Durations as multiples of the lower bounds, before the bounds are applied.
     """
 
-    pull: float
+    pull: float | None
     stretch: float
 
 
@@ -32,6 +33,21 @@ INFEASIBLE = 2
 """Status of a linear programme without a solution."""
 
 GUESS_STYLES = (GuessStyle(0.5, 1.5), GuessStyle(0.3, 1.2), GuessStyle(0.7, 2.5))
+"""Of any motion."""
+
+PENDULUM = GuessStyle(None, 1.5)
+"""Of a body on its feet, before the others."""
+
+_PENDULUM_SAMPLES = 5
+_JERK_TIME = 0.02
+"""Weight of the jerk in metres of distance from the supports [s^3]."""
+
+
+def guess_styles(problem: CentroidalProblem) -> tuple[GuessStyle, ...]:
+    """Ways of guessing, in the order in which they should be tried."""
+    contacts = [contact for phase in problem.sequence for contact in phase.stance]
+    on_feet = all(contact.kind is ContactKind.SOLE and contact.normal[2] > 0.99 for contact in contacts)
+    return (PENDULUM, *GUESS_STYLES) if on_feet else GUESS_STYLES
 
 
 def guess(
@@ -46,6 +62,8 @@ def guess(
     """
     durations = _guess_durations(problem, style.stretch, polytopes)
     instants = np.concatenate([[0.0], np.cumsum(durations)])
+    if style.pull is None:
+        return _pendulum(problem, instants).bezier_points(), durations
     path = PchipInterpolator(instants, _guess_key_positions(problem, instants, style.pull))
     k = problem.degree
     knots = clamped_knots(k, instants)
@@ -57,6 +75,46 @@ def guess(
         last=end_control_points(k, knots, problem.goal_com, rest[1]),
     )  # fmt: skip
     return spline.bezier_points(), durations
+
+
+def _pendulum(problem: CentroidalProblem, instants: FloatArray) -> BSpline:
+    """Path of a linear inverted pendulum whose zero moment point is near the middles of the supports.
+
+    Its height is that of the start. With ``c`` the middle of a phase's supports and ``h`` the height above
+    them, the spline minimises ``|p - h / g p'' - c|^2 + w^2 |p^(3)|^2`` over samples of the motion; as ``h``
+    is given, this is linear least squares. The true height follows the straight line in between.
+    """
+    k = problem.degree
+    knots = clamped_knots(k, instants)
+    count = len(knots) - k - 1
+    share = (np.arange(_PENDULUM_SAMPLES) + 0.5) / _PENDULUM_SAMPLES
+    durations = np.diff(instants)
+    times = (instants[:-1, None] + durations[:, None] * share).ravel()
+    weight = np.repeat(np.sqrt(durations), _PENDULUM_SAMPLES)[:, None]
+    middles = np.array([
+        np.mean([contact.points_in_world.mean(axis=0) for contact in phase.stance], axis=0)
+        for phase in problem.sequence
+    ])  # fmt: skip
+    wanted = np.repeat(middles[:, :2], _PENDULUM_SAMPLES, axis=0)
+    height = problem.start_com[2] - middles[0, 2]
+    basis = BSpline(k, knots, np.eye(count))
+    rows = np.vstack([
+        weight * (basis(times) - height / GRAVITY * basis(times, 2)), _JERK_TIME * weight * basis(times, 3)
+    ])  # fmt: skip
+    values = np.vstack([weight * wanted, np.zeros_like(wanted)])
+    rest = np.zeros(3)
+    first = start_control_points(k, knots, problem.start_com, _or(problem.start_velocity, rest), rest)
+    last = end_control_points(k, knots, problem.goal_com, _or(problem.goal_velocity, rest), rest)
+    points = np.linspace(problem.start_com, problem.goal_com, count)
+    points[: len(first)], points[count - len(last) :] = first, last
+    inner = slice(len(first), count - len(last))
+    given = rows[:, : inner.start] @ first[:, :2] + rows[:, inner.stop :] @ last[:, :2]
+    points[inner, :2] = np.linalg.lstsq(rows[:, inner], values - given, rcond=None)[0]
+    return BSpline(k, knots, points)
+
+
+def _or(given: FloatArray | None, default: FloatArray) -> FloatArray:
+    return default if given is None else given
 
 
 def _guess_durations(

@@ -132,9 +132,11 @@ def optimise(
         durations: (phases,) [s].
     """
     programme = build_programme(problem, facets)
-    lower, upper = _unknown_bounds(programme, problem)
+    lower, upper = _unknown_bounds(programme, problem, targets)
     row_lower, row_upper = _row_bounds(programme, problem, targets)
-    unknowns = programme.pack_unknowns(bezier, durations, problem.required_margin, 10.0)
+    unknowns = programme.pack_unknowns(
+        bezier, durations, float(durations.sum()), problem.required_margin, 10.0
+    )
     solution = programme.solver(
         x0=np.clip(unknowns, lower, upper),
         p=programme.pack_parameters(_parameters(problem, polytopes, facets, targets)),
@@ -174,15 +176,18 @@ def _parameters(
     return values
 
 
-def _unknown_bounds(programme: Programme, problem: CentroidalProblem) -> tuple[FloatArray, FloatArray]:
+def _unknown_bounds(
+    programme: Programme, problem: CentroidalProblem, targets: Targets
+) -> tuple[FloatArray, FloatArray]:
     phases, k = programme.structure.phases, programme.structure.degree
     points = np.full((phases, k + 1, 3), np.inf)
     low, high = -points, points.copy()
     for bound in (low, high):
         bound[0, 0], bound[-1, -1] = problem.start_com, problem.goal_com
-    lower = programme.pack_unknowns(low, problem.min_durations, -np.inf, 0.0)
+    total = np.inf if problem.max_duration is None else problem.max_duration - targets.duration
+    lower = programme.pack_unknowns(low, problem.min_durations, 0.0, -np.inf, 0.0)
     longest = np.maximum(LONGEST_PHASE, 2.0 * problem.min_durations)
-    upper = programme.pack_unknowns(high, np.minimum(problem.max_durations, longest), np.inf, np.inf)
+    upper = programme.pack_unknowns(high, np.minimum(problem.max_durations, longest), total, np.inf, np.inf)
     return lower, upper
 
 
@@ -190,13 +195,12 @@ def _row_bounds(
     programme: Programme, problem: CentroidalProblem, targets: Targets
 ) -> tuple[FloatArray, FloatArray]:
     limit = (problem.support_distance or 0.0) - targets.position
-    longest = np.inf if problem.max_duration is None else problem.max_duration - targets.duration
     bounds = {
         "balance": (0.0, np.inf),
         "distance": (-np.inf, limit**2),
         "continuity": (0.0, 0.0),
         "key_plane": (-np.inf, 0.0),
-        "total_duration": (0.0, longest),
+        "total_duration": (0.0, 0.0),
         "required_margin": (targets.margin / MARGIN_SCALE[problem.margin_space], np.inf),
     }
     ends = iter(

@@ -8,7 +8,7 @@ from manikin.balance import LimitingConstraint, WrenchPolytope
 from manikin.centroidal.certificate import Residuals, measure
 from manikin.centroidal.facets import facet_distances, nearest_facets, with_violated
 from manikin.centroidal.feasibility import Failure, Feasibility, assess_feasibility, polytopes_of
-from manikin.centroidal.initial_guess import GUESS_STYLES, GuessStyle, guess
+from manikin.centroidal.initial_guess import GuessStyle, guess, guess_styles
 from manikin.centroidal.optimise import Attempt, Targets, optimise, trajectory_of
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.centroidal.trajectory import CentroidalTrajectory
@@ -129,7 +129,7 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
 
 def _search(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope]) -> list[Attempt]:
     attempts: list[Attempt] = []
-    for style in GUESS_STYLES:
+    for style in guess_styles(problem):
         attempts.extend(_rounds(problem, polytopes, style))
         if attempts[-1].certificate.within():
             break

@@ -64,8 +64,8 @@ class Programme:
     Attributes:
         structure: What it was built for.
         solver: CasADi function made by ``nlpsol``; unknowns are the Bezier points of each
-            phase (column by column), the durations [s], d_min and its shortfall below the
-            required margin, both over MARGIN_SCALE.
+            phase (column by column), the durations and their sum [s], d_min and its shortfall below
+            the required margin, both over MARGIN_SCALE.
         groups: Names of the row groups with their number of rows, in order. ``end`` rows are
             start velocity, start acceleration, goal velocity, goal acceleration.
         parameters: Names and shapes of the parameters, in order.
@@ -90,11 +90,11 @@ class Programme:
         return np.concatenate(packed)
 
     def pack_unknowns(
-        self, bezier: FloatArray, durations: FloatArray, margin: float, shortfall: float
+        self, bezier: FloatArray, durations: FloatArray, total: float, margin: float, shortfall: float
     ) -> FloatArray:
-        """Vector of unknowns from (phases, k + 1, 3) points, (phases,) durations, d_min and shortfall."""
+        """Vector of unknowns from (phases, k + 1, 3) points, (phases,) durations, sum, d_min, shortfall."""
         margins = np.array([margin, shortfall]) / MARGIN_SCALE[self.structure.margin_space]
-        return np.concatenate([bezier.transpose(0, 2, 1).ravel(), durations, margins])
+        return np.concatenate([bezier.transpose(0, 2, 1).ravel(), durations, [total], margins])
 
     def unpack_unknowns(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Bezier points (phases, k + 1, 3), durations (phases,) and d_min."""
@@ -115,6 +115,7 @@ class _Builder:
         size = structure.degree + 1
         self.bezier = [ca.SX.sym(f"b{i}", size, 3) for i in range(structure.phases)]
         self.durations = ca.SX.sym("h", structure.phases)
+        self.total = ca.SX.sym("T")
         self.margin = ca.SX.sym("d")
         self.shortfall = ca.SX.sym("e")
 
@@ -139,11 +140,15 @@ def transcribe(structure: Structure) -> Programme:
             _add_continuity(builder, phase)
     _add_end_conditions(builder)
     _add_key_planes(builder)
-    builder.add("total_duration", ca.sum1(builder.durations))
+    builder.add("total_duration", ca.sum1(builder.durations) - builder.total)
     builder.add("required_margin", builder.margin + builder.shortfall)
     objective = _objective(builder)
     unknowns = ca.vertcat(
-        *[ca.vec(b) for b in builder.bezier], builder.durations, builder.margin, builder.shortfall
+        *[ca.vec(b) for b in builder.bezier],
+        builder.durations,
+        builder.total,
+        builder.margin,
+        builder.shortfall,
     )
     problem = {
         "x": unknowns,
@@ -263,11 +268,12 @@ def _objective(builder: _Builder) -> ca.SX:
     """Weighted objectives ([Qiu2012]_ 5.27-5.28), the sums exactly integrated.
 
     The required margin is asked for by an exact penalty, so that the largest margin is found
-    when it cannot be reached.
+    when it cannot be reached. The total duration is an unknown of its own: as a sum of all durations it
+    would tie each phase to every other one in the second derivatives, here it ties each to itself only.
     """
     weights = builder.parameter("weights", 4)
     diagonals = [builder.parameter(name, 1, 3) for name in ("velocity", "acceleration", "jerk")]
-    total = ca.sum1(builder.durations)
+    total = builder.total
     scale = MARGIN_SCALE[builder.structure.margin_space]
     smoothness = ca.SX(0)
     for points, duration in zip(builder.bezier, ca.vertsplit(builder.durations), strict=True):

@@ -1,4 +1,4 @@
-"""``manikin walk``: the way a person walks to a place, with the whole body; or steer somebody with the keys."""
+"""``manikin walk``: how a person walks to a place, with the whole body; or somebody steered with keys."""
 
 import math
 from pathlib import Path

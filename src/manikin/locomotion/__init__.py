@@ -1,10 +1,12 @@
 """How people walk: paths, segments of walks, whole-body walks ([Truong2010]_ chapters 4 to 6)."""
+"""How people walk: paths by optimal control, footprints, segments ([Truong2010]_ chapters 4 and 5)."""
 
 from manikin.locomotion.categories import CategoryStatistics, Spread, category_of, category_statistics
 from manikin.locomotion.controller import WalkController, WalkFrame
 from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
 from manikin.locomotion.floor_plan import floor_plan
 from manikin.locomotion.follow import Walk, walk_along
+from manikin.locomotion.footprints import Footprint, Footprints
 from manikin.locomotion.library import MotionLibrary
 from manikin.locomotion.library_file import load_library, save_library
 from manikin.locomotion.objective import LITERAL_ORDER, PROSE_ORDER, WalkObjective
@@ -24,6 +26,7 @@ from manikin.locomotion.segmentation import (
     segment_path,
 )
 from manikin.locomotion.shoulders import ShoulderPaths
+from manikin.locomotion.stepper import StepRule, place_footprints
 from manikin.locomotion.targets import START, TEST_TARGETS, experiment_targets
 from manikin.locomotion.zone import HolonomicZone, holonomic_zone
 
@@ -37,6 +40,8 @@ __all__ = [
     "START",
     "TEST_TARGETS",
     "CategoryStatistics",
+    "Footprint",
+    "Footprints",
     "HolonomicEnds",
     "HolonomicZone",
     "MotionLibrary",
@@ -47,6 +52,7 @@ __all__ = [
     "SegmentationRule",
     "ShoulderPaths",
     "Spread",
+    "StepRule",
     "Walk",
     "WalkController",
     "WalkFrame",
@@ -66,6 +72,7 @@ __all__ = [
     "holonomic_zone",
     "load_library",
     "path_deviation",
+    "place_footprints",
     "save_library",
     "segment_path",
     "walk_along",

@@ -205,7 +205,7 @@ def check_swing(
     """
     state = curve.evaluate(_instants(curve, limits, instants))
     distance = _distances(state, clearance)
-    required = _required(curve, state, distance, limits)
+    required = _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
     slack = (distance - required)[1:-1]  # at the contacts themselves it is zero by definition
     worst = int(np.argmin(slack)) + 1
     in_flight = required >= limits.clearance
@@ -217,33 +217,79 @@ def check_swing(
             f"clearance is {distance[worst]:.4f} m at t = {state.time[worst]:.3f} s with the effector at "
             f"({place}); required {required[worst]:.4f} m"
         )
-    elif curve.peak_speed > limits.speed:
-        failure = f"speed reaches {curve.peak_speed:.2f} m/s; limit {limits.speed:.2f} m/s"
-    elif curve.peak_angular_speed > limits.angular_speed:
-        failure = (
-            f"angular speed reaches {curve.peak_angular_speed:.2f} rad/s; "
-            f"limit {limits.angular_speed:.2f} rad/s"
-        )
+    else:
+        failure = _hurry(curve, limits)
     return SwingCheck(
         float(slack[worst - 1]), float(state.time[worst]), smallest,
         curve.peak_speed, curve.peak_angular_speed, failure,
     )  # fmt: skip
 
 
+def _hurry(curve: SwingCurve, limits: SwingLimits) -> str | None:
+    """Which speed is above its limit, if one is."""
+    if curve.peak_speed > limits.speed:
+        return f"speed reaches {curve.peak_speed:.2f} m/s; limit {limits.speed:.2f} m/s"
+    if curve.peak_angular_speed > limits.angular_speed:
+        return (
+            f"angular speed reaches {curve.peak_angular_speed:.2f} rad/s; "
+            f"limit {limits.angular_speed:.2f} rad/s"
+        )
+    return None
+
+
 def _first_clear(
     family: Iterator[SwingCurve], clearance: Clearance, limits: SwingLimits
 ) -> tuple[SwingCurve, SwingCheck, int]:
-    """First curve that keeps the limits, or else the first of those nearest to clear; how many were tried."""
-    found: list[tuple[SwingCurve, SwingCheck]] = []
+    """First curve that keeps the limits, or else the first of those nearest to clear; how many were tried.
+
+    A curve is given up at the first instant at which it is too near and no better than the best one before
+    it. Instants at which curves were given up are looked at first.
+    """
+    best, least, tried = None, -np.inf, 0
+    coarse, dense = _Slack(clearance, limits, COARSE), _Slack(clearance, limits)
     for curve in family:
-        check = check_swing(curve, clearance, limits, instants=COARSE)
-        if check.kept:
-            check = check_swing(curve, clearance, limits)
-        found.append((curve, check))
-        if check.kept:
-            return curve, check, len(found)
-    curve, _ = max(found, key=lambda item: min(item[1].slack, 0.0))
-    return curve, check_swing(curve, clearance, limits), len(found)
+        tried += 1
+        slack = coarse.least(curve, least)
+        if slack >= -TOLERANCE and _hurry(curve, limits) is None:
+            slack = dense.least(curve, least)
+            if slack >= -TOLERANCE:
+                return curve, check_swing(curve, clearance, limits), tried
+        if best is None or min(slack, 0.0) > least:
+            best, least = curve, min(slack, 0.0)
+    assert best is not None  # a family has members
+    return best, check_swing(best, clearance, limits), tried
+
+
+class _Slack:
+    """Smallest slack of curves over the same instants, those first that were the nearest before.
+
+    Args:
+        clearance: Signed distance of the effector at a time and pose [m].
+        limits: What to keep.
+        count: Of the instants; every ``limits.time_step`` when omitted.
+    """
+
+    def __init__(self, clearance: Clearance, limits: SwingLimits, count: int | None = None) -> None:
+        self._clearance, self._limits, self._count = clearance, limits, count
+        self._order: list[int] = []
+
+    def least(self, curve: SwingCurve, known: float) -> float:
+        """Smallest slack [m]; of what is neither clear nor better than ``known``, the first that shows it."""
+        state = curve.evaluate(_instants(curve, self._limits, self._count))
+        last = len(state.time) - 1
+        self._order = self._order or list(range(1, last))
+        at_contact = self._distance(state, 0), self._distance(state, last)
+        required = _required(curve, state, at_contact, self._limits)
+        smallest, enough = np.inf, min(known + TOLERANCE, -TOLERANCE)
+        for place, index in enumerate(self._order):
+            smallest = min(smallest, self._distance(state, index) - float(required[index]))
+            if smallest < enough:
+                self._order.insert(0, self._order.pop(place))
+                break
+        return smallest
+
+    def _distance(self, state: SwingState, index: int) -> float:
+        return self._clearance(float(state.time[index]), Pose(state.position[index], state.rotation[index]))
 
 
 def _choices(heights: Sequence[float]) -> list[tuple[float, float, float]]:
@@ -280,11 +326,13 @@ def required_clearance(
     return wanted
 
 
-def _required(curve: SwingCurve, state: SwingState, distance: FloatArray, limits: SwingLimits) -> FloatArray:
-    """Distance wanted at each instant of a curve."""
+def _required(
+    curve: SwingCurve, state: SwingState, at_contact: tuple[float, float], limits: SwingLimits
+) -> FloatArray:
+    """Distance wanted at each instant of a curve, from those at its two contacts."""
     from_start = np.linalg.norm(state.position - curve.start.position, axis=1)
     to_end = np.linalg.norm(state.position - curve.end.position, axis=1)
-    return required_clearance((from_start, to_end), (float(distance[0]), float(distance[-1])), limits)
+    return required_clearance((from_start, to_end), at_contact, limits)
 
 
 def _refine(
@@ -307,7 +355,7 @@ def _refine(
         check = check_swing(curve, clearance, limits)
         if _rank(curve, check) > _rank(best, best_check):
             best, best_check = curve, check
-        if check.kept and np.abs(step).max() < SETTLED:
+        if np.abs(step).max() < (SETTLED if check.kept else STATIONARY):
             break
     return best, best_check, done
 
@@ -340,6 +388,9 @@ ROW_STEP = 0.012
 
 SETTLED = 0.004
 """Change of the control coordinates below which the optimisation stops [m]."""
+
+STATIONARY = 1e-5
+"""The same where no curve keeps the limits: another iteration would lead to the same curve [m]."""
 
 TOLERANCE = 1e-5
 """Accuracy expected of measured distances [m]."""
@@ -382,7 +433,7 @@ def _distance_rows(
     """Rows G and bounds l of ``G dx >= l`` from the distances near the required ones."""
     state = curve.evaluate(_instants(curve, limits, max(33, int(curve.duration / ROW_STEP))))
     distance = _distances(state, clearance)
-    required = _required(curve, state, distance, limits)
+    required = _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
     weights = basis((state.time - curve.start_time) / curve.duration, len(curve.control_position))
     rows, lower = [], []
     for index in np.flatnonzero(distance - required < 0.1)[1:-1]:

@@ -372,12 +372,20 @@ def normal_tangents(normal: ArrayLike) -> FloatArray:
 
 def _least_norm(energy: FloatArray, matrix: FloatArray, target: FloatArray) -> FloatArray:
     """Control points (n, 3) of least energy among those that meet ``matrix x = target``."""
-    n = len(energy)
+    gain = _least_norm_gain(len(energy), energy.tobytes(), matrix.tobytes())
+    return (gain @ target).reshape(len(energy), 3)
+
+
+@lru_cache(maxsize=64)
+def _least_norm_gain(n: int, energy_bytes: bytes, matrix_bytes: bytes) -> FloatArray:
+    """(3n, m) linear map from the targets to the control points of least energy; cached by its matrices."""
+    energy = np.frombuffer(energy_bytes).reshape(n, n)
+    matrix = np.frombuffer(matrix_bytes).reshape(-1, 3 * n)
     hessian = block_rows(energy / np.trace(energy)) + 1e-12 * np.eye(3 * n)
     m = len(matrix)
     system = np.block([[hessian, matrix.T], [matrix, np.zeros((m, m))]])
-    solution = np.linalg.solve(system, np.concatenate([np.zeros(3 * n), target]))
-    return np.asarray(solution[: 3 * n], dtype=np.float64).reshape(n, 3)
+    targets = np.vstack([np.zeros((3 * n, m)), np.eye(m)])
+    return np.asarray(np.linalg.solve(system, targets)[: 3 * n], dtype=np.float64)
 
 
 PITCH_DECLINE = 2.0
