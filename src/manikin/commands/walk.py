@@ -25,9 +25,11 @@ def walk(
         Place | None,
         typer.Option(metavar="X Y HEADING_DEG", help="Goal [m, m, deg, counter-clockwise from x]."),
     ] = None,
-    start: Annotated[
-        Place, typer.Option("--from", metavar="X Y HEADING_DEG", help="Start [m, m, deg].")
-    ] = (0.0, 0.0, 0.0),
+    start: Annotated[Place, typer.Option("--from", metavar="X Y HEADING_DEG", help="Start [m, m, deg].")] = (
+        0.0,
+        0.0,
+        0.0,
+    ),
     scene: Annotated[
         str | None,
         typer.Option("--in", metavar="NAME|FILE.yaml", help="Scenario whose obstacles stand in the way."),

@@ -1,5 +1,4 @@
-"""How people walk: paths, segments of walks, whole-body walks ([Truong2010]_ chapters 4 to 6)."""
-"""How people walk: paths by optimal control, footprints, segments ([Truong2010]_ chapters 4 and 5)."""
+"""How people walk: paths, footprints, segments, words, whole-body walks ([Truong2010]_ chapters 3 to 6)."""
 
 from manikin.locomotion.categories import CategoryStatistics, Spread, category_of, category_statistics
 from manikin.locomotion.controller import WalkController, WalkFrame
