@@ -56,6 +56,21 @@ class Walk:
     slides_before: FloatArray
     slides: FloatArray
 
+    def __post_init__(self) -> None:
+        for name in ("time", "q", "place", "support", "outside", "slides_before", "slides"):
+            getattr(self, name).setflags(write=False)
+
+    @property
+    def notice(self) -> str | None:
+        """Says so where the path is faster than any walk of the library; None if it nowhere is."""
+        if not self.outside.any():
+            return None
+        first = self.time[int(np.argmax(self.outside))]
+        return (
+            f"{100 * np.mean(self.outside):.0f} % of the path, from {first:.2f} s on, are beyond the motion "
+            "library; legs move there as in the nearest walk"
+        )
+
     @property
     def feet(self) -> tuple[str, ...]:
         """Effectors that walk, in the order of ``support``."""

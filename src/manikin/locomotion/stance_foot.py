@@ -16,14 +16,15 @@ from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import FootPlacement, Sole
 from manikin.locomotion.gait import GaitFrames
 from manikin.locomotion.leg_kinematics import HINGES, LegKinematics
+from manikin.locomotion.turns import dot
 from manikin.mocap.anatomy import SIDES
 from manikin.spatial import FloatArray
 
 FLAT = np.deg2rad(4.0)
 """A standing foot pitched by less than this is put flat, more or less [rad]."""
 
-EASE = 0.2
-"""Share of the swing in which a foot leaves, and in which it reaches, the floor."""
+LEAVING, LANDING = 0.2, 0.2
+"""Shares of the swing in which a foot leaves, and in which it reaches, the floor."""
 
 LIFT = 0.15
 """A foot is lifted by at least this share of the distance by which its step is corrected."""
@@ -31,6 +32,15 @@ LIFT = 0.15
 STRAIGHTENING = 2.5
 """Toes are straight again at this height over their length; at 1 they would leave the floor no sooner than
 they must, faster than toes can move."""
+
+HEEL_UP = np.deg2rad(20.0)
+"""A standing foot with its heel up by this rolls on for its leg, with less heel the less so [rad]."""
+
+OFF_FLOOR = 0.05
+"""A foot higher than this does not [m]."""
+
+MOST_HEEL = np.deg2rad(20.0)
+"""By how much it rolls on at most [rad]."""
 
 YIELDS = 2
 """How often feet yield to joints at the ends of their ranges."""
@@ -76,6 +86,7 @@ class Legs:
             Postures (n, nq) and by how much the pelvis sinks (n,) [m].
         """
         angles = frames.angles
+        feet = self._with_heels_up(frames, feet)
         for last in (False,) * YIELDS + (True,):
             angles, sink = self._legs_to(frames, feet, angles, least)
             excess = angles - np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
@@ -92,6 +103,22 @@ class Legs:
         self._tilt(q, angles)
         q[:, 7:] = np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
         return q, sink
+
+    def _with_heels_up(self, frames: GaitFrames, feet: FootPlacement) -> FootPlacement:
+        """Feet that roll on over the ball where a leg is longer than the gait has it: knees stay as bent.
+
+        One step of Newton's method on the distance of the ankle from the hip, which the pitch shortens.
+        """
+        share = smooth_step(feet.pitch / HEEL_UP) * smooth_step(1.0 - feet.clearance / OFF_FLOOR)
+        if not np.any(share):
+            return feet
+        foot, ankle = feet.to_foot(self._sole)
+        line = ankle - self._legs.hips(frames.pelvis, frames.place)
+        length = np.sqrt(dot(line, line))
+        knees = frames.angles[:, self._legs.slots[:, HINGES.index("knee_flexion")]].T
+        shortens = -dot(line, self._sole.ball * foot[..., 2] + self._sole.depth * foot[..., 0]) / length
+        more = (length - self._legs.length_at(knees)) / np.maximum(shortens, 0.5 * self._sole.ball)
+        return replace(feet, pitch=feet.pitch + share * np.clip(more, 0.0, MOST_HEEL))
 
     def _legs_to(
         self, frames: GaitFrames, feet: FootPlacement, angles: FloatArray, least: FloatArray | float
@@ -112,7 +139,7 @@ class Legs:
         """Feet and knee rotations that ask less of joints at the ends of their ranges.
 
         A foot rolls over its edge, heel or ball where the ankle turns no further; the knee takes over what
-        the hip cannot rotate.
+        the hip cannot rotate, and the foot turns about its heel or ball for what the knee cannot either.
         """
         over = np.moveaxis(excess[:, self._legs.slots], 0, 1)
         hip, ankle, inversion = (over[..., HINGES.index(name)] for name in _YIELDING)
@@ -120,8 +147,9 @@ class Legs:
         knees = self._legs.slots[:, HINGES.index("knee_rotation")]
         wanted = angles[:, knees] + hip.T
         angles[:, knees] = np.clip(wanted, self._body.lower[knees], self._body.upper[knees])
-        rolled = feet.roll + inversion * [[1.0], [-1.0]]
-        return replace(feet, pitch=feet.pitch + ankle, roll=rolled), angles
+        side = np.array([[1.0], [-1.0]])
+        turned = feet.turned(self._sole, side * (wanted - angles[:, knees]).T)
+        return replace(turned, pitch=feet.pitch + ankle, roll=feet.roll + side * inversion), angles
 
     def _tilt(self, q: FloatArray, angles: FloatArray) -> None:
         """Tilt the pelvis about the line of the hip joints; hips and spine make up for it."""
@@ -150,7 +178,7 @@ def corrected(
         distance: (...) by how much the whole step is corrected [m].
     """
     standing = swing < 0.0
-    up = np.where(standing, 0.0, smooth_step(swing / EASE) * smooth_step((1.0 - swing) / EASE))
+    up = np.where(standing, 0.0, smooth_step(swing / LEAVING) * smooth_step((1.0 - swing) / LANDING))
     flat = wanted.pitch - FLAT * np.tanh(wanted.pitch / FLAT)
     return FootPlacement(
         point=wanted.point + offset[..., :2],
