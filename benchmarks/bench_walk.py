@@ -8,8 +8,10 @@ import pytest
 from manikin.centroidal import plan_com
 from manikin.centroidal.transcription import transcribe
 from manikin.contact import ContactSchedule
+from manikin.locomotion import place_footprints, walking_path
 from manikin.pipeline import run
 from manikin.scenarios import load_scenario
+from manikin.scenarios.walked import walk_before, walking_supports
 from manikin.wholebody import WholeBodySettings, plan_whole_body
 from manikin.wholebody.manner import manner_of
 
@@ -42,4 +44,29 @@ def test_whole_body(benchmark, scenario):
 def test_everything(benchmark, scenario):
     """All stages with the execution, without files and figures."""
     result = benchmark.pedantic(lambda: run(scenario), rounds=2, iterations=1)
+    assert result.succeeded
+
+
+@pytest.fixture(scope="module", params=["straight", "around", "to the platform"])
+def walked(request):
+    """Scenarios on footprints: 3 m in 8 steps, a quarter turn in 11, 4 m and three steps more in 13."""
+    if request.param == "to the platform":
+        path = walking_path((0, -4, np.pi / 2), (0, 0, np.pi / 2), max_speed=0.6)
+        return walk_before(place_footprints(path, first="right_foot"), load_scenario("platform"))
+    goal = {"straight": (3.0, 0.0, 0.0), "around": (2.0, 2.0, np.pi / 2)}[request.param]
+    return walking_supports(
+        place_footprints(walking_path((0, 0, 0), goal, max_speed=0.6)), load_scenario("walk")
+    )
+
+
+def test_walk_on_footprints_com(benchmark, walked):
+    """The CoM of a long walk, cold; the motions last 8 to 12 s."""
+    problem = walked.build_centroidal_problem()
+    result = benchmark.pedantic(plan_com, (problem,), setup=transcribe.cache_clear, rounds=3)
+    assert result.succeeded
+
+
+def test_walk_on_footprints(benchmark, walked):
+    """All stages with the execution, without files and figures."""
+    result = benchmark.pedantic(lambda: run(walked), rounds=2, iterations=1)
     assert result.succeeded

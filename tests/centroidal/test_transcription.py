@@ -9,7 +9,9 @@ from manikin.centroidal.facets import facet_distances, nearest_facets, with_viol
 from manikin.centroidal.feasibility import polytopes_of
 from manikin.centroidal.initial_guess import GUESS_STYLES, PENDULUM, guess
 from manikin.centroidal.optimise import Targets, build_programme, optimise, trajectory_of
-from manikin.centroidal.transcription import bernstein_gram, spline_from_bezier
+from manikin.centroidal.transcription import Structure, bernstein_gram, spline_from_bezier, transcribe
+from manikin.scenarios import load_scenario
+from manikin.spatial import GRAVITY, GRAVITY_VECTOR
 from manikin.spline import BSpline, bernstein_matrix, clamped_knots
 
 
@@ -142,3 +144,33 @@ def test_problems_of_one_structure_share_the_compiled_programme(platform):
     heavier = platform(mass=95.0, goal_com=(0.61, 0.64, 0.86))
     facets = tuple(np.arange(12) for _ in range(7))
     assert build_programme(platform(), facets) is build_programme(heavier, facets)
+
+
+def test_the_pendulum_stands_on_its_feet():
+    """In the middle of each single support the zero moment point of the guess is on the sole."""
+    problem = load_scenario("walk").build_centroidal_problem()
+    bezier, durations = guess(problem, PENDULUM, polytopes_of(problem))
+    trajectory = trajectory_of(problem, bezier, durations)
+    instants = trajectory.schedule.instants
+    for phase, start, end in zip(problem.sequence, instants[:-1], instants[1:], strict=True):
+        if len(phase.stance) > 1:
+            continue
+        (contact,) = phase.stance
+        time = (start + end) / 2
+        com, acceleration = trajectory.position(time), trajectory.acceleration(time)
+        zmp = com - com[2] / (GRAVITY + acceleration[2]) * (acceleration - GRAVITY_VECTOR)
+        local = contact.rotation_contact_to_world.T @ (zmp - contact.position)
+        assert abs(local[0]) < contact.length / 2
+        assert abs(local[1]) < contact.width / 2
+
+
+def test_second_derivatives_grow_with_the_number_of_phases_only():
+    """Twice the phases have twice the entries of the Hessian, but for the few unknowns that all share."""
+
+    def entries(phases):
+        structure = Structure(4, 2, (1,) * phases, (1,) * phases, "wrench", (), False)
+        return transcribe(structure).solver.get_function("nlp_hess_l").nnz_out(0)
+
+    few, double = entries(4), entries(8)
+    # One block is (3 (k + 1) + 1)^2 / 2; ties to the neighbour through the continuity are of the same kind.
+    assert double / few == pytest.approx(2.0, rel=0.1)

@@ -77,15 +77,26 @@ def test_feet_reach_every_goal_within_the_limits_of_the_hips(distance, direction
 
 def test_steps_of_a_straight_walk_have_the_walk_ratio():
     """In the steady middle, length over frequency is the walk ratio, but for the whole number of steps."""
-    path, rule = walking_path((0, 0, 0), (8, 0, 0), max_speed=0.8), StepRule()
+    path, rule = walking_path((0, 0, 0), (8, 0, 0), max_speed=0.5), StepRule()
     footprints = place_footprints(path, rule)
     middle = footprints.steps[7:13]
     lengths = np.diff([step.position[0] for step in middle])
     periods = np.diff([step.lands for step in middle])
-    # 8 m are some 14 steps; making their number whole changes it by at most one of them.
+    # 8 m are some 18 steps; making their number whole changes it by at most one of them.
     assert np.allclose(lengths, lengths[0], rtol=0.02)
     assert np.allclose(lengths * periods, rule.walk_ratio, rtol=0.15)
-    assert np.allclose(lengths / periods, 0.8, rtol=0.02)
+    assert np.allclose(lengths / periods, 0.5, rtol=0.02)
+
+
+def test_fast_walks_have_no_longer_steps_but_more():
+    rule = StepRule()
+    speeds = np.zeros((3, 3))
+    speeds[:, 0] = (0.5, 1.0, 1.5)
+    lengths = speeds[:, 0] / rule.frequency(speeds)
+    assert lengths[0] < rule.longest_step
+    assert np.allclose(lengths[1:], rule.longest_step)
+    footprints = place_footprints(walking_path((0, 0, 0), (4, 0, 0)))
+    assert max(abs(beside(*pair)[0]) for pair in landings(footprints)) <= rule.longest_step + ROUNDING
 
 
 def test_feet_alternate_and_the_body_passes_each_in_its_support():

@@ -82,7 +82,7 @@ def _pendulum(problem: CentroidalProblem, instants: FloatArray) -> BSpline:
 
     Its height is that of the start. With ``c`` the middle of a phase's supports and ``h`` the height above
     them, the spline minimises ``|p - h / g p'' - c|^2 + w^2 |p^(3)|^2`` over samples of the motion; as ``h``
-    is given, this is linear least squares. The true height follows the straight line in between.
+    is given, this is linear least squares. The true height changes evenly along the way.
     """
     k = problem.degree
     knots = clamped_knots(k, instants)
@@ -110,6 +110,9 @@ def _pendulum(problem: CentroidalProblem, instants: FloatArray) -> BSpline:
     inner = slice(len(first), count - len(last))
     given = rows[:, : inner.start] @ first[:, :2] + rows[:, inner.stop :] @ last[:, :2]
     points[inner, :2] = np.linalg.lstsq(rows[:, inner], values - given, rcond=None)[0]
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    if way[-1] > 0.0:
+        points[inner, 2] = np.interp(way[inner], way[[0, -1]], points[[0, -1], 2])
     return BSpline(k, knots, points)
 
 

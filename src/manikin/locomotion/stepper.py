@@ -29,6 +29,7 @@ class StepRule:
 
     Attributes:
         walk_ratio: Step length over step frequency [m s].
+        longest_step: Steps are shorter than this at any speed [m]; no plan was found for steps of 0.6 m.
         side_step: Way of the body in a close-and-open pair of steps to the side [m].
         turn_step: Turn of the body in a step [rad].
         width: Between the soles' middles in walking, across the heading [m].
@@ -47,6 +48,7 @@ class StepRule:
     """
 
     walk_ratio: float = 0.0065 * 60.0
+    longest_step: float = 0.5
     side_step: float = 0.25
     turn_step: float = np.radians(25.0)
     width: float = 0.15
@@ -63,8 +65,8 @@ class StepRule:
     standing: float = 0.3
 
     def __post_init__(self) -> None:
-        for name in ("walk_ratio", "side_step", "turn_step", "narrowest", "sole_length", "longest",
-                     "single", "double", "standing"):  # fmt: skip
+        for name in ("walk_ratio", "longest_step", "side_step", "turn_step", "narrowest", "sole_length",
+                     "longest", "single", "double", "standing"):  # fmt: skip
             finite_number(getattr(self, name), f"step rule {name}", above=0.0)
         for name in ("width", "standing_width", "widest"):
             finite_number(getattr(self, name), f"step rule {name} [m]", at_least=self.narrowest)
@@ -80,7 +82,16 @@ class StepRule:
         """
         length = finite_number(stature, "stature [m]", above=0.0) / 1.75
         time = np.sqrt(length)
-        lengths = ("side_step", "width", "standing_width", "narrowest", "sole_length", "widest", "longest")
+        lengths = (
+            "longest_step",
+            "side_step",
+            "width",
+            "standing_width",
+            "narrowest",
+            "sole_length",
+            "widest",
+            "longest",
+        )
         times = ("single", "double", "standing")
         return replace(
             self,
@@ -91,7 +102,8 @@ class StepRule:
 
     def frequency(self, velocity: FloatArray) -> FloatArray:
         """(...) steps per second at (..., 3) forward, left [m/s] and angular velocities [rad/s]."""
-        ahead = np.abs(velocity[..., 0]) / self.walk_ratio
+        speed = np.abs(velocity[..., 0])
+        ahead = np.maximum(speed / self.walk_ratio, (speed / self.longest_step) ** 2)
         aside, turning = 2.0 * velocity[..., 1] / self.side_step, velocity[..., 2] / self.turn_step
         return np.sqrt(ahead + aside**2 + turning**2)
 
