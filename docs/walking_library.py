@@ -8,8 +8,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from manikin.figures.views import ALONG_X, ALONG_Y, draw_body
 from manikin.locomotion import walking_path
 from manikin.locomotion.blend import MIRRORED, TURN_RADIUS, ControlSpace
 from manikin.locomotion.controller import WalkController
@@ -55,22 +58,27 @@ frame = WalkController().step(1 / 60, (1.2, 0.0, 0.3))    # forward, left [m/s],
 frame.q, frame.notice                           # posture; says so where no recorded walk is that fast
 ```
 
+![Walks of given velocities, one cycle each, seen from the right and from the front](images/walks.png)
+
 ## How it is made
 
-- A cycle goes from one left toe-off to the next; of each window that of the
-  cycles whose ends differ least (at most {closed:.0f}° RMS) is taken. Where a foot makes one
-  step only, as in sidesteps, the cycle ends when the other foot has landed.
-- The line or circle of the root is the one around which its error is periodic and has no mean. Joint angles and the
-  error are kept as Fourier series, mean and {harmonics} harmonics, of the cycle's duration T (the thesis prints 2 T).
-- Joint angles are those of the 1.75 m human; places and velocities are scaled with the length of the legs, durations kept.
-- Skeletons tell the pelvis' tilt loosely; it is set by the trunk's lean, and hips and lumbar spine make up for it. Soles are
-  levelled in the middle of the stance.
-- A person's habits (offsets of mean angles that velocity does not explain, sides apart) are taken out, so that blends
-  of two people do not change from one habit to another. The movement around the means stays the person's own.
-- Straight walks, runs and standing are averaged with their mirror images; of others the
-  mirror image is added. Cycles nearer to another than {near:g} m/s (1 rad/s counts as {radius:g} m/s) are left out.
-- Velocities are forward, left and angular. The thesis' first one, the total speed, cannot tell backward from forward, and
-  blends of it are not the speed of the blend. Outside the tetrahedra the nearest velocity is walked, with a notice.
+- A cycle goes from one left toe-off to the next; of those of a window, the one whose ends differ least is
+  taken (at most {closed:.0f}° RMS). Where a foot makes one step only, as in sidesteps, the cycle ends when the other
+  foot has landed.
+- The line or circle of the root is the one around which its error is periodic and has no mean. Joint angles
+  and the error are kept as Fourier series of the cycle's duration T (the thesis prints 2 T), mean and
+  {harmonics} harmonics.
+- Joint angles are those of the 1.75 m human; places and velocities are scaled with the length of the legs,
+  durations are kept.
+- Skeletons tell the pelvis' tilt loosely; it is set by the trunk's lean, and hips and lumbar spine make up for
+  it. Soles are levelled in the middle of the stance.
+- A person's habits (offsets of mean angles that velocity does not explain) are taken out, so that blends of
+  two people do not change from one habit to another. The movement around the means stays the person's own.
+- Straight walks, runs and standing are averaged with their mirror images; of others the mirror image is added.
+  Cycles nearer to another than {near:g} m/s (1 rad/s counts as {radius:g} m/s) are left out.
+- Velocities are forward, left and angular. The thesis' first one, the total speed, cannot tell backward from
+  forward, and blends of it are not the speed of the blend. Outside the tetrahedra the nearest velocity is
+  walked, with a notice.
 
 ## Cycles
 
@@ -80,40 +88,43 @@ Velocities are those of the 1.75 m human. {count} cycles, {mirrored} of them mir
 LEAVE = """
 ## Leaving one out
 
-Each cycle inside the hull, blended from the others at its velocity: root mean square over
-all hinges and the cycle. *Recording out*: its mirror image and others of the same file are left out, too. Offsets of persons
-were found with the cycle. {over} At its own velocity every cycle comes back within {own:.1g}°.
+Each cycle inside the hull, blended from the others at its velocity: root mean square over all hinges and the
+cycle. *Recording out*: its mirror image and others of the same file are left out, too. The offsets of
+persons were found with the cycle. {over} At its own velocity every cycle comes back within {own:.1g}°.
 
 """
 SLIDE = """
 ## Standing feet
 
-Slide in a stance over four cycles at each cycle's velocity: displacements of the lower end of the sole, added up from frame to
-frame. Before: as blended. After: feet in place, legs by inverse kinematics. *Sinks*: by how much the
-pelvis is lowered for a leg to reach its foot. *Velocity*: largest deviation of the pelvis' velocity over a
-cycle from the one asked for.
+Slide in a stance over four cycles at each cycle's velocity: displacements of the lower end of the sole, added
+up from frame to frame. Before: as blended. After: feet in place, legs by inverse kinematics. *Sinks*: by how
+much the pelvis is lowered for a leg to reach its foot. *Velocity*: largest deviation of the pelvis' velocity
+over a cycle from the one asked for.
 
 """
-WALKS = """
+REST = """
+Where it is more than 5 mm, hip and knee rotate no further, in sharp turns at speed.
+
 Walks along planned paths, at most 1.4 m/s, 60 frames a second:
 
 """
 DRIVEN = """
-Under directives that change at once (forward, sideways, turning, backward, running, standing), with accelerations of at most 2 m/s²,
-1.5 m/s² to the side and 4 rad/s²: {stances} stances, slide at most {slide:.1f} mm, 95 % below {most:.1f} mm.
+Under directives that change at once (forward, sideways, turning, backward, running, standing), with
+accelerations of at most 2 m/s², 1.5 m/s² to the side and 4 rad/s²: {stances} stances, slide at most {slide:.1f} mm.
 
 ## Computing time
 
-Processor time on one core. A step of the controller takes {median:.2f} ms in the median, {high:.2f} ms in the 99th percentile (60
-frames/s leave 16.7 ms). A walk along a path takes {metre:.1f} ms per metre in the median of the walks above, without the
-path itself (thesis, on its computer: 90 ms).
+Processor time on one core. A step of the controller takes {median:.2f} ms in the median and {high:.2f} ms in the 99th
+percentile (60 frames/s leave 16.7 ms). A walk along a path takes {metre:.1f} ms per metre in the median of the walks
+above, without the path itself (thesis, on its computer: 90 ms).
 
 ## Limits
 
-- Sidesteps come from few single steps; walks to the front and aside are blends of sidesteps and walks, for which there is no
-  recording. Sharp turns are parts of turns to another direction, not of steady circles.
-- Without dynamics: the motion has neither forces nor torques, and in quick changes of direction the feet stay where they
-  are at the cost of the pelvis, which sinks.
+- Sidesteps come from few single steps; walks ahead and aside are blends of sidesteps and walks, for which
+  there is no recording. Sharp turns are parts of turns to another direction, not of steady circles.
+- There are no walks between standing and {slowest:.2f} m/s: slower ones are blends with standing.
+- Without dynamics: the motion has neither forces nor torques, and in quick changes of direction the feet
+  stay where they are at the cost of the pelvis, which sinks.
 
 ## Acknowledgements
 
@@ -121,10 +132,11 @@ path itself (thesis, on its computer: 90 ms).
 """
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Steady:
-    """A steady walk, measured."""
+    """Four cycles of a steady walk, measured."""
 
+    q: FloatArray
     before: FloatArray
     after: FloatArray
     sink: float
@@ -208,22 +220,22 @@ def leave_table(alone: dict[int, float], files: dict[int, float]) -> Iterator[st
 def slide_table() -> Iterator[str]:
     """Slides by class."""
     yield from row(
-        "class", "stances", "before, median [mm]", "before, largest [mm]", "after, largest [mm]", "sinks [mm]",
-        "velocity [mm/s]",
+        "class", "stances", "before, median [mm]", "before, largest [mm]", "after, median [mm]",
+        "after, largest [mm]", "sinks [mm]", "velocity [mm/s]",
     )  # fmt: skip
     for kind, members in sorted(kinds().items()):
         found = [steady(LIBRARY.velocities[i]) for i in members]
         before, after = (1e3 * np.concatenate([getattr(f, n) for f in found]) for n in ("before", "after"))
         yield from row(
-            kind, len(after), f"{np.median(before):.0f}", f"{before.max():.0f}", f"{after.max():.1f}",
-            f"{1e3 * max(f.sink for f in found):.0f}", f"{1e3 * max(f.error for f in found):.2f}", head=False,
+            kind, len(after), f"{np.median(before):.0f}", f"{before.max():.0f}", f"{np.median(after):.1f}",
+            f"{after.max():.1f}", f"{1e3 * max(f.sink for f in found):.0f}", f"{1e3 * max(f.error for f in found):.2f}", head=False,
         )  # fmt: skip
 
 
 def walks_table() -> tuple[list[str], float]:
     """Walks along paths, and the median time per metre [ms]."""
-    lines = list(row("to x, y [m], heading [°]", "length [m]", "stances", "before, median [mm]", "before, largest [mm]",
-                     "after, largest [mm]", "ms per metre"))  # fmt: skip
+    lines = list(row("to x, y [m], heading [°]", "length [m]", "stances", "before, median [mm]",
+                     "before, largest [mm]", "after, largest [mm]", "ms per metre"))  # fmt: skip
     costs = []
     for goal in GOALS:
         path = walking_path((0.0, 0.0, 0.0), goal, max_speed=1.4)
@@ -232,7 +244,8 @@ def walks_table() -> tuple[list[str], float]:
         name = f"{goal[0]:g}, {goal[1]:g}, {np.degrees(goal[2]):.0f}"
         lines += row(
             name, f"{path.length:.1f}", len(walk.slides), f"{1e3 * np.median(walk.slides_before):.0f}",
-            f"{1e3 * walk.slides_before.max():.0f}", f"{1e3 * walk.slides.max():.1f}", f"{costs[-1]:.1f}", head=False,
+            f"{1e3 * walk.slides_before.max():.0f}", f"{1e3 * walk.slides.max():.1f}", f"{costs[-1]:.1f}",
+            head=False,
         )  # fmt: skip
     return lines, float(np.median(costs))
 
@@ -248,6 +261,28 @@ def driven() -> tuple[FloatArray, FloatArray]:
             q.append(frame.q)
             support.append(frame.support)
     return stance_slides(BODY, np.array(q), np.array(support).T), np.array(times)
+
+
+def draw() -> None:
+    """One cycle of some walks, from the right and from the front."""
+    figure, panels = plt.subplots(len(DRAWN), 1, figsize=(12.0, 1.65 * len(DRAWN)), layout="constrained")
+    count = 8
+    for axes, (name, velocity) in zip(panels, DRAWN.items(), strict=True):
+        q = steady(np.array(velocity)).q
+        cycle = q[(len(q) - 1) // 4 : (len(q) - 1) // 2]
+        for number, index in enumerate(np.linspace(0, len(cycle) - 1, count).round().astype(int)):
+            posture = cycle[index].copy()
+            turn = Rotation.from_quat(posture[3:7])
+            posture[3:7] = (Rotation.from_euler("Z", -turn.as_euler("ZYX")[0]) * turn).as_quat()
+            posture[:2] = 0.0
+            draw_body(axes, BODY, posture, ALONG_Y.moved(1.2 * number, 0.0))
+            draw_body(axes, BODY, posture, ALONG_X.moved(1.2 * (count + 0.8 * number), 0.0))
+        axes.axhline(0.0, color="black", linewidth=0.5)
+        axes.set(xlim=(-0.7, 1.2 * 1.8 * count), ylim=(-0.12, 1.85), aspect="equal")
+        axes.set_title(name, loc="left", fontsize=9)
+        axes.axis("off")
+    figure.savefig(PAGE.parent / "images" / "walks.png", dpi=75)
+    plt.close(figure)
 
 
 def processor_time(job: Callable[[], object], rounds: int = 5) -> float:
@@ -295,13 +330,16 @@ def main() -> None:
         "closed": np.degrees(NOT_CLOSED), "harmonics": LIBRARY.harmonics, "near": NEAR, "radius": TURN_RADIUS,
         "count": len(LIBRARY), "mirrored": sum(name.endswith(MIRRORED) for name in LIBRARY.names),
         "own": max(own, 1e-6), "over": f"{above} of {len(alone)} are above 8°.", "stances": len(slides),
-        "slide": 1e3 * slides.max(), "most": 1e3 * float(np.percentile(slides, 95)), "metre": metre,
-        "median": np.median(times), "high": np.percentile(times, 99), "thanks": " ".join(LIBRARY.acknowledgements),
+        "slide": 1e3 * slides.max(), "metre": metre, "median": np.median(times),
+        "high": np.percentile(times, 99), "thanks": "\n".join(LIBRARY.acknowledgements),
+        "slowest": LIBRARY.velocities[kinds()["walk straight"], 0].min(),
     }  # fmt: skip
     PAGE.write_text(
-        TEXT.format(**numbers) + table(cycles_table()) + LEAVE.format(**numbers) + table(leave_table(alone, files))
-        + SLIDE + table(slide_table()) + WALKS + table(walks) + DRIVEN.format(**numbers)
+        TEXT.format(**numbers) + table(cycles_table()) + LEAVE.format(**numbers)
+        + table(leave_table(alone, files)) + SLIDE + table(slide_table()) + REST + table(walks)
+        + DRIVEN.format(**numbers)
     )  # fmt: skip
+    draw()
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The command line: ``manikin scenarios | run | push | compare | view | balance | contact | export | library``.
+"""The command line: ``manikin scenarios | run | push | compare | view | balance | contact | export | ...``.
 
 Exit status: 0 done, 2 bad input (one line on standard error), 3 a run that ended in an
 explained failure, 130 interrupted.  With ``--json`` standard output holds exactly one

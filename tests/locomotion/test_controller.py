@@ -46,7 +46,7 @@ def test_standing_is_still():
 
 
 def test_directives_are_walked():
-    """Velocities are reached with the accelerations allowed, the place is their integral, feet do not slide."""
+    """Velocities are reached with the accelerations allowed, feet do not slide, it ends standing."""
     controller = WalkController()
     orders = [((1.2, 0.0, 0.0), 3.0), ((1.0, 0.0, 0.5), 2.0), ((0.3, 0.0, 0.0), 2.0), ((0.0, 0.4, 0.0), 3.0),
               ((0.0, 0.0, 1.2), 2.0), ((-0.6, 0.0, 0.0), 3.0), ((0.0, 0.0, 0.0), 3.0)]  # fmt: skip
@@ -89,7 +89,8 @@ def test_beyond_the_library_there_is_a_notice():
 
 @pytest.mark.parametrize(
     ("dt", "directive"),
-    [(0.0, (1, 0, 0)), (1.0, (1, 0, 0)), (np.nan, (1, 0, 0)), (0.01, (1, 0)), (0.01, (np.inf, 0, 0)), (0.01, "fast")],
+    [(0.0, (1, 0, 0)), (1.0, (1, 0, 0)), (np.nan, (1, 0, 0)), (0.01, (1, 0)), (0.01, (np.inf, 0, 0)),
+     (0.01, "fast")],
 )  # fmt: skip
 def test_bad_directives(dt, directive):
     with pytest.raises(InputError):

@@ -82,7 +82,7 @@ def test_placement_and_back():
 
 
 def test_a_rolling_foot_stays():
-    """Toes up about the heel, heel up about the ball: the point on the floor is the same, nothing below it."""
+    """Toes up about the heel, heel up about the ball: one point on the floor, nothing below it."""
     pitch = np.deg2rad(np.linspace(-30.0, 50.0, 33))
     n = len(pitch)
     rolling = FootPlacement(np.tile([0.4, -0.2], (n, 1)), np.full(n, 0.7), pitch, np.zeros(n), np.zeros(n))

@@ -44,12 +44,12 @@ class ControlSpace:
 
     The coordinates are the forward, left and angular velocities. The thesis' first one is the total speed,
     of which the lateral velocity is a component: points with it larger do not exist, and walking backward
-    and forward are the same. The forward velocity has neither fault, and blends of velocities are then exactly
-    those of the blended motion.
+    and forward are the same. The forward velocity has neither fault, and blends of velocities are then
+    exactly those of the blended motion.
 
-    Tetrahedra of a library that contains mirror images need not be mirror images. The weights are therefore the
-    mean of those found for the velocity and those found for its reflection, reflected: a directive straight
-    ahead gives a symmetric walk.
+    Tetrahedra of a library that contains mirror images need not be mirror images. The weights are therefore
+    the mean of those found for the velocity and those found for its reflection, reflected: a directive
+    straight ahead gives a symmetric walk.
     """
 
     def __init__(self, library: MotionLibrary, radius: float = TURN_RADIUS) -> None:
@@ -69,8 +69,8 @@ class ControlSpace:
             self._cells = Delaunay(self._points)
         except (QhullError, ValueError):
             raise InputError(
-                f"the {len(library)} velocities of the motion library span no volume; valid: at least 4 cycles, "
-                "forward, sideways and turning"
+                f"the {len(library)} velocities of the motion library span no volume; "
+                "valid: at least 4 cycles, forward, sideways and turning"
             ) from None
         self._partners = _partners(library)
 
@@ -101,7 +101,7 @@ class ControlSpace:
     def _located(
         self, points: FloatArray
     ) -> tuple[NDArray[np.int64], FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Vertices (n, 4), weights (n, 4), the points or those nearest to them (n, 3), and which are outside."""
+        """Vertices (n, 4), weights (n, 4), the points or the nearest ones (n, 3), and which are outside."""
         cell = self._cells.find_simplex(points)
         transform = self._cells.transform[cell]
         first = np.einsum("nij,nj->ni", transform[:, :3], points - transform[:, 3])
@@ -137,7 +137,7 @@ def control_space(library: MotionLibrary) -> ControlSpace:
 
 
 def _nearest_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """(n, f, 3) weights of the corners that give the point of each of f triangles nearest to each of n points."""
+    """(n, f, 3) weights of the corners that give the point of each triangle nearest to each of n points."""
     a, b, c = (triangles[None, :, k] for k in range(3))
     p = points[:, None]
     u, v, w = b - a, c - a, p - a

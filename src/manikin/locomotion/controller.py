@@ -161,7 +161,7 @@ class WalkController:
         return WalkFrame(q[0], self._place, self._velocity, self._phase, (left, right), notice)
 
     def _next_offset(self, blend: Blend, foot: int, events: FloatArray) -> FloatArray:
-        """Correction at landing that puts the foot at the mean of where the gait has it in the next stance."""
+        """Correction at landing that puts the foot at the mean of where the gait has it in its stance."""
         landing, off, other = events
         first, last = (landing, 1.0) if foot == 0 else (other + 1.0, off + 1.0)
         ahead = (first - self._phase) % 1.0
@@ -169,10 +169,8 @@ class WalkController:
         time = (phase - self._phase) * self._gait.period(blend)[0]
         moved = travelled(np.broadcast_to(blend.velocity[0], (PREDICTED, 3)), time)
         place = self._place + to_world(self._place[2], moved)
-        several = Blend(*(
-            np.repeat(value, PREDICTED, axis=0)
-            for value in (blend.cycles, blend.weights, blend.velocity, blend.outside)
-        ))  # fmt: skip
+        same = np.zeros(PREDICTED, dtype=np.int64)
+        several = Blend(blend.cycles[same], blend.weights[same], blend.velocity[same], blend.outside[same])
         path = poses(self._legs.feet(self._gait.frames(several, phase, place)))[foot]
         return path.mean(axis=0) - path[0]
 
@@ -182,6 +180,6 @@ def _notice(wanted: FloatArray, asked: Blend) -> str | None:
         return None
     forward, left, angular = asked.velocity[0]
     return (
-        f"directive {wanted[0]:.2f} m/s forward, {wanted[1]:.2f} m/s left, {wanted[2]:.2f} rad/s is beyond the "
-        f"motion library; nearest: {forward:.2f}, {left:.2f}, {angular:.2f}"
+        f"directive {wanted[0]:.2f} m/s forward, {wanted[1]:.2f} m/s left, {wanted[2]:.2f} rad/s "
+        f"is beyond the motion library; nearest: {forward:.2f}, {left:.2f}, {angular:.2f}"
     )

@@ -107,7 +107,8 @@ def sole_points(body: BodyModel, q: FloatArray) -> dict[str, tuple[FloatArray, F
 def cycle_cuts(events: Mapping[str, FootEvents], begin: float, end: float) -> list[CycleCut]:
     """Cycles that lie for the most part in a window, of either foot.
 
-    Where a foot makes one step only, as in a single sidestep, the cycle ends when the other foot has followed.
+    Where a foot makes one step only, as in a single sidestep, the cycle ends when the other foot has
+    followed.
 
     Args:
         events: Of both feet.
@@ -152,9 +153,7 @@ def _cut(
     before = other.on[(other.on < other_off) & (other.on > other_off - (end - start))]
     # A recording that begins in the other foot's stance: both feet are taken to swing equally long.
     landed = before[-1] if len(before) else landing + other_off - end
-    return CycleCut(
-        *(float(v) for v in (start, end)), foot, *(float(v) for v in (landing, other_off, landed))
-    )
+    return CycleCut(float(start), float(end), foot, float(landing), float(other_off), float(landed))
 
 
 def _stands(point: FloatArray, rate: float) -> NDArray[np.bool_]:

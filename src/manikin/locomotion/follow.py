@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.errors import InputError
@@ -49,14 +50,14 @@ class Walk:
     time: FloatArray
     q: FloatArray
     place: FloatArray
-    support: FloatArray
-    outside: FloatArray
+    support: NDArray[np.bool_]
+    outside: NDArray[np.bool_]
     slides_before: FloatArray
     slides: FloatArray
 
     @cached_property
     def motion(self) -> Motion:
-        """With velocities, centre of mass and angular momentum; torques, forces and margin are not known (NaN)."""
+        """With velocities, centre of mass and angular momentum; torques, forces and margin are NaN."""
         body, model = self.body, self.body.pinocchio
         n, dt = len(self.time), float(self.time[1] - self.time[0])
         steps = np.array([pin.difference(model, a, b) for a, b in zip(self.q[:-1], self.q[1:], strict=True)])

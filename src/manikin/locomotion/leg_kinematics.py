@@ -92,7 +92,7 @@ class LegKinematics:
     def angles(
         self, pelvis: FloatArray, place: FloatArray, foot: FloatArray, ankle: FloatArray, angles: FloatArray
     ) -> FloatArray:
-        """Angles that put the feet there; out of reach, as near as a stretched leg gets. Limits are not looked at.
+        """Angles, within limits or not, that put the feet there; out of reach, as near as a leg gets.
 
         Args:
             pelvis: (n, 3, 3) from the pelvis' axes to the world's.

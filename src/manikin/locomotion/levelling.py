@@ -68,12 +68,12 @@ def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> F
     spans = {"left": (landing, 1.0), "right": (other, off)}
     for number, side in enumerate(SIDES):
         first, last = spans[side]
-        middle = np.linspace(*(first + share * (last - first) for share in MIDDLE), 16)
+        middle = first + np.linspace(MIDDLE[0], MIDDLE[1], 16) * (last - first)
         pitch = float(np.median(_feet(body, found, middle).pitch[number]))
         slot = len(ROOT) + body.joint_index(f"{side}_ankle_dorsiflexion")
         found[0, slot] += np.clip(pitch, -MOST_LEVELLED, MOST_LEVELLED)
     stances = [
-        _feet(body, found, np.linspace(*spans[side], SAMPLES)).clearance[number]
+        _feet(body, found, np.linspace(spans[side][0], spans[side][1], SAMPLES)).clearance[number]
         for number, side in enumerate(SIDES)
     ]
     found[0, _HEIGHT] -= np.median(np.concatenate(stances))

@@ -15,8 +15,8 @@ from manikin.locomotion.fourier import shifted
 from manikin.spatial import FloatArray, frozen_array
 
 ROOT = ("ahead", "left", "height", "roll", "pitch", "yaw")
-"""Signals of the root: its error around the line or circle, and its height [m]; its turns, yaw being the error
-of the heading [rad]. The hinges' angles follow."""
+"""Signals of the root: its error around the line or circle, and its height [m]; its turns, yaw being the
+error of the heading [rad]. The hinges' angles follow."""
 
 _ROOT_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 

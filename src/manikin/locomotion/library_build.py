@@ -1,6 +1,5 @@
 """Building the motion library from recordings ([Truong2010]_ 6.4)."""
 
-import csv
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -18,14 +17,12 @@ from manikin.locomotion.fourier import fourier_coefficients, shifted
 from manikin.locomotion.gait import Gait
 from manikin.locomotion.levelling import levelled, tilted
 from manikin.locomotion.library import ROOT, STAND, MotionLibrary, leg_length, reference_body
+from manikin.locomotion.library_windows import TABLE, Window, read_windows
 from manikin.locomotion.persons import as_one_person
 from manikin.locomotion.slide import stance_slides
 from manikin.locomotion.steady import steady_motion, travelled
 from manikin.mocap import Recording, read_recording, reconstruct
 from manikin.spatial import FloatArray
-
-TABLE = "clips_locomotion.csv"
-"""Names the windows to use: columns class, file, first_frame0, end_frame0, in the folder of recordings."""
 
 RECORDINGS = "mocap"
 
@@ -41,7 +38,7 @@ ACKNOWLEDGEMENTS = {
 """By the beginning of a recording's folder."""
 
 NOT_CLOSED = np.deg2rad(15.0)
-"""Root mean square, over the hinges, of the difference between both ends of a cycle; more is no cycle [rad]."""
+"""Root mean square difference of the hinges between both ends of a cycle; more is no cycle [rad]."""
 
 MOST_SLIDE = 0.3
 """A cycle in which a standing foot slides by more has its landings or toe-offs found wrongly [m]."""
@@ -56,61 +53,12 @@ SYMMETRIC = ("walk straight", "run straight", "backward", STAND)
 """Classes of cycles that are averaged with their mirror images, to go exactly straight."""
 
 
-@dataclass(frozen=True)
-class Window:
-    """A part of a recording to take a cycle from.
-
-    Attributes:
-        kind: Its class.
-        file: The recording, below the folder.
-        first: Frame.
-        last: Frame after the last one.
-    """
-
-    kind: str
-    file: str
-    first: int
-    last: int
-
-
 @dataclass(frozen=True, eq=False)
 class _Person:
     """A recording as a motion of the reference body."""
 
     q: FloatArray
     rate: float
-
-
-def read_windows(folder: Path) -> list[Window]:
-    """Windows named by a folder's table.
-
-    Raises:
-        InputError: If it has none, or a row cannot be read.
-    """
-    table = folder / TABLE
-    if not table.is_file():
-        raise InputError(f"{folder} has no {TABLE}; valid: a folder with this table and the recordings")
-    try:
-        rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{table} cannot be read: {error}; valid: a table in UTF-8") from None
-    found = []
-    for number, row in enumerate(rows, 2):
-        try:
-            found.append(_window(row))
-        except (KeyError, TypeError, ValueError, AttributeError):
-            raise InputError(
-                f"{table} line {number} is not usable; valid: class, file, first_frame0, end_frame0"
-            ) from None
-    return found
-
-
-def _window(row: dict[str, str]) -> Window:
-    kind = row["class"].split("(")[0].strip().removesuffix(" core")
-    first, last = int(row["first_frame0"]), int(row["end_frame0"])
-    if not 0 <= first < last:
-        raise ValueError
-    return Window(STAND if kind == "idle" else kind, row["file"], first, last)
 
 
 @dataclass(frozen=True, eq=False)

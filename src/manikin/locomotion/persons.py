@@ -1,4 +1,4 @@
-"""Cycles of several people as if one had walked them all: what a person always does differently is taken out."""
+"""Cycles of several people as if one had walked them all: each one's habits are taken out."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -25,9 +25,9 @@ def as_one_person(
     """Cycles with the mean postures of the person who has most of them, equal on both sides.
 
     People hold arms, back and head in their own ways, and skeletons are fitted to them in different ways;
-    blends of neighbouring cycles of two people would change with the speed from one habit to another. The mean
-    angle of a hinge in a cycle is taken as a function of the velocity, the same for all, plus an
-    offset of the person. What is equal on both sides is an even function of lateral and angular
+    blends of neighbouring cycles of two people would change with the speed from one habit to another. The
+    mean angle of a hinge in a cycle is taken as a function of the velocity, the same for all, plus an offset
+    of the person. What is equal on both sides is an even function of lateral and angular
     velocity, what is opposite an odd one; each is fitted by linear least squares. Only offsets are taken
     out, and only of mean angles; the movement stays the person's own.
 

@@ -1,14 +1,16 @@
-"""Feet that do not slide: where they stand, how they get there, and the legs that follow by inverse kinematics.
+"""Feet that do not slide: where they stand, how they get there, and the legs that follow.
 
-The thesis leaves this open (6.8). Blended cycles let the standing foot slide, for their steps do not quite fit
-the blended velocity. Here a foot has one place on the floor from landing to toe-off, over which it rolls
-from heel to ball; in the swing the correction goes over, smoothly, from that of one step to that of the next.
+The thesis leaves this open (6.8). Blended cycles let the standing foot slide, for their steps do not quite
+fit the blended velocity. Here a foot has one place on the floor from landing to toe-off, over which it rolls
+from heel to ball; in the swing the correction goes over, smoothly, from that of one step to that of the
+next. Legs follow by inverse kinematics in closed form.
 """
 
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import FootPlacement, Sole
@@ -43,7 +45,7 @@ def smooth_step(share: FloatArray) -> FloatArray:
 
 
 class Legs:
-    """Both legs of a body: feet from postures, and postures from feet. Arrays of both begin with left, right."""
+    """Both legs of a body: feet from postures, and postures from feet; left first, then right."""
 
     def __init__(self, body: BodyModel) -> None:
         """Take lengths and soles from a human."""
@@ -62,8 +64,8 @@ class Legs:
     ) -> tuple[FloatArray, FloatArray]:
         """Postures with the feet where they shall be.
 
-        The pelvis sinks where a leg is too short, and tilts forward where a hip does not extend far enough. A foot
-        whose ankle or hip turns no further rolls over its edge or end.
+        The pelvis sinks where a leg is too short, and tilts forward where a hip does not extend far enough.
+        A foot whose ankle turns no further rolls over its edge, heel or ball.
 
         Args:
             frames: Of n instants of the gait.
@@ -109,8 +111,8 @@ class Legs:
     ) -> tuple[FootPlacement, FloatArray]:
         """Feet and knee rotations that ask less of joints at the ends of their ranges.
 
-        A foot rolls over its edge, heel or ball where the ankle turns no further; the knee takes over what the
-        hip cannot rotate.
+        A foot rolls over its edge, heel or ball where the ankle turns no further; the knee takes over what
+        the hip cannot rotate.
         """
         over = np.moveaxis(excess[:, self._legs.slots], 0, 1)
         hip, ankle, inversion = (over[..., HINGES.index(name)] for name in _YIELDING)
@@ -122,7 +124,7 @@ class Legs:
         return replace(feet, pitch=feet.pitch + ankle, roll=rolled), angles
 
     def _tilt(self, q: FloatArray, angles: FloatArray) -> None:
-        """Tilt the pelvis about the line of the hip joints: hips and spine make up for it, nothing else moves."""
+        """Tilt the pelvis about the line of the hip joints; hips and spine make up for it."""
         lower = self._body.lower
         tilt = np.maximum((lower[self._hips] - angles[:, self._hips]).max(axis=1), 0.0)
         tilt = np.minimum(tilt, np.maximum(angles[:, self._lumbar] - lower[self._lumbar], 0.0))
@@ -199,6 +201,6 @@ def _steps(path: FloatArray, swing: FloatArray) -> tuple[FloatArray, FloatArray]
     return offset, distance
 
 
-def borders(values: FloatArray) -> list[int]:
+def borders(values: NDArray[np.bool_]) -> list[int]:
     """Where runs of equal values begin, and the number of values."""
     return [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
