@@ -39,6 +39,11 @@ GOALS = (
     (-2.0, 0.0, 0.0),
     (0.5, 0.0, 0.0),
 )
+DRAWN = {
+    "0.5 m/s": (0.5, 0.0, 0.0), "1.2 m/s": (1.2, 0.0, 0.0), "1 m/s, 0.8 rad/s": (1.0, 0.0, 0.8),
+    "0.4 m/s to the left": (0.0, 0.4, 0.0), "1.5 rad/s on the spot": (0.0, 0.0, 1.5),
+    "0.7 m/s backward": (-0.7, 0.0, 0.0), "3 m/s": (3.0, 0.0, 0.0),
+}  # fmt: skip
 ORDERS = (
     ((1.2, 0.0, 0.0), 4.0), ((1.0, 0.0, 0.6), 3.0), ((0.0, 0.4, 0.0), 4.0), ((0.0, 0.0, 1.2), 3.0),
     ((-0.6, 0.0, 0.0), 4.0), ((3.0, 0.0, 0.0), 4.0), ((0.0, 0.0, 0.0), 4.0),
@@ -63,19 +68,19 @@ frame.q, frame.notice                           # posture; says so where no reco
 ## How it is made
 
 - A cycle goes from one left toe-off to the next; of those of a window, the one whose ends differ least is
-  taken (at most {closed:.0f}° RMS). Where a foot makes one step only, as in sidesteps, the cycle ends when the other
-  foot has landed.
+  taken (at most {closed:.0f}° RMS). Where a foot makes one step only, as in sidesteps, the cycle ends when
+  the other foot has landed.
 - The line or circle of the root is the one around which its error is periodic and has no mean. Joint angles
   and the error are kept as Fourier series of the cycle's duration T (the thesis prints 2 T), mean and
   {harmonics} harmonics.
 - Joint angles are those of the 1.75 m human; places and velocities are scaled with the length of the legs,
   durations are kept.
-- Skeletons tell the pelvis' tilt loosely; it is set by the trunk's lean, and hips and lumbar spine make up for
-  it. Soles are levelled in the middle of the stance.
+- Skeletons tell the pelvis' tilt loosely; it is set by the trunk's lean, and hips and lumbar spine make up
+  for it. Soles are levelled in the middle of the stance.
 - A person's habits (offsets of mean angles that velocity does not explain) are taken out, so that blends of
   two people do not change from one habit to another. The movement around the means stays the person's own.
-- Straight walks, runs and standing are averaged with their mirror images; of others the mirror image is added.
-  Cycles nearer to another than {near:g} m/s (1 rad/s counts as {radius:g} m/s) are left out.
+- Straight walks, runs and standing are averaged with their mirror images; of others the mirror image is
+  added. Cycles nearer to another than {near:g} m/s (1 rad/s counts as {radius:g} m/s) are left out.
 - Velocities are forward, left and angular. The thesis' first one, the total speed, cannot tell backward from
   forward, and blends of it are not the speed of the blend. Outside the tetrahedra the nearest velocity is
   walked, with a notice.
@@ -110,13 +115,14 @@ Walks along planned paths, at most 1.4 m/s, 60 frames a second:
 """
 DRIVEN = """
 Under directives that change at once (forward, sideways, turning, backward, running, standing), with
-accelerations of at most 2 m/s², 1.5 m/s² to the side and 4 rad/s²: {stances} stances, slide at most {slide:.1f} mm.
+accelerations of at most 2 m/s², 1.5 m/s² to the side and 4 rad/s²: {stances} stances, slide at most
+{slide:.1f} mm.
 
 ## Computing time
 
-Processor time on one core. A step of the controller takes {median:.2f} ms in the median and {high:.2f} ms in the 99th
-percentile (60 frames/s leave 16.7 ms). A walk along a path takes {metre:.1f} ms per metre in the median of the walks
-above, without the path itself (thesis, on its computer: 90 ms).
+Processor time on one core. A step of the controller takes {median:.2f} ms in the median and {high:.2f} ms in
+the 99th percentile (60 frames/s leave 16.7 ms). A walk along a path takes {metre:.1f} ms per metre in the
+median of the walks above, without the path itself (thesis, on its computer: 90 ms).
 
 ## Limits
 
@@ -157,12 +163,9 @@ def steady(velocity: FloatArray) -> Steady:
     places = q[count::count, :2]
     expected = turn[:2] + q[0, :2] @ np.array([[cos, sin], [-sin, cos]])
     error = float(np.hypot(*(places[0] - expected))) / period
-    return Steady(
-        stance_slides(BODY, frames.q, swing < 0.0),
-        stance_slides(BODY, q, swing < 0.0),
-        float(sink.max()),
-        error,
-    )
+    before, after = (stance_slides(BODY, posture, swing < 0.0) for posture in (frames.q, q))
+    # The first and the last stance are cut by the begin and the end.
+    return Steady(q, before, after, float(sink[count:-count].max()), error)
 
 
 def rms(first: FloatArray, second: FloatArray) -> float:
@@ -228,7 +231,8 @@ def slide_table() -> Iterator[str]:
         before, after = (1e3 * np.concatenate([getattr(f, n) for f in found]) for n in ("before", "after"))
         yield from row(
             kind, len(after), f"{np.median(before):.0f}", f"{before.max():.0f}", f"{np.median(after):.1f}",
-            f"{after.max():.1f}", f"{1e3 * max(f.sink for f in found):.0f}", f"{1e3 * max(f.error for f in found):.2f}", head=False,
+            f"{after.max():.1f}", f"{1e3 * max(f.sink for f in found):.0f}",
+            f"{1e3 * max(f.error for f in found):.2f}", head=False,
         )  # fmt: skip
 
 
@@ -281,7 +285,7 @@ def draw() -> None:
         axes.set(xlim=(-0.7, 1.2 * 1.8 * count), ylim=(-0.12, 1.85), aspect="equal")
         axes.set_title(name, loc="left", fontsize=9)
         axes.axis("off")
-    figure.savefig(PAGE.parent / "images" / "walks.png", dpi=75)
+    figure.savefig(PAGE.parent / "images" / "walks.png", dpi=60)
     plt.close(figure)
 
 

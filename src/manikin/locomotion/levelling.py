@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import FootPlacement, Sole
-from manikin.locomotion.fourier import fourier_basis
+from manikin.locomotion.fourier import fourier_basis, shifted
 from manikin.locomotion.leg_kinematics import LegKinematics
 from manikin.locomotion.library import ROOT
 from manikin.locomotion.turns import rotations
@@ -23,6 +23,12 @@ MOST_LEVELLED = np.deg2rad(15.0)
 """A sole with more pitch than this does not lie flat [rad]."""
 
 SAMPLES = 64
+
+LIFTED = 0.01
+"""A sole whose lower end is higher than this has left the floor, or not yet landed [m]."""
+
+MOST_TRIMMED = 0.25
+"""Share of a stance by which either end is moved at most."""
 
 _HEIGHT = ROOT.index("height")
 
@@ -78,6 +84,40 @@ def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> F
     ]
     found[0, _HEIGHT] -= np.median(np.concatenate(stances))
     return found
+
+
+def on_the_floor(
+    body: BodyModel, coefficients: FloatArray, events: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Cycle and events whose stances begin and end with the sole on the floor.
+
+    The recorded toes leave the floor later than the ball of the foot, over which ours rolls.
+
+    Args:
+        body: The reference body.
+        coefficients: (2 k + 1, s) of one cycle, levelled.
+        events: (3,) phases.
+
+    Returns:
+        Coefficients that begin where the left sole leaves the floor, and (3,) phases.
+    """
+    landing, off, other = events
+    (left_on, left_off), (right_on, right_off) = (
+        _standing(_feet(body, coefficients, phase).clearance[number], phase)
+        for number, phase in enumerate(
+            np.linspace(first, last, 4 * SAMPLES + 1) for first, last in ((landing, 1.0), (other, off))
+        )
+    )
+    earlier = 1.0 - left_off
+    return shifted(coefficients, -earlier), np.array([left_on, right_off, right_on]) + earlier
+
+
+def _standing(clearance: FloatArray, phase: FloatArray) -> tuple[float, float]:
+    """First and last phase of a stance with the sole on the floor."""
+    low, n = np.flatnonzero(clearance < LIFTED), len(phase)
+    most = int(MOST_TRIMMED * n)
+    first, last = (low[0], low[-1]) if low.size else (0, n - 1)
+    return float(phase[min(first, most)]), float(phase[max(last, n - 1 - most)])
 
 
 def _feet(body: BodyModel, coefficients: FloatArray, phase: FloatArray) -> FootPlacement:

@@ -15,7 +15,7 @@ from manikin.locomotion.blend import TURN_RADIUS, Blend
 from manikin.locomotion.cycles import CycleCut, cycle_cuts, foot_events
 from manikin.locomotion.fourier import fourier_coefficients, shifted
 from manikin.locomotion.gait import Gait
-from manikin.locomotion.levelling import levelled, tilted
+from manikin.locomotion.levelling import levelled, on_the_floor, tilted
 from manikin.locomotion.library import ROOT, STAND, MotionLibrary, leg_length, reference_body
 from manikin.locomotion.library_windows import TABLE, Window, read_windows
 from manikin.locomotion.persons import as_one_person
@@ -218,7 +218,10 @@ def _person_of(window: Window) -> str:
 
 
 def _levelled(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
-    return replace(cycle, coefficients=levelled(body, cycle.coefficients[0], cycle.events[0])[None])
+    """A cycle with its soles level and on the floor."""
+    level = levelled(body, cycle.coefficients[0], cycle.events[0])
+    coefficients, events = on_the_floor(body, level, cycle.events[0])
+    return replace(cycle, coefficients=levelled(body, coefficients, events)[None], events=events[None])
 
 
 def _by_person(found: list[tuple[Window, MotionLibrary]]) -> list[tuple[Window, MotionLibrary]]:

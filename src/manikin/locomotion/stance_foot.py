@@ -22,8 +22,8 @@ from manikin.spatial import FloatArray
 FLAT = np.deg2rad(4.0)
 """A standing foot pitched by less than this is put flat, more or less [rad]."""
 
-EASE = 0.2
-"""Share of the swing in which a foot leaves, and in which it reaches, the floor."""
+LEAVING, LANDING = 0.2, 0.2
+"""Shares of the swing in which a foot leaves, and in which it reaches, the floor."""
 
 LIFT = 0.15
 """A foot is lifted by at least this share of the distance by which its step is corrected."""
@@ -150,7 +150,7 @@ def corrected(
         distance: (...) by how much the whole step is corrected [m].
     """
     standing = swing < 0.0
-    up = np.where(standing, 0.0, smooth_step(swing / EASE) * smooth_step((1.0 - swing) / EASE))
+    up = np.where(standing, 0.0, smooth_step(swing / LEAVING) * smooth_step((1.0 - swing) / LANDING))
     flat = wanted.pitch - FLAT * np.tanh(wanted.pitch / FLAT)
     return FootPlacement(
         point=wanted.point + offset[..., :2],
