@@ -52,8 +52,14 @@ def test_the_command_table_lists_every_command_and_option():
     rows = {row[1]: row[0] for row in re.finditer(r"^\| `manikin (\w+).*$", README, re.MULTILINE)}
     assert set(rows) == set(COMMANDS)
     for name, row in rows.items():
-        known = {option for parameter in COMMANDS[name].params for option in _options(parameter)}
+        known = {option for parameter in _parameters(COMMANDS[name]) for option in _options(parameter)}
         assert set(re.findall(r"--[\w-]+", row)) <= known
+
+
+def _parameters(command):
+    """Of a command, or of those of a group."""
+    inner = getattr(command, "commands", {})
+    return [*command.params, *(parameter for each in inner.values() for parameter in each.params)]
 
 
 def _options(parameter):

@@ -59,10 +59,13 @@ class LegKinematics:
         self.hip = np.array([parts[0].origin for parts in sides])
         """(2, 3) hip joints in the pelvis [m]."""
         self.thigh, self.shank = (-float(part.origin[2]) for part in sides[0][1:])
-        self.length = float(np.sqrt(
-            self.thigh**2 + self.shank**2 + 2.0 * self.thigh * self.shank * np.cos(LEAST_BEND)
-        ))  # fmt: skip
+        self.length = float(self.length_at(np.array(LEAST_BEND)))
         """Largest distance of the ankle from the hip [m]."""
+
+    def length_at(self, bend: FloatArray) -> FloatArray:
+        """(...) distance of the ankle from the hip [m] at (...) angles of the knee [rad]."""
+        a, b = self.thigh, self.shank
+        return np.sqrt(a**2 + b**2 + 2.0 * a * b * np.cos(bend))
 
     def hips(self, pelvis: FloatArray, place: FloatArray) -> FloatArray:
         """(2, n, 3) places of the hip joints of (n, 3, 3) turns and (n, 3) origins of the pelvis [m]."""

@@ -24,7 +24,7 @@ MOST_LEVELLED = np.deg2rad(15.0)
 
 SAMPLES = 64
 
-LIFTED = 0.01
+LIFTED = 0.02
 """A sole whose lower end is higher than this has left the floor, or not yet landed [m]."""
 
 MOST_TRIMMED = 0.25

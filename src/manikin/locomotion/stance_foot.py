@@ -16,6 +16,7 @@ from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import FootPlacement, Sole
 from manikin.locomotion.gait import GaitFrames
 from manikin.locomotion.leg_kinematics import HINGES, LegKinematics
+from manikin.locomotion.turns import dot
 from manikin.mocap.anatomy import SIDES
 from manikin.spatial import FloatArray
 
@@ -31,6 +32,15 @@ LIFT = 0.15
 STRAIGHTENING = 2.5
 """Toes are straight again at this height over their length; at 1 they would leave the floor no sooner than
 they must, faster than toes can move."""
+
+HEEL_UP = np.deg2rad(20.0)
+"""A standing foot with its heel up by this rolls on for its leg, with less heel the less so [rad]."""
+
+OFF_FLOOR = 0.05
+"""A foot higher than this does not [m]."""
+
+MOST_HEEL = np.deg2rad(20.0)
+"""By how much it rolls on at most [rad]."""
 
 YIELDS = 2
 """How often feet yield to joints at the ends of their ranges."""
@@ -76,6 +86,7 @@ class Legs:
             Postures (n, nq) and by how much the pelvis sinks (n,) [m].
         """
         angles = frames.angles
+        feet = self._with_heels_up(frames, feet)
         for last in (False,) * YIELDS + (True,):
             angles, sink = self._legs_to(frames, feet, angles, least)
             excess = angles - np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
@@ -92,6 +103,22 @@ class Legs:
         self._tilt(q, angles)
         q[:, 7:] = np.minimum(np.maximum(angles, self._body.lower), self._body.upper)
         return q, sink
+
+    def _with_heels_up(self, frames: GaitFrames, feet: FootPlacement) -> FootPlacement:
+        """Feet that roll on over the ball where a leg is longer than the gait has it: knees stay as bent.
+
+        One step of Newton's method on the distance of the ankle from the hip, which the pitch shortens.
+        """
+        share = smooth_step(feet.pitch / HEEL_UP) * smooth_step(1.0 - feet.clearance / OFF_FLOOR)
+        if not np.any(share):
+            return feet
+        foot, ankle = feet.to_foot(self._sole)
+        line = ankle - self._legs.hips(frames.pelvis, frames.place)
+        length = np.sqrt(dot(line, line))
+        knees = frames.angles[:, self._legs.slots[:, HINGES.index("knee_flexion")]].T
+        shortens = -dot(line, self._sole.ball * foot[..., 2] + self._sole.depth * foot[..., 0]) / length
+        more = (length - self._legs.length_at(knees)) / np.maximum(shortens, 0.5 * self._sole.ball)
+        return replace(feet, pitch=feet.pitch + share * np.clip(more, 0.0, MOST_HEEL))
 
     def _legs_to(
         self, frames: GaitFrames, feet: FootPlacement, angles: FloatArray, least: FloatArray | float
