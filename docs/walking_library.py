@@ -108,7 +108,8 @@ over a cycle from the one asked for.
 
 """
 REST = """
-Where it is more than 5 mm, hip and knee rotate no further, in sharp turns at speed.
+A standing foot does more than roll from heel to ball where joints end: it tips over its edge, and in the
+sharpest turns it turns about its heel or ball.
 
 Walks along planned paths, at most 1.4 m/s, 60 frames a second:
 

@@ -157,6 +157,8 @@ class WalkController:
         least = self._sink * float(np.exp(-dt / RISE_TIME))
         q, sink = self._legs.reached(frames, feet, least)
         self._sink = float(sink[0])
+        for array in (q, self._place, self._velocity):
+            array.setflags(write=False)
         left, right = (bool(standing) for standing in swing[:, 0] < 0.0)
         return WalkFrame(q[0], self._place, self._velocity, self._phase, (left, right), notice)
 

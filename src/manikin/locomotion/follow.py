@@ -55,6 +55,10 @@ class Walk:
     slides_before: FloatArray
     slides: FloatArray
 
+    def __post_init__(self) -> None:
+        for name in ("time", "q", "place", "support", "outside", "slides_before", "slides"):
+            getattr(self, name).setflags(write=False)
+
     @cached_property
     def motion(self) -> Motion:
         """With velocities, centre of mass and angular momentum; torques, forces and margin are NaN."""

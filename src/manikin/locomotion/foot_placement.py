@@ -1,6 +1,6 @@
 """A foot on or over the floor: where its sole is, and over which end it rolls."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -79,6 +79,14 @@ class FootPlacement:
         place = ankle + pivot[..., None] * foot[..., 0] - sole.depth * foot[..., 2]
         clearance = place[..., 2] - _edge(sole, pitch, roll)
         return cls(place[..., :2] + _flat(sole, pivot, yaw), yaw, pitch, roll, clearance)
+
+    def turned(self, sole: Sole, angle: FloatArray) -> Self:
+        """The feet turned about the end they stand on, heel or ball, by (...) angles [rad]."""
+        pivot = np.where(self.pitch > 0.0, sole.ball, sole.heel)
+        yaw = self.yaw + angle
+        return replace(
+            self, point=self.point - _flat(sole, pivot, self.yaw) + _flat(sole, pivot, yaw), yaw=yaw
+        )
 
     def to_foot(self, sole: Sole) -> tuple[FloatArray, FloatArray]:
         """(..., 3, 3) orientations, foot to world, and (..., 3) origins (ankles) [m]."""

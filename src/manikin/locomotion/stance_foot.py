@@ -139,7 +139,7 @@ class Legs:
         """Feet and knee rotations that ask less of joints at the ends of their ranges.
 
         A foot rolls over its edge, heel or ball where the ankle turns no further; the knee takes over what
-        the hip cannot rotate.
+        the hip cannot rotate, and the foot turns about its heel or ball for what the knee cannot either.
         """
         over = np.moveaxis(excess[:, self._legs.slots], 0, 1)
         hip, ankle, inversion = (over[..., HINGES.index(name)] for name in _YIELDING)
@@ -147,8 +147,9 @@ class Legs:
         knees = self._legs.slots[:, HINGES.index("knee_rotation")]
         wanted = angles[:, knees] + hip.T
         angles[:, knees] = np.clip(wanted, self._body.lower[knees], self._body.upper[knees])
-        rolled = feet.roll + inversion * [[1.0], [-1.0]]
-        return replace(feet, pitch=feet.pitch + ankle, roll=rolled), angles
+        side = np.array([[1.0], [-1.0]])
+        turned = feet.turned(self._sole, side * (wanted - angles[:, knees]).T)
+        return replace(turned, pitch=feet.pitch + ankle, roll=feet.roll + side * inversion), angles
 
     def _tilt(self, q: FloatArray, angles: FloatArray) -> None:
         """Tilt the pelvis about the line of the hip joints; hips and spine make up for it."""
