@@ -10,6 +10,7 @@ from manikin.locomotion import walking_path
 from manikin.locomotion.controller import ACCELERATION, WalkController
 from manikin.locomotion.follow import walk_along
 from manikin.locomotion.slide import stance_slides
+from manikin.motion.file import MotionFile, read_motions, write_motions
 
 RATE = 60.0
 
@@ -134,6 +135,25 @@ def test_a_walk_as_a_motion():
     body_velocity = motion.v[:, 0]
     assert body_velocity.max() == pytest.approx(path.velocity[:, 0].max(), rel=0.35)
     assert np.isnan(motion.margin).all()
+
+
+def test_a_path_beyond_the_library_has_a_notice():
+    """Two metres straight back, by a turn on the way that nobody was recorded to make."""
+    path = walking_path((0.0, 0.0, 0.0), (-2.0, 0.0, 0.0), max_speed=1.4)
+    found = walk_along(path)
+    assert found.slides.max() < 0.005
+    assert found.outside.any()
+    assert found.notice is not None
+    assert "beyond the motion library" in found.notice
+    assert walk_along(walking_path((0.0, 0.0, 0.0), (2.0, 0.0, 0.0))).notice is None
+
+
+def test_a_walk_can_be_kept_in_a_motion_file(tmp_path):
+    walk = walk_along(walking_path((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    write_motions(tmp_path / "motion.h5", MotionFile(planned=walk.motion, body=walk.body))
+    found = read_motions(tmp_path / "motion.h5").planned
+    np.testing.assert_array_equal(found.q, walk.q)
+    np.testing.assert_array_equal(found.support, walk.support)
 
 
 def test_bad_paths():

@@ -59,6 +59,17 @@ class Walk:
         for name in ("time", "q", "place", "support", "outside", "slides_before", "slides"):
             getattr(self, name).setflags(write=False)
 
+    @property
+    def notice(self) -> str | None:
+        """Says so where the path is faster than any walk of the library; None if it nowhere is."""
+        if not self.outside.any():
+            return None
+        first = self.time[int(np.argmax(self.outside))]
+        return (
+            f"{100 * np.mean(self.outside):.0f} % of the path, from {first:.2f} s on, are beyond the motion "
+            "library; legs move there as in the nearest walk"
+        )
+
     @cached_property
     def motion(self) -> Motion:
         """With velocities, centre of mass and angular momentum; torques, forces and margin are NaN."""

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from manikin.spatial import FloatArray
 
 HARMONICS = 8
-"""Of a walking cycle; what is left out of the library's cycles is reported in the docs."""
+"""Of a walking cycle; they leave out 0.4 degrees RMS of the recorded cycles in the median, 1.0 at most."""
 
 
 def fourier_basis(phase: ArrayLike, harmonics: int = HARMONICS) -> FloatArray:
