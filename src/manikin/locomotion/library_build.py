@@ -20,6 +20,7 @@ from manikin.locomotion.library import ROOT, STAND, MotionLibrary, leg_length, r
 from manikin.locomotion.library_windows import TABLE, Window, read_windows
 from manikin.locomotion.persons import as_one_person
 from manikin.locomotion.slide import stance_slides
+from manikin.locomotion.spreading import spread
 from manikin.locomotion.steady import steady_motion, travelled
 from manikin.mocap import Recording, read_recording, reconstruct
 from manikin.spatial import FloatArray
@@ -218,8 +219,8 @@ def _person_of(window: Window) -> str:
 
 
 def _levelled(body: BodyModel, cycle: MotionLibrary) -> MotionLibrary:
-    """A cycle with its soles level and on the floor."""
-    level = levelled(body, cycle.coefficients[0], cycle.events[0])
+    """A cycle with its limbs apart, its soles level and on the floor."""
+    level = levelled(body, spread(body, cycle.coefficients[0]), cycle.events[0])
     coefficients, events = on_the_floor(body, level, cycle.events[0])
     return replace(cycle, coefficients=levelled(body, coefficients, events)[None], events=events[None])
 
