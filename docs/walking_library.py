@@ -77,6 +77,8 @@ frame.q, frame.notice                           # posture; says so where no reco
   durations are kept.
 - Skeletons tell the pelvis' tilt loosely; it is set by the trunk's lean, and hips and lumbar spine make up
   for it. Soles are levelled in the middle of the stance.
+- Arms and legs are spread until they touch neither the body nor each other: the reference body is wider than
+  some of the recorded people.
 - A person's habits (offsets of mean angles that velocity does not explain) are taken out, so that blends of
   two people do not change from one habit to another. The movement around the means stays the person's own.
 - Straight walks, runs and standing are averaged with their mirror images; of others the mirror image is
