@@ -26,6 +26,7 @@ from manikin.stages.keyed_contacts import KeyedContacts
 from manikin.stages.planned_motion import PlannedMotion
 from manikin.stages.recovery import recover_from_push
 from manikin.stages.refined import refine_contacts
+from manikin.stages.walk_on_footprints import walk_on_footprints
 from manikin.stages.walking import walk_to_goal
 from manikin.stages.wholebody import follow_centre_of_mass, move_point_mass
 from manikin.wholebody import WholeBodySettings
@@ -85,8 +86,14 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
     """The whole road; contacts are planned where the scenario lists none, and none for a body that stays."""
     if context.scenario.recovery is not None:
         return RunResult.of(report, recovery=recover_from_push(context, report))
-    if context.scenario.walking is not None:
+    walking = context.scenario.walking
+    if walking is not None and not walking.is_planned(context.scenario.file.supports):
         return RunResult.of(report, planned=walk_to_goal(context, report))
+    if walking is not None:
+        on_footprints = walk_on_footprints(context, report)
+        if on_footprints is None:
+            return RunResult.of(report)
+        context = on_footprints
     with_contacts = context if context.has_supports else plan_contacts(context, report)
     if with_contacts is None:
         return RunResult.of(report)

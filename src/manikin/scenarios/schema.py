@@ -193,9 +193,17 @@ class ScenarioFile(Section):
             raise refuse("walking", f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
         if self.floor_height_m is None:
             raise refuse("floor_height_m", "is null; valid in a walk: the height of a floor")
-        for key in ("supports", "contacts", "recovery", "push"):
+        for key in ("contacts", "recovery", *(() if self.walking.is_planned(self.supports) else ("push",))):
             if getattr(self, key) is not None:
                 raise refuse(key, "is given beside walking; valid: one of them")
+        if (self.supports is None) != (self.walking.start is None):
+            raise refuse("walking.start", "goes with supports, which it leads to; valid: both or neither")
+        if self.walking.is_planned(self.supports):
+            for key in ("via", "others"):
+                if getattr(self.walking, key):
+                    raise refuse(f"walking.{key}", "are given for a planned walk; valid: a recorded one")
+        if self.supports is not None:
+            return
         if self.task.act is not None:
             raise refuse("task.act", "is given beside walking; valid: one of them")
         for end in ("start", "goal"):

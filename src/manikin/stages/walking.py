@@ -60,9 +60,9 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
         context: Of a scenario with a ``walking`` section.
         report: Takes the ``walk`` block, and the failure where there is no way.
     """
-    plan = plan_walks(context)
+    plan = plan_walks(context, *(end_of(context.scenario, end) for end in ("start", "goal")))
     report.progress(STAGE, 0.5)
-    height, block = context.scene.floor_height or 0.0, _path_block(plan)
+    height, block = context.scene.floor_height or 0.0, path_block(plan)
     for name, route in plan.others.items():
         if not route.succeeded:
             report.fail(STAGE, f"way of {name}: {route.failure}", where=name)
@@ -84,11 +84,13 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
     return motion
 
 
-def plan_walks(context: RunContext) -> PlannedWalks:
+def plan_walks(context: RunContext, start: FloatArray, goal: FloatArray) -> PlannedWalks:
     """Find a way for everyone, each around those before.
 
     Args:
         context: Of a scenario with a ``walking`` section.
+        start: (3,) x, y [m], heading [rad] of the body at the beginning.
+        goal: (3,) The same at the end.
 
     Raises:
         ScenarioError: If a way cannot be asked for: no floor, a start in an obstacle, a waypoint in vain.
@@ -104,12 +106,11 @@ def plan_walks(context: RunContext) -> PlannedWalks:
         key: KeyPath = ("walking", "others", number)
         stops = [_waypoint(one) for one in other.via]
         others[other.name] = _route(
-            scenario, key, _place(other.start), stops, objective, obstacles, section.room_m,
+            scenario, key, place_of(other.start), stops, objective, obstacles, section.room_m,
             other.max_speed_m_s, other.wait_s,
         )  # fmt: skip
         obstacles.append(others[other.name].as_obstacle(other.name, radius))
     began = clock.perf_counter()
-    start, goal = (_end(scenario, end) for end in ("start", "goal"))
     stops = [*map(_waypoint, section.via), Waypoint(goal)]
     route = _route(
         scenario, ("walking",), start, stops, objective, obstacles, section.room_m, section.max_speed_m_s,
@@ -143,21 +144,21 @@ def _route(
         raise scenario.refused(key, error) from None
 
 
-def _end(scenario: Scenario, end: str) -> FloatArray:
-    """(3,) place of an end of the task."""
+def end_of(scenario: Scenario, end: str) -> FloatArray:
+    """(3,) x, y [m], heading [rad] of an end of the task."""
     state = getattr(scenario.file.task, end)
     return np.array([*state.at, math.radians(state.heading_deg or 0.0)])
 
 
-def _place(stand: StandSection) -> FloatArray:
+def place_of(stand: StandSection) -> FloatArray:
     return np.array([*stand.at, math.radians(stand.heading_deg)])
 
 
 def _waypoint(section: WaypointSection) -> Waypoint:
-    return Waypoint(_place(section), section.speed_m_s, section.wait_s)
+    return Waypoint(place_of(section), section.speed_m_s, section.wait_s)
 
 
-def _path_block(plan: PlannedWalks) -> dict[str, Any]:
+def path_block(plan: PlannedWalks) -> dict[str, Any]:
     route, forward, left = plan.route, *np.abs(plan.route.velocity[:, :2]).max(axis=0)
     return {
         "duration_s": route.duration,

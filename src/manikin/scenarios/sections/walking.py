@@ -43,6 +43,16 @@ class WalkerSection(Section):
 class WalkingSection(Section):
     """A walk from start to goal of the task: path by optimal control, whole body from recorded walks."""
 
+    whole_body: Literal["recorded", "planned"] = Field(
+        default="recorded",
+        description="recorded: as recorded people walk, along the path; planned: on footprints along the path, "
+        "balanced and executed in the physics engine",
+    )
+    start: StandSection | None = Field(
+        default=None,
+        description="with supports: where the body walks from, to the feet of their first phase; the plan goes "
+        "on from there",
+    )
     via: list[WaypointSection] = Field(
         default_factory=list, description="where the way to the goal leads past, in order"
     )
@@ -59,6 +69,10 @@ class WalkingSection(Section):
         description="others who walk there; each keeps away from those before it in the list, and the "
         "scenario's body from all of them",
     )  # fmt: skip
+
+    def is_planned(self, supports: object) -> bool:
+        """Whether footprints are planned and executed, as they always are before supports."""
+        return self.whole_body == "planned" or supports is not None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
