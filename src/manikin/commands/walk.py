@@ -65,7 +65,7 @@ def walk(
             "--to": to, "--max-speed": max_speed, "--weights": weights, "--out": out, "--json": json or None,
         }  # fmt: skip
         for option, value in given.items():
-            refuse(value is not None, option, "it does not go with --drive")
+            refuse(value is not None, option, "it is for a walk to a place")
         return _drive(body, start, scene, 8080 if port is None else port)
     refuse(port is not None, "--port", "it is for --drive")
     if to is None:
@@ -93,7 +93,7 @@ def walk(
     directory = out if out is not None else None if json else Path("runs") / name
     summary = run_job(job, directory, context.obj, draw=figures)
     if json:
-        print_json(summary)
+        print_json({"max_stance_slide_m": None} | summary["walk"] | summary)
     else:
         print_table({key: summary["walk"].get(key) for key in SHOWN})
         print_ending(summary, directory)

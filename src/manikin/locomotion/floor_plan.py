@@ -60,8 +60,13 @@ def _outline(obstacle: Obstacle) -> WalkObstacle:
 
 
 def _around(corners: FloatArray) -> FloatArray:
-    """(:data:`CORNERS`, 2) where neighbouring tangents of a polygon meet, evenly many directions of them."""
-    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
+    """(:data:`CORNERS`, 2) where neighbouring tangents of a polygon meet, those in even directions.
+
+    One of them is along the longest chord, so that long outlines stay narrow.
+    """
+    chords = (corners[:, None] - corners).reshape(-1, 2)
+    longest = chords[np.hypot(*chords.T).argmax()]
+    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False) + np.arctan2(longest[1], longest[0])
     normal = np.column_stack([np.cos(angle), np.sin(angle)])
     offset = (corners @ normal.T).max(axis=0)
     pairs = np.stack([normal, np.roll(normal, -1, axis=0)], axis=1)

@@ -104,6 +104,7 @@ def walk_along(
     library: MotionLibrary | None = None,
     *,
     rate: float = RATE,
+    height: float = 0.0,
 ) -> Walk:
     """Walk along a path, from standing to standing.
 
@@ -116,6 +117,7 @@ def walk_along(
         body: A human; that of the library if omitted.
         library: Cycles; those that come with this package if omitted.
         rate: Frames per second [Hz], 20 to 1000.
+        height: Of the floor [m].
 
     Raises:
         InputError: If the path is none, failed, or the rate is not usable.
@@ -139,6 +141,7 @@ def walk_along(
     end = _last_frame(swing, time, path.duration)
     swing[:, end:] = -1.0
     q, _ = legs.reached(frames, put_in_place(legs.feet(frames), swing))
+    q[:, 2] += finite_number(height, "height of the floor [m]")
     kept = slice(0, min(end + int(STANDING_TIME * rate) + 1, len(time)))
     support = (swing < 0.0)[:, kept]
     return Walk(

@@ -2,8 +2,9 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,13 +12,16 @@ from numpy.typing import ArrayLike
 from manikin.errors import InputError
 from manikin.locomotion.model import to_body
 from manikin.locomotion.objective import PROSE_ORDER, WalkObjective
-from manikin.locomotion.obstacles import Walker, WalkObstacle
+from manikin.locomotion.obstacles import Walker, WalkObstacle, clearance
 from manikin.locomotion.path import SAMPLING, WalkingPath, WalkingTask
 from manikin.locomotion.plan import NEAREST, walking_path
 from manikin.locomotion.segmentation import PathSegments, segment_path
 from manikin.locomotion.shoulders import ShoulderPaths
 from manikin.locomotion.spot_turn import SMALLEST, spot_turn
 from manikin.spatial import FloatArray, finite_number, frozen_array
+
+OVERLOOKED = 1e-3
+"""Lack of room that counts as none where the walker stands or turns on the spot [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +56,12 @@ class WalkRoute:
     Attributes:
         legs: In order; each starts where and as fast as the one before ends.
         waits: (legs + 1,) times of standing before each leg and after the last [s].
+        blocked: Who comes too near where the walker stands or turns on the spot, or None.
     """
 
     legs: tuple[WalkingPath, ...]
     waits: tuple[float, ...]
+    blocked: str | None = None
 
     def __post_init__(self) -> None:
         if not self.legs:
@@ -65,13 +71,13 @@ class WalkRoute:
 
     @property
     def failure(self) -> str | None:
-        """Why a leg is no solution of its task, or None."""
+        """Why a leg is no solution of its task, or there is no room to stand, or None."""
         broken = [(i, leg.failure) for i, leg in enumerate(self.legs) if leg.failure is not None]
-        return f"leg {broken[0][0] + 1} of {len(self.legs)}: {broken[0][1]}" if broken else None
+        return f"leg {broken[0][0] + 1} of the way: {broken[0][1]}" if broken else self.blocked
 
     @property
     def succeeded(self) -> bool:
-        """Whether every leg is a solution of its task."""
+        """Whether every leg is a solution of its task, with room where the walker stands."""
         return self.failure is None
 
     @cached_property
@@ -150,7 +156,7 @@ class WalkRoute:
             name: What messages call it.
             radius: Of the disc [m].
         """
-        times = np.append(np.arange(0.0, self.duration, 0.1), self.duration)
+        times = np.linspace(0.0, self.duration, int(np.ceil(self.duration / 0.1)) + 1)
         return WalkObstacle.moving_disc(name, times, self.place_at(times)[:, :2], radius)
 
     @cached_property
@@ -190,39 +196,46 @@ def walking_route(
         wait: Time of standing at the start [s].
 
     Returns:
-        The route, up to the first leg that has no solution, which then is the last one.
+        The route, up to the first leg that has no solution, which then is the last one. Where the walker
+        stands or turns on the spot, obstacles that move may come too near: then it is ``blocked``.
 
     Raises:
-        InputError: If an argument is not usable, the last waypoint is no stop, or one is passed that is in
-            the same place as its neighbour.
+        InputError: If an argument is not usable, the last waypoint is no stop, one is in an obstacle, or one
+            is passed that is in the same place as its neighbour.
     """
     if not waypoints:
         raise InputError("route has no waypoint; valid: at least one")
     if waypoints[-1].speed > 0.0:
         raise InputError(f"last waypoint is passed with {waypoints[-1].speed:g} m/s; valid: a stop, speed 0")
-    limit = np.inf if max_speed is None else max_speed
+    limit = np.inf if max_speed is None else finite_number(max_speed, "max_speed [m/s]", at_least=0.1)
+    finite_number(room, "walking room [m]", at_least=0.0)
+    walker = walker or Walker()
     place, velocity = frozen_array(start, "walking start [m, m, rad]", (3,)), np.zeros(3)
     clock = finite_number(wait, "walking wait [s]", at_least=0.0)
     legs: list[WalkingPath] = []
     for number, waypoint in enumerate(waypoints):
-        where = f"waypoint {number + 1}"
+        where = "walking goal" if number == len(waypoints) - 1 else f"waypoint {number + 1}"
         if waypoint.speed > limit:
             raise InputError(f"{where} is passed with {waypoint.speed:g} m/s; valid: at most {limit:g} m/s")
         after = waypoints[number + 1].place if waypoint.speed > 0.0 else waypoint.place
         goal_velocity = _passing(waypoint, after, where)
         still = [_later(one, clock) for one in obstacles]
+        lack = room - float(clearance(still, walker, place[None], np.zeros(1)).min(initial=np.inf))
+        if legs and lack > OVERLOOKED:
+            break
         apart = float(np.hypot(*(waypoint.place - place)[:2]))
         turn = abs(float(np.angle(np.exp(1j * (waypoint.place[2] - place[2])))))
         if apart >= NEAREST:
-            leg = walking_path(
-                place, waypoint.place, objective, obstacles=still, walker=walker, room=room,
+            leg = _walked(
+                where, place, waypoint.place, objective, obstacles=still, walker=walker,
+                room=room - max(lack, 0.0) if legs else room,
                 max_speed=max_speed, start_velocity=velocity, goal_velocity=goal_velocity,
             )  # fmt: skip
         elif np.any(velocity != 0.0) or turn < SMALLEST:
             raise InputError(f"{where} is where the walker already is; valid: {NEAREST:g} m away, or a turn")
         else:
             task = WalkingTask(
-                place, np.append(place[:2], waypoint.place[2]), objective, (), walker or Walker(), room,
+                place, np.append(place[:2], waypoint.place[2]), objective, tuple(still), walker, room,
                 max_speed, velocity, goal_velocity,
             )  # fmt: skip
             leg = spot_turn(task)
@@ -232,7 +245,33 @@ def walking_route(
         clock += leg.duration + waypoint.wait
         place, velocity = leg.task.goal, goal_velocity
     waits = (wait, *(one.wait for one in waypoints[: len(legs)]))
-    return WalkRoute(tuple(legs), waits)
+    route = WalkRoute(tuple(legs), waits)
+    return replace(route, blocked=_blocked(route, obstacles, walker, room)) if route.succeeded else route
+
+
+def _walked(
+    where: str, start: FloatArray, goal: FloatArray, objective: WalkObjective, **options: Any
+) -> WalkingPath:
+    """A walking path whose messages say which waypoint it leads to."""
+    try:
+        return walking_path(start, goal, objective, **options)
+    except InputError as error:
+        raise InputError(str(error).replace("walking goal", where)) from None
+
+
+def _blocked(route: WalkRoute, obstacles: Sequence[WalkObstacle], walker: Walker, room: float) -> str | None:
+    """Who first comes too near on the whole route and, as long as anything moves, after it."""
+    end = max([route.duration, *(float(one.times[-1]) for one in obstacles if one.moves)])
+    time = np.linspace(0.0, end, int(np.ceil(end / SAMPLING)) + 1)
+    left = clearance(obstacles, walker, route.place_at(time), time)
+    if not np.any(left < room - OVERLOOKED):
+        return None
+    first = int(np.argmax(np.any(left < room - OVERLOOKED, axis=1)))
+    nearest = int(left[first].argmin())
+    return (
+        f"obstacle {obstacles[nearest].name!r} comes within {left[first, nearest]:.3g} m "
+        f"at {time[first]:.2f} s, where {room:g} m are kept"
+    )
 
 
 def _passing(waypoint: Waypoint, after: FloatArray, where: str) -> FloatArray:

@@ -15,8 +15,7 @@ def spot_turn(task: WalkingTask) -> WalkingPath:
 
     Without a way to go the criterion ([Truong2010]_ 5.6) is ``a0 T + a3 int u_angular^2``. The cheapest turn
     by ``D`` in the time ``T`` is the cubic ``D (3 s^2 - 2 s^3)``, for ``12 D^2 / T^3``, so that ``T^4 = 36 a3
-    D^2 / a0``. Obstacles are not looked at: a body that has room turns within that room, but for its
-    shoulders.
+    D^2 / a0``. Obstacles are not looked at.
 
     Args:
         task: Its goal is where it starts, but for the heading.

@@ -72,13 +72,13 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
         report.finish(STAGE, block)
         return None
     began = clock.perf_counter()
-    walk = walk_along(plan.route, context.body)
+    walk = walk_along(plan.route, context.body, height=height)
     block |= _walk_block(walk, clock.perf_counter() - began)
     schedule, motion = walked_motion(walk, height)
     report.finish(STAGE, block | _balance_block(motion))
     report.keep_motions(schedule, motion)
     for number, (name, route) in enumerate(plan.others.items()):
-        report.keep_other(name, *walked_motion(walk_along(route, context.body), height))
+        report.keep_other(name, *walked_motion(walk_along(route, context.body, height=height), height))
         report.progress(STAGE, 0.6 + 0.4 * (number + 1) / len(plan.others))
     report.progress(STAGE, 1.0)
     return motion
@@ -109,7 +109,8 @@ def plan_walks(context: RunContext, start: FloatArray, goal: FloatArray) -> Plan
             scenario, key, place_of(other.start), stops, objective, obstacles, section.room_m,
             other.max_speed_m_s, other.wait_s,
         )  # fmt: skip
-        obstacles.append(others[other.name].as_obstacle(other.name, radius))
+        if others[other.name].succeeded:
+            obstacles.append(others[other.name].as_obstacle(other.name, radius))
     began = clock.perf_counter()
     stops = [*map(_waypoint, section.via), Waypoint(goal)]
     route = _route(

@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from manikin.errors import InputError
 from manikin.locomotion import WalkController, WalkFrame
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
@@ -13,6 +14,7 @@ from manikin.viewer.page import Page
 from manikin.viewer.stage import COLOURS, BodyShapes, add_scene, look_at
 
 if TYPE_CHECKING:
+    from viser import GuiEvent
     from viser._messages import HotkeyKey
 
 FRAME_RATE = 60.0
@@ -79,18 +81,24 @@ class WalkViewer(Page):
             port: Port to listen on; 0 picks a free one.
 
         Raises:
-            InputError: If the port is taken.
+            InputError: If the scene has no floor, or the port is taken.
         """
+        scene = Scene(floor_height=0.0) if scene is None else scene
+        if scene.floor_height is None:
+            raise InputError("scene has no floor; valid: floor_height_m, to walk on")
         super().__init__(port, FRAME_RATE)
         self.controller, self.directive = controller, np.zeros(3)
         self.notice: str | None = None
         self._place = np.zeros(3)
         self._trail: list[FloatArray] = []
-        add_scene(self.server, Scene() if scene is None else scene)
+        add_scene(self.server, scene)
+        self._floor = scene.floor_height
+        self._raised = np.zeros(controller.body.nq)
+        self._raised[2] = self._floor
         self._shapes = BodyShapes(self.server, controller.body)
         self._build_controls()
         self.advance(1.0 / FRAME_RATE)
-        look_at(self.server, np.append(self._place[:2], 0.9))
+        look_at(self.server, np.append(self._place[:2], self._floor + 0.9))
 
     def press(self, key: Key) -> None:
         """Change the directive as a key does."""
@@ -140,19 +148,24 @@ class WalkViewer(Page):
         with gui.add_folder("Now"):
             self._text = gui.add_markdown("")
         for handle in self._sliders:
-            handle.on_update(lambda _: self.steer(np.array([one.value for one in self._sliders])))
+            handle.on_update(self._slid)
         for key in KEYS:
             gui.add_command(key.label, hotkey=key.hotkey).on_trigger(partial(self._pressed, key))
 
     def _pressed(self, key: Key, _event: object) -> None:
         self.press(key)
 
+    def _slid(self, event: "GuiEvent[Any]") -> None:
+        """Follow the sliders, unless it was this page that moved them."""
+        if event.client is not None:
+            self.steer(np.array([one.value for one in self._sliders]))
+
     def _show(self, frame: WalkFrame) -> None:
         moved = frame.place - self._place
         self._place = frame.place
-        self._trail = [*self._trail[-TRAIL:], np.append(frame.place[:2], 0.004)]
+        self._trail = [*self._trail[-TRAIL:], np.append(frame.place[:2], self._floor + 0.004)]
         with self.server.atomic():
-            self._shapes.place(frame.q)
+            self._shapes.place(frame.q + self._raised)
             if len(self._trail) > 1:
                 path = np.array(self._trail)
                 self.server.scene.add_line_segments(
@@ -163,8 +176,7 @@ class WalkViewer(Page):
             shift = np.array([moved[0], moved[1], 0.0])
             for client in self.server.get_clients().values():
                 with client.atomic():
-                    client.camera.position = client.camera.position + shift
-                    client.camera.look_at = client.camera.look_at + shift
+                    client.camera.position = client.camera.position + shift  # takes look_at along
         self._text.content = _lines(frame)
 
 

@@ -160,6 +160,9 @@ def plan_forces(
     forces = np.zeros((len(time), len(names), 6))
     for rows, generators, stance in _alike(body, schedule, time, q):
         part = dynamics.part(rows)
+        if not len(stance):
+            tau[rows] = part.needed  # in the air nothing pushes
+            continue
         cost = generators.cost / shares[rows][:, generators.contact]
         matrix, target = _centred(generators, part.wrench)
         magnitude = share_wrenches(matrix, target, cost)
