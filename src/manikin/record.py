@@ -20,7 +20,7 @@ from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
 from manikin.motion.derived import PhaseTable, com_velocity, effector_positions, phases_of
 from manikin.motion.file import MotionFile, read_motions
-from manikin.output import MOTION, SCENARIO, STAGES, SUMMARY, read_summary
+from manikin.output import MOTION, SCENARIO, STAGES, SUMMARY, WALK_PATHS, read_summary
 from manikin.scenarios import Scenario, load_scenario
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
@@ -71,6 +71,7 @@ class RunRecord:
         summary: As written by the run.
         mass: Of the body [kg].
         plan: The CoM as planned for a point mass, its margin with the planning soles.
+        walks: (n, 4) instants [s], x, y [m] and headings [rad] of ways over the floor, by who walks.
     """
 
     label: str
@@ -78,6 +79,7 @@ class RunRecord:
     summary: Mapping[str, Any] = field(default_factory=dict)
     mass: float | None = None
     plan: ComTrack | None = None
+    walks: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def scenario(self) -> str:
@@ -168,7 +170,7 @@ def read_run(directory: str | Path) -> RunRecord:
     data = _read_trajectory(folder / STAGES / COM_TRAJECTORY)
     if data is None:
         mass = None if content.body is None else content.body.mass
-        return RunRecord(_label(folder), content, summary, mass)
+        return RunRecord(_label(folder), content, summary, mass, walks=_read_walks(folder))
     scenario = load_scenario(folder / SCENARIO)
     trajectory = _trajectory(data, scenario.build_sequence(planning=True), folder)
     if not has_motion:
@@ -176,7 +178,7 @@ def read_run(directory: str | Path) -> RunRecord:
         schedule = ContactSchedule(real, trajectory.schedule.instants)
         content = MotionFile(scene=scenario.build_scene(), schedule=schedule)
     plan = point_mass_track(scenario, trajectory)
-    return RunRecord(_label(folder), content, summary, trajectory.mass, plan)
+    return RunRecord(_label(folder), content, summary, trajectory.mass, plan, _read_walks(folder))
 
 
 def point_mass_track(scenario: Scenario, trajectory: CentroidalTrajectory) -> ComTrack:
@@ -220,6 +222,20 @@ def _read_trajectory(path: Path) -> dict[str, Any] | None:
     if not isinstance(data, dict):
         raise MotionFileError(f"{path}: is not a JSON object; valid: as written by manikin")
     return data
+
+
+def _read_walks(folder: Path) -> dict[str, FloatArray]:
+    """Ways over the floor, (n, 4) each; none where nobody walks."""
+    path = folder / STAGES / f"{WALK_PATHS}.json"
+    data = _read_trajectory(path)
+    try:
+        return {
+            name: np.column_stack([one["time_s"], np.reshape(one["place"], (-1, 3))]).astype(np.float64)
+            for name, one in (data or {}).items()
+        }
+    except (KeyError, TypeError, ValueError) as error:
+        problem = " ".join(str(error).split())[:160]
+        raise MotionFileError(f"{path}: is damaged ({problem}); valid: as written by manikin") from None
 
 
 def _trajectory(data: dict[str, Any], sequence: StanceSequence, folder: Path) -> CentroidalTrajectory:

@@ -51,7 +51,7 @@ def walking_paths_figure(groups: Mapping[str, Sequence[WalkingPath]], title: str
         for path in paths:
             _draw_path(axes, path)
         for obstacle in paths[0].task.obstacles:
-            _draw_obstacle(axes, obstacle)
+            draw_obstacle(axes, obstacle)
         dress(
             axes,
             "y [m]" if number % columns == 0 else "",
@@ -86,7 +86,7 @@ def _draw_path(axes: Axes, path: WalkingPath) -> None:
     axes.plot(*path.task.start[:2], "o", color=COLOURS["ink"], markersize=3.5, zorder=6)
 
 
-def _draw_obstacle(axes: Axes, obstacle: WalkObstacle) -> None:
+def draw_obstacle(axes: Axes, obstacle: WalkObstacle) -> None:
     """Outline where it begins, and dashed where it ends if it moves."""
     angle = np.linspace(0.0, 2.0 * np.pi, 24 * len(obstacle.corners), endpoint=False)
     circle = np.column_stack([np.cos(angle), np.sin(angle)])

@@ -27,6 +27,7 @@ from manikin.figures.postures import postures_figure
 from manikin.figures.scene import scene_figure
 from manikin.figures.timing import timing_figure
 from manikin.figures.tracking import tracking_figure
+from manikin.figures.walk_paths import walk_paths_figure
 from manikin.figures.zmp import zmp_figure
 from manikin.record import RunRecord
 
@@ -34,6 +35,7 @@ FIGURES: dict[str, Callable[[RunRecord], Figure]] = {
     "com": com_figure,
     "margin": margin_figure,
     "footprints": footprint_figure,
+    "walk_paths": walk_paths_figure,
     "zmp": zmp_figure,
     "planes": planes_figure,
     "contacts": contacts_figure,

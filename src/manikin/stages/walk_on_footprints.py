@@ -12,7 +12,7 @@ from manikin.scenarios.walked import walk_before, walking_supports
 from manikin.spatial import FloatArray
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report
-from manikin.stages.walking import STAGE, end_of, path_block, place_of, plan_walks
+from manikin.stages.walking import STAGE, end_of, keep_paths, path_block, place_of, plan_walks
 
 FEET = ("left_foot", "right_foot")
 
@@ -35,6 +35,7 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
     stance = None if scenario.file.supports is None else _first_stance(scenario)
     start, goal = _ends(scenario, stance)
     plan = plan_walks(context, start, goal)
+    keep_paths(report, plan)
     if not plan.route.succeeded:
         report.fail(STAGE, plan.route.failure or "", where="way of the body")
         report.finish(STAGE, path_block(plan))

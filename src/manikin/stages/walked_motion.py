@@ -5,11 +5,13 @@ import math
 
 import numpy as np
 import pinocchio as pin
+from scipy.signal import butter, sosfiltfilt
 
 from manikin.balance import wrench_polytope
 from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import BodyError
 from manikin.locomotion import Walk
+from manikin.mocap.recorded_motion import CUTOFF
 from manikin.motion import Motion
 from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
 from manikin.spatial import GRAVITY
@@ -24,6 +26,7 @@ def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
 
     The motion is that of recorded people, carried over to another body, so that its margin may be negative
     and its torques may leave a rest on the pelvis: both say how far this body is from walking like that.
+    Velocities are low-passed as those of recordings are, since accelerations follow from them.
 
     Args:
         walk: Of a body along a path.
@@ -31,7 +34,10 @@ def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
     """
     schedule, motion = walked_schedule(walk, height), walk.motion
     polytopes = [wrench_polytope(phase.stance) for phase in schedule.sequence]
-    full, _ = full_motion(walk.body, schedule, polytopes, motion.time, motion.q, motion.v, motion.a)
+    rate = (len(motion.time) - 1) / motion.duration
+    v = sosfiltfilt(butter(2, CUTOFF, fs=rate, output="sos"), motion.v, axis=0)
+    a = np.gradient(v, 1.0 / rate, axis=0)
+    full, _ = full_motion(walk.body, schedule, polytopes, motion.time, motion.q, v, a)
     return schedule, full
 
 

@@ -23,6 +23,7 @@ from manikin.locomotion import (
 )
 from manikin.locomotion.obstacles import clearance
 from manikin.motion import Motion
+from manikin.output import BODY, WALK_PATHS
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections import StandSection, WalkingSection, WaypointSection
 from manikin.scenarios.validation import Path as KeyPath
@@ -32,6 +33,9 @@ from manikin.stages.report import Report
 from manikin.stages.walked_motion import walked_motion
 
 STAGE = "walk"
+
+PATH_EVERY = 5
+"""Instants of a route for each one that is kept."""
 
 OBJECTIVES = {"prose": PROSE_ORDER, "literal": LITERAL_ORDER}
 
@@ -61,6 +65,7 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
         report: Takes the ``walk`` block, and the failure where there is no way.
     """
     plan = plan_walks(context, *(end_of(context.scenario, end) for end in ("start", "goal")))
+    keep_paths(report, plan)
     report.progress(STAGE, 0.5)
     height, block = context.scene.floor_height or 0.0, path_block(plan)
     for name, route in plan.others.items():
@@ -145,6 +150,15 @@ def _route(
         raise scenario.refused(key, error) from None
 
 
+def keep_paths(report: Report, plan: PlannedWalks) -> None:
+    """Keep the ways of all who walk among the files of the run: instants [s], x, y [m], headings [rad]."""
+    routes = {BODY: plan.route, **plan.others}
+    report.keep(WALK_PATHS, {
+        name: {"time_s": route.time[::PATH_EVERY], "place": route.place[::PATH_EVERY]}
+        for name, route in routes.items()
+    })  # fmt: skip
+
+
 def end_of(scenario: Scenario, end: str) -> FloatArray:
     """(3,) x, y [m], heading [rad] of an end of the task."""
     state = getattr(scenario.file.task, end)
@@ -152,6 +166,7 @@ def end_of(scenario: Scenario, end: str) -> FloatArray:
 
 
 def place_of(stand: StandSection) -> FloatArray:
+    """(3,) x, y [m], heading [rad] of a place in a file."""
     return np.array([*stand.at, math.radians(stand.heading_deg)])
 
 
@@ -160,6 +175,7 @@ def _waypoint(section: WaypointSection) -> Waypoint:
 
 
 def path_block(plan: PlannedWalks) -> dict[str, Any]:
+    """What the summary says of the way itself."""
     route, forward, left = plan.route, *np.abs(plan.route.velocity[:, :2]).max(axis=0)
     return {
         "duration_s": route.duration,
@@ -196,10 +212,8 @@ def _walk_block(walk: Walk, wall: float) -> dict[str, Any]:
 
 
 def _balance_block(motion: Motion) -> dict[str, Any]:
-    over = np.abs(motion.tau[:, :6])
     return {
         "min_margin": float(motion.margin.min()),
         "margin_unit": motion.margin_unit,
         "balanced_share": float(np.mean(motion.margin >= 0.0)),
-        "max_missing_force_N": float(over[:, :3].max()),
     }

@@ -45,13 +45,13 @@ class WalkingSection(Section):
 
     whole_body: Literal["recorded", "planned"] = Field(
         default="recorded",
-        description="recorded: as recorded people walk, along the path; planned: on footprints along the path, "
-        "balanced and executed in the physics engine",
+        description="recorded: as recorded people walk, along the path; planned: on footprints along the "
+        "path, balanced and executed in the physics engine",
     )
     start: StandSection | None = Field(
         default=None,
-        description="with supports: where the body walks from, to the feet of their first phase; the plan goes "
-        "on from there",
+        description="with supports: where the body walks from, to the feet of their first phase; the plan "
+        "goes on from there",
     )
     via: list[WaypointSection] = Field(
         default_factory=list, description="where the way to the goal leads past, in order"
