@@ -11,10 +11,10 @@ from manikin.locomotion import WalkController, WalkFrame
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 from manikin.viewer.page import Page
-from manikin.viewer.stage import COLOURS, BodyShapes, add_scene, look_at
+from manikin.viewer.stage import COLOURS, VIEW, BodyShapes, add_scene, look_at
 
 if TYPE_CHECKING:
-    from viser import GuiEvent
+    from viser import ClientHandle, GuiEvent
     from viser._messages import HotkeyKey
 
 FRAME_RATE = 60.0
@@ -91,14 +91,15 @@ class WalkViewer(Page):
         self.notice: str | None = None
         self._place = np.zeros(3)
         self._trail: list[FloatArray] = []
-        add_scene(self.server, scene)
+        add_scene(self.server, scene, endless_floor=True)
         self._floor = scene.floor_height
         self._raised = np.zeros(controller.body.nq)
         self._raised[2] = self._floor
         self._shapes = BodyShapes(self.server, controller.body)
         self._build_controls()
         self.advance(1.0 / FRAME_RATE)
-        look_at(self.server, np.append(self._place[:2], self._floor + 0.9))
+        look_at(self.server, self._middle)
+        self.server.on_client_connect(self._welcome)
 
     def press(self, key: Key) -> None:
         """Change the directive as a key does."""
@@ -155,13 +156,23 @@ class WalkViewer(Page):
     def _pressed(self, key: Key, _event: object) -> None:
         self.press(key)
 
+    def _welcome(self, client: "ClientHandle") -> None:
+        """Let a new visitor see the walker, wherever it is by now."""
+        with client.atomic():
+            client.camera.position, client.camera.look_at = self._middle + VIEW, self._middle
+
+    @property
+    def _middle(self) -> FloatArray:
+        """(3,) middle of the walker [m]."""
+        return np.append(self._place[:2], self._floor + 0.9)
+
     def _slid(self, event: "GuiEvent[Any]") -> None:
         """Follow the sliders, unless it was this page that moved them."""
         if event.client is not None:
             self.steer(np.array([one.value for one in self._sliders]))
 
     def _show(self, frame: WalkFrame) -> None:
-        moved = frame.place - self._place
+        moved = bool(np.any(frame.place != self._place))
         self._place = frame.place
         self._trail = [*self._trail[-TRAIL:], np.append(frame.place[:2], self._floor + 0.004)]
         with self.server.atomic():
@@ -172,11 +183,13 @@ class WalkViewer(Page):
                     "/trail", np.stack([path[:-1], path[1:]], axis=1), np.array(COLOURS["planned"]),
                     thickness=2.0, thickness_units="screen",
                 )  # fmt: skip
-        if self._follow.value:
-            shift = np.array([moved[0], moved[1], 0.0])
+        if moved and self._follow.value:
+            middle = self._middle
             for client in self.server.get_clients().values():
                 with client.atomic():
-                    client.camera.position = client.camera.position + shift  # takes look_at along
+                    # What the page last said of its camera may be late, but not how it looks at the walker.
+                    view = client.camera.position - client.camera.look_at
+                    client.camera.position, client.camera.look_at = middle + view, middle
         self._text.content = _lines(frame)
 
 
@@ -185,6 +198,6 @@ def _lines(frame: WalkFrame) -> str:
     standing = [name for name, on in zip(("left", "right"), frame.support, strict=True) if on]
     lines = [
         f"- forward {forward:.2f} m/s, left {left:.2f} m/s, turning {angular:.2f} rad/s",
-        f"- on the {' and the '.join(standing) or 'air'}",
+        f"- standing on: {', '.join(standing) or 'nothing'}",
     ]
     return "\n".join([*lines, *([f"- {frame.notice}"] if frame.notice else [])])

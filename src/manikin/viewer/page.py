@@ -42,7 +42,7 @@ class Page(ABC):
         """Serve until :meth:`close` is called or Ctrl-C is pressed."""
         before = clock.monotonic()
         try:
-            while not self._closed.wait(1.0 / self._frame_rate):
+            while not self._closed.wait(max(0.0, before + 1.0 / self._frame_rate - clock.monotonic())):
                 now = clock.monotonic()
                 self.advance(now - before)
                 before = now

@@ -29,6 +29,10 @@ COLOURS = {
 }
 
 
+VIEW = np.array([-1.7, -1.9, 0.5])
+"""Where new visitors look from, seen from what they look at [m]."""
+
+
 def start_server(port: int) -> viser.ViserServer:
     """Start a server on this computer.
 
@@ -51,7 +55,7 @@ def stop_server(server: viser.ViserServer) -> None:
         server.stop()
 
 
-def add_scene(server: viser.ViserServer, scene: Scene | None) -> None:
+def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: bool = False) -> None:
     """Draw the finite obstacles and the floor."""
     for obstacle in scene or ():
         if isinstance(obstacle.shape, (HalfSpace, Plane)):
@@ -69,14 +73,20 @@ def add_scene(server: viser.ViserServer, scene: Scene | None) -> None:
     if scene is not None and scene.floor_height is not None:
         height = scene.floor_height - 1e-3
         server.scene.add_grid(
-            "/floor", width=8.0, height=8.0, cell_size=0.5, plane="xy", position=(0, 0, height)
+            "/floor",
+            width=8.0,
+            height=8.0,
+            cell_size=0.5,
+            plane="xy",
+            position=(0, 0, height),
+            infinite_grid=endless_floor,
         )
 
 
 def look_at(server: viser.ViserServer, middle: FloatArray) -> None:
     """Let new visitors look at a point (3,) from the front of its left, from a person's height [m]."""
     server.initial_camera.look_at = middle
-    server.initial_camera.position = middle + np.array([-1.7, -1.9, 0.5])
+    server.initial_camera.position = middle + VIEW
     server.initial_camera.up = (0.0, 0.0, 1.0)
 
 
