@@ -252,11 +252,13 @@ def view(
     if samples is not None:
         raise InputError("--samples goes with --contacts; valid: leave it out")
     from manikin.motion.file import read_motions
+    from manikin.output import other_motions
 
     content = read_motions(Path(source))
+    others = {name: read_motions(path) for name, path in other_motions(Path(source)).items()}
     from manikin.viewer import serve
 
-    serve(content, port=port, announce=announce)
+    serve(content, port=port, announce=announce, others=others)
 
 
 @app.command()

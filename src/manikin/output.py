@@ -43,6 +43,12 @@ def other_motion(name: str) -> str:
     return OTHERS.replace("*", name)
 
 
+def other_motions(directory: Path) -> dict[str, Path]:
+    """Files of the motions of others in a run directory, by their names; none beside a single file."""
+    first, last = OTHERS.split("*")
+    return {path.name.removeprefix(first).removesuffix(last): path for path in sorted(directory.glob(OTHERS))}
+
+
 class RunDirectory:
     """Writes the files of one run.
 

@@ -13,6 +13,7 @@ import pytest
 
 from manikin.body import Configuration
 from manikin.errors import InputError
+from manikin.motion.file import MotionFile
 from manikin.viewer import serve
 
 pytest.importorskip("viser")
@@ -141,3 +142,20 @@ def test_missing_extra_says_how_to_install(finished_run, monkeypatch):
     monkeypatch.setattr(builtins, "__import__", without_viser)
     with pytest.raises(InputError, match=r"pip install 'manikin\[viewer\]'"):
         serve(finished_run)
+
+
+def test_others_move_on_the_same_clock(finished_run):
+    """A twin who is there too is always where the body is; a file without a body is refused."""
+    from manikin.viewer.session import ViewerSession
+
+    with pytest.raises(InputError, match="twin"):
+        ViewerSession(finished_run, port=0, others={"twin": MotionFile(finished_run.planned)})
+    session = ViewerSession(finished_run, port=0, others={"twin": finished_run})
+    try:
+        for time in (0.5, 1.2):
+            session.show(time)
+            shapes, _ = session._others[0]
+            for name, frame in session._shapes.frames.items():
+                np.testing.assert_array_equal(shapes.frames[name].position, frame.position)
+    finally:
+        session.close()

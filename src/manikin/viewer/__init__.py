@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -17,20 +17,27 @@ if TYPE_CHECKING:
 __all__ = ["serve", "serve_contacts", "serve_drive"]
 
 
-def serve(content: MotionFile, port: int = 8080, announce: Callable[[str], None] | None = None) -> None:
+def serve(
+    content: MotionFile,
+    port: int = 8080,
+    announce: Callable[[str], None] | None = None,
+    *,
+    others: Mapping[str, MotionFile] | None = None,
+) -> None:
     """Show a motion file in the browser until Ctrl-C, on this computer only.
 
     Args:
         content: At least one motion, and the body.
         port: Port to listen on; 0 picks a free one.
         announce: Told the page's address when it can be opened.
+        others: Motions of others who are there, by name.
 
     Raises:
         InputError: If the viewer is not installed, the file holds no body or the port is taken.
     """
     with _installed():
         from manikin.viewer.session import ViewerSession
-    session = ViewerSession(content, port)
+    session = ViewerSession(content, port, others)
     if announce is not None:
         announce(session.url)
     session.run()

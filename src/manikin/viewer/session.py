@@ -1,5 +1,6 @@
 """One viewer in the browser: the scene, the body, the controls and their state."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -32,18 +33,26 @@ class ViewerSession(Page):
         speed: Seconds of motion per second.
     """
 
-    def __init__(self, content: MotionFile, port: int = 8080) -> None:
+    def __init__(
+        self, content: MotionFile, port: int = 8080, others: Mapping[str, MotionFile] | None = None
+    ) -> None:
         """Start the server and draw the first instant.
 
         Args:
             content: At least one motion, and the body.
             port: Port to listen on; 0 picks a free one.
+            others: Motions of others who are there, by name, on the same clock.
 
         Raises:
-            InputError: If the file holds no body, or the port is taken.
+            InputError: If a file holds no body, or the port is taken.
         """
         if content.body is None:
             raise InputError("motion file holds no body; valid: a motion file written by 'manikin run'")
+        for name, other in (others or {}).items():
+            if other.body is None or not other.motions:
+                raise InputError(
+                    f"motion of {name} holds no body or no motion; valid: as 'manikin run' wrote it"
+                )
         self.content = content
         self.chosen = list(content.motions)[-1]
         self.playing = False
@@ -58,6 +67,7 @@ class ViewerSession(Page):
         self.time = float(self.motion.time[0])
         self._build_scene()
         self._build_body()
+        self._build_others(others or {})
         self._build_controls()
         self.show(self.time)
 
@@ -77,6 +87,7 @@ class ViewerSession(Page):
                 self._place_legs(motion, index)
                 self._place_forces(motion, index)
                 self._com.position = motion.com[index]
+                self._place_others()
             self._show_numbers(motion, index)
 
     def choose(self, name: str) -> None:
@@ -167,6 +178,17 @@ class ViewerSession(Page):
             )
             for name in names
         }
+
+    def _build_others(self, others: Mapping[str, MotionFile]) -> None:
+        self._others: list[tuple[BodyShapes, Motion]] = []
+        for name, content in others.items():
+            assert content.body is not None
+            shapes = BodyShapes(self.server, content.body, 0.35, f"/others/{name}")
+            self._others.append((shapes, list(content.motions.values())[-1]))
+
+    def _place_others(self) -> None:
+        for shapes, motion in self._others:
+            shapes.place(motion.q[int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))])
 
     def _place_forces(self, motion: Motion, index: int) -> None:
         for number, name in enumerate(motion.contact_names):

@@ -98,8 +98,17 @@ class BodyShapes:
         data: Pinocchio's data of the configuration shown.
     """
 
-    def __init__(self, server: viser.ViserServer, body: BodyModel, opacity: float = 0.7) -> None:
-        """Draw the body; what is inside it stays visible."""
+    def __init__(
+        self, server: viser.ViserServer, body: BodyModel, opacity: float = 0.7, root: str = "/body"
+    ) -> None:
+        """Draw the body; what is inside it stays visible.
+
+        Args:
+            server: Of the page.
+            body: Whose shapes.
+            opacity: In [0, 1].
+            root: Name of the body on the page.
+        """
         self._body = body
         self.data = body.pinocchio.createData()
         self.frames: dict[str, viser.FrameHandle] = {}
@@ -107,9 +116,9 @@ class BodyShapes:
             triangles = segment_triangles(segment)
             if triangles is None:
                 continue
-            self.frames[segment.name] = server.scene.add_frame(f"/body/{segment.name}", show_axes=False)
+            self.frames[segment.name] = server.scene.add_frame(f"{root}/{segment.name}", show_axes=False)
             server.scene.add_mesh_simple(
-                f"/body/{segment.name}/shape", *triangles, color=side_colour(segment.name), opacity=opacity
+                f"{root}/{segment.name}/shape", *triangles, color=side_colour(segment.name), opacity=opacity
             )
 
     def place(self, q: FloatArray) -> None:
