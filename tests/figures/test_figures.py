@@ -47,7 +47,7 @@ def drawn(figure, values):
 def test_every_figure_is_written_and_is_the_same_again(run, tmp_path):
     shares = []
     written = write_figures(run, tmp_path, shares.append)
-    assert [path.stem for path in written] == list(FIGURES)
+    assert [path.stem for path in written] == [name for name in FIGURES if name != "walk_paths"]
     assert shares[-1] == 1.0
     first = {path.name: path.read_bytes() for path in written}
     assert all(data.startswith(PNG) for data in first.values())
@@ -75,8 +75,8 @@ def applicable(record):
 
 
 def test_only_what_a_run_has_is_drawn(run, planned_only, walls, seated, failed):
-    """No execution: no tracking. A point mass on walls: no feet, no ZMP. Nothing planned: nothing."""
-    every = set(FIGURES)
+    """No walk: no ways. No execution: no tracking. On walls: no feet, no ZMP. Nothing planned: nothing."""
+    every = set(FIGURES) - {"walk_paths"}
     assert applicable(run) == every
     assert applicable(planned_only) == every - {"tracking"}
     assert applicable(seated) == every - {"tracking"}
