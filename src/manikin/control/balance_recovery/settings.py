@@ -39,7 +39,8 @@ class RecoverySettings:
         swing_weight: Of its squared error, and of that of the pelvis' tilt meanwhile.
         unwinding: Of the objective's joint accelerations: they are measured from those that bring the joints
             gently back to the posture; the thesis has none, so that swung arms go on to their stops.
-        posture: Largest gains of the posture control (2.65); their ratio is kept where they must be less.
+        posture: Largest gains of the posture control (2.65); their damping ratio is kept where they must
+            be less.
         stiffness: With these gains muscles hold the posture before they react, and locked joints always.
         ankle_stiffness: Share of ``m g h`` per radian that both ankles have together before they react:
             the stiffness of calf muscles at rest, 0.64 to 0.91 of it (Casadio et al. 2005; Loram and Lakie
