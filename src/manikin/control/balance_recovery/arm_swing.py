@@ -16,22 +16,22 @@ from manikin.control.dynamics import DynamicsState
 from manikin.control.settings import Impedance
 from manikin.spatial import FloatArray
 
-APART = 0.19
+APART = 0.183
 """Time for which arms that go up go sideways too [s]."""
 
-RAISED = 0.265
+RAISED = 0.246
 """Time after which raised arms are swung [s]: about as long as raising them takes."""
 
 SWUNG = 1.25
 """Time after which the swing is over [s]."""
 
-PULL = Impedance(112.0, 21.2)
+PULL = Impedance(112.4, 21.2)
 """Of shoulders and elbows: critically damped, in some 0.3 s at the angle wanted."""
 
 RAISING, SWINGING = 0.07, 0.3
 """Weights of their accelerations while they are raised and swung, against 1 of the other joints."""
 
-UP, SIDEWAYS, BENT, DOWN = 3.1, 1.39, 0.63, -1.0
+UP, SIDEWAYS, BENT, DOWN = 3.057, 1.39, 0.63, -1.04
 """Angles of shoulders and elbows: flexion and abduction at most, the elbow on the way up, the end [rad]."""
 
 FAR = 1.3
