@@ -34,6 +34,9 @@ RAISING, SWINGING = 0.07, 0.3
 UP, SIDEWAYS, BENT, DOWN = 3.057, 1.39, 0.63, -1.04
 """Angles of shoulders and elbows: flexion and abduction at most, the elbow on the way up, the end [rad]."""
 
+CLEAR = 0.2
+"""Abduction of swung arms: their hands pass by the thighs [rad]."""
+
 FAR = 1.3
 """Reach of the settled point over the soles from which on arms are raised; the trunk alone does for less."""
 
@@ -92,7 +95,7 @@ class ArmSwing:
         since = np.inf if self._began is None else time - self._began
         if since >= SWUNG:
             return None
-        angles = (UP, SIDEWAYS if since < APART else 0.0, BENT) if since < RAISED else (DOWN, 0.0, 0.0)
+        angles = (UP, SIDEWAYS if since < APART else 0.0, BENT) if since < RAISED else (DOWN, CLEAR, 0.0)
         error = np.repeat(angles, self._arms) - state.q[7 + self._joints]
         pull = PULL.stiffness * error - PULL.damping * state.v[6 + self._joints]
         return pull, RAISING if since < RAISED else SWINGING
