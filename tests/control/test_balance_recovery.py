@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from manikin.body import BodyModel, human, insect, kudoh
 from manikin.control.balance_recovery import (
     BalanceRecovery,
+    ClosedLoop,
     FeltPush,
     LinearMap,
     RecoverySettings,
@@ -138,27 +139,55 @@ def test_reach_is_one_on_the_edge_and_the_nearest_point_is_inside():
 @SOME
 @given(seed=SEEDS)
 def test_posture_gains_are_the_largest_that_keep_the_zmp_inside(seed):
-    """At the share found no row is positive; a little more of the gains, and one is, unless all are used."""
+    """At the share found no row is positive, and at none of 200 larger ones are all rows not positive."""
+    loop, rows, stiff, damped = posture_problem(seed)
+    found = posture_control(loop, rows, stiff, damped)
+
+    def excess(share: float) -> float:
+        return rows(reduced(loop, stiff, damped, share)).max()
+
+    if found is None:
+        assert all(excess(share) > -1e-6 for share in np.linspace(1e-3, 1.0, 200))
+        return
+    np.testing.assert_allclose(
+        found.joints, loop.joints(reduced(loop, stiff, damped, found.share)), atol=1e-6
+    )
+    assert excess(found.share) <= 1e-9 * BODIES["kudoh"].mass * GRAVITY
+    if found.share < 1.0:
+        assert all(excess(share) > 0.0 for share in np.linspace(1.0, found.share, 200, endpoint=False))
+
+
+@SOME
+@given(seed=SEEDS)
+def test_where_no_gains_keep_the_zmp_inside_it_leaves_least(seed):
+    """No share of a fine grid has a smaller largest row."""
+    loop, rows, stiff, damped = posture_problem(seed)
+    outside = LinearMap(rows.matrix, rows.offset + 500.0)
+    assert posture_control(loop, outside, stiff, damped) is None
+    found = posture_control(loop, outside, stiff, damped, always=True)
+    assert found is not None
+    assert not found.inside
+    excess = [
+        outside(reduced(loop, stiff, damped, s)).max() for s in (found.share, *np.linspace(0.0, 1.0, 101))
+    ]
+    assert excess[0] <= min(excess[1:]) + 1e-6
+
+
+def posture_problem(seed: int) -> tuple[ClosedLoop, LinearMap, np.ndarray, np.ndarray]:
+    """A moved body, where its ZMP may be, and both parts of its posture control."""
     body = BODIES["kudoh"]
     dynamics, groups, q, v = moved_state(body, seed, spread=0.02)
     state = dynamics.evaluate(q, 0.2 * v)
     loop = close_loop(state, groups.feet, FeltPush.none(body.nv))
     area = SupportArea(np.array([[-0.1, -0.2], [0.14, -0.2], [0.14, 0.2], [-0.1, 0.2]]), 0.0)
     rows = zmp_rows(area, loop, state.com, 0.0)
-    pull = 100.0 * (body.standing_posture() - q)[7:] - 20.0 * state.v[6:]
-    found = posture_control(loop, rows, pull)
-    solve = lambda share: np.linalg.lstsq(  # noqa: E731
-        loop.joints.matrix, share * pull - loop.joints.offset, rcond=None
-    )[0]
-    if found is None:
-        shares = np.linspace(1e-3, 1.0, 200)
-        assert all(rows(solve(share)).max() > -1e-6 for share in shares)
-        return
-    scale = body.mass * GRAVITY
-    np.testing.assert_allclose(found.joints, loop.joints(solve(found.share)), atol=1e-6)
-    assert rows(solve(found.share)).max() <= 1e-9 * scale
-    if found.share < 1.0:
-        assert rows(solve(1.001 * found.share)).max() > 0.0
+    return loop, rows, 100.0 * (body.standing_posture() - q)[7:], -20.0 * state.v[6:]
+
+
+def reduced(loop: ClosedLoop, stiff: np.ndarray, damped: np.ndarray, share: float) -> np.ndarray:
+    """Accelerations of the closed loop with reduced gains."""
+    wanted = share**2 * stiff + share * damped - loop.joints.offset
+    return np.linalg.lstsq(loop.joints.matrix, wanted, rcond=None)[0]
 
 
 def test_symmetry_lets_legs_grow_no_less_alike():

@@ -6,6 +6,7 @@ from manikin.body import BodyModel, Configuration
 from manikin.control.balance_recovery import joint_groups, sole_at
 from manikin.errors import InputError
 from manikin.posture import Placement, PostureProblem, com_target, generate_posture
+from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray, finite_number
 
 RAISED = np.array([-0.1, 0.0, 0.12])
@@ -16,7 +17,7 @@ APART = "distance between the feet [m]"
 
 
 def one_foot_posture(body: BodyModel, foot: str) -> FloatArray:
-    """Stand on one foot, the centre of mass over the middle of its sole.
+    """Stand on one foot, the centre of mass over the middle of its sole and no part of the body in another.
 
     Args:
         body: A body with two legs.
@@ -37,7 +38,7 @@ def one_foot_posture(body: BodyModel, foot: str) -> FloatArray:
     rotation, place = start.effector_placement(other)
     problem = PostureProblem(
         body, (contact,), placements={other: Placement(place + RAISED, rotation)},
-        com=com_target(*contact.position[:2]),
+        com=com_target(*contact.position[:2]), proximity=Proximity(body, Scene([], floor_height=None)),
     )  # fmt: skip
     return _standing(problem, f"on the {foot!r}")
 

@@ -16,23 +16,26 @@ from manikin.control.dynamics import DynamicsState
 from manikin.control.settings import Impedance
 from manikin.spatial import FloatArray
 
-APART = 0.19
+APART = 0.183
 """Time for which arms that go up go sideways too [s]."""
 
-RAISED = 0.265
+RAISED = 0.246
 """Time after which raised arms are swung [s]: about as long as raising them takes."""
 
 SWUNG = 1.25
 """Time after which the swing is over [s]."""
 
-PULL = Impedance(112.0, 21.2)
+PULL = Impedance(112.4, 21.2)
 """Of shoulders and elbows: critically damped, in some 0.3 s at the angle wanted."""
 
 RAISING, SWINGING = 0.07, 0.3
 """Weights of their accelerations while they are raised and swung, against 1 of the other joints."""
 
-UP, SIDEWAYS, BENT, DOWN = 3.1, 1.39, 0.63, -1.0
+UP, SIDEWAYS, BENT, DOWN = 3.057, 1.39, 0.63, -1.04
 """Angles of shoulders and elbows: flexion and abduction at most, the elbow on the way up, the end [rad]."""
+
+CLEAR = 0.2
+"""Abduction of swung arms: their hands pass by the thighs [rad]."""
 
 FAR = 1.3
 """Reach of the settled point over the soles from which on arms are raised; the trunk alone does for less."""
@@ -92,7 +95,7 @@ class ArmSwing:
         since = np.inf if self._began is None else time - self._began
         if since >= SWUNG:
             return None
-        angles = (UP, SIDEWAYS if since < APART else 0.0, BENT) if since < RAISED else (DOWN, 0.0, 0.0)
+        angles = (UP, SIDEWAYS if since < APART else 0.0, BENT) if since < RAISED else (DOWN, CLEAR, 0.0)
         error = np.repeat(angles, self._arms) - state.q[7 + self._joints]
         pull = PULL.stiffness * error - PULL.damping * state.v[6 + self._joints]
         return pull, RAISING if since < RAISED else SWINGING

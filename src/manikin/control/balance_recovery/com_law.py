@@ -17,8 +17,9 @@ point over the soles when it begins with the *settled point*
 
 over them. While that is beyond the soles the law asks for turning, and once it is over them for stopping
 it. The moment that stops it is what uses up the range ``R`` of arms and trunk that is left, ``M = L^2 / (2
-R)``: stopping sooner and harder would throw the capture point out again. This part is ours; it is what a
-controller that looks no step ahead has in place of a plan.
+R)``: stopping sooner and harder would throw the capture point out again. Where it would have to be large,
+the law asks for stopping even if the capture point is not back: else the joints stop at their ends, all at
+once. This part is ours; it is what a controller that looks no step ahead has in place of a plan.
 """
 
 from dataclasses import dataclass
@@ -35,6 +36,9 @@ NEED = (0.85, 1.0)
 
 STOPPING = 0.1
 """The moment that stops the turning is at most the angular momentum over this time [s]."""
+
+SLOW = 5.0
+"""Angular momentum up to which the ends of the ranges are nothing to stop for [kg.m^2/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,13 +88,14 @@ def com_law(
     momentum = fall_momentum(state)
     amount = float(np.linalg.norm(momentum))
     most = settings.turning * weight
-    brake = _braking(momentum, turned, state.mass, settings)
+    needed = _needed_braking(momentum, turned, settings.range * state.mass)
+    brake = float(np.clip(needed, settings.least_braking * weight, most))
     settled = capture_point(state.com, velocity, height)
     if amount > 0.0:
         settled = settled + brake / weight * (1.0 - np.exp(-frequency * amount / brake)) * momentum / amount
     reach = area.reach(settled)
     need = float(np.clip((reach - NEED[0]) / (NEED[1] - NEED[0]), 0.0, 1.0))
-    if not may_turn:
+    if not may_turn or (amount > SLOW and needed > settings.late_braking * weight):
         need = 0.0
     zmp = area.nearest(settled + settings.calm / frequency * (settled - home[:2]), settings.sole_inset)
     outward = settled - area.centre
@@ -102,12 +107,11 @@ def com_law(
     return ComLaw(law, settled, reach, need)
 
 
-def _braking(momentum: FloatArray, turned: FloatArray, mass: float, settings: RecoverySettings) -> float:
-    """Moment that stops the turning at the end of the range [N.m]."""
-    weight, amount = mass * GRAVITY, float(np.linalg.norm(momentum))
-    left = settings.range * mass - float(turned @ momentum) / max(amount, 1e-9)
-    needed = amount**2 / (2.0 * left) if left > 0.0 else np.inf
-    return float(np.clip(needed, settings.least_braking * weight, settings.turning * weight))
+def _needed_braking(momentum: FloatArray, turned: FloatArray, reach: float) -> float:
+    """Moment that stops the turning at the end of the range [N.m]; infinite where that is used up."""
+    amount = float(np.linalg.norm(momentum))
+    left = reach - float(turned @ momentum) / max(amount, 1e-9)
+    return amount**2 / (2.0 * left) if left > 0.0 else np.inf
 
 
 def capture_point(com: FloatArray, velocity: FloatArray, height: float) -> FloatArray:

@@ -56,6 +56,7 @@ class Objectives:
         settings = self._settings
         weight = np.ones(len(posture))
         weight[self._groups.joints["arm"]] = settings.arm_weight
+        weight[self._groups.joints["trunk"]] = settings.trunk_weight
         gains = settings.unwinding
         damping = gains.damping + (1.0 - law.need) * settings.stopping
         wanted = pull(Impedance(gains.stiffness, damping), state, posture)

@@ -14,7 +14,7 @@ from manikin.control.balance_recovery.closed_loop import ClosedLoop, FeltPush, L
 from manikin.control.balance_recovery.com_law import ComLaw, com_law, fall_momentum
 from manikin.control.balance_recovery.joint_groups import joint_groups
 from manikin.control.balance_recovery.muscles import held_posture
-from manikin.control.balance_recovery.objectives import ROOT, Objectives, pull
+from manikin.control.balance_recovery.objectives import ROOT, Objectives
 from manikin.control.balance_recovery.posture_control import PostureControl, posture_control
 from manikin.control.balance_recovery.problem import (
     JointBounds,
@@ -257,8 +257,10 @@ class BalanceRecovery:
     def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
         """Posture control with the ZMP well inside; None where it would leave."""
         calm = zmp_rows(self.area.shrunk(self.settings.posture_area), loop, state.com, 0.0)
-        wanted = pull(self.settings.posture, state, self.posture)
-        return posture_control(loop, calm, wanted, always=self.settings.posture_control_only)
+        gains = self.settings.posture
+        stiff = gains.stiffness * (self.posture - state.q[7:])
+        damped = -gains.damping * state.v[6:]
+        return posture_control(loop, calm, stiff, damped, always=self.settings.posture_control_only)
 
     # --- limits ------------------------------------------------------------------------------
 

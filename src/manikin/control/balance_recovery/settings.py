@@ -25,6 +25,8 @@ class RecoverySettings:
         turning: Largest moment with which arms and trunk turn where the ZMP is not enough, and are stopped
             again, in body weights [m].
         least_braking: Smallest moment with which they are stopped, in body weights [m].
+        late_braking: Moment in body weights [m] beyond which the turning is stopped wherever the capture
+            point is: otherwise the stops of the joints do it, all at once.
         range: How far arms, trunk and legs can turn: the integral over time of the angular momentum, for
             each kilogram of the body [m^2].
         least_load: The ground carries at least this share of the weight where that is possible: a body that
@@ -34,12 +36,15 @@ class RecoverySettings:
         height_weight: Of the squared error of that law; 0, as in the thesis, leaves the height to ``upward``.
         arm_weight: Of a squared acceleration of an arm's joint, against 1 of any other: the diagonal of
             ``C_theta`` (2.27).
+        trunk_weight: The same of a joint of the trunk: hips fold first, so that both come to the end of their
+            range together.
         upward: Wanted acceleration of the centre of mass upward, as the slope of the objective (2.54).
         swing: Gains with which a stepping foot follows its way.
         swing_weight: Of its squared error, and of that of the pelvis' tilt meanwhile.
         unwinding: Of the objective's joint accelerations: they are measured from those that bring the joints
             gently back to the posture; the thesis has none, so that swung arms go on to their stops.
-        posture: Largest gains of the posture control (2.65); their ratio is kept where they must be less.
+        posture: Largest gains of the posture control (2.65); their damping ratio is kept where they must
+            be less.
         stiffness: With these gains muscles hold the posture before they react, and locked joints always.
         ankle_stiffness: Share of ``m g h`` per radian that both ankles have together before they react:
             the stiffness of calf muscles at rest, 0.64 to 0.91 of it (Casadio et al. 2005; Loram and Lakie
@@ -62,15 +67,17 @@ class RecoverySettings:
     period: float = 0.005
     delay: float = 0.2
     com_weight: float = 1e4
-    calm: float = 4.8
-    turning: float = 0.35
+    calm: float = 5.37
+    turning: float = 0.3
     least_braking: float = 0.1
-    range: float = 0.16
+    late_braking: float = 0.3
+    range: float = 0.2
     least_load: float = 0.15
     stopping: float = 10.0
     height: Impedance = _HEIGHT
-    height_weight: float = 1e3
+    height_weight: float = 220.0
     arm_weight: float = 0.03
+    trunk_weight: float = 3.0
     upward: float = 1.0
     swing: Impedance = _SWING
     swing_weight: float = 1e3
@@ -94,7 +101,7 @@ class RecoverySettings:
         positive = (
             "period", "com_weight", "friction_share", "inner", "outer", "posture_area", "strength",
             "joint_limit_horizon", "max_joint_acceleration", "turning", "least_braking", "range",
-            "arm_weight",
+            "arm_weight", "trunk_weight", "late_braking",
         )  # fmt: skip
         for name in positive:
             finite_number(getattr(self, name), f"recovery {name}", above=0.0)
