@@ -145,6 +145,7 @@ def test_sliders_steer_and_what_the_page_itself_moves_does_not(viewer, press):
 def test_a_directive_beyond_the_library_is_said_so(viewer, press):
     press("arrowdown", 4)
     press("arrowleft", 8)
+    press("A", 8)
     walked(viewer, 0.1)
     assert "beyond the motion library" in viewer.notice
     assert viewer.notice in viewer._text.content
