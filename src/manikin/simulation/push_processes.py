@@ -1,7 +1,6 @@
 """Searches of several directions at once, each in a process beside this one."""
 
 import multiprocessing
-import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -11,6 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from manikin.errors import InputError, ManikinError
 from manikin.simulation.push_search import DirectionSearch, HeldImpulse
+from manikin.worker import prepare_worker
 
 
 def search_directions(
@@ -63,11 +63,10 @@ _given_up: Event | None = None
 
 
 def _prepare(given_up: Event) -> None:
-    """Make a new process one of the search: one thread, deaf to Ctrl-C, which its parent sees to."""
+    """Make a new process one of the search, which ends when it is given up."""
     global _given_up
     _given_up = given_up
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threadpool_limits(1)
+    prepare_worker()
 
 
 def _run(search: DirectionSearch) -> HeldImpulse:

@@ -1,9 +1,6 @@
 """Slices of the partition, several at once, each in a process beside this one."""
 
 import multiprocessing
-import os
-import signal
-import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -13,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from manikin.errors import InputError, ManikinError
 from manikin.locomotion.words.grid import THESIS_GRID, WordGrid
 from manikin.locomotion.words.partition import WordSlice, solve_slice
+from manikin.worker import prepare_worker
 
 
 def solve_slices(
@@ -43,7 +41,7 @@ def solve_slices(
         return
     # Fresh processes: copies of this one would share the threads and locks of its libraries.
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(jobs, len(headings_deg)), context, _prepare)
+    pool = ProcessPoolExecutor(min(jobs, len(headings_deg)), context, prepare_worker)
     try:
         futures = [pool.submit(solve_slice, heading, grid) for heading in headings_deg]
         for future in as_completed(futures):
@@ -52,18 +50,3 @@ def solve_slices(
         raise ManikinError("a process of the words ended before its time, for want of memory?") from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _prepare() -> None:
-    """Make a new process one of the pool: one thread, deaf to Ctrl-C, which its parent sees to."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threadpool_limits(1)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """Leave no process behind when the parent is killed."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
