@@ -227,7 +227,7 @@ def test_no_way_is_an_explained_failure_that_keeps_its_files(tmp_path):
     assert "leg 1 of the way: " in failure["reason"]
     assert "no way" in failure["reason"]
     kept = {file.relative_to(tmp_path).as_posix() for file in tmp_path.rglob("*") if file.is_file()}
-    assert kept == {"scenario.yaml", "summary.json", "stages/walk.json"}
+    assert kept == {"scenario.yaml", "summary.json", "stages/walk.json", "stages/walk_paths.json"}
 
 
 def test_no_way_of_another_is_their_failure():

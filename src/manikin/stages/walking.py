@@ -64,7 +64,7 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
         context: Of a scenario with a ``walking`` section.
         report: Takes the ``walk`` block, and the failure where there is no way.
     """
-    plan = plan_walks(context, *(end_of(context.scenario, end) for end in ("start", "goal")))
+    plan = plan_walks(context)
     keep_paths(report, plan)
     report.progress(STAGE, 0.5)
     height, block = context.scene.floor_height or 0.0, path_block(plan)
@@ -89,12 +89,14 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
     return motion
 
 
-def plan_walks(context: RunContext, start: FloatArray, goal: FloatArray) -> PlannedWalks:
+def plan_walks(
+    context: RunContext, start: FloatArray | None = None, goal: FloatArray | None = None
+) -> PlannedWalks:
     """Find a way for everyone, each around those before.
 
     Args:
         context: Of a scenario with a ``walking`` section.
-        start: (3,) x, y [m], heading [rad] of the body at the beginning.
+        start: (3,) x, y [m], heading [rad] of the body at the beginning; that of the task if omitted.
         goal: (3,) The same at the end.
 
     Raises:
@@ -117,6 +119,8 @@ def plan_walks(context: RunContext, start: FloatArray, goal: FloatArray) -> Plan
         if others[other.name].succeeded:
             obstacles.append(others[other.name].as_obstacle(other.name, radius))
     began = clock.perf_counter()
+    start = end_of(scenario, "start") if start is None else start
+    goal = end_of(scenario, "goal") if goal is None else goal
     stops = [*map(_waypoint, section.via), Waypoint(goal)]
     route = _route(
         scenario, ("walking",), start, stops, objective, obstacles, section.room_m, section.max_speed_m_s,
