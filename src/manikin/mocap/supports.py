@@ -1,0 +1,274 @@
+"""Which feet support a recorded person, when and at which height.
+
+A foot supports while its heel or its toes do. Each of the two points is followed by a switch with
+hysteresis: it closes where the point is slow and near a surface, and opens where it is fast or away from
+it. Speeds are compared with the highest one of the swing, for the low-pass filter turns the stop of a
+fast foot into a slope that is as high as the foot was fast. Surfaces are found from the recording itself
+(:mod:`manikin.mocap.support_levels`), so stairs need no description.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from manikin.errors import InputError
+from manikin.mocap.reconstruction import Reconstruction
+from manikin.mocap.runs import runs
+from manikin.mocap.support_levels import CUTOFF, LEVELS_APART, REST, Track, surface_heights, track
+from manikin.spatial import FloatArray, frozen_array
+
+FEET = ("left_foot", "right_foot")
+
+TOUCH_SHARE = 0.08
+"""Share of the highest speed of its swing below which a point has touched down."""
+
+LIFT_SHARE = 0.24
+"""Share of the highest speed of its swing above which a point has lifted off."""
+
+NEAR = 0.05
+"""Height above a surface within which a point touches down [m]."""
+
+AWAY = 0.10
+"""Distance from a surface beyond which a point has left it [m]. Below it, the sole of a model is stiff."""
+
+SHORTEST = 0.08
+"""Shorter supports, and shorter interruptions of one, are not told from noise [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """One effector on a surface from an instant to another.
+
+    Attributes:
+        effector: Name of the body's effector.
+        start: Touch-down, or the first instant of the recording [s].
+        end: Lift-off, or the last instant of the recording [s].
+        place: (3,) where the effector is, as a median, its height that of the surface [m].
+        first_contact: (3,) heel or toes, whichever touched down, then [m].
+        last_contact: (3,) heel or toes, whichever lifted off, then [m].
+        start_seen: Whether the touch-down is in the recording.
+        end_seen: Whether the lift-off is in the recording.
+    """
+
+    effector: str
+    start: float
+    end: float
+    place: FloatArray
+    first_contact: FloatArray
+    last_contact: FloatArray
+    start_seen: bool
+    end_seen: bool
+
+    def __post_init__(self) -> None:
+        if self.end < self.start:
+            raise InputError(
+                f"support of {self.effector} from {self.start:g} to {self.end:g} s; valid: an end behind"
+            )
+        for name in ("place", "first_contact", "last_contact"):
+            where = f"support of {self.effector} {name}"
+            object.__setattr__(self, name, frozen_array(getattr(self, name), where, (3,)))
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class SupportPhase:
+    """A time in which the supports do not change.
+
+    Attributes:
+        start: [s].
+        end: [s].
+        effectors: Those that support; none in flight.
+    """
+
+    start: float
+    end: float
+    effectors: tuple[str, ...]
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedSupports:
+    """The supports of a recorded motion.
+
+    Attributes:
+        supports: In the order of their starts.
+        start: First instant looked at [s].
+        end: Last instant looked at [s].
+        surfaces: Heights of the surfaces found, lowest first [m].
+    """
+
+    supports: tuple[Support, ...]
+    start: float
+    end: float
+    surfaces: tuple[float, ...]
+
+    def of(self, effector: str) -> tuple[Support, ...]:
+        """Supports of one effector, in order."""
+        return tuple(support for support in self.supports if support.effector == effector)
+
+    @cached_property
+    def key_frames(self) -> tuple[float, ...]:
+        """Instants at which supports change, with the first and the last instant ([Qiu2012]_ 3.4) [s]."""
+        inner = {support.start for support in self.supports} | {support.end for support in self.supports}
+        return tuple(sorted(inner | {self.start, self.end}))
+
+    @cached_property
+    def phases(self) -> tuple[SupportPhase, ...]:
+        """From each key frame to the next."""
+        return tuple(
+            SupportPhase(start, end, tuple(sorted({
+                support.effector for support in self.supports if support.start <= start and end <= support.end
+            })))
+            for start, end in pairwise(self.key_frames)
+        )  # fmt: skip
+
+    @property
+    def sequence(self) -> tuple[str, ...]:
+        """Effectors in the order in which they touch down during the recording."""
+        return tuple(support.effector for support in self.supports if support.start_seen)
+
+
+def supports_of(found: Reconstruction, *, start: float = 0.0, cutoff: float = CUTOFF) -> RecordedSupports:
+    """Foot supports of a reconstructed recording, markers or skeleton.
+
+    Args:
+        found: At least four instants at an even rate, not yet smoothed.
+        start: What the first frame of the recording is on its clock [s].
+        cutoff: Of the low-pass filter [Hz].
+
+    Raises:
+        InputError: If the body has no feet with soles, there are too few instants, or the cutoff is too high.
+    """
+    soles = sole_points(found)
+    rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0]) if len(found.time) > 1 else 1.0
+    return supports_of_points(soles, rate, start=start + found.first_frame / rate, cutoff=cutoff)
+
+
+def supports_of_points(
+    soles: Mapping[str, tuple[FloatArray, FloatArray]], rate: float, *, start: float = 0.0,
+    cutoff: float = CUTOFF,
+) -> RecordedSupports:  # fmt: skip
+    """Foot supports from heels and toes.
+
+    Args:
+        soles: (n, 3) heel and (n, 3) toes of each foot, by its name [m].
+        rate: Frames per second [Hz].
+        start: Instant of the first frame [s].
+        cutoff: Of the low-pass filter [Hz].
+
+    Raises:
+        InputError: If there are too few positions, or the cutoff is too high.
+    """
+    tracks = {
+        name: (track(heel, rate, cutoff), track(toes, rate, cutoff)) for name, (heel, toes) in soles.items()
+    }
+    frames = min(len(one.speed) for both in tracks.values() for one in both)
+    flat = {name: heel.resting & toes.resting for name, (heel, toes) in tracks.items()}
+    middle = {name: _height(heel, toes) for name, (heel, toes) in tracks.items()}
+    surfaces = surface_heights(list(tracks.values()))
+    levels = np.array(surfaces)
+    supports: list[Support] = []
+    for name, both in tracks.items():
+        # What a model's sole is above the surface where it stands flat is the model's error.
+        above = _height_above(middle[name], levels)
+        stands = flat[name] & (np.abs(above) < LEVELS_APART)
+        offsets = [
+            np.median((one.positions[:, 2] - middle[name] + above)[stands]) if stands.any() else 0.0
+            for one in both
+        ]
+        touching = [_touching(one, levels + offset) for one, offset in zip(both, offsets, strict=True)]
+        supports += _supports(name, both, np.array(touching), levels, start)
+    supports.sort(key=lambda support: (support.start, support.effector))
+    return RecordedSupports(tuple(supports), start, start + (frames - 1) / rate, surfaces)
+
+
+def sole_points(found: Reconstruction) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """(n, 3) heel and (n, 3) toes of each foot, the middles of the sole's ends [m].
+
+    Raises:
+        InputError: If the body has no feet with soles.
+    """
+    body = found.body
+    if body.sole_length is None or not set(FEET) <= set(body.effectors):
+        raise InputError(f"body {body.name!r} has no feet with soles; valid: a human")
+    model, data, half = body.pinocchio, body.pinocchio.createData(), 0.5 * body.sole_length
+    frames = [body.effector_frame(name) for name in FEET]
+    ends = np.empty((len(FEET), 2, len(found.q), 3))
+    for number, q in enumerate(found.q):
+        pin.framesForwardKinematics(model, data, q)
+        for foot, frame in enumerate(frames):
+            for end, along in enumerate((-half, half)):
+                ends[foot, end, number] = data.oMf[frame].act(np.array([along, 0.0, 0.0]))
+    return {name: (ends[foot, 0], ends[foot, 1]) for foot, name in enumerate(FEET)}
+
+
+def _height(heel: Track, toes: Track) -> FloatArray:
+    return 0.5 * (heel.positions[:, 2] + toes.positions[:, 2])
+
+
+def _height_above(heights: FloatArray, levels: FloatArray) -> FloatArray:
+    """(n,) from the nearest of the levels; infinite where there is none [m]."""
+    if not len(levels):
+        return np.full(len(heights), np.inf)
+    above = heights[:, None] - levels
+    return np.take_along_axis(above, np.argmin(np.abs(above), axis=1)[:, None], axis=1)[:, 0]
+
+
+def _touching(one: Track, levels: FloatArray) -> NDArray[np.bool_]:
+    """(n,) whether a point touches one of the levels."""
+    touching = np.zeros(len(one.speed), dtype=bool)
+    height = _height_above(one.positions[:, 2], levels)
+    peaks = one.peak_speed()
+    closes = (one.speed < np.maximum(REST, TOUCH_SHARE * peaks)) & (height > -AWAY) & (height < NEAR)
+    opens = (one.speed > np.maximum(REST, LIFT_SHARE * peaks)) | (np.abs(height) > AWAY)
+    state = False
+    for frame in range(len(touching)):
+        state = bool(closes[frame]) or (state and not opens[frame])
+        touching[frame] = state
+    return touching
+
+
+def _supports(
+    name: str, points: tuple[Track, ...], touching: NDArray[np.bool_], levels: FloatArray, start: float
+) -> list[Support]:
+    """Runs in which any of the points touches, without those that are too short to tell.
+
+    Args:
+        name: The foot.
+        points: Heel and toes.
+        touching: (2, n) which of them touches.
+        levels: (k,) heights of the surfaces [m].
+        start: Instant of the first frame [s].
+    """
+    rate, any_touches = points[0].rate, np.logical_or(*touching)
+    shortest, last = SHORTEST * rate, len(any_touches) - 1
+    for first, stop in runs(~any_touches):
+        if stop - first < shortest and first > 0 and stop <= last:
+            any_touches[first:stop] = True
+    found = []
+    for first, stop in runs(any_touches):
+        if stop - first < shortest:
+            continue
+        place = np.median(np.mean([point.positions[first:stop] for point in points], axis=0), axis=0)
+        place[2] = levels[np.argmin(np.abs(levels - place[2]))]
+        begins, ends = (points[int(np.argmax(touching[:, frame]))] for frame in (first, stop - 1))
+        found.append(
+            Support(
+                name, start + first / rate, start + min(stop, last) / rate, place,
+                begins.positions[first], ends.positions[stop - 1], first > 0, stop <= last,
+            )
+        )  # fmt: skip
+    return found
