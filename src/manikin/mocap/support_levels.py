@@ -17,6 +17,9 @@ CUTOFF = 5.0
 REST = 0.12
 """Speed below which a point rests [m/s]."""
 
+NEVER_AT_REST = (2.0 * REST, 4.0 * REST)
+"""Speeds at which soles are looked at in turn where none ever rests, as in running [m/s]."""
+
 SHIFT_SPEED = 0.6
 """Highest speed of a shift, in contrast to a swing [m/s]."""
 
@@ -102,23 +105,14 @@ def surface_heights(feet: Sequence[tuple[Track, Track]]) -> tuple[float, ...]:
     lowest height at which one rests, and any at which one rests as level as on those. A foot that hangs
     still in the air, while another one stands, is on none.
 
+    Where no sole ever rests, as in running, slow ones are taken.
+
     Args:
         feet: Heel and toes of each.
     """
-    resting = [heel.resting & toes.resting for heel, toes in feet]
     rests: list[_Rest] = []
-    for number, (heel, toes) in enumerate(feet):
-        others = [~other for place, other in enumerate(resting) if place != number]
-        shortest = SHORTEST_REST * heel.rate
-        height = 0.5 * (heel.positions[:, 2] + toes.positions[:, 2])
-        tilt = toes.positions[:, 2] - heel.positions[:, 2]
-        for first, stop in runs(resting[number]):
-            if stop - first >= shortest:
-                alone = any(np.sum(moving[first:stop]) >= shortest for moving in others)
-                here = slice(first, stop)
-                rests.append(
-                    _Rest(number, float(np.median(height[here])), float(np.median(tilt[here])), alone)
-                )
+    for limit in (REST, *NEVER_AT_REST):
+        rests = rests or _rests(feet, limit)
     if not rests:
         return ()
     rests.sort(key=lambda rest: rest.height)
@@ -130,6 +124,23 @@ def surface_heights(feet: Sequence[tuple[Track, Track]]) -> tuple[float, ...]:
     sure = [rest for place, group in enumerate(groups) for rest in group if place == 0 or rest.alone]
     kept = [group for group in groups if any(rest in sure or _as_level(rest, sure) for rest in group)]
     return tuple(float(np.median([rest.height for rest in group])) for group in kept)
+
+
+def _rests(feet: Sequence[tuple[Track, Track]], limit: float) -> list["_Rest"]:
+    """Times in which both ends of a sole are slower than a limit [m/s]."""
+    resting = [(heel.speed < limit) & (toes.speed < limit) for heel, toes in feet]
+    found = []
+    for number, (heel, toes) in enumerate(feet):
+        others = [~other for place, other in enumerate(resting) if place != number]
+        shortest = SHORTEST_REST * heel.rate
+        height = 0.5 * (heel.positions[:, 2] + toes.positions[:, 2])
+        tilt = toes.positions[:, 2] - heel.positions[:, 2]
+        for first, stop in runs(resting[number]):
+            if stop - first >= shortest:
+                alone = any(np.sum(moving[first:stop]) >= shortest for moving in others)
+                here = slice(first, stop)
+                found.append(_Rest(number, float(np.median(height[here])), float(np.median(tilt[here])), alone))
+    return found
 
 
 @dataclass(frozen=True)
