@@ -17,7 +17,7 @@ CUTOFF = 5.0
 REST = 0.12
 """Speed below which a point rests [m/s]."""
 
-NEVER_AT_REST = (2.0 * REST, 4.0 * REST)
+NEVER_AT_REST = (2.0 * REST, 4.0 * REST, 8.0 * REST)
 """Speeds at which soles are looked at in turn where none ever rests, as in running [m/s]."""
 
 SHIFT_SPEED = 0.6
@@ -26,8 +26,8 @@ SHIFT_SPEED = 0.6
 SHIFT_WAY = 0.08
 """Longest way of a shift, in contrast to a swing [m]."""
 
-LEVELS_APART = 0.06
-"""Heights of rest that are closer than this belong to the same surface [m]."""
+LEVELS_APART = 0.08
+"""Heights of rest within less than this belong to the same surface [m]."""
 
 LEVEL = 0.04
 """Difference between heights of heel and toes up to which a foot is as level as another time [m]."""
@@ -118,7 +118,7 @@ def surface_heights(feet: Sequence[tuple[Track, Track]]) -> tuple[float, ...]:
     rests.sort(key=lambda rest: rest.height)
     groups = [[rests[0]]]
     for one in rests[1:]:
-        if one.height - groups[-1][-1].height > LEVELS_APART:
+        if one.height - groups[-1][0].height > LEVELS_APART:
             groups.append([])
         groups[-1].append(one)
     sure = [rest for place, group in enumerate(groups) for rest in group if place == 0 or rest.alone]
@@ -139,7 +139,9 @@ def _rests(feet: Sequence[tuple[Track, Track]], limit: float) -> list["_Rest"]:
             if stop - first >= shortest:
                 alone = any(np.sum(moving[first:stop]) >= shortest for moving in others)
                 here = slice(first, stop)
-                found.append(_Rest(number, float(np.median(height[here])), float(np.median(tilt[here])), alone))
+                found.append(
+                    _Rest(number, float(np.median(height[here])), float(np.median(tilt[here])), alone)
+                )
     return found
 
 

@@ -182,13 +182,9 @@ def supports_of_points(
     levels = np.array(surfaces)
     supports: list[Support] = []
     for name, both in tracks.items():
-        # What a model's sole is above the surface where it stands flat is the model's error.
-        above = _height_above(middle[name], levels)
-        stands = flat[name] & (np.abs(above) < LEVELS_APART)
-        offsets = [
-            np.median((one.positions[:, 2] - middle[name] + above)[stands]) if stands.any() else 0.0
-            for one in both
-        ]
+        offsets = _offsets(both, flat[name] & ~_others(flat, name), levels)
+        if offsets is None:
+            offsets = _offsets(both, flat[name], levels) or (0.0, 0.0)
         touching = [_touching(one, levels + offset) for one, offset in zip(both, offsets, strict=True)]
         supports += _supports(name, both, np.array(touching), levels, start)
     supports.sort(key=lambda support: (support.start, support.effector))
@@ -217,6 +213,28 @@ def sole_points(found: Reconstruction) -> dict[str, tuple[FloatArray, FloatArray
 
 def _height(heel: Track, toes: Track) -> FloatArray:
     return 0.5 * (heel.positions[:, 2] + toes.positions[:, 2])
+
+
+def _others(flat: Mapping[str, NDArray[np.bool_]], name: str) -> NDArray[np.bool_]:
+    """(n,) whether another foot rests."""
+    return np.any([rests for other, rests in flat.items() if other != name], axis=0)
+
+
+def _offsets(
+    points: tuple[Track, Track], stands: NDArray[np.bool_], levels: FloatArray
+) -> tuple[float, float] | None:
+    """Heights of heel and toes above the surface where the foot stands: the errors of a model's sole [m].
+
+    They are learnt best while the other foot moves: with both on the ground a person may be on the toes.
+    None where the foot never stands so.
+    """
+    above = _height_above(_height(*points), levels)
+    stands = stands & (np.abs(above) < LEVELS_APART)
+    if not stands.any():
+        return None
+    under = _height(*points) - above
+    heel, toes = (float(np.median((point.positions[:, 2] - under)[stands])) for point in points)
+    return heel, toes
 
 
 def _height_above(heights: FloatArray, levels: FloatArray) -> FloatArray:
