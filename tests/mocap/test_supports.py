@@ -7,10 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from manikin.body import human
 from manikin.errors import InputError
-from manikin.mocap import ForcePlate, read_recording, reconstruct
+from manikin.mocap import ForcePlate, Reconstruction, Targets, read_recording, reconstruct
 from manikin.mocap.plate_supports import plate_loads, timing_errors
-from manikin.mocap.supports import RecordedSupports, Support, SupportPhase, supports_of, supports_of_points
+from manikin.mocap.recorded_supports import RecordedSupports, Support, SupportPhase
+from manikin.mocap.supports import supports_of, supports_of_points
 
 STAND, SWING = 0.5, 0.45
 TOES = np.array([0.25, 0.0, 0.0])
@@ -215,3 +217,60 @@ def test_recorded_supports_are_those_of_the_plates(recordings_folder, file, comp
     assert np.median(errors) <= 0.030
     assert max(errors) <= 0.050
     assert len(found.surfaces) == 1
+
+
+def rising(seconds_seated, rate=50.0):
+    """A reconstruction of somebody who sits, rises within a second and stands for one; seat-off is known.
+
+    The feet stay: the pelvis goes up and forward while knees and hips stretch.
+    """
+    body = human(1.75, 75.0)
+    thigh, standing = float(np.linalg.norm(body.segment("left_leg").origin)), body.standing_posture()
+    time = np.arange(round((seconds_seated + 2.0) * rate) + 1) / rate
+    share = np.clip(time - seconds_seated, 0.0, 1.0)
+    bend = 0.5 * np.pi * (0.5 + 0.5 * np.cos(np.pi * share))
+    q = np.tile(standing, (len(time), 1))
+    for side in ("left", "right"):
+        hip, knee = body.joint_index(f"{side}_hip_flexion"), body.joint_index(f"{side}_knee_flexion")
+        q[:, 7 + hip] += bend
+        q[:, 7 + knee] += bend
+    q[:, 0] -= thigh * np.sin(bend)
+    q[:, 2] -= thigh * (1.0 - np.cos(bend))
+    targets = Targets(("pelvis",), ("pelvis",), np.zeros((1, 3)), q[:, None, :3], np.ones(1))
+    off = float(time[np.flatnonzero(q[:, 2] > q[0, 2] + 0.04)[0]])
+    return Reconstruction(body, time, q, targets, np.zeros((len(time), 1))), off
+
+
+def test_who_sits_and_rises_has_left_the_seat_then():
+    found, off = rising(1.0)
+    supports = supports_of(found)
+    (seat,) = supports.of("buttocks")
+    assert not seat.start_seen
+    assert seat.end == pytest.approx(off, abs=0.05)
+    assert supports.phases[0].effectors == ("buttocks", "left_foot", "right_foot")
+    assert supports.phases[-1].effectors == ("left_foot", "right_foot")
+
+
+def test_who_stands_does_not_sit():
+    found, _ = rising(0.5)
+    standing = Reconstruction(
+        found.body, found.time, np.tile(found.q[-1], (len(found.time), 1)), found.targets, found.residual
+    )
+    assert [one.effector for one in supports_of(standing).supports] == ["left_foot", "right_foot"]
+
+
+def test_recorded_seat_off_is_when_the_feet_carry_the_weight(recordings_folder):
+    path = next(recordings_folder.rglob("STS1.trc"), None)
+    if path is None:
+        pytest.skip("the sit-to-stands are not there")
+    recording = read_recording(path)
+    found = supports_of(reconstruct(recording), start=recording.start)
+    each = [np.interp(recording.time, plate.time, plate.force[:, 2]) for plate in recording.plates]
+    carried = np.sum(each, axis=0)
+    ends = [one.end for one in found.of("buttocks") if one.end_seen]
+    assert len(ends) == 5
+    for end in ends:
+        # The chair stands beside the plates: all weight is on them, once the seat has none.
+        near = np.abs(recording.time - end) < 0.4
+        full = recording.time[near][np.flatnonzero(carried[near] >= 650.0)[0]]
+        assert end == pytest.approx(full, abs=0.1)

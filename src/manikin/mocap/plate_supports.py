@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.mocap.force_plate import ForcePlate
+from manikin.mocap.recorded_supports import RecordedSupports, Support
 from manikin.mocap.runs import runs
-from manikin.mocap.supports import RecordedSupports, Support
 from manikin.spatial import FloatArray, frozen_array
 
 SHORTEST_LOAD = 0.2

@@ -8,9 +8,7 @@ fast foot into a slope that is as high as the foot was fast. Surfaces are found 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -18,9 +16,11 @@ from numpy.typing import NDArray
 
 from manikin.errors import InputError
 from manikin.mocap.reconstruction import Reconstruction
+from manikin.mocap.recorded_supports import RecordedSupports, Support
 from manikin.mocap.runs import runs
+from manikin.mocap.seat_supports import seat_supports
 from manikin.mocap.support_levels import CUTOFF, LEVELS_APART, REST, Track, surface_heights, track
-from manikin.spatial import FloatArray, frozen_array
+from manikin.spatial import FloatArray
 
 FEET = ("left_foot", "right_foot")
 
@@ -40,109 +40,8 @@ SHORTEST = 0.08
 """Shorter supports, and shorter interruptions of one, are not told from noise [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Support:
-    """One effector on a surface from an instant to another.
-
-    Attributes:
-        effector: Name of the body's effector.
-        start: Touch-down, or the first instant of the recording [s].
-        end: Lift-off, or the last instant of the recording [s].
-        place: (3,) where the effector is, as a median, its height that of the surface [m].
-        first_contact: (3,) heel or toes, whichever touched down, then [m].
-        last_contact: (3,) heel or toes, whichever lifted off, then [m].
-        start_seen: Whether the touch-down is in the recording.
-        end_seen: Whether the lift-off is in the recording.
-    """
-
-    effector: str
-    start: float
-    end: float
-    place: FloatArray
-    first_contact: FloatArray
-    last_contact: FloatArray
-    start_seen: bool
-    end_seen: bool
-
-    def __post_init__(self) -> None:
-        if self.end < self.start:
-            raise InputError(
-                f"support of {self.effector} from {self.start:g} to {self.end:g} s; valid: an end behind"
-            )
-        for name in ("place", "first_contact", "last_contact"):
-            where = f"support of {self.effector} {name}"
-            object.__setattr__(self, name, frozen_array(getattr(self, name), where, (3,)))
-
-    @property
-    def duration(self) -> float:
-        """[s]."""
-        return self.end - self.start
-
-
-@dataclass(frozen=True)
-class SupportPhase:
-    """A time in which the supports do not change.
-
-    Attributes:
-        start: [s].
-        end: [s].
-        effectors: Those that support; none in flight.
-    """
-
-    start: float
-    end: float
-    effectors: tuple[str, ...]
-
-    @property
-    def duration(self) -> float:
-        """[s]."""
-        return self.end - self.start
-
-
-@dataclass(frozen=True, eq=False)
-class RecordedSupports:
-    """The supports of a recorded motion.
-
-    Attributes:
-        supports: In the order of their starts.
-        start: First instant looked at [s].
-        end: Last instant looked at [s].
-        surfaces: Heights of the surfaces found, lowest first [m].
-    """
-
-    supports: tuple[Support, ...]
-    start: float
-    end: float
-    surfaces: tuple[float, ...]
-
-    def of(self, effector: str) -> tuple[Support, ...]:
-        """Supports of one effector, in order."""
-        return tuple(support for support in self.supports if support.effector == effector)
-
-    @cached_property
-    def key_frames(self) -> tuple[float, ...]:
-        """Instants at which supports change, with the first and the last instant ([Qiu2012]_ 3.4) [s]."""
-        inner = {support.start for support in self.supports} | {support.end for support in self.supports}
-        return tuple(sorted(inner | {self.start, self.end}))
-
-    @cached_property
-    def phases(self) -> tuple[SupportPhase, ...]:
-        """From each key frame to the next."""
-        return tuple(
-            SupportPhase(start, end, tuple(sorted({
-                support.effector for support in self.supports if support.start <= start and end <= support.end
-            })))
-            for start, end in pairwise(self.key_frames)
-        )  # fmt: skip
-
-    @property
-    def sequence(self) -> tuple[str, ...]:
-        """Effectors in the order in which they touch down during the recording."""
-        return tuple(support.effector for support in self.supports if support.start_seen)
-
-
 def supports_of(found: Reconstruction, *, start: float = 0.0, cutoff: float = CUTOFF) -> RecordedSupports:
-    """Foot supports of a reconstructed recording, markers or skeleton.
+    """Supports of feet and seat of a reconstructed recording, markers or skeleton.
 
     Args:
         found: At least four instants at an even rate, not yet smoothed.
@@ -154,7 +53,10 @@ def supports_of(found: Reconstruction, *, start: float = 0.0, cutoff: float = CU
     """
     soles = sole_points(found)
     rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0]) if len(found.time) > 1 else 1.0
-    return supports_of_points(soles, rate, start=start + found.first_frame / rate, cutoff=cutoff)
+    begin = start + found.first_frame / rate
+    feet = supports_of_points(soles, rate, start=begin, cutoff=cutoff)
+    both = (*feet.supports, *seat_supports(found, soles, rate, start=begin, cutoff=cutoff))
+    return replace(feet, supports=tuple(sorted(both, key=lambda one: (one.start, one.effector))))
 
 
 def supports_of_points(
@@ -177,7 +79,6 @@ def supports_of_points(
     }
     frames = min(len(one.speed) for both in tracks.values() for one in both)
     flat = {name: heel.resting & toes.resting for name, (heel, toes) in tracks.items()}
-    middle = {name: _height(heel, toes) for name, (heel, toes) in tracks.items()}
     surfaces = surface_heights(list(tracks.values()))
     levels = np.array(surfaces)
     supports: list[Support] = []
