@@ -274,3 +274,14 @@ def test_recorded_seat_off_is_when_the_feet_carry_the_weight(recordings_folder):
         near = np.abs(recording.time - end) < 0.4
         full = recording.time[near][np.flatnonzero(carried[near] >= 650.0)[0]]
         assert end == pytest.approx(full, abs=0.1)
+
+
+def test_steps_of_a_recorded_stair_are_found(recordings_folder):
+    path = recordings_folder / "cmu_asf_amc" / "14_21.amc"
+    if not path.exists():
+        pytest.skip("the clip on a stair is not there")
+    found = supports_of(reconstruct(read_recording(path)))
+    # Three steps of about 0.2 m up and down again, one foot on each in turn.
+    assert np.diff(found.surfaces) == pytest.approx([0.21, 0.21, 0.21], abs=0.03)
+    assert all(phase.effectors or phase.duration < 0.05 for phase in found.phases)
+    assert all(one != other for one, other in pairwise(found.sequence))

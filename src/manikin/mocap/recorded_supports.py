@@ -89,7 +89,7 @@ class RecordedSupports:
 
     @cached_property
     def key_frames(self) -> tuple[float, ...]:
-        """Instants at which supports change, with the first and the last instant ([Qiu2012]_ 3.4) [s]."""
+        """Instants at which supports change, with the first and the last instant ([Qiu2012]_ 3.2.2) [s]."""
         inner = {support.start for support in self.supports} | {support.end for support in self.supports}
         return tuple(sorted(inner | {self.start, self.end}))
 

@@ -12,7 +12,7 @@ from manikin.mocap.runs import runs
 from manikin.spatial import FloatArray, frozen_array
 
 CUTOFF = 5.0
-"""Of the low-pass filter of positions, of second order, forward and backward ([Qiu2012]_ 3.4) [Hz]."""
+"""Of the low-pass filter of positions, of second order, forward and backward ([Qiu2012]_ 3.2.1) [Hz]."""
 
 REST = 0.12
 """Speed below which a point rests [m/s]."""
