@@ -14,12 +14,15 @@ from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.gaps import Gap
 from manikin.mocap.markers import Event, MarkerRecording
 from manikin.mocap.mot import read_mot
+from manikin.mocap.plate_supports import TimingError, timing_errors
 from manikin.mocap.read import read_recording
 from manikin.mocap.reconstruct import person_of, reconstruct
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_motion import motion_of, smoothed
+from manikin.mocap.recorded_supports import RecordedSupports, Support, SupportPhase
 from manikin.mocap.recording import Recording
 from manikin.mocap.subject import Subject
+from manikin.mocap.supports import supports_of
 from manikin.mocap.targets import Targets
 from manikin.mocap.trc import read_trc
 
@@ -30,10 +33,14 @@ __all__ = [
     "Gap",
     "MarkerRecording",
     "Reconstruction",
+    "RecordedSupports",
     "Recording",
     "Skeleton",
     "Subject",
+    "Support",
+    "SupportPhase",
     "Targets",
+    "TimingError",
     "anatomy_of",
     "ball_joint_angles",
     "motion_of",
@@ -47,4 +54,6 @@ __all__ = [
     "read_trc",
     "reconstruct",
     "smoothed",
+    "supports_of",
+    "timing_errors",
 ]

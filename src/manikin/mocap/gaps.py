@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from manikin.mocap.runs import runs
 from manikin.spatial import FloatArray
 
 LONGEST_GAP = 0.1
@@ -45,7 +46,7 @@ def gaps_of(seen: NDArray[np.bool_], names: Sequence[str]) -> tuple[Gap, ...]:
     return tuple(
         Gap(names[marker], first, stop)
         for marker in np.flatnonzero(~seen.all(axis=0)).tolist()
-        for first, stop in _runs(~seen[:, marker])
+        for first, stop in runs(~seen[:, marker])
     )
 
 
@@ -67,15 +68,9 @@ def filled(positions: FloatArray, longest: int) -> FloatArray:
     for marker in range(positions.shape[1]):
         seen = ~np.isnan(positions[:, marker, 0])
         frames = np.flatnonzero(seen)
-        for first, stop in _runs(~seen):
+        for first, stop in runs(~seen):
             after = int(np.searchsorted(frames, first))
             used = frames[max(after - NEIGHBOURS, 0) : after + NEIGHBOURS]
             if stop - first <= longest and 2 <= after <= len(frames) - 2:
                 found[first:stop, marker] = CubicSpline(used, positions[used, marker])(np.arange(first, stop))
     return found
-
-
-def _runs(marked: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First frame and the frame after the last of each run of marked frames."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8)))
-    return [(int(first), int(stop)) for first, stop in edges.reshape(-1, 2)]

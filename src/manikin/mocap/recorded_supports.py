@@ -1,0 +1,109 @@
+"""Supports of a recorded motion, its phases and key frames, as values."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+from manikin.errors import InputError
+from manikin.spatial import FloatArray, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """One effector on a surface from an instant to another.
+
+    Attributes:
+        effector: Name of the body's effector.
+        start: Touch-down, or the first instant of the recording [s].
+        end: Lift-off, or the last instant of the recording [s].
+        place: (3,) where the effector is, as a median, its height that of the surface [m].
+        first_contact: (3,) heel, toes or seat, whichever touched down, then [m].
+        last_contact: (3,) heel, toes or seat, whichever lifted off, then [m].
+        start_seen: Whether the touch-down is in the recording.
+        end_seen: Whether the lift-off is in the recording.
+    """
+
+    effector: str
+    start: float
+    end: float
+    place: FloatArray
+    first_contact: FloatArray
+    last_contact: FloatArray
+    start_seen: bool
+    end_seen: bool
+
+    def __post_init__(self) -> None:
+        if self.end < self.start:
+            raise InputError(
+                f"support of {self.effector} from {self.start:g} to {self.end:g} s; valid: an end behind"
+            )
+        for name in ("place", "first_contact", "last_contact"):
+            where = f"support of {self.effector} {name}"
+            object.__setattr__(self, name, frozen_array(getattr(self, name), where, (3,)))
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class SupportPhase:
+    """A time in which the supports do not change.
+
+    Attributes:
+        start: [s].
+        end: [s].
+        effectors: Those that support; none in flight.
+    """
+
+    start: float
+    end: float
+    effectors: tuple[str, ...]
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedSupports:
+    """The supports of a recorded motion.
+
+    Attributes:
+        supports: In the order of their starts.
+        start: First instant looked at [s].
+        end: Last instant looked at [s].
+        surfaces: Heights of the surfaces found on which feet stand, lowest first [m].
+    """
+
+    supports: tuple[Support, ...]
+    start: float
+    end: float
+    surfaces: tuple[float, ...]
+
+    def of(self, effector: str) -> tuple[Support, ...]:
+        """Supports of one effector, in order."""
+        return tuple(support for support in self.supports if support.effector == effector)
+
+    @cached_property
+    def key_frames(self) -> tuple[float, ...]:
+        """Instants at which supports change, with the first and the last instant ([Qiu2012]_ 3.2.2) [s]."""
+        inner = {support.start for support in self.supports} | {support.end for support in self.supports}
+        return tuple(sorted(inner | {self.start, self.end}))
+
+    @cached_property
+    def phases(self) -> tuple[SupportPhase, ...]:
+        """From each key frame to the next."""
+        return tuple(
+            SupportPhase(start, end, tuple(sorted({
+                support.effector for support in self.supports if support.start <= start and end <= support.end
+            })))
+            for start, end in pairwise(self.key_frames)
+        )  # fmt: skip
+
+    @property
+    def sequence(self) -> tuple[str, ...]:
+        """Effectors in the order in which they touch down during the recording."""
+        return tuple(support.effector for support in self.supports if support.start_seen)

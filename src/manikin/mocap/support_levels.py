@@ -1,0 +1,161 @@
+"""Points of the feet that rest, and the heights of the surfaces on which they do."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from manikin.errors import InputError
+from manikin.mocap.runs import runs
+from manikin.spatial import FloatArray, frozen_array
+
+CUTOFF = 5.0
+"""Of the low-pass filter of positions, of second order, forward and backward ([Qiu2012]_ 3.2.1) [Hz]."""
+
+REST = 0.12
+"""Speed below which a point rests [m/s]."""
+
+NEVER_AT_REST = (2.0 * REST, 4.0 * REST, 8.0 * REST)
+"""Speeds at which soles are looked at in turn where none ever rests, as in running [m/s]."""
+
+SHIFT_SPEED = 0.6
+"""Highest speed of a shift, in contrast to a swing [m/s]."""
+
+SHIFT_WAY = 0.08
+"""Longest way of a shift, in contrast to a swing [m]."""
+
+LEVELS_APART = 0.08
+"""Heights of rest within less than this belong to the same surface [m]."""
+
+LEVEL = 0.04
+"""Difference between heights of heel and toes up to which a foot is as level as another time [m]."""
+
+SHORTEST_REST = 0.1
+"""Time for which a foot rests on a surface that is found from it [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One point of an effector through a recording, without noise.
+
+    Attributes:
+        positions: (n, 3) low-passed [m].
+        speed: (n,) [m/s].
+        rate: Frames per second [Hz].
+    """
+
+    positions: FloatArray
+    speed: FloatArray
+    rate: float
+
+    @property
+    def resting(self) -> NDArray[np.bool_]:
+        """(n,) whether the point is slower than :data:`REST`."""
+        return self.speed < REST
+
+    def peak_speed(self) -> FloatArray:
+        """(n,) the highest speed of the swing between two rests [m/s]; infinite where there is none.
+
+        A point that leaves its rest slowly and rests again close to it has not swung, it has shifted: as
+        the toes do when the heel lifts. Of a swing that the recording cuts, the highest speed may be
+        missing: it is taken for at least the median of the whole ones.
+        """
+        peaks, last = np.full(len(self.speed), np.inf), len(self.speed)
+        swings = [(first, stop, float(self.speed[first:stop].max())) for first, stop in runs(~self.resting)]
+        swings = [one for one in swings if not self._shifts(*one)]
+        whole = [peak for first, stop, peak in swings if first > 0 and stop < last]
+        for first, stop, peak in swings:
+            usual = float(np.median(whole)) if whole and (first == 0 or stop == last) else 0.0
+            peaks[first:stop] = max(peak, usual)
+        return peaks
+
+    def _shifts(self, first: int, stop: int, peak: float) -> bool:
+        way = self.positions[min(stop, len(self.speed) - 1)] - self.positions[max(first - 1, 0)]
+        return peak < SHIFT_SPEED and float(np.linalg.norm(way)) < SHIFT_WAY
+
+
+def track(positions: FloatArray, rate: float, cutoff: float = CUTOFF) -> Track:
+    """Low-pass the positions of a point and take their speed by central differences.
+
+    Args:
+        positions: (n, 3), at least four, in the world [m].
+        rate: Frames per second [Hz].
+        cutoff: Where each of the two passes halves the power [Hz].
+
+    Raises:
+        InputError: If there are too few positions, or the cutoff is not below half the rate.
+    """
+    if len(positions) < 4:
+        raise InputError(f"{len(positions)} positions of an effector; valid: at least 4")
+    if not 0.0 < cutoff < 0.5 * rate:
+        raise InputError(f"cutoff is {cutoff:g} Hz; valid: above 0, below half the rate, {0.5 * rate:g} Hz")
+    sections = butter(2, cutoff, fs=rate, output="sos")
+    padding = min(len(positions) - 1, int(np.ceil(2.0 * rate / cutoff)))
+    smooth = sosfiltfilt(sections, positions, axis=0, padlen=padding)
+    speed = np.linalg.norm(np.gradient(smooth, 1.0 / rate, axis=0), axis=1)
+    return Track(frozen_array(smooth, "track positions"), frozen_array(speed, "track speed"), rate)
+
+
+def surface_heights(feet: Sequence[tuple[Track, Track]]) -> tuple[float, ...]:
+    """Heights of the surfaces on which feet stand, lowest first.
+
+    A foot that rests while another one moves carries the body, so what it rests on is a surface; so is the
+    lowest height at which one rests, and any at which one rests as level as on those. A foot that hangs
+    still in the air, while another one stands, is on none.
+
+    Where no sole ever rests, as in running, slow ones are taken.
+
+    Args:
+        feet: Heel and toes of each.
+    """
+    rests: list[_Rest] = []
+    for limit in (REST, *NEVER_AT_REST):
+        rests = rests or _rests(feet, limit)
+    if not rests:
+        return ()
+    rests.sort(key=lambda rest: rest.height)
+    groups = [[rests[0]]]
+    for one in rests[1:]:
+        if one.height - groups[-1][0].height > LEVELS_APART:
+            groups.append([])
+        groups[-1].append(one)
+    sure = [rest for place, group in enumerate(groups) for rest in group if place == 0 or rest.alone]
+    kept = [group for group in groups if any(rest in sure or _as_level(rest, sure) for rest in group)]
+    return tuple(float(np.median([rest.height for rest in group])) for group in kept)
+
+
+def _rests(feet: Sequence[tuple[Track, Track]], limit: float) -> list["_Rest"]:
+    """Times in which both ends of a sole are slower than a limit [m/s]."""
+    resting = [(heel.speed < limit) & (toes.speed < limit) for heel, toes in feet]
+    found = []
+    for number, (heel, toes) in enumerate(feet):
+        others = [~other for place, other in enumerate(resting) if place != number]
+        shortest = SHORTEST_REST * heel.rate
+        height = 0.5 * (heel.positions[:, 2] + toes.positions[:, 2])
+        tilt = toes.positions[:, 2] - heel.positions[:, 2]
+        for first, stop in runs(resting[number]):
+            if stop - first >= shortest:
+                alone = any(np.sum(moving[first:stop]) >= shortest for moving in others)
+                here = slice(first, stop)
+                found.append(
+                    _Rest(number, float(np.median(height[here])), float(np.median(tilt[here])), alone)
+                )
+    return found
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """A time for which the sole of a foot rests: its height, its toes above its heel, whether alone."""
+
+    foot: int
+    height: float
+    tilt: float
+    alone: bool
+
+
+def _as_level(rest: _Rest, sure: list[_Rest]) -> bool:
+    """Whether a foot is as level as where the same one surely stands."""
+    tilts = [one.tilt for one in sure if one.foot == rest.foot]
+    return bool(tilts) and abs(rest.tilt - float(np.median(tilts))) < LEVEL
