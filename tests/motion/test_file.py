@@ -15,7 +15,7 @@ from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, grasp, sole
 from manikin.errors import MotionFileError
 from manikin.motion import Motion
-from manikin.motion.file import DATASETS, MotionFile, read_motions, write_motions
+from manikin.motion.file import DATASETS, GROUPS, MotionFile, read_motions, write_motions
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
 
 
@@ -49,7 +49,8 @@ def content():
     hand = grasp("right_hand", (0.4, -0.2, 1.1), max_force=100.0, max_moment=1.0)
     sequence = StanceSequence([Phase(Stance([left, hand], 1500.0), 0.2, 3.0), Phase(Stance([left]), 0.1)])
     schedule = ContactSchedule(sequence, [0.0, 1 / 3, 0.7])
-    return MotionFile(random_motion(body), random_motion(body, 20, 1), body, scene, schedule)
+    recorded = random_motion(body, 30, 2)
+    return MotionFile(random_motion(body), random_motion(body, 20, 1), body, scene, schedule, recorded)
 
 
 def test_what_is_read_is_what_was_written(content, tmp_path):
@@ -100,8 +101,8 @@ def test_file_can_be_read_without_us(content, tmp_path):
     """Names, units and shapes as documented."""
     write_motions(tmp_path / "motion.h5", content)
     with h5py.File(tmp_path / "motion.h5") as file:
-        assert set(file) == {"planned", "executed", "body", "scene", "schedule"}
-        for group in (file["planned"], file["executed"]):
+        assert set(file) == {"recorded", "planned", "executed", "body", "scene", "schedule"}
+        for group in (file["recorded"], file["planned"], file["executed"]):
             assert set(group) == set(DATASETS)
             assert list(group.attrs["joint_names"]) == list(content.body.joint_names)
             assert list(group.attrs["contact_names"]) == ["left_foot", "right_foot", "right_hand"]
@@ -136,7 +137,7 @@ def replaced(file, name, value):
         (lambda f: f.attrs.__setitem__("format_version", 99), "version 99"),
         (lambda f: f["planned"].__delitem__("q"), "planned/q is missing"),
         (lambda f: f["planned"].attrs.__delitem__("joint_names"), "planned/joint_names is missing"),
-        (lambda f: (f.__delitem__("planned"), f.__delitem__("executed")), "holds no motion"),
+        (lambda f: [f.__delitem__(name) for name in GROUPS], "holds no motion"),
         (lambda f: f["planned/time"].__setitem__(3, -1.0), "time does not increase"),
         (lambda f: replaced(f, "planned/com", [1.0]), "com has shape"),
         (lambda f: replaced(f, "body", "{}"), "body is damaged"),

@@ -159,3 +159,25 @@ def test_others_move_on_the_same_clock(finished_run):
                 np.testing.assert_array_equal(shapes.frames[name].position, frame.position)
     finally:
         session.close()
+
+
+def test_a_recording_is_shown_beside_its_plan(finished_run):
+    """Both at the same instant, apart across the way and nowhere else."""
+    from manikin.viewer.session import BESIDE, ViewerSession
+
+    viewer = ViewerSession(replace(finished_run, recorded=finished_run.planned), port=0)
+    try:
+        assert viewer.beside == "recorded"
+        viewer.choose("planned")
+        viewer.show(0.7)
+        for name, frame in viewer._second.frames.items():
+            apart = np.asarray(frame.position) - np.asarray(viewer._shapes.frames[name].position)
+            assert np.linalg.norm(apart[:2]) == pytest.approx(BESIDE, abs=1e-9)
+            assert apart[2] == pytest.approx(0.0, abs=1e-12)
+            assert frame.visible
+        viewer.put_beside("nothing")
+        assert not any(frame.visible for frame in viewer._second.frames.values())
+        with pytest.raises(InputError, match="valid here: nothing, recorded, planned, executed"):
+            viewer.put_beside("replayed")
+    finally:
+        viewer.close()

@@ -14,6 +14,7 @@ from manikin.errors import FigureError
 from manikin.record import RunRecord
 
 COLOURS = {
+    "recorded": "#6A51A3",
     "planned": "#0072B2",
     "executed": "#D55E00",
     "left_foot": "#009E73",
@@ -34,6 +35,7 @@ COLOURS = {
 """Okabe and Ito's palette, which colour-blind readers can tell apart."""
 
 STYLES: dict[str, dict[str, Any]] = {
+    "recorded": {"color": COLOURS["recorded"], "linewidth": 1.6, "zorder": 2.8},
     "planned point mass": {"color": "#8A8A8A", "linewidth": 1.2, "zorder": 2.5},
     "planned": {"color": COLOURS["planned"], "linewidth": 2.4, "zorder": 3},
     "executed": {"color": COLOURS["executed"], "linewidth": 0.9, "zorder": 4},

@@ -1,9 +1,9 @@
-"""The motion file: planned and executed motion, body, scene and schedule in one HDF5 file.
+"""The motion file: recorded, planned and executed motion, body, scene and schedule in one HDF5 file.
 
 Layout (format version 1)::
 
     /                    attributes: format, format_version, created_by
-    /planned, /executed  one group per motion; attributes: joint_names, contact_names
+    /recorded, /planned, /executed   one group per motion; attributes: joint_names, contact_names
         time (n,) q (n, nq) v (n, nv) a (n, nv) tau (n, nv) com (n, 3)
         angular_momentum (n, 3) margin (n,) support (n, c) contact_force (n, c, 6)
                          each with the attributes: unit, description
@@ -39,7 +39,7 @@ from manikin.version import __version__
 
 FORMAT = "manikin-motion"
 FORMAT_VERSION = 1
-GROUPS = ("planned", "executed")
+GROUPS = ("recorded", "planned", "executed")
 
 DATASETS: Mapping[str, tuple[str, str]] = {
     "time": ("s", "sample times, increasing"),
@@ -72,6 +72,7 @@ class MotionFile:
         body: Who moved.
         scene: Where.
         schedule: With which contacts, when.
+        recorded: Motion of a recorded person, reconstructed.
     """
 
     planned: Motion | None = None
@@ -79,10 +80,11 @@ class MotionFile:
     body: BodyModel | None = None
     scene: Scene | None = None
     schedule: ContactSchedule | None = None
+    recorded: Motion | None = None
 
     @property
     def motions(self) -> dict[str, Motion]:
-        """The motions there are, by name, the planned one first."""
+        """The motions there are, by name, in the order of :data:`GROUPS`."""
         found = {name: getattr(self, name) for name in GROUPS}
         return {name: motion for name, motion in found.items() if motion is not None}
 
@@ -98,7 +100,7 @@ def write_motions(path: str | Path, content: MotionFile) -> None:
         MotionFileError: If there is no motion, or the file cannot be written.
     """
     if not content.motions:
-        raise MotionFileError(f"{path}: no motion to write; valid: planned, executed or both")
+        raise MotionFileError(f"{path}: no motion to write; valid: a recorded, planned or executed one")
     try:
         with atomic_path(path) as temporary, h5py.File(temporary, "w-", libver="v110") as file:
             _fill(file, content)
@@ -174,6 +176,7 @@ def _content(file: h5py.File, source: str) -> MotionFile:
         body=_read_json(file, "body", body_from, source),
         scene=_read_json(file, "scene", scene_from, source),
         schedule=_read_json(file, "schedule", schedule_from, source),
+        recorded=_read_motion(file, "recorded", source),
     )
     if not content.motions:
         raise MotionFileError(f"{source}: holds no motion; valid: a group {' or '.join(GROUPS)}")

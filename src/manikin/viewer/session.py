@@ -20,6 +20,9 @@ METRES_PER_NEWTON = 1e-3
 SMALLEST_FORCE = 5.0
 """Contact forces below this are not drawn [N]."""
 PLOT_POINTS = 400
+BESIDE = 1.2
+"""From the motion shown to the one beside it [m]."""
+NOTHING = "nothing"
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
 
 
@@ -28,6 +31,7 @@ class ViewerSession(Page):
 
     Attributes:
         chosen: Name of the motion shown.
+        beside: Name of the motion shown beside it, or ``"nothing"``.
         time: Instant shown [s].
         playing: Whether time runs.
         speed: Seconds of motion per second.
@@ -55,6 +59,7 @@ class ViewerSession(Page):
                 )
         self.content = content
         self.chosen = list(content.motions)[-1]
+        self.beside = "recorded" if content.recorded is not None and self.chosen != "recorded" else NOTHING
         self.playing = False
         self.speed = 1.0
         self._body = content.body
@@ -88,6 +93,7 @@ class ViewerSession(Page):
                 self._place_forces(motion, index)
                 self._com.position = motion.com[index]
                 self._place_others()
+                self._place_beside()
             self._show_numbers(motion, index)
 
     def choose(self, name: str) -> None:
@@ -100,6 +106,21 @@ class ViewerSession(Page):
             raise InputError(f"motion is {name!r}; valid here: {', '.join(self.content.motions)}")
         with self._lock:
             self.chosen = name
+            self.show(self.time)
+
+    def put_beside(self, name: str) -> None:
+        """Show a motion of the file beside the chosen one, at the same instant.
+
+        Args:
+            name: Of the motion; ``"nothing"`` for none.
+
+        Raises:
+            InputError: If the file does not hold it.
+        """
+        if name not in (NOTHING, *self.content.motions):
+            raise InputError(f"motion is {name!r}; valid here: {NOTHING}, {', '.join(self.content.motions)}")
+        with self._lock:
+            self.beside = name
             self.show(self.time)
 
     def play(self) -> None:
@@ -162,6 +183,8 @@ class ViewerSession(Page):
     def _build_body(self) -> None:
         scene = self.server.scene
         self._shapes = BodyShapes(self.server, self._body)  # the centre of mass and its path are inside
+        self._second = BodyShapes(self.server, self._body, 0.45, "/beside")
+        self._aside = BESIDE * _across(self.motion.com)
         self._com = scene.add_icosphere("/com/now", radius=0.03, color=(34, 34, 34))
         names = dict.fromkeys(
             name for motion in self.content.motions.values() for name in motion.contact_names
@@ -189,6 +212,15 @@ class ViewerSession(Page):
     def _place_others(self) -> None:
         for shapes, motion in self._others:
             shapes.place(motion.q[int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))])
+
+    def _place_beside(self) -> None:
+        self._second.show(self.beside != NOTHING)
+        if self.beside == NOTHING:
+            return
+        motion = self.content.motions[self.beside]
+        q = np.array(motion.q[int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))])
+        q[:2] += self._aside
+        self._second.place(q)
 
     def _place_forces(self, motion: Motion, index: int) -> None:
         for number, name in enumerate(motion.contact_names):
@@ -229,6 +261,7 @@ class ViewerSession(Page):
             self._button = gui.add_button("Play")
             speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
             motions = gui.add_dropdown("motion", tuple(self.content.motions), initial_value=self.chosen)
+            beside = gui.add_dropdown("beside", (NOTHING, *self.content.motions), initial_value=self.beside)
             self._forces = gui.add_checkbox("contact forces", initial_value=True)
         with gui.add_folder("Now"):
             self._text = gui.add_markdown("")
@@ -238,6 +271,7 @@ class ViewerSession(Page):
         self._button.on_click(lambda _: self.pause() if self.playing else self.play())
         speed.on_update(lambda _: setattr(self, "speed", float(speed.value)))
         motions.on_update(lambda _: self.choose(motions.value))
+        beside.on_update(lambda _: self.put_beside(beside.value))
         self._forces.on_update(lambda _: self.show(self.time))
 
     def _scrubbed(self, by_hand: bool) -> None:
@@ -253,8 +287,9 @@ class ViewerSession(Page):
             np.interp(self._plot_time, motion.time, motion.margin, left=np.nan, right=np.nan)
             for motion in self.content.motions.values()
         ]
-        low = min(0.0, *(float(motion.margin.min()) for motion in self.content.motions.values()))
-        high = max(1.0, *(float(motion.margin.max()) for motion in self.content.motions.values()))
+        known = np.concatenate([motion.margin for motion in self.content.motions.values()])
+        known = known[np.isfinite(known)]
+        low, high = float(known.min(initial=0.0)), float(known.max(initial=1.0))
         self._plot_range = (low - 0.05 * (high - low), high + 0.05 * (high - low))
         series: list[Any] = [uplot.Series(label="time [s]")]
         for name in self.content.motions:
@@ -297,6 +332,13 @@ class ViewerSession(Page):
                 f"- CoM: {', '.join(f'{value:.3f}' for value in motion.com[index])} m",
             ]
         )
+
+
+def _across(path: FloatArray) -> FloatArray:
+    """(2,) unit vector over the ground, to the left of where a (n, 3) path leads."""
+    way = path[-1, :2] - path[0, :2]
+    length = float(np.linalg.norm(way))
+    return np.array([-way[1], way[0]]) / length if length > 0.1 else np.array([0.0, 1.0])
 
 
 def _css(colour: tuple[int, int, int]) -> str:

@@ -18,6 +18,7 @@ HOST = "127.0.0.1"
 """The viewer listens to this computer only."""
 
 COLOURS = {
+    "recorded": (106, 81, 163),
     "planned": (0, 114, 178),
     "executed": (213, 94, 0),
     "left": (0, 158, 115),
@@ -128,6 +129,11 @@ class BodyShapes:
             placement = self.data.oMf[self._body.segment_frame(name)]
             x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
             frame.wxyz, frame.position = (w, x, y, z), placement.translation
+
+    def show(self, visible: bool) -> None:
+        """Draw the body, or hide it."""
+        for frame in self.frames.values():
+            frame.visible = visible
 
 
 def side_colour(name: str) -> tuple[int, int, int]:

@@ -1,0 +1,7 @@
+"""Recorded motion, measured: supports, timing, balance, forces, walking segments and effort in one value."""
+
+from manikin.analysis.analysis import Analysis
+from manikin.analysis.analyze import AnalysisOptions, analyze, analyze_file
+from manikin.analysis.sources import recordings_in
+
+__all__ = ["Analysis", "AnalysisOptions", "analyze", "analyze_file", "recordings_in"]

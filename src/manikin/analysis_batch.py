@@ -1,0 +1,110 @@
+"""Recordings measured side by side, each in a process beside this one; a bad file stops none of the others."""
+
+import multiprocessing
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from os.path import commonpath
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from manikin.analysis import AnalysisOptions, analyze_file
+from manikin.analysis_directory import write_analysis
+from manikin.errors import InputError, ManikinError
+from manikin.worker import prepare_worker
+
+
+@dataclass(frozen=True)
+class AnalysisJob:
+    """One file to measure.
+
+    Attributes:
+        path: The recording.
+        directory: For its files; None to write none.
+        draw: Whether the report has its figure.
+    """
+
+    path: Path
+    directory: Path | None = None
+    draw: bool = True
+
+
+@dataclass(frozen=True)
+class AnalysisEntry:
+    """What came of one file.
+
+    Attributes:
+        job: The file.
+        summary: As :meth:`manikin.analysis.Analysis.as_dict`; None where it was refused.
+        refusal: Why, in one line.
+    """
+
+    job: AnalysisJob
+    summary: dict[str, Any] | None
+    refusal: str = ""
+
+
+def analyze_files(
+    jobs: Sequence[AnalysisJob], options: AnalysisOptions, *, workers: int = 1
+) -> Iterator[AnalysisEntry]:
+    """Measure files, and write the directory of each as soon as it is known.
+
+    Args:
+        jobs: The files.
+        options: The same for all.
+        workers: Processes; with 1 all is done here. With more a script must keep its own work under
+            ``if __name__ == "__main__":``.
+
+    Yields:
+        Entries in the order in which they are done.
+
+    Raises:
+        InputError: If ``workers`` is less than 1.
+        ManikinError: If a process ends before its time.
+    """
+    if workers < 1:
+        raise InputError(f"workers is {workers}; valid: at least 1")
+    if workers == 1 or len(jobs) < 2:
+        for job in jobs:
+            with threadpool_limits(1):
+                entry = analyze_one(job, options)
+            yield entry
+        return
+    # Fresh processes: copies of this one would share the threads and locks of its libraries.
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(min(workers, len(jobs)), context, prepare_worker)
+    try:
+        for future in as_completed([pool.submit(analyze_one, job, options) for job in jobs]):
+            yield future.result()
+    except BrokenProcessPool:
+        raise ManikinError("a process of the analysis ended before its time, for want of memory?") from None
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def analyze_one(job: AnalysisJob, options: AnalysisOptions) -> AnalysisEntry:
+    """Measure one file and write its directory."""
+    try:
+        found = analyze_file(job.path, options)
+    except InputError as error:
+        return AnalysisEntry(job, None, " ".join(str(error).split()))
+    if job.directory is not None:
+        write_analysis(found, job.directory, draw=job.draw)
+    return AnalysisEntry(job, found.as_dict())
+
+
+def directories_for(paths: Sequence[Path], out: Path) -> list[Path]:
+    """A directory in ``out`` for each file: its path below the folder that all share, without the ending.
+
+    Files that differ in their ending only keep it.
+    """
+    whole = [path.resolve() for path in paths]
+    shared = Path(commonpath([path.parent for path in whole]))
+    stems = [path.with_suffix("") for path in whole]
+    return [
+        out / (path if stems.count(stem) > 1 else stem).relative_to(shared)
+        for path, stem in zip(whole, stems, strict=True)
+    ]

@@ -1,0 +1,147 @@
+"""The directory of a measured recording, and the overview of several.
+
+::
+
+    DIR/summary.json     what was measured
+    DIR/series.csv       what was measured at every frame, units in the header
+    DIR/motion.h5        the reconstructed motion with its supports, forces and margins (manikin.motion.file)
+    DIR/report.html      all of it for people, in one file
+
+    DIR/index.html, DIR/analyses.csv, DIR/analyses.json    of several recordings
+
+Each file is written atomically.
+"""
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from manikin.analysis import Analysis
+from manikin.analysis_report import overview_page, report_page
+from manikin.atomic import write_text
+from manikin.errors import MotionFileError
+from manikin.figures.recording import recording_figure
+from manikin.figures.write import png_of
+from manikin.motion.file import MotionFile, write_motions
+from manikin.output import MOTION, SUMMARY, make_directory, to_json
+
+if TYPE_CHECKING:
+    from manikin.analysis_batch import AnalysisEntry
+
+REPORT = "report.html"
+SERIES = "series.csv"
+OVERVIEW = "index.html"
+TABLE = "analyses.csv"
+ANALYSES = "analyses.json"
+
+OURS = (REPORT, SERIES, MOTION, SUMMARY, OVERVIEW, TABLE, ANALYSES)
+
+
+def check_directory(path: Path) -> None:
+    """Create a directory for an analysis, or take over that of an earlier one.
+
+    Raises:
+        MotionFileError: If it cannot be written, or holds something else.
+    """
+    if path.exists() and not path.is_dir():
+        raise MotionFileError(f"{path}: is a file; valid: a directory for the analysis")
+    make_directory(path)
+    content = sorted(item.name for item in path.iterdir() if not item.name.startswith("."))
+    if content and not {REPORT, OVERVIEW, SUMMARY} & set(content):
+        raise MotionFileError(
+            f"{path}: holds {content[0]!r} but no {REPORT}, so it is not an earlier analysis; "
+            "valid: a new or empty directory, or that of an analysis"
+        )
+
+
+def write_analysis(found: Analysis, directory: Path, *, draw: bool = True) -> None:
+    """Write the files of one recording; the summary comes last.
+
+    Args:
+        found: What was measured.
+        directory: Created if it is not there.
+        draw: Whether the report has its figure.
+
+    Raises:
+        MotionFileError: If they cannot be written.
+    """
+    make_directory(directory)
+    summary = found.as_dict()
+    figure = png_of(recording_figure(found)) if draw else None
+    write_motions(directory / MOTION, MotionFile(recorded=found.motion, body=found.body))
+    _write(directory / SERIES, _series_text(found))
+    _write(directory / REPORT, report_page(found, summary, figure))
+    _write(directory / SUMMARY, to_json(summary) + "\n")
+
+
+def write_overview(entries: Sequence["AnalysisEntry"], overview: dict[str, Any], directory: Path) -> None:
+    """Write the table of several recordings as a page, as CSV and as JSON.
+
+    Args:
+        entries: In order.
+        overview: What the command says of all of them.
+        directory: Where the directories of the recordings are.
+
+    Raises:
+        MotionFileError: If they cannot be written.
+    """
+    rows = [_row(entry) for entry in entries]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    _write(directory / TABLE, text.getvalue())
+    links = {
+        str(entry.job.path): f"{entry.job.directory.relative_to(directory).as_posix()}/{REPORT}"
+        for entry in entries
+        if entry.job.directory is not None and entry.summary is not None
+    }
+    _write(directory / OVERVIEW, overview_page(rows, overview, links))
+    _write(directory / ANALYSES, to_json(overview) + "\n")
+
+
+def _row(entry: "AnalysisEntry") -> dict[str, Any]:
+    """A recording in one line; empty where it was refused."""
+    found = entry.summary or {}
+    margin, residual = found.get("margin") or {}, found.get("reconstruction_residual_m") or {}
+    plates, effort = found.get("force_plates") or {}, found.get("ergonomics") or {}
+    return {
+        "file": str(entry.job.path),
+        "duration_s": found.get("duration_s"),
+        "frames": found.get("frames"),
+        "stature_m": found.get("stature_m"),
+        "mass_kg": found.get("mass_kg"),
+        "residual_median_m": residual.get("median"),
+        "supports": len(found["supports"]) if found else None,
+        "phases": len(found["phase_durations_s"]) if found else None,
+        "com_height_min_m": found.get("com_height_min_m"),
+        "margin_min_Nm": margin.get("min"),
+        "margin_share_positive": margin.get("share_positive"),
+        "timing_median_s": plates.get("timing_median_s"),
+        "vertical_rms_body_weight": plates.get("vertical_rms_body_weight"),
+        "cop_rms_m": plates.get("cop_rms_m"),
+        "rula_max": effort.get("rula_max"),
+        "reba_max": effort.get("reba_max"),
+        "refused": entry.refusal,
+    }
+
+
+def _series_text(found: Analysis) -> str:
+    columns = found.series()
+    text = io.StringIO()
+    text.write(",".join(columns) + "\n")
+    np.savetxt(text, np.column_stack(list(columns.values())), fmt="%.6g", delimiter=",")
+    return text.getvalue()
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        write_text(path, text)
+    except OSError as error:
+        raise MotionFileError(
+            f"{path}: cannot be written ({error.strerror}); valid: a writable directory"
+        ) from None

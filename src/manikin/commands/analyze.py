@@ -1,0 +1,127 @@
+"""``manikin analyze``: what a recorded person did, measured with the yardsticks of the plans."""
+
+import time as clock
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from manikin.commands.console import BAD_INPUT, DONE, JsonOption, complain, print_json, print_table, refuse
+from manikin.commands.console import stdout_kept_clean
+from manikin.errors import InputError
+from manikin.interruption import Interruption
+
+SHOWN = (
+    "duration_s", "frames", "sequence", "phase_durations_s", "com_height_min_m", "reconstruction_residual_m",
+    "margin", "force_plates", "ergonomics",
+)  # fmt: skip
+"""What people are told about a recording; everything is in the JSON."""
+
+
+def analyze(
+    context: typer.Context,
+    sources: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE|DIR...", help="Recordings (.c3d .trc .bvh .amc), or folders of them."),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Default: runs/analysis/NAME or runs/analysis; none with --json."),
+    ] = None,
+    frames: Annotated[
+        tuple[int, int] | None,
+        typer.Option(metavar="FIRST STOP", help="Frames from FIRST up to, not with, STOP; counted from 0."),
+    ] = None,
+    mass: Annotated[
+        float | None, typer.Option(metavar="KG", help="Mass of the person. Default: the file's, or the plates'.")
+    ] = None,
+    sex: Annotated[str, typer.Option(metavar="male|female", help="Table of segment masses.")] = "male",
+    friction: Annotated[float, typer.Option(metavar="MU", help="Of soles on the ground.")] = 0.8,
+    load: Annotated[float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands.")] = 0.0,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Files at a time; default: one per core.")
+    ] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the figure of the report.")] = True,
+    json: JsonOption = False,
+) -> int:
+    """Measure recorded people: supports, timing, balance, forces, effort; one report for each file."""
+    from manikin.analysis import AnalysisOptions, recordings_in
+
+    options = AnalysisOptions(frames=frames, mass=mass, sex=sex, friction=friction, load=load)
+    single = len(sources) == 1 and not sources[0].is_dir()
+    paths = recordings_in(sources)
+    if single:
+        refuse(jobs is not None, "--jobs", "there is one file")
+        directory = out if out is not None else None if json else Path("runs/analysis") / paths[0].stem
+        return _one(paths[0], directory, options, draw=figures, json=json)
+    refuse(frames is not None, "--frames", "there are several files")
+    directory = out if out is not None else None if json else Path("runs/analysis")
+    return _several(paths, directory, options, context.obj, jobs, draw=figures, json=json)
+
+
+def _one(path: Path, directory: Path | None, options: Any, *, draw: bool, json: bool) -> int:
+    with stdout_kept_clean():
+        from manikin.analysis import analyze_file
+        from manikin.analysis_directory import check_directory, write_analysis
+
+        if directory is not None:
+            check_directory(directory)
+        found = analyze_file(path, options)
+        if directory is not None:
+            write_analysis(found, directory, draw=draw)
+    summary = found.as_dict()
+    if json:
+        print_json(summary)
+        return DONE
+    print_table({key: summary[key] for key in SHOWN})
+    for remark in summary["remarks"]:
+        typer.echo(f"note: {remark}", err=True)
+    typer.echo(f"report in {directory}/report.html; see the motion with: manikin view {directory}", err=True)
+    return DONE
+
+
+def _several(
+    paths: Sequence[Path], directory: Path | None, options: Any, interruption: Interruption,
+    jobs: int | None, *, draw: bool, json: bool,
+) -> int:  # fmt: skip
+    from manikin.analysis_batch import AnalysisJob, analyze_files, directories_for
+    from manikin.analysis_directory import check_directory, write_overview
+    from manikin.batch import usable_cores
+    from manikin.progress import StageProgress
+
+    if directory is not None:
+        check_directory(directory)
+    folders = [None] * len(paths) if directory is None else directories_for(paths, directory)
+    work = [AnalysisJob(path, folder, draw) for path, folder in zip(paths, folders, strict=True)]
+    began, entries = clock.perf_counter(), {}
+    with stdout_kept_clean(), StageProgress() as bars:
+        for entry in analyze_files(work, options, workers=jobs or usable_cores()):
+            interruption.check()
+            entries[entry.job.path] = entry
+            if entry.summary is None:
+                complain(entry.refusal, BAD_INPUT)
+            bars("analyze", len(entries) / len(work), entry.job.path.name)
+    wall = clock.perf_counter() - began
+    ordered = [entries[path] for path in paths]
+    recorded = sum(entry.summary["duration_s"] for entry in ordered if entry.summary is not None)
+    refused = [entry for entry in ordered if entry.summary is None]
+    overview: dict[str, Any] = {
+        "files": [entry.summary for entry in ordered if entry.summary is not None],
+        "refused": [{"file": str(entry.job.path), "reason": entry.refusal} for entry in refused],
+        "duration_s": recorded, "wall_s": wall, "realtime_factor": recorded / wall,
+    }  # fmt: skip
+    if directory is not None:
+        write_overview(ordered, overview, directory)
+    if json:
+        print_json(overview)
+    else:
+        typer.echo(
+            f"{len(ordered) - len(refused)} recordings of {recorded:.0f} s measured in {wall:.1f} s, "
+            f"{len(refused)} refused"
+        )
+        if directory is not None:
+            typer.echo(f"overview in {directory}/index.html", err=True)
+    if len(refused) == len(ordered):
+        raise InputError(f"none of the {len(ordered)} files could be measured; valid: recordings, see above")
+    return BAD_INPUT if refused else DONE
