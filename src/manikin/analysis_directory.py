@@ -124,8 +124,8 @@ def _row(entry: "AnalysisEntry") -> dict[str, Any]:
         "timing_median_s": plates.get("timing_median_s"),
         "vertical_rms_body_weight": plates.get("vertical_rms_body_weight"),
         "cop_rms_m": plates.get("cop_rms_m"),
-        "rula_max": effort.get("rula_max"),
-        "reba_max": effort.get("reba_max"),
+        "rula_max": (effort.get("rula") or {}).get("max"),
+        "reba_max": (effort.get("reba") or {}).get("max"),
         "refused": entry.refusal,
     }
 

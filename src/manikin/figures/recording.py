@@ -5,7 +5,9 @@ import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from manikin.analysis import Analysis
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    from manikin.analysis import Analysis
 from manikin.figures.style import COLOURS, colours_of, dress, legend_above, new_grid, readable
 from manikin.figures.views import ALONG_Y, draw_body
 from manikin.spatial import FloatArray
@@ -21,7 +23,7 @@ HEIGHTS = (2.0, 0.75, 1.35, 1.35, 1.1, 1.1)
 """Of the panels [inch]."""
 
 
-def recording_figure(analysis: Analysis) -> Figure:
+def recording_figure(analysis: "Analysis") -> Figure:
     """Draw what was measured of a recording over time."""
     names = analysis.motion.contact_names
     heights = (*HEIGHTS[:1], max(0.5, 0.25 * len(names)), *HEIGHTS[2:])
@@ -46,7 +48,7 @@ def recording_figure(analysis: Analysis) -> Figure:
     return figure
 
 
-def _postures(axes: Axes, analysis: Analysis) -> None:
+def _postures(axes: Axes, analysis: "Analysis") -> None:
     """Postures from the right side of where the person goes, or looks at first."""
     frames = np.unique(np.linspace(0, len(analysis.time) - 1, POSTURES).round().astype(int))
     turned = _turned(analysis.motion.q[frames], -_heading(analysis))
@@ -63,7 +65,7 @@ def _postures(axes: Axes, analysis: Analysis) -> None:
     axes.axis("off")
 
 
-def _heading(analysis: Analysis) -> float:
+def _heading(analysis: "Analysis") -> float:
     """Where the pelvis goes, or faces in the middle of the recording where it stays [rad]."""
     q = analysis.motion.q
     way = q[-1, :2] - q[0, :2]
@@ -81,7 +83,7 @@ def _turned(q: FloatArray, angle: float) -> FloatArray:
     return turned
 
 
-def _supports(axes: Axes, analysis: Analysis) -> None:
+def _supports(axes: Axes, analysis: "Analysis") -> None:
     names = analysis.motion.contact_names
     colours = colours_of(names)
     for row, name in enumerate(names):
@@ -93,7 +95,7 @@ def _supports(axes: Axes, analysis: Analysis) -> None:
     axes.grid(False)
 
 
-def _forces(axes: Axes, analysis: Analysis) -> None:
+def _forces(axes: Axes, analysis: "Analysis") -> None:
     weight = analysis.weight
     axes.plot(analysis.time, analysis.vertical_force / weight, color=COLOURS["recorded"], label="from motion")
     if analysis.plates is not None:
@@ -103,7 +105,7 @@ def _forces(axes: Axes, analysis: Analysis) -> None:
     legend_above(axes)
 
 
-def _margins(axes: Axes, analysis: Analysis) -> None:
+def _margins(axes: Axes, analysis: "Analysis") -> None:
     axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
     axes.plot(analysis.time, analysis.point_mass_margin, color=COLOURS["soft"], linewidth=1.0, label="point mass")
     axes.plot(analysis.time, analysis.motion.margin, color=COLOURS["recorded"], label="whole body")
@@ -115,14 +117,16 @@ def _margins(axes: Axes, analysis: Analysis) -> None:
     legend_above(axes)
 
 
-def _heights(axes: Axes, analysis: Analysis) -> None:
+def _heights(axes: Axes, analysis: "Analysis") -> None:
     axes.plot(analysis.time, analysis.com_height, color=COLOURS["recorded"])
     dress(axes, "centre of mass\n[m]")
 
 
-def _scores(axes: Axes, analysis: Analysis) -> None:
-    axes.step(analysis.time, analysis.ergonomics.rula.grand, where="post", color=COLOURS["planned"], label="RULA")
-    axes.step(analysis.time, analysis.ergonomics.reba.score, where="post", color=COLOURS["executed"], label="REBA")
+def _scores(axes: Axes, analysis: "Analysis") -> None:
+    posture = analysis.ergonomics.posture
+    if posture is not None:
+        for one, colour in ((posture.rula, COLOURS["planned"]), (posture.reba, COLOURS["executed"])):
+            axes.step(analysis.time, one.score, where="post", color=colour, label=one.method)
+        legend_above(axes)
     axes.set_ylim(0.0, 15.5)
     dress(axes, "score")
-    legend_above(axes)

@@ -1,6 +1,7 @@
 """Writing every figure that a run has the data for."""
 
 from collections.abc import Callable, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
 
@@ -122,11 +123,17 @@ def save_figure(figure: Figure, path: Path) -> None:
     """
     try:
         with atomic_path(path) as temporary:
-            # One drawing instead of the two of savefig; and the same data gives the same bytes.
-            canvas = FigureCanvasAgg(figure)
-            canvas.draw()
-            image = Image.fromarray(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
-            image.save(temporary, format="png", compress_level=4, dpi=(figure.dpi, figure.dpi))
+            temporary.write_bytes(png_of(figure))
     except OSError as error:
         problem = f"{path}: cannot be written ({error.strerror})"
         raise MotionFileError(f"{problem}; valid: a writable folder") from None
+
+
+def png_of(figure: Figure) -> bytes:
+    """Content of a PNG file."""
+    # One drawing instead of the two of savefig; and the same data gives the same bytes.
+    canvas, content = FigureCanvasAgg(figure), BytesIO()
+    canvas.draw()
+    image = Image.fromarray(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
+    image.save(content, format="png", compress_level=4, dpi=(figure.dpi, figure.dpi))
+    return content.getvalue()

@@ -1,0 +1,136 @@
+"""A recording measured from beginning to end."""
+
+import time as clock
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from manikin.analysis.analysis import Analysis
+from manikin.analysis.on_plates import PlateReport, measured_mass, plate_report
+from manikin.analysis.remarks import remarks_on
+from manikin.analysis.walking import walked_segments
+from manikin.errors import InputError
+from manikin.ergonomics import Circumstances, ergonomics_of, upright_neck
+from manikin.mocap.markers import MarkerRecording
+from manikin.mocap.read import read_recording
+from manikin.mocap.reconstruct import reconstruct
+from manikin.mocap.recorded_dynamics import dynamics_of, with_mass
+from manikin.mocap.recorded_forces import motion_on_contacts
+from manikin.mocap.recorded_margins import recorded_margins
+from manikin.mocap.recorded_stances import FRICTION, recorded_schedule
+from manikin.mocap.recording import Recording
+from manikin.mocap.supports import supports_of
+from manikin.mocap.untold_segments import untold_upright
+from manikin.spatial import finite_number
+
+SEXES = ("male", "female")
+
+FEWEST_FRAMES = 10
+"""Fewer frames are no motion: smoothing and differences need as many."""
+
+
+@dataclass(frozen=True)
+class AnalysisOptions:
+    """What a recording does not say, or not well.
+
+    Attributes:
+        frames: First frame and the one after the last; None for all.
+        mass: Of the person [kg]; None for the file's, that by the plates, or a usual one.
+        sex: Table of segment masses, ``"male"`` or ``"female"``.
+        friction: Of soles on the ground.
+        load: Carried in the hands [kg], for RULA and REBA.
+    """
+
+    frames: tuple[int, int] | None = None
+    mass: float | None = None
+    sex: str = "male"
+    friction: float = FRICTION
+    load: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.mass is not None:
+            finite_number(self.mass, "mass [kg]", above=0.0)
+        if self.sex not in SEXES:
+            raise InputError(f"sex is {self.sex!r}; valid: {', '.join(SEXES)}")
+        finite_number(self.friction, "friction", above=0.0)
+        finite_number(self.load, "load [kg]", at_least=0.0)
+
+
+def analyze_file(path: str | Path, options: AnalysisOptions | None = None) -> Analysis:
+    """Read a recording and measure it.
+
+    Args:
+        path: C3D, TRC (with its MOT beside it), BVH or AMC (with its ASF).
+        options: What the file does not say.
+
+    Raises:
+        InputError: If it cannot be read, or is not a person's motion that can be measured; the message
+            begins with the file.
+    """
+    given = options or AnalysisOptions()
+    began = clock.perf_counter()
+    recording = read_recording(path, given.frames)
+    try:
+        found = analyze(recording, given, Path(path).stem)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if str(path) in text else f"{path}: {text}") from None
+    return replace(found, source=str(path), wall=clock.perf_counter() - began)
+
+
+def analyze(
+    recording: Recording | MarkerRecording, options: AnalysisOptions | None = None, name: str = ""
+) -> Analysis:
+    """Reconstruct a recorded person and measure supports, balance, forces, walking and ergonomics.
+
+    Args:
+        recording: At least :data:`FEWEST_FRAMES` frames.
+        options: What the recording does not say.
+        name: What to call it; the recording's own name if empty.
+
+    Raises:
+        InputError: If it is too short, or is not a person's motion that can be measured.
+    """
+    given, began = options or AnalysisOptions(), clock.perf_counter()
+    if len(recording) < FEWEST_FRAMES:
+        raise InputError(
+            f"recording {recording.name!r} has {len(recording)} frame(s); valid: at least {FEWEST_FRAMES}"
+        )
+    start, plates = 0.0, ()
+    if isinstance(recording, MarkerRecording):
+        start, plates = recording.start, recording.plates
+    found = untold_upright(reconstruct(recording, sex=given.sex, mass=given.mass))
+    if len(found.time) < FEWEST_FRAMES:
+        raise InputError(
+            f"recording {recording.name!r} shows the person in {len(found.time)} frame(s); "
+            f"valid: at least {FEWEST_FRAMES}"
+        )
+    supports = supports_of(found, start=start)
+    schedule = recorded_schedule(found, supports, friction=given.friction)
+    dynamics = dynamics_of(found)
+    mass = None if given.mass is not None else measured_mass(recording, dynamics, schedule, supports.start)
+    if mass is not None:
+        found = with_mass(found, mass)
+        schedule = recorded_schedule(found, supports, friction=given.friction)
+        dynamics = dynamics_of(found)
+    margins = recorded_margins(dynamics, schedule, supports.start)
+    motion = motion_on_contacts(dynamics, schedule, supports.start)
+    ground = min(supports.surfaces, default=0.0)
+    report: PlateReport | None = None
+    if plates:
+        report = plate_report(plates, supports, schedule, dynamics, margins)
+    neck = upright_neck(found.body, motion.q)
+    circumstances = Circumstances(
+        load_kg=given.load, neck_upright_deg=0.0 if neck is None else float(np.degrees(neck))
+    )
+    ergonomics = ergonomics_of(
+        found.body, motion, schedule=schedule, given=circumstances, friction=given.friction
+    )
+    analysis = Analysis(
+        name=name or recording.name, source=recording.name, rate=recording.rate, sex=given.sex, found=found,
+        supports=supports, motion=motion, point_mass_margin=margins.point_mass,
+        limiting=margins.limiting(margins.lowest), cop=dynamics.zero_moment_point(ground),
+        segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
+    )  # fmt: skip
+    return replace(analysis, remarks=remarks_on(analysis, recording), wall=clock.perf_counter() - began)

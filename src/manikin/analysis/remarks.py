@@ -1,0 +1,68 @@
+"""What a reader of an analysis must know before believing it."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from manikin.mocap.markers import MarkerRecording
+from manikin.mocap.recording import Recording
+
+if TYPE_CHECKING:
+    from manikin.analysis.analysis import Analysis
+
+LARGE_RESIDUAL = 0.02
+"""Median distance between the body and what was recorded above which the body does not fit [m]."""
+
+SLOW_RATE = 50.0
+"""Below this rate instants of supports are as coarse as the frames [Hz]."""
+
+LONG_FLIGHT = 0.5
+"""Nobody is without support for longer [s]."""
+
+FEW_POSITIVE = 0.9
+"""Share of frames with a positive margin below which contacts must be missing."""
+
+
+def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> tuple[str, ...]:
+    """Reasons to doubt the numbers, a line each.
+
+    Args:
+        analysis: Whose numbers.
+        recording: What they were measured on.
+    """
+    found, supports, lines = analysis.found, analysis.supports, []
+    if found.median > LARGE_RESIDUAL:
+        lines.append(
+            f"the body does not fit the recording: residual {1e3 * found.median:.0f} mm (median); "
+            "are its units, or the names of its markers, right?"
+        )
+    if found.neutral:
+        names = ", ".join(name.replace("_", " ") for name in found.neutral)
+        lines.append(f"not recorded, held as in standing: {names}")
+    if found.others:
+        lines.append(f"{len(found.others)} markers are not used, for their names say nothing known")
+    dropped = len(recording) - len(found.time)
+    if dropped > 0:
+        lines.append(f"{dropped} of {len(recording)} frames at the ends show too little of the person")
+    if recording.rate < SLOW_RATE:
+        lines.append(
+            f"{recording.rate:g} frames per second: instants are known to {0.5e3 / recording.rate:.0f} ms, "
+            "and the forces of quick steps are cut off"
+        )
+    if not supports.supports:
+        lines.append("no support was found: nothing rests near the ground for long enough")
+    flights = [one.duration for one in supports.phases if not one.effectors]
+    if supports.supports and max(flights, default=0.0) > LONG_FLIGHT:
+        lines.append(
+            f"nothing supports for {max(flights):.2f} s: the person may touch something that is not recorded"
+        )
+    margin = analysis.motion.margin[np.isfinite(analysis.motion.margin)]
+    if margin.size and float(np.mean(margin > 0.0)) < FEW_POSITIVE:
+        share = 100.0 * float(np.mean(margin > 0.0))
+        lines.append(
+            f"balanced in {share:.0f} % of the frames only: running, or supports that were not found"
+        )
+    if isinstance(recording, MarkerRecording) and recording.plates and analysis.plates is not None:
+        if not analysis.plates.compared.any():
+            lines.append("no instant has all supports on force plates: their forces are not compared")
+    return tuple(lines)
