@@ -79,12 +79,25 @@ def cluster_turns(places: FloatArray) -> FloatArray | None:
     if places.shape[1] < FEWEST or not whole.size:
         return None
     model, turns = places[whole[0]], np.full((len(places), 3, 3), np.nan)
-    for frame, now in enumerate(places):
-        seen = ~np.isnan(now[:, 0])
-        if seen.sum() >= FEWEST:
-            first, last = model[seen] - model[seen].mean(axis=0), now[seen] - now[seen].mean(axis=0)
-            turns[frame] = Rotation.align_vectors(last, first)[0].as_matrix()
+    seen = ~np.isnan(places[..., 0])
+    enough = np.flatnonzero(seen.sum(axis=1) >= FEWEST)
+    weights = seen[enough][..., None] / seen[enough].sum(axis=1)[:, None, None]
+    now = np.where(seen[enough][..., None], places[enough], 0.0)
+    first = model - np.sum(weights * model, axis=1, keepdims=True)
+    last = now - np.sum(weights * now, axis=1, keepdims=True)
+    turns[enough] = best_turns(weights * first, last)
     return turns
+
+
+def best_turns(first: FloatArray, last: FloatArray) -> FloatArray:
+    """(n, 3, 3) rotations that bring vectors (n, k, 3) closest to others (n, k, 3).
+
+    By the singular values of their products: Kabsch, "A discussion of the solution for the best rotation to
+    relate two sets of vectors", Acta Crystallographica A34 (1978).
+    """
+    left, _, right = np.linalg.svd(last.transpose(0, 2, 1) @ first)
+    left[..., 2] *= np.linalg.det(left @ right)[:, None]
+    return left @ right
 
 
 def _seen(places: FloatArray) -> bool:

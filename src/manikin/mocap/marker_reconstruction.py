@@ -7,19 +7,19 @@ frames follow the markers themselves.
 """
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.errors import InputError
-from manikin.mocap.follow import follow
+from manikin.mocap.follow import follow, improved
 from manikin.mocap.marker_centres import check_sides, landmarks, marker_centres, pelvis_axes
 from manikin.mocap.marker_guides import placing_targets
 from manikin.mocap.marker_sets import MarkerSet, marker_set
 from manikin.mocap.markers import MarkerRecording
 from manikin.mocap.proportions import human_of, middle
 from manikin.mocap.reconstruction import Reconstruction
+from manikin.mocap.segment_placements import SegmentPlacements
 from manikin.mocap.targets import Targets
 from manikin.spatial import FloatArray
 
@@ -67,7 +67,7 @@ def reconstruct_markers(
         )
     starts = _starts(body, marked)[first:stop]
     wanted = Targets(placed.names, placed.segments, placed.points, filled[first:stop], placed.weights)
-    q, residual = follow(body, wanted, starts)
+    q, residual = follow(body, wanted, starts, recording.rate)
     recorded = recording.chosen(placed.names).positions[first:stop]
     time = np.arange(stop - first) / recording.rate
     followed = {*placed.names}
@@ -110,7 +110,7 @@ def _placed(marked: _Marked, body: BodyModel) -> Targets:
         placed = Targets(names, segments, points, positions, np.ones(len(names)))
         if number < ROUNDS:
             here = Targets(names, segments, points, positions[frames], placed.weights)
-            q, _ = follow(body, here, q)
+            q = improved(body, here, q)
     return placed
 
 
@@ -140,21 +140,16 @@ def _present(targets: Targets, frames: NDArray[np.int64]) -> Targets:
 
 def _local(body: BodyModel, q: FloatArray, segments: tuple[str, ...], places: FloatArray) -> FloatArray:
     """(k, 3) medians of places in the frames of their segments [m]."""
-    data, local = body.pinocchio.createData(), np.empty_like(places)
-    frames = [body.segment_frame(segment) for segment in segments]
-    for posture, seen, found in zip(q, places, local, strict=True):
-        pin.framesForwardKinematics(body.pinocchio, data, posture)
-        turns = np.array([data.oMf[frame].rotation for frame in frames])
-        shifts = np.array([data.oMf[frame].translation for frame in frames])
-        found[:] = np.einsum("kji,kj->ki", turns, seen - shifts)
-    return np.nanmedian(local, axis=0)
+    placed = SegmentPlacements(body, segments).of(q)
+    away = places.transpose(1, 2, 0) - placed.roots - placed.shifts
+    return np.nanmedian(np.einsum("kjin,kjn->kin", placed.turns, away), axis=2)
 
 
 def _starts(body: BodyModel, marked: _Marked, pelvis: FloatArray | None = None) -> FloatArray:
     """(n, nq) standing postures put where the pelvis is, or was last seen."""
     turns, hips = marked.pelvis if pelvis is None else pelvis, middle(marked.centres, "thigh")
     known = np.flatnonzero(~np.isnan(turns[:, 0, 0]) & ~np.isnan(hips[:, 0]))
-    nearest = known[np.abs(np.arange(len(turns))[:, None] - known).argmin(axis=1)]
+    nearest = known[np.searchsorted(0.5 * (known[1:] + known[:-1]), np.arange(len(turns)))]
     q = np.tile(body.standing_posture(), (len(turns), 1))
     q[:, :3] = hips[nearest]
     q[:, 3:7] = Rotation.from_matrix(turns[nearest]).as_quat()

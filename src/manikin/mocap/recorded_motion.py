@@ -7,7 +7,7 @@ import pinocchio as pin
 from scipy.signal import butter, sosfiltfilt
 
 from manikin.errors import InputError
-from manikin.mocap.inverse_kinematics import InverseKinematics
+from manikin.mocap.posture_cost import PostureCost
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.motion.motion import Motion
 from manikin.spatial import FloatArray, finite_number
@@ -43,12 +43,8 @@ def smoothed(found: Reconstruction, cutoff: float = CUTOFF) -> Reconstruction:
     q = sosfiltfilt(sections, q, axis=0, padlen=padding)
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
-    places = InverseKinematics(found.body, found.targets).places
-    residual = [
-        np.linalg.norm(places(one) - there, axis=1)
-        for one, there in zip(q, found.targets.positions, strict=True)
-    ]
-    return replace(found, q=q, residual=np.array(residual))
+    residual = PostureCost(found.body, found.targets).distances(q, found.targets.positions)
+    return replace(found, q=q, residual=residual)
 
 
 def motion_of(found: Reconstruction, cutoff: float | None = CUTOFF) -> Motion:

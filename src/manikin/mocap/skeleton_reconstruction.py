@@ -28,5 +28,5 @@ def reconstruct_skeleton(
     pelvis, thorax = (trunk_turns(recording, centres, name) for name in ("pelvis", "thorax"))
     wanted = origin_targets(centres, CENTRES)
     followed = wanted.and_these(guides(recording, person, centres, pelvis, thorax))
-    q, residual = follow(person, followed, closed_form(person, centres, pelvis, thorax))
+    q, residual = follow(person, followed, closed_form(person, centres, pelvis, thorax), recording.rate)
     return Reconstruction(person, recording.time, q, wanted, residual[:, : len(wanted.names)])
