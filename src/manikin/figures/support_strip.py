@@ -22,6 +22,9 @@ MOST = 14
 ALWAYS = ("left_foot", "right_foot", "left_hand", "right_hand")
 """Effectors whose heights are drawn though they support nothing."""
 
+ORDER = ("left_knee", "right_knee", "left_elbow", "right_elbow", "pelvis", "buttocks")
+"""Of the other effectors, below those."""
+
 GAP = 0.1
 """Between two postures [m]."""
 
@@ -55,7 +58,8 @@ def support_strip_figure(
         raise FigureError(
             f"no instant from {begin:g} to {end:g} s; valid: from {supports.start:g} to {supports.end:g} s"
         )
-    names = tuple(dict.fromkeys((*ALWAYS, *sorted(one.effector for one in supports.supports))))
+    seen = {one.effector for one in supports.supports}
+    names = (*ALWAYS, *(name for name in ORDER if name in seen), *sorted(seen - {*ALWAYS, *ORDER}))
     places = effector_places(found.body, found.q, names)
     samples = _samples(supports, time, begin, end)
     turned = _seen_from_the_side(found, places)
@@ -119,7 +123,7 @@ def _frame(body: BodyModel, q: FloatArray) -> tuple[float, float, float]:
     names = [segment.name for segment in body.segments] + list(body.effectors)
     places = effector_places(body, q, names)
     across = 2.0 * float(np.abs(places[..., 0] - q[:, 0]).max()) + 0.1
-    return across, float(places[..., 2].min()) - 0.1, float(places[..., 2].max()) + 0.12
+    return across, float(places[..., 2].min()) - 0.1, float(places[..., 2].max()) + 0.04
 
 
 def _draw_postures(
@@ -137,7 +141,7 @@ def _draw_postures(
         if on:
             for name, place in zip(on, effector_places(found.body, turned[[sample]], on)[:, 0], strict=True):
                 axes.plot(*view(place), "o", color=colours[name], markersize=6, markeredgecolor="black", zorder=6)
-        axes.annotate(f"{time[sample]:.2f} s", (pitch * number, high), fontsize=8, ha="center", va="top")
+        axes.annotate(f"{time[sample]:.2f} s", (pitch * number, high), fontsize=8, ha="center", va="bottom")
     for height in supports.surfaces:
         axes.axhline(height, color=COLOURS["soft"], linewidth=0.7, zorder=0.5)
     axes.set(xlim=(-0.5 * pitch, pitch * (len(samples) - 0.5)), ylim=(low, high))
