@@ -1,4 +1,4 @@
-"""Figures of a finished run or of two, one function each; no window and no global state is used."""
+"""Figures of a finished run, of two, or of a recording, one function each; no window and no global state is used."""
 
 from manikin.figures.com import com_figure
 from manikin.figures.compare_com import compare_planes_figure, compare_scene_figure
@@ -15,6 +15,7 @@ from manikin.figures.planes import planes_figure
 from manikin.figures.postures import postures_figure
 from manikin.figures.push_map import push_map_figure
 from manikin.figures.scene import scene_figure
+from manikin.figures.support_strip import support_strip_figure
 from manikin.figures.timing import timing_figure
 from manikin.figures.tracking import tracking_figure
 from manikin.figures.walking import walking_paths_figure
@@ -46,6 +47,7 @@ __all__ = [
     "postures_figure",
     "push_map_figure",
     "scene_figure",
+    "support_strip_figure",
     "timing_figure",
     "tracking_figure",
     "walking_paths_figure",

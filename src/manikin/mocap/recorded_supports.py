@@ -1,8 +1,10 @@
 """Supports of a recorded motion, its phases and key frames, as values."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+
+import numpy as np
 
 from manikin.errors import InputError
 from manikin.spatial import FloatArray, frozen_array
@@ -16,9 +18,9 @@ class Support:
         effector: Name of the body's effector.
         start: Touch-down, or the first instant of the recording [s].
         end: Lift-off, or the last instant of the recording [s].
-        place: (3,) where the effector is, as a median, its height that of the surface [m].
-        first_contact: (3,) heel, toes or seat, whichever touched down, then [m].
-        last_contact: (3,) heel, toes or seat, whichever lifted off, then [m].
+        place: (3,) where the effector is, as a median; of a foot, its height is that of the surface [m].
+        first_contact: (3,) heel or toes, whichever touched down, or the effector, then [m].
+        last_contact: (3,) heel or toes, whichever lifted off, or the effector, then [m].
         start_seen: Whether the touch-down is in the recording.
         end_seen: Whether the lift-off is in the recording.
     """
@@ -45,6 +47,26 @@ class Support:
     def duration(self) -> float:
         """[s]."""
         return self.end - self.start
+
+
+def support_between(
+    effector: str, positions: FloatArray, frames: tuple[int, int], rate: float, start: float
+) -> Support:
+    """Support of one point for a run of frames.
+
+    Args:
+        effector: Its name.
+        positions: (n, 3) of the point in all frames [m].
+        frames: First frame of the run and the one after its last.
+        rate: Frames per second [Hz].
+        start: Instant of the first of all frames [s].
+    """
+    (first, stop), last = frames, len(positions) - 1
+    return Support(
+        effector, start + first / rate, start + min(stop, last) / rate,
+        np.median(positions[first:stop], axis=0), positions[first], positions[stop - 1],
+        first > 0, stop <= last,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -86,6 +108,10 @@ class RecordedSupports:
     def of(self, effector: str) -> tuple[Support, ...]:
         """Supports of one effector, in order."""
         return tuple(support for support in self.supports if support.effector == effector)
+
+    def only(self, *effectors: str) -> "RecordedSupports":
+        """These effectors' supports alone, as if nothing else could support: the feet of a walk, say."""
+        return replace(self, supports=tuple(one for one in self.supports if one.effector in effectors))
 
     @cached_property
     def key_frames(self) -> tuple[float, ...]:

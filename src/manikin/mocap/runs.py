@@ -12,3 +12,31 @@ def runs(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
     return [(int(first), int(stop)) for first, stop in edges.reshape(-1, 2)]
+
+
+def switch(closes: NDArray[np.bool_], opens: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n,) state of a switch that is open before the first frame; where both hold, it closes.
+
+    Args:
+        closes: (n,) whether it closes in each frame.
+        opens: (n,) whether it opens.
+    """
+    state, states = False, np.zeros(len(closes), dtype=bool)
+    for frame in range(len(states)):
+        state = bool(closes[frame]) or (state and not opens[frame])
+        states[frame] = state
+    return states
+
+
+def lasting(holds: NDArray[np.bool_], shortest: float) -> list[tuple[int, int]]:
+    """Runs of at least ``shortest`` frames, interruptions of less ignored.
+
+    Args:
+        holds: (n,) whether it holds in each frame.
+        shortest: Frames; what is missing before the first frame and behind the last is no interruption.
+    """
+    held, last = holds.copy(), len(holds)
+    for first, stop in runs(~holds):
+        if stop - first < shortest and first > 0 and stop < last:
+            held[first:stop] = True
+    return [(first, stop) for first, stop in runs(held) if stop - first >= shortest]

@@ -8,10 +8,12 @@ from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
+from manikin.mocap.effector_places import effector_places
 from manikin.mocap.reconstruction import Reconstruction
-from manikin.mocap.recorded_supports import Support
-from manikin.mocap.runs import runs
+from manikin.mocap.recorded_supports import Support, support_between
+from manikin.mocap.runs import lasting, runs
 from manikin.mocap.support_levels import CUTOFF, SHORTEST_REST, track
 from manikin.spatial import FloatArray
 
@@ -26,6 +28,9 @@ BESIDE = 0.05
 RISEN = 0.04
 """Height above that of rest from which the buttocks have left a seat: flesh and cushion give way [m]."""
 
+TILTED = np.deg2rad(60.0)
+"""Angle of the line from pelvis to neck with the vertical from which a person lies or crawls [rad]."""
+
 SHORTEST_SEAT = 0.2
 """Shorter supports of a seat, and shorter interruptions, are not told from noise [s]."""
 
@@ -35,6 +40,8 @@ def seat_supports(
     start: float = 0.0, cutoff: float = CUTOFF,
 ) -> tuple[Support, ...]:  # fmt: skip
     """Times in which a person sits, in order; none for a body without buttocks.
+
+    Who lies does not sit (:mod:`manikin.mocap.ground_supports`).
 
     Args:
         found: At least four instants.
@@ -55,7 +62,7 @@ def seat_supports(
     height = seat.positions[:, 2]
     floor = np.min([end[:, 2] for both in soles.values() for end in both], axis=0)
     beside = np.min([_beyond(com, heel, toes) for heel, toes in soles.values()], axis=0)
-    rests = seat.resting & (height - floor < LOW * standing) & (beside > BESIDE)
+    rests = seat.resting & (height - floor < LOW * standing) & (beside > BESIDE) & ~lying(found)
     seated = np.zeros(len(height), dtype=bool)
     for first, stop in runs(rests):
         if stop - first >= SHORTEST_REST * rate:
@@ -63,20 +70,17 @@ def seat_supports(
             near = height < float(np.median(height[first:stop])) + RISEN
             for begin, end in runs(near):
                 seated[begin:end] |= begin < stop and first < end
-    shortest, last, supports = SHORTEST_SEAT * rate, len(height) - 1, []
-    for first, stop in runs(~seated):
-        if stop - first < shortest and first > 0 and stop <= last:
-            seated[first:stop] = True
-    for first, stop in runs(seated):
-        if stop - first >= shortest:
-            supports.append(
-                Support(
-                    SEAT, start + first / rate, start + min(stop, last) / rate,
-                    np.median(seat.positions[first:stop], axis=0), seat.positions[first],
-                    seat.positions[stop - 1], first > 0, stop <= last,
-                )
-            )  # fmt: skip
-    return tuple(supports)
+    return tuple(
+        support_between(SEAT, seat.positions, frames, rate, start)
+        for frames in lasting(seated, SHORTEST_SEAT * rate)
+    )
+
+
+def lying(found: Reconstruction) -> NDArray[np.bool_]:
+    """(n,) whether the trunk is nearer to lying than to upright, :data:`TILTED` or more."""
+    pelvis, neck = effector_places(found.body, found.q, ("pelvis", "neck"))
+    up = (neck - pelvis)[:, 2] / np.linalg.norm(neck - pelvis, axis=1)
+    return up < np.cos(TILTED)
 
 
 def _places(found: Reconstruction, postures: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -17,6 +17,12 @@ CUTOFF = 5.0
 REST = 0.12
 """Speed below which a point rests [m/s]."""
 
+TOUCH_SHARE = 0.08
+"""Share of the highest speed of its swing below which a point has touched down."""
+
+LIFT_SHARE = 0.24
+"""Share of the highest speed of its swing above which a point has lifted off."""
+
 NEVER_AT_REST = (2.0 * REST, 4.0 * REST, 8.0 * REST)
 """Speeds at which soles are looked at in turn where none ever rests, as in running [m/s]."""
 
@@ -31,6 +37,15 @@ LEVELS_APART = 0.08
 
 LEVEL = 0.04
 """Difference between heights of heel and toes up to which a foot is as level as another time [m]."""
+
+STEEP = 0.4
+"""Rise of a sole over its length from which it stands on its ball, the toes bent: in squatting."""
+
+UPRIGHT = 0.9
+"""Rise of a sole over its length from which it stands on the tips of its toes: in crawling and lying."""
+
+BALL = 0.75
+"""Share of the sole that is behind the ball of the foot."""
 
 SHORTEST_REST = 0.1
 """Time for which a foot rests on a surface that is found from it [s]."""
@@ -55,6 +70,11 @@ class Track:
         """(n,) whether the point is slower than :data:`REST`."""
         return self.speed < REST
 
+    def rests(self, limit: float) -> NDArray[np.bool_]:
+        """(n,) whether the point is slower than a limit [m/s], or than it touches down after its swing."""
+        peaks = self.peak_speed()
+        return self.speed < np.maximum(limit, np.where(np.isfinite(peaks), TOUCH_SHARE * peaks, 0.0))
+
     def peak_speed(self) -> FloatArray:
         """(n,) the highest speed of the swing between two rests [m/s]; infinite where there is none.
 
@@ -70,6 +90,12 @@ class Track:
             usual = float(np.median(whole)) if whole and (first == 0 or stop == last) else 0.0
             peaks[first:stop] = max(peak, usual)
         return peaks
+
+    def slow_and_fast(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(n,) whether the point is slow enough to have touched down, and fast enough to have lifted off."""
+        peaks = self.peak_speed()
+        slow = self.speed < np.maximum(REST, TOUCH_SHARE * peaks)
+        return slow, self.speed > np.maximum(REST, LIFT_SHARE * peaks)
 
     def _shifts(self, first: int, stop: int, peak: float) -> bool:
         way = self.positions[min(stop, len(self.speed) - 1)] - self.positions[max(first - 1, 0)]
@@ -98,7 +124,9 @@ def track(positions: FloatArray, rate: float, cutoff: float = CUTOFF) -> Track:
     return Track(frozen_array(smooth, "track positions"), frozen_array(speed, "track speed"), rate)
 
 
-def surface_heights(feet: Sequence[tuple[Track, Track]]) -> tuple[float, ...]:
+def surface_heights(
+    feet: Sequence[tuple[Track, Track]], lying: NDArray[np.bool_] | None = None
+) -> tuple[float, ...]:
     """Heights of the surfaces on which feet stand, lowest first.
 
     A foot that rests while another one moves carries the body, so what it rests on is a surface; so is the
@@ -109,10 +137,12 @@ def surface_heights(feet: Sequence[tuple[Track, Track]]) -> tuple[float, ...]:
 
     Args:
         feet: Heel and toes of each.
+        lying: (n,) whether the person lies or crawls: such feet lean on anything, and tell the lowest
+            surface only. None for never.
     """
     rests: list[_Rest] = []
     for limit in (REST, *NEVER_AT_REST):
-        rests = rests or _rests(feet, limit)
+        rests = rests or _rests(feet, limit, lying)
     if not rests:
         return ()
     rests.sort(key=lambda rest: rest.height)
@@ -126,36 +156,53 @@ def surface_heights(feet: Sequence[tuple[Track, Track]]) -> tuple[float, ...]:
     return tuple(float(np.median([rest.height for rest in group])) for group in kept)
 
 
-def _rests(feet: Sequence[tuple[Track, Track]], limit: float) -> list["_Rest"]:
+def sole_height(heel: Track, toes: Track) -> FloatArray:
+    """(n,) of the middle of a sole, of the ball of a steep one, or of the lower end of an upright one [m]."""
+    ends = heel.positions[:, 2], toes.positions[:, 2]
+    rise = sole_rise(heel, toes)
+    steep = np.where(rise > UPRIGHT, np.minimum(*ends), (1.0 - BALL) * ends[0] + BALL * ends[1])
+    return np.where(rise > STEEP, steep, 0.5 * (ends[0] + ends[1]))
+
+
+def sole_rise(heel: Track, toes: Track) -> FloatArray:
+    """(n,) difference in height between the ends of a sole over its length."""
+    way = toes.positions - heel.positions
+    return np.abs(way[:, 2]) / np.maximum(np.linalg.norm(way, axis=1), 1e-9)
+
+
+def _rests(
+    feet: Sequence[tuple[Track, Track]], limit: float, lying: NDArray[np.bool_] | None
+) -> list["_Rest"]:
     """Times in which both ends of a sole are slower than a limit [m/s]."""
-    resting = [(heel.speed < limit) & (toes.speed < limit) for heel, toes in feet]
+    resting = [heel.rests(limit) & toes.rests(limit) for heel, toes in feet]
     found = []
     for number, (heel, toes) in enumerate(feet):
         others = [~other for place, other in enumerate(resting) if place != number]
         shortest = SHORTEST_REST * heel.rate
-        height = 0.5 * (heel.positions[:, 2] + toes.positions[:, 2])
+        height = sole_height(heel, toes)
         tilt = toes.positions[:, 2] - heel.positions[:, 2]
         for first, stop in runs(resting[number]):
             if stop - first >= shortest:
-                alone = any(np.sum(moving[first:stop]) >= shortest for moving in others)
                 here = slice(first, stop)
-                found.append(
-                    _Rest(number, float(np.median(height[here])), float(np.median(tilt[here])), alone)
-                )
+                down = lying is not None and bool(np.median(lying[here]))
+                alone = not down and any(np.sum(moving[here]) >= shortest for moving in others)
+                heights = float(np.median(height[here])), float(np.median(tilt[here]))
+                found.append(_Rest(number, *heights, alone, down))
     return found
 
 
 @dataclass(frozen=True)
 class _Rest:
-    """A time for which the sole of a foot rests: its height, its toes above its heel, whether alone."""
+    """A time for which the sole of a foot rests: its height, its toes above its heel, whether alone, whether lying."""
 
     foot: int
     height: float
     tilt: float
     alone: bool
+    lying: bool
 
 
 def _as_level(rest: _Rest, sure: list[_Rest]) -> bool:
     """Whether a foot is as level as where the same one surely stands."""
     tilts = [one.tilt for one in sure if one.foot == rest.foot]
-    return bool(tilts) and abs(rest.tilt - float(np.median(tilts))) < LEVEL
+    return bool(tilts) and not rest.lying and abs(rest.tilt - float(np.median(tilts))) < LEVEL

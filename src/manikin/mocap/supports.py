@@ -7,7 +7,7 @@ fast foot into a slope that is as high as the foot was fast. Surfaces are found 
 (:mod:`manikin.mocap.support_levels`), so stairs need no description.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,26 +15,34 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.errors import InputError
+from manikin.mocap.ground_supports import ground_supports
+from manikin.mocap.hand_supports import hand_supports
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_supports import RecordedSupports, Support
-from manikin.mocap.runs import runs
-from manikin.mocap.seat_supports import seat_supports
-from manikin.mocap.support_levels import CUTOFF, LEVELS_APART, REST, Track, surface_heights, track
+from manikin.mocap.runs import lasting, switch
+from manikin.mocap.seat_supports import lying, seat_supports
+from manikin.mocap.support_levels import (
+    CUTOFF,
+    LEVELS_APART,
+    STEEP,
+    Track,
+    sole_height,
+    sole_rise,
+    surface_heights,
+    track,
+)
 from manikin.spatial import FloatArray
 
 FEET = ("left_foot", "right_foot")
-
-TOUCH_SHARE = 0.08
-"""Share of the highest speed of its swing below which a point has touched down."""
-
-LIFT_SHARE = 0.24
-"""Share of the highest speed of its swing above which a point has lifted off."""
 
 NEAR = 0.05
 """Height above a surface within which a point touches down [m]."""
 
 AWAY = 0.10
 """Distance from a surface beyond which a point has left it [m]. Below it, the sole of a model is stiff."""
+
+NEAR_LYING, AWAY_LYING = 0.13, 0.18
+"""The same where a person crawls or lies, whose feet lean on the ground with any side [m]."""
 
 SHORTEST = 0.08
 """Shorter supports, and shorter interruptions of one, are not told from noise [s]."""
@@ -54,14 +62,21 @@ def supports_of(found: Reconstruction, *, start: float = 0.0, cutoff: float = CU
     soles = sole_points(found)
     rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0]) if len(found.time) > 1 else 1.0
     begin = start + found.first_frame / rate
-    feet = supports_of_points(soles, rate, start=begin, cutoff=cutoff)
-    both = (*feet.supports, *seat_supports(found, soles, rate, start=begin, cutoff=cutoff))
-    return replace(feet, supports=tuple(sorted(both, key=lambda one: (one.start, one.effector))))
+    feet = supports_of_points(soles, rate, start=begin, cutoff=cutoff, lying=lying(found))
+    seats = seat_supports(found, soles, rate, start=begin, cutoff=cutoff)
+    floor = floor_under(soles, feet.surfaces)
+    others = (
+        *seats,
+        *ground_supports(found, floor, rate, start=begin, cutoff=cutoff),
+        *hand_supports(found, floor, seats, rate, start=begin, cutoff=cutoff),
+    )
+    every = (*feet.supports, *others)
+    return replace(feet, supports=tuple(sorted(every, key=lambda one: (one.start, one.effector))))
 
 
 def supports_of_points(
     soles: Mapping[str, tuple[FloatArray, FloatArray]], rate: float, *, start: float = 0.0,
-    cutoff: float = CUTOFF,
+    cutoff: float = CUTOFF, lying: NDArray[np.bool_] | None = None,
 ) -> RecordedSupports:  # fmt: skip
     """Foot supports from heels and toes.
 
@@ -70,6 +85,7 @@ def supports_of_points(
         rate: Frames per second [Hz].
         start: Instant of the first frame [s].
         cutoff: Of the low-pass filter [Hz].
+        lying: (n,) whether the person lies or crawls; None for never.
 
     Raises:
         InputError: If there are too few positions, or the cutoff is too high.
@@ -79,14 +95,18 @@ def supports_of_points(
     }
     frames = min(len(one.speed) for both in tracks.values() for one in both)
     flat = {name: heel.resting & toes.resting for name, (heel, toes) in tracks.items()}
-    surfaces = surface_heights(list(tracks.values()))
+    surfaces = surface_heights(list(tracks.values()), lying)
     levels = np.array(surfaces)
+    down = np.zeros(frames, dtype=bool) if lying is None else lying
+    near, away = np.where(down, NEAR_LYING, NEAR), np.where(down, AWAY_LYING, AWAY)
     supports: list[Support] = []
     for name, both in tracks.items():
         offsets = _offsets(both, flat[name] & ~_others(flat, name), levels)
         if offsets is None:
             offsets = _offsets(both, flat[name], levels) or (0.0, 0.0)
-        touching = [_touching(one, levels + offset) for one, offset in zip(both, offsets, strict=True)]
+        heel, toes = (one.positions[:, 2] - offset for one, offset in zip(both, offsets, strict=True))
+        above = [_height_above(heel, levels), _toes_above(both, toes, levels)]
+        touching = [_touching(one, height, near, away) for one, height in zip(both, above, strict=True)]
         supports += _supports(name, both, np.array(touching), levels, start)
     supports.sort(key=lambda support: (support.start, support.effector))
     return RecordedSupports(tuple(supports), start, start + (frames - 1) / rate, surfaces)
@@ -112,8 +132,20 @@ def sole_points(found: Reconstruction) -> dict[str, tuple[FloatArray, FloatArray
     return {name: (ends[foot, 0], ends[foot, 1]) for foot, name in enumerate(FEET)}
 
 
-def _height(heel: Track, toes: Track) -> FloatArray:
-    return 0.5 * (heel.positions[:, 2] + toes.positions[:, 2])
+def floor_under(
+    soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Sequence[float]
+) -> FloatArray:
+    """(n,) height of the surface under the lower foot [m]; under its sole where no surface is known.
+
+    Args:
+        soles: (n, 3) heel and (n, 3) toes of each foot, by its name [m].
+        surfaces: Heights [m].
+    """
+    lowest = np.min([end[:, 2] for both in soles.values() for end in both], axis=0)
+    if not surfaces:
+        return lowest
+    levels = np.array(surfaces)
+    return levels[np.argmin(np.abs(lowest[:, None] - levels), axis=1)]
 
 
 def _others(flat: Mapping[str, NDArray[np.bool_]], name: str) -> NDArray[np.bool_]:
@@ -129,11 +161,12 @@ def _offsets(
     They are learnt best while the other foot moves: with both on the ground a person may be on the toes.
     None where the foot never stands so.
     """
-    above = _height_above(_height(*points), levels)
-    stands = stands & (np.abs(above) < LEVELS_APART)
+    height = sole_height(*points)
+    above = _height_above(height, levels)
+    stands = stands & (np.abs(above) < LEVELS_APART) & (sole_rise(*points) < STEEP)
     if not stands.any():
         return None
-    under = _height(*points) - above
+    under = height - above
     heel, toes = (float(np.median((point.positions[:, 2] - under)[stands])) for point in points)
     return heel, toes
 
@@ -146,18 +179,17 @@ def _height_above(heights: FloatArray, levels: FloatArray) -> FloatArray:
     return np.take_along_axis(above, np.argmin(np.abs(above), axis=1)[:, None], axis=1)[:, 0]
 
 
-def _touching(one: Track, levels: FloatArray) -> NDArray[np.bool_]:
-    """(n,) whether a point touches one of the levels."""
-    touching = np.zeros(len(one.speed), dtype=bool)
-    height = _height_above(one.positions[:, 2], levels)
-    peaks = one.peak_speed()
-    closes = (one.speed < np.maximum(REST, TOUCH_SHARE * peaks)) & (height > -AWAY) & (height < NEAR)
-    opens = (one.speed > np.maximum(REST, LIFT_SHARE * peaks)) | (np.abs(height) > AWAY)
-    state = False
-    for frame in range(len(touching)):
-        state = bool(closes[frame]) or (state and not opens[frame])
-        touching[frame] = state
-    return touching
+def _toes_above(points: tuple[Track, Track], toes: FloatArray, levels: FloatArray) -> FloatArray:
+    """(n,) from the nearest level, of the toes, or of what a steep sole stands on where that is nearer [m]."""
+    above = _height_above(toes, levels)
+    ball = np.where(sole_rise(*points) > STEEP, _height_above(sole_height(*points), levels), np.inf)
+    return np.where(np.abs(ball) < np.abs(above), ball, above)
+
+
+def _touching(one: Track, height: FloatArray, near: FloatArray, away: FloatArray) -> NDArray[np.bool_]:
+    """(n,) whether a point touches a surface that it is at a height (n,) above [m]."""
+    slow, fast = one.slow_and_fast()
+    return switch(slow & (height > -away) & (height < near), fast | (np.abs(height) > away))
 
 
 def _supports(
@@ -172,15 +204,8 @@ def _supports(
         levels: (k,) heights of the surfaces [m].
         start: Instant of the first frame [s].
     """
-    rate, any_touches = points[0].rate, np.logical_or(*touching)
-    shortest, last = SHORTEST * rate, len(any_touches) - 1
-    for first, stop in runs(~any_touches):
-        if stop - first < shortest and first > 0 and stop <= last:
-            any_touches[first:stop] = True
-    found = []
-    for first, stop in runs(any_touches):
-        if stop - first < shortest:
-            continue
+    rate, last, found = points[0].rate, touching.shape[1] - 1, []
+    for first, stop in lasting(np.logical_or(*touching), SHORTEST * rate):
         place = np.median(np.mean([point.positions[first:stop] for point in points], axis=0), axis=0)
         place[2] = levels[np.argmin(np.abs(levels - place[2]))]
         begins, ends = (points[int(np.argmax(touching[:, frame]))] for frame in (first, stop - 1))
