@@ -19,6 +19,7 @@ from manikin.mocap.read import read_recording
 from manikin.mocap.reconstruct import person_of, reconstruct
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_motion import motion_of, smoothed
+from manikin.mocap.recorded_stances import recorded_schedule
 from manikin.mocap.recorded_supports import RecordedSupports, Support, SupportPhase
 from manikin.mocap.recording import Recording
 from manikin.mocap.subject import Subject
@@ -53,6 +54,7 @@ __all__ = [
     "read_recording",
     "read_trc",
     "reconstruct",
+    "recorded_schedule",
     "smoothed",
     "supports_of",
     "timing_errors",
