@@ -1,4 +1,4 @@
-"""The command line: ``manikin scenarios | run | push | walk | words | view | contact | export | ...``.
+"""The command line: ``manikin scenarios | run | push | walk | words | view | ergonomics | export | ...``.
 
 Exit status: 0 done, 2 bad input (one line on standard error), 3 a run that ended in an
 explained failure, 130 interrupted.  With ``--json`` standard output holds exactly one
@@ -26,6 +26,7 @@ from manikin.commands.console import (
     refuse,
     stdout_kept_clean,
 )
+from manikin.commands.ergonomics import ergonomics
 from manikin.commands.job import print_summary, run_job
 from manikin.commands.library import library
 from manikin.commands.push import push
@@ -177,6 +178,7 @@ def run(
 app.command()(push)
 app.command()(walk)
 app.command()(words)
+app.command()(ergonomics)
 app.add_typer(library, name="library")
 
 

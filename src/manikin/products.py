@@ -1,4 +1,4 @@
-"""What is drawn: figures and the BVH file of a run, the comparison of two, a contact that was found."""
+"""What is drawn: figures and BVH file of a run, the comparison of two, a contact that was found."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -9,12 +9,14 @@ from manikin.atomic import write_text
 from manikin.body import BodyModel
 from manikin.comparison import RunComparison
 from manikin.contact_planning.single_contact import ContactAnswer
+from manikin.ergonomics import Ergonomics
 from manikin.errors import MotionFileError
 from manikin.export import export_motion
 from manikin.figures import (
     ChoicePanel,
     contact_choice_figure,
     equal_paths_figure,
+    ergonomics_figure,
     push_map_figure,
     words_figure,
     write_comparison,
@@ -112,6 +114,41 @@ def write_contact_figure(body: BodyModel, scene: Scene, answer: ContactAnswer, p
     figure = contact_choice_figure(body, scene, panels, f"Contact of {readable(result.limb)}")
     save_figure(figure, file)
     return file
+
+
+def write_ergonomics_figure(found: Ergonomics, path: str | Path, title: str = "Ergonomics") -> Path:
+    """Draw the scores and torque shares of a motion.
+
+    Args:
+        found: Of the motion.
+        path: PNG file.
+        title: Of the figure.
+
+    Raises:
+        FigureError: If there is nothing to draw.
+        MotionFileError: If the file cannot be written.
+    """
+    save_figure(ergonomics_figure(found, title), Path(path))
+    return Path(path)
+
+
+def write_ergonomics_csv(found: Ergonomics, path: str | Path) -> Path:
+    """Write the time series of a motion's ergonomics as comma-separated text.
+
+    Args:
+        found: Of the motion.
+        path: Of the file.
+
+    Raises:
+        MotionFileError: If the file cannot be written.
+    """
+    try:
+        write_text(path, found.csv())
+    except OSError as error:
+        raise MotionFileError(
+            f"{path}: cannot be written ({error.strerror}); valid: a file in a writable folder"
+        ) from None
+    return Path(path)
 
 
 def write_push_map_figure(maps: Sequence[PushMap], trials: PushTrials, folder: Path) -> Path:

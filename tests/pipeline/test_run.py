@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import manikin
+from manikin.ergonomics import lowest_margin
 from manikin.motion.file import read_motions
 from manikin.pipeline import run
 from manikin.scenarios import load_scenario
@@ -88,6 +89,20 @@ def test_the_motion_file_holds_both_motions(platform):
     assert np.array_equal(content.planned.q, platform.planned.q)
     assert np.array_equal(content.executed.margin, platform.executed.margin)
     assert content.body.mass == pytest.approx(79.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("which", ["planned", "executed"])
+def test_the_lowest_margin_is_explained_as_in_the_summary(platform, which):
+    """Found again from the file, by the planned contacts and from the effectors alone (within 0.5 N.m)."""
+    content = read_motions(platform.directory / "motion.h5")
+    motion = content.motions[which]
+    stage = "wholebody" if which == "planned" else "execution"
+    for schedule in (content.schedule, None):
+        found = lowest_margin(content.body, motion, schedule)
+        assert found.value == pytest.approx(platform.summary[stage]["min_margin"], abs=1e-9)
+        assert found.reproduced
+        assert found.limiting.description == platform.summary["centroidal"]["limiting_contact"]
 
 
 @pytest.mark.slow

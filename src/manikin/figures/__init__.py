@@ -8,6 +8,7 @@ from manikin.figures.compare_timing import compare_timing_figure
 from manikin.figures.contact_choice import ChoicePanel, contact_choice_figure
 from manikin.figures.contacts import contacts_figure
 from manikin.figures.effectors import effectors_figure
+from manikin.figures.ergonomics import ergonomics_figure
 from manikin.figures.flights import flights_figure
 from manikin.figures.footprints import footprint_figure
 from manikin.figures.margin import margin_figure
@@ -38,6 +39,7 @@ __all__ = [
     "contacts_figure",
     "effectors_figure",
     "equal_paths_figure",
+    "ergonomics_figure",
     "flights_figure",
     "footprint_figure",
     "holonomic_ends_figure",

@@ -1,0 +1,39 @@
+"""Ergonomics of any motion: RULA and REBA, torques against strength, effort, the lowest margin."""
+
+from manikin.ergonomics.assessment import Assessment, PosturalAssessment, assess_posture
+from manikin.ergonomics.bearing import Bearing, bearing_of
+from manikin.ergonomics.circumstances import Circumstances
+from manikin.ergonomics.effort import CumulativeEffort, cumulative_effort
+from manikin.ergonomics.margin import LowestMargin, lowest_margin
+from manikin.ergonomics.postural_angles import ArmAngles, PosturalAngles, postural_angles, upright_neck
+from manikin.ergonomics.reba import RebaSteps, reba_action_level, reba_score
+from manikin.ergonomics.report import Ergonomics, ergonomics_of
+from manikin.ergonomics.rula import RulaSteps, rula_action_level, rula_score
+from manikin.ergonomics.strength import JointStrength, joint_strength
+
+__all__ = [
+    "ArmAngles",
+    "Assessment",
+    "Bearing",
+    "Circumstances",
+    "CumulativeEffort",
+    "Ergonomics",
+    "JointStrength",
+    "LowestMargin",
+    "PosturalAngles",
+    "PosturalAssessment",
+    "RebaSteps",
+    "RulaSteps",
+    "assess_posture",
+    "bearing_of",
+    "cumulative_effort",
+    "ergonomics_of",
+    "joint_strength",
+    "lowest_margin",
+    "postural_angles",
+    "reba_action_level",
+    "reba_score",
+    "rula_action_level",
+    "rula_score",
+    "upright_neck",
+]

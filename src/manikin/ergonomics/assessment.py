@@ -1,0 +1,153 @@
+"""Scores of RULA or REBA over a motion."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.body import BodyModel
+from manikin.ergonomics.bearing import Bearing, bearing_of
+from manikin.ergonomics.circumstances import Circumstances
+from manikin.ergonomics.held import held
+from manikin.ergonomics.parts import SIDES
+from manikin.ergonomics.postural_angles import PosturalAngles, postural_angles
+from manikin.ergonomics.reba import (
+    RISKS,
+    reba_action_level,
+    reba_coupling,
+    reba_load,
+    reba_score,
+    reba_steps,
+)
+from manikin.ergonomics.rula import ACTIONS, rula_action_level, rula_force, rula_score, rula_steps
+from manikin.ergonomics.strength import durations
+from manikin.ergonomics.tables import Scores
+from manikin.motion import Motion
+from manikin.spatial import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """One score over time.
+
+    Attributes:
+        method: ``"RULA"`` or ``"REBA"``.
+        time: (n,) [s].
+        sides: (n,) scores of the left and the right side.
+        steps: Step scores (n,) of each side.
+        levels: Meaning of the action levels, the lowest first.
+        level_of: Action level of scores.
+        static_known: Whether the motion was long enough to tell what is held for a minute.
+    """
+
+    method: str
+    time: FloatArray
+    sides: Mapping[str, Scores]
+    steps: Mapping[str, Any]
+    levels: Mapping[int, str]
+    level_of: Callable[[ArrayLike], Scores]
+    static_known: bool
+
+    @property
+    def score(self) -> Scores:
+        """(n,) of the worse side."""
+        return np.maximum(self.sides["left"], self.sides["right"])
+
+    @property
+    def level(self) -> Scores:
+        """(n,) action level of the worse side."""
+        return self.level_of(self.score)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values: the worst and mean score, the time at each level, and the worst posture's steps."""
+        score, weight = self.score, durations(self.time)
+        worst = int(score.argmax())
+        side = max(SIDES, key=lambda name: self.sides[name][worst])
+        steps = self.steps[side]
+        share = weight / weight.sum()
+        return {
+            "max": int(score.max()),
+            "max_at_s": float(self.time[worst]),
+            "max_side": side,
+            "max_steps": {name: int(values[worst]) for name, values in vars(steps).items()},
+            "mean": float(share @ score),
+            "left_max": int(self.sides["left"].max()),
+            "right_max": int(self.sides["right"].max()),
+            "action_level": int(self.level.max()),
+            "action": self.levels[int(self.level.max())],
+            "share_of_time": {
+                str(level): float(share[self.level == level].sum()) for level in self.levels
+            },
+            "static_known": self.static_known,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class PosturalAssessment:
+    """What the posture alone tells.
+
+    Attributes:
+        angles: Of each frame.
+        bearing: What carries the weight.
+        rula: Scores 1 to 7.
+        reba: Scores 1 to 15.
+    """
+
+    angles: PosturalAngles
+    bearing: Bearing
+    rula: Assessment
+    reba: Assessment
+
+
+def assess_posture(body: BodyModel, motion: Motion, given: Circumstances | None = None) -> PosturalAssessment:
+    """Score every frame by RULA and by REBA, both sides of the body.
+
+    Static muscle work is found where the motion lasts longer than a minute: of an arm, and of trunk, neck and
+    legs, each by itself. Of a shorter motion :attr:`Circumstances.static` says it.
+
+    Args:
+        body: A human.
+        motion: Of this body.
+        given: What the motion does not tell.
+
+    Raises:
+        BodyError: If the body is no human.
+    """
+    circumstances = given or Circumstances()
+    angles = postural_angles(body, motion.q, np.deg2rad(circumstances.neck_upright_deg))
+    bearing = bearing_of(body, motion)
+    body_held = held(motion.time, angles.trunk_and_legs())
+    arms_held = {side: held(motion.time, angles.arm(side)) for side in SIDES}
+    known = body_held is not None
+    static = {
+        side: (_or(body_held, circumstances.static), _or(arms_held[side], circumstances.static))
+        for side in SIDES
+    }
+    in_rula, in_reba = rula_steps(angles, bearing, circumstances), reba_steps(angles, bearing, circumstances)
+    rula, reba = {}, {}
+    for side, (trunk, arm) in static.items():
+        rula[side] = rula_score(
+            in_rula[side],
+            muscle_arm=arm | circumstances.repeated,
+            muscle_body=trunk | circumstances.repeated,
+            force=rula_force(circumstances.load_kg, circumstances.load_pattern),
+        )
+        reba[side] = reba_score(
+            in_reba[side],
+            load=reba_load(circumstances.load_kg, circumstances.load_pattern),
+            coupling=reba_coupling(circumstances.coupling),
+            activity=(trunk | arm).astype(int) + circumstances.repeated + circumstances.rapid,
+        )
+    time = motion.time
+    return PosturalAssessment(
+        angles, bearing,
+        Assessment("RULA", time, rula, in_rula, ACTIONS, rula_action_level, known),
+        Assessment("REBA", time, reba, in_reba, RISKS, reba_action_level, known),
+    )  # fmt: skip
+
+
+def _or(found: np.ndarray | None, otherwise: bool) -> np.ndarray:
+    """What was found, or what was given where nothing could be."""
+    return np.asarray(otherwise) if found is None else found

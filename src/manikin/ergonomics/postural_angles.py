@@ -1,0 +1,236 @@
+"""The angles of a posture that RULA and REBA ask for, for all frames at once.
+
+An observer sees these angles from the side, from behind and from above; here each is defined from the segment
+frames (x forward, y left, z up). All are 0 in the zero posture: upright, arms hanging, palms inward.
+
+* trunk: the line from between the hips to the base of the neck, against the vertical, in the vertical planes
+  along and across the pelvis' heading; its twist is that of the segment with the shoulders on the pelvis;
+* neck: the head's axis in the frame of the segment with the shoulders;
+* upper arm, elbow, forearm: directions of the segments in the frame of the segment with the shoulders;
+* wrist: the forearm's direction in the frame of the hand; twist of the forearm against the upper arm.
+
+Twists are what a rotation is left with when the shortest swing of the long axis is taken away.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.ergonomics.parts import (
+    SIDES,
+    Parts,
+    joint_rotation,
+    parts_of,
+    placements,
+    root_rotation,
+    twist_about_z,
+)
+from manikin.errors import BodyError
+from manikin.spatial import FloatArray
+
+SIDEWAYS = np.deg2rad(45.0)
+"""An upper arm lifted further sideways than this has no angle in the sagittal plane worth the name; ours."""
+
+UPRIGHT = np.deg2rad(10.0)
+"""Lean of the trunk up to which a neck is taken for upright; ours."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArmAngles:
+    """One arm, (n,) each.
+
+    Attributes:
+        flexion: Of the upper arm in the sagittal plane of the chest, backwards negative [rad].
+        abduction: Of the upper arm out of that plane, outward positive [rad].
+        elevation: Between the upper arm and the chest's downward axis [rad].
+        from_vertical: Between the upper arm and the world's downward vertical [rad].
+        elbow: Flexion, 0 for a straight arm [rad].
+        outward: Of the forearm out of the sagittal plane of the chest, outward positive [rad].
+        aside: Of the wrist from the middle plane of the chest, negative across it [m].
+        wrist_flexion: Towards the palm [rad].
+        wrist_deviation: Towards the thumb [rad].
+        wrist_twist: Of the forearm from the middle, pronation positive [rad].
+    """
+
+    flexion: FloatArray
+    abduction: FloatArray
+    elevation: FloatArray
+    from_vertical: FloatArray
+    elbow: FloatArray
+    outward: FloatArray
+    aside: FloatArray
+    wrist_flexion: FloatArray
+    wrist_deviation: FloatArray
+    wrist_twist: FloatArray
+
+    @property
+    def raised(self) -> FloatArray:
+        """(n,) angle by which an upper arm is scored, backwards negative [rad].
+
+        Flexion in the sagittal plane, as published; of an arm lifted more than 45 degrees sideways that is
+        not defined, and its elevation is taken (our choice).
+        """
+        return np.where(np.abs(self.abduction) > SIDEWAYS, self.elevation, self.flexion)
+
+
+@dataclass(frozen=True, eq=False)
+class PosturalAngles:
+    """Angles of a motion, (n,) each.
+
+    Attributes:
+        trunk_flexion: Forward positive [rad].
+        trunk_side_bend: To the left positive [rad].
+        trunk_twist: To the left positive [rad].
+        neck_flexion: Forward positive, of the head against the chest [rad].
+        neck_side_bend: To the left positive [rad].
+        neck_twist: To the left positive [rad].
+        arms: By side.
+        knees: Flexion by side [rad].
+    """
+
+    trunk_flexion: FloatArray
+    trunk_side_bend: FloatArray
+    trunk_twist: FloatArray
+    neck_flexion: FloatArray
+    neck_side_bend: FloatArray
+    neck_twist: FloatArray
+    arms: Mapping[str, ArmAngles]
+    knees: Mapping[str, FloatArray]
+
+    def arm(self, side: str) -> FloatArray:
+        """(n, 7) what an arm does [rad]: flexion, abduction, elbow, outward, and the wrist's three."""
+        arm = self.arms[side]
+        columns = (arm.flexion, arm.abduction, arm.elbow, arm.outward)
+        return np.column_stack([*columns, arm.wrist_flexion, arm.wrist_deviation, arm.wrist_twist])
+
+    def trunk_and_legs(self) -> FloatArray:
+        """(n, 8) what trunk, neck and knees do [rad]."""
+        trunk = (self.trunk_flexion, self.trunk_side_bend, self.trunk_twist)
+        neck = (self.neck_flexion, self.neck_side_bend, self.neck_twist)
+        return np.column_stack([*trunk, *neck, *(self.knees[side] for side in SIDES)])
+
+    def columns_deg(self) -> dict[str, FloatArray]:
+        """Every angle in degrees by its name, ``left_arm_flexion_deg`` and so on."""
+        found = {
+            f"{f.name}_deg": np.rad2deg(getattr(self, f.name))
+            for f in fields(self)
+            if f.name not in ("arms", "knees")
+        }
+        for side in SIDES:
+            found |= {
+                f"{side}_arm_{f.name}_deg": np.rad2deg(getattr(self.arms[side], f.name))
+                for f in fields(ArmAngles)
+                if f.name != "aside"
+            }
+            found[f"{side}_knee_flexion_deg"] = np.rad2deg(self.knees[side])
+        return found
+
+
+def postural_angles(body: BodyModel, q: FloatArray, neck_upright: float = 0.0) -> PosturalAngles:
+    """Measure the angles of postures.
+
+    Args:
+        body: A human: two arms and two legs of three segments, and a head.
+        q: (n, nq) configurations.
+        neck_upright: Flexion of an upright neck, from which that of the neck is counted [rad]. 0 for what
+            we plan; of recordings see :func:`upright_neck`.
+
+    Raises:
+        BodyError: If the body is no human, or the configurations are of another body.
+    """
+    q = np.asarray(q, dtype=np.float64)
+    if q.ndim != 2 or q.shape[1] != body.nq:
+        raise BodyError(f"configurations have shape {q.shape}; valid: (n, {body.nq})")
+    parts = parts_of(body)
+    pelvis = root_rotation(q)
+    rotations, places = placements(body, q, parts.trunk[1:], pelvis, np.zeros(3))
+    chest = rotations[-1] if rotations else pelvis
+    chest_place = places[-1] if places else np.zeros((len(q), 3))
+    base_of_neck = chest_place + chest @ body.segment(parts.neck[0]).origin
+    forward, aside = _bend(_upright_axes(pelvis), base_of_neck)
+    neck, _ = placements(body, q, parts.neck, np.broadcast_to(np.eye(3), pelvis.shape), np.zeros(3))
+    head = neck[-1]
+    return PosturalAngles(
+        trunk_flexion=forward,
+        trunk_side_bend=aside,
+        trunk_twist=twist_about_z(np.swapaxes(pelvis, 1, 2) @ chest),
+        neck_flexion=np.arctan2(head[:, 0, 2], head[:, 2, 2]) - neck_upright,
+        neck_side_bend=_arcsin(head[:, 1, 2]),
+        neck_twist=twist_about_z(head),
+        arms={side: _arm(body, q, parts, side, chest) for side in SIDES},
+        knees={side: _knee(body, q, parts.legs[side][1]) for side in SIDES},
+    )
+
+
+def upright_neck(body: BodyModel, q: FloatArray) -> float | None:
+    """Flexion of the neck of somebody who stands or walks upright, the zero of a recording's neck [rad].
+
+    The line from the base of a real neck to the top of the head leans forward (by 16 to 23 degrees in the
+    recordings we looked at), while the neck of our human is upright at 0. So where recorded points are
+    followed an upright neck has that angle. It is taken from the recording itself: the median over the frames
+    whose trunk is within 10 degrees of the vertical, or None of a recording without such a frame. Of somebody
+    who looks down all the time that is not noticed.
+
+    Args:
+        body: A human.
+        q: (n, nq) configurations.
+
+    Raises:
+        BodyError: As :func:`postural_angles`.
+    """
+    angles = postural_angles(body, q)
+    upright = np.hypot(angles.trunk_flexion, angles.trunk_side_bend) <= UPRIGHT
+    return float(np.median(angles.neck_flexion[upright])) if upright.any() else None
+
+
+def _upright_axes(pelvis: FloatArray) -> FloatArray:
+    """(n, 3, 3) forward, left and up as rows, where the pelvis' left is made level."""
+    left = pelvis[:, :, 1] * [1.0, 1.0, 0.0]
+    left = left / np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-12)
+    up = np.broadcast_to([0.0, 0.0, 1.0], left.shape)
+    return np.stack([np.cross(left, up), left, up], axis=1)
+
+
+def _bend(axes: FloatArray, line: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Flexion and side bend of a line (n, 3) in axes given as rows [rad]."""
+    x, y, z = np.einsum("nij,nj->in", axes, line / np.linalg.norm(line, axis=1, keepdims=True))
+    return np.arctan2(x, z), _arcsin(y)
+
+
+def _arm(body: BodyModel, q: FloatArray, parts: Parts, side: str, chest: FloatArray) -> ArmAngles:
+    outward = 1.0 if side == "left" else -1.0
+    still = np.broadcast_to(np.eye(3), (len(q), 3, 3))
+    rotations, places = placements(body, q, parts.arms[side], still, np.zeros(3))
+    upper, fore = -rotations[0][:, :, 2], -rotations[1][:, :, 2]  # limbs hang along -z
+    vertical = -np.einsum("nj,nj->n", chest[:, 2, :], upper)
+    in_upper_arm = np.swapaxes(rotations[0], 1, 2) @ rotations[1]
+    wrist = np.swapaxes(rotations[1], 1, 2) @ rotations[2]
+    in_hand = wrist[:, 2, :]  # the forearm's long axis, free of a turn about it
+    turn = twist_about_z(in_upper_arm) + np.arctan2(-wrist[:, 0, 1], wrist[:, 1, 1])
+    return ArmAngles(
+        flexion=np.arctan2(upper[:, 0], -upper[:, 2]),
+        abduction=outward * _arcsin(upper[:, 1]),
+        elevation=_arccos(-upper[:, 2]),
+        from_vertical=_arccos(vertical),
+        elbow=_arccos(np.einsum("ni,ni->n", upper, fore)),
+        outward=outward * _arcsin(fore[:, 1]),
+        aside=outward * places[2][:, 1],
+        wrist_flexion=-outward * _arcsin(in_hand[:, 1]),
+        wrist_deviation=np.arctan2(in_hand[:, 0], in_hand[:, 2]),
+        wrist_twist=-outward * turn,
+    )
+
+
+def _knee(body: BodyModel, q: FloatArray, shank: str) -> FloatArray:
+    """Angle between thigh and shank [rad]."""
+    return _arccos(joint_rotation(body, q, shank)[:, 2, 2])
+
+
+def _arcsin(value: FloatArray) -> FloatArray:
+    return np.arcsin(np.clip(value, -1.0, 1.0))
+
+
+def _arccos(value: FloatArray) -> FloatArray:
+    return np.arccos(np.clip(value, -1.0, 1.0))
