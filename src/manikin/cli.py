@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import typer
 
+from manikin.commands.analyze import analyze
 from manikin.commands.console import (
     BAD_INPUT,
     DONE,
@@ -175,6 +176,7 @@ def run(
     return DONE if summary["succeeded"] else FAILED
 
 
+app.command()(analyze)
 app.command()(push)
 app.command()(walk)
 app.command()(words)

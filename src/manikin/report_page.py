@@ -85,9 +85,13 @@ class ReportPage:
 def _cell(value: Any, links: Mapping[str, str]) -> str:
     if isinstance(value, bool) or value is None or isinstance(value, str):
         text = "-" if value is None else escape(str(value))
-        return f'<td><a href="{escape(links[value])}">{text}</a></td>' if value in links else f"<td>{text}</td>"
+        return (
+            f'<td><a href="{escape(links[value])}">{text}</a></td>' if value in links else f"<td>{text}</td>"
+        )
     if isinstance(value, float):
         return f'<td class="number">{value:.4g}</td>'
     if isinstance(value, int):
         return f'<td class="number">{value}</td>'
-    return f"<td>{escape(', '.join(f'{one:.4g}' if isinstance(one, float) else str(one) for one in value))}</td>"
+    return (
+        f"<td>{escape(', '.join(f'{one:.4g}' if isinstance(one, float) else str(one) for one in value))}</td>"
+    )

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from manikin.analysis.on_plates import PlateReport
 from manikin.balance.limiting import LimitingConstraint
 from manikin.body import BodyModel
 from manikin.ergonomics import Ergonomics
-from manikin.errors import InputError
 from manikin.locomotion.segmentation import PathSegments
-from manikin.analysis.on_plates import PlateReport
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_supports import RecordedSupports, SupportPhase
 from manikin.motion import Motion

@@ -10,8 +10,8 @@ from manikin.analysis.analysis import Analysis
 from manikin.analysis.on_plates import PlateReport, measured_mass, plate_report
 from manikin.analysis.remarks import remarks_on
 from manikin.analysis.walking import walked_segments
-from manikin.errors import InputError
 from manikin.ergonomics import Circumstances, ergonomics_of, upright_neck
+from manikin.errors import InputError
 from manikin.mocap.markers import MarkerRecording
 from manikin.mocap.read import read_recording
 from manikin.mocap.reconstruct import reconstruct

@@ -7,16 +7,18 @@ from typing import Annotated, Any
 
 import typer
 
-from manikin.commands.console import BAD_INPUT, DONE, JsonOption, complain, print_json, print_table, refuse
-from manikin.commands.console import stdout_kept_clean
+from manikin.commands.console import (
+    BAD_INPUT,
+    DONE,
+    JsonOption,
+    complain,
+    print_json,
+    print_table,
+    refuse,
+    stdout_kept_clean,
+)
 from manikin.errors import InputError
 from manikin.interruption import Interruption
-
-SHOWN = (
-    "duration_s", "frames", "sequence", "phase_durations_s", "com_height_min_m", "reconstruction_residual_m",
-    "margin", "force_plates", "ergonomics",
-)  # fmt: skip
-"""What people are told about a recording; everything is in the JSON."""
 
 
 def analyze(
@@ -34,7 +36,8 @@ def analyze(
         typer.Option(metavar="FIRST STOP", help="Frames from FIRST up to, not with, STOP; counted from 0."),
     ] = None,
     mass: Annotated[
-        float | None, typer.Option(metavar="KG", help="Mass of the person. Default: the file's, or the plates'.")
+        float | None,
+        typer.Option(metavar="KG", help="Mass of the person. Default: the file's, or the plates'."),
     ] = None,
     sex: Annotated[str, typer.Option(metavar="male|female", help="Table of segment masses.")] = "male",
     friction: Annotated[float, typer.Option(metavar="MU", help="Of soles on the ground.")] = 0.8,
@@ -74,11 +77,47 @@ def _one(path: Path, directory: Path | None, options: Any, *, draw: bool, json: 
     if json:
         print_json(summary)
         return DONE
-    print_table({key: summary[key] for key in SHOWN})
+    print_table(_shown(summary))
     for remark in summary["remarks"]:
         typer.echo(f"note: {remark}", err=True)
     typer.echo(f"report in {directory}/report.html; see the motion with: manikin view {directory}", err=True)
     return DONE
+
+
+def _shown(summary: dict[str, Any]) -> dict[str, Any]:
+    """What people are told about a recording; everything is in the JSON."""
+    margin, residual, effort = summary["margin"], summary["reconstruction_residual_m"], summary["ergonomics"]
+    shown = {
+        "duration": f"{summary['duration_s']:.2f} s, {summary['frames']} frames",
+        "person": f"{summary['stature_m']:.2f} m, {summary['mass_kg']:.1f} kg",
+        "residual": f"{1e3 * residual['median']:.1f} mm (median), {1e3 * residual['max']:.1f} mm (largest)",
+        "touch-downs": ", ".join(summary["sequence"]) or "none",
+        "phases [s]": " ".join(f"{duration:.2f}" for duration in summary["phase_durations_s"]),
+        "lowest CoM": f"{summary['com_height_min_m']:.3f} m at {summary['com_height_min_at_s']:.2f} s",
+    }
+    if margin["min"] is not None:
+        shown["lowest margin"] = (
+            f"{margin['min']:.1f} N.m at {margin['at_s']:.2f} s ({margin['limiting'] or 'in flight'}), "
+            f"positive in {100.0 * margin['share_positive']:.1f} % of the frames"
+        )
+    for name in ("rula", "reba"):
+        if effort[name] is not None:
+            one = effort[name]
+            shown[name.upper()] = f"{one['max']} at {one['max_at_s']:.2f} s, {one['mean']:.1f} on average"
+    if effort["strength"] is not None:
+        one = effort["strength"]
+        shown["largest torque"] = (
+            f"{100.0 * one['max_share']:.0f} % of strength, {one['max_joint']} at {one['max_at_s']:.2f} s"
+        )
+    plates = summary["force_plates"]
+    if plates is not None and plates["timing_median_s"] is not None:
+        shown["plates: instants"] = f"{1e3 * plates['timing_median_s']:.0f} ms (median of {plates['events']})"
+    if plates is not None and plates["cop_rms_m"] is not None:
+        shown["plates: forces"] = (
+            f"vertical {100.0 * plates['vertical_rms_body_weight']:.1f} % of body weight, "
+            f"CoP {1e3 * plates['cop_rms_m']:.0f} mm (RMS)"
+        )
+    return shown
 
 
 def _several(

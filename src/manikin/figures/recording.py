@@ -1,11 +1,12 @@
 """A recorded person on one sheet: postures, supports, forces, balance, height, joint scores."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from manikin.analysis import Analysis
 from manikin.figures.style import COLOURS, colours_of, dress, legend_above, new_grid, readable
@@ -107,7 +108,9 @@ def _forces(axes: Axes, analysis: "Analysis") -> None:
 
 def _margins(axes: Axes, analysis: "Analysis") -> None:
     axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
-    axes.plot(analysis.time, analysis.point_mass_margin, color=COLOURS["soft"], linewidth=1.0, label="point mass")
+    axes.plot(
+        analysis.time, analysis.point_mass_margin, color=COLOURS["soft"], linewidth=1.0, label="point mass"
+    )
     axes.plot(analysis.time, analysis.motion.margin, color=COLOURS["recorded"], label="whole body")
     known = analysis.motion.margin[np.isfinite(analysis.motion.margin)]
     if known.size:
