@@ -48,7 +48,7 @@ Scores, shares and margins of recordings and of our own executed and planned mot
 * *Time*: per frame, of everything in the report; reading and reconstruction are not in it.
 * Recordings have neither torques nor margins here: both need contacts and inverse dynamics.
 * Feet are on the ground by their heights where a recording is concerned. On steps that is wrong, and the legs
-  score as if they stood on one foot; and a seat is not known, so that the bent knees of who sits count in REBA.
+  score as if they stood on one foot; and no seat is known, so that bent knees of who sits count in REBA.
 * RULA has no word for walking: on one foot the legs are not evenly loaded, which alone makes its score 3.
 
 ## Recordings
