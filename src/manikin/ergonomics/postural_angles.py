@@ -167,8 +167,8 @@ def postural_angles(body: BodyModel, q: FloatArray, neck_upright: float = 0.0) -
 def upright_neck(body: BodyModel, q: FloatArray) -> float | None:
     """Flexion of the neck of somebody who stands or walks upright, the zero of a recording's neck [rad].
 
-    The line from the base of a real neck to the top of the head leans forward (by 16 to 23 degrees in the
-    recordings we looked at), while the neck of our human is upright at 0. So where recorded points are
+    The line from the base of a real neck to the top of the head leans forward (by 10 to 23 degrees in the
+    skeletons we looked at), while the neck of our human is upright at 0. So where recorded points are
     followed an upright neck has that angle. It is taken from the recording itself: the median over the frames
     whose trunk is within 10 degrees of the vertical, or None of a recording without such a frame. Of somebody
     who looks down all the time that is not noticed.
