@@ -71,6 +71,8 @@ def test_the_walk_to_the_platform_goes_on_without_a_seam():
         ("platform", "walking={}", "walking.start"),
         ("stroll", "walking.start={at: [0, 0]}", "walking.start"),
         ("stroll", "walking.via=[{at: [1, 0]}]", "walking.via"),
+        ("stroll", "walking.wait_s=2.0", "walking.wait_s is 2 in a planned walk; valid there: leave it out"),
+        ("walk-and-platform", "walking.wait_s=0.5", "walking.wait_s is 0.5"),
         ("stroll", "contacts={}", "contacts"),
         ("walk-and-platform", "walking.start.at=[0.0, 0.0]", "already is"),
         ("walk-and-platform", "supports.phases.0.left_foot=null", "left_foot"),

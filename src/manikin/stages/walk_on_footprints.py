@@ -6,6 +6,7 @@ import numpy as np
 
 from manikin.errors import InputError
 from manikin.locomotion import Footprints, StepRule, place_footprints
+from manikin.locomotion.footprints import FEET
 from manikin.scenarios import Scenario
 from manikin.scenarios.sequence import flat_sequence
 from manikin.scenarios.walked import walk_before, walking_supports
@@ -13,8 +14,6 @@ from manikin.spatial import FloatArray
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report
 from manikin.stages.walking import STAGE, end_of, keep_paths, path_block, place_of, plan_walks
-
-FEET = ("left_foot", "right_foot")
 
 
 def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None:
