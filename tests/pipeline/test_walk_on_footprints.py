@@ -73,6 +73,8 @@ def test_the_walk_to_the_platform_goes_on_without_a_seam():
         ("stroll", "walking.via=[{at: [1, 0]}]", "walking.via"),
         ("stroll", "walking.wait_s=2.0", "walking.wait_s is 2 in a planned walk; valid there: leave it out"),
         ("walk-and-platform", "walking.wait_s=0.5", "walking.wait_s is 0.5"),
+        ("goal-left", "walking.footprints=library", "walking.footprints is library"),
+        ("walk-and-platform", "walking.footprints=library", "walking.footprints is library"),
         ("stroll", "contacts={}", "contacts"),
         ("walk-and-platform", "walking.start.at=[0.0, 0.0]", "already is"),
         ("walk-and-platform", "supports.phases.0.left_foot=null", "left_foot"),

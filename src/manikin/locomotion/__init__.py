@@ -39,6 +39,7 @@ from manikin.locomotion.segmentation import (
 from manikin.locomotion.shoulders import ShoulderPaths
 from manikin.locomotion.stepper import StepRule, place_footprints
 from manikin.locomotion.targets import START, TEST_TARGETS, experiment_targets
+from manikin.locomotion.walked_footprints import walked_footprints
 from manikin.locomotion.zone import HolonomicZone, holonomic_zone
 
 __all__ = [
@@ -91,6 +92,7 @@ __all__ = [
     "segment_path",
     "walk_along",
     "walked",
+    "walked_footprints",
     "walking_path",
     "walking_paths",
     "walking_route",

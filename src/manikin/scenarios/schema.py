@@ -203,6 +203,12 @@ class ScenarioFile(Section):
                 if value := getattr(self.walking, key):
                     given = f"is {value:g}" if key == "wait_s" else "are given"
                     raise refuse(f"walking.{key}", f"{given} in a planned walk; valid there: leave it out")
+        if self.walking.footprints == "library" and (
+            self.supports is not None or self.walking.whole_body != "planned"
+        ):
+            raise refuse(
+                "walking.footprints", "is library; valid: in a planned walk (whole_body) without supports"
+            )
         if self.supports is not None:
             return
         if self.task.act is not None:

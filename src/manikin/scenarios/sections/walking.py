@@ -48,6 +48,11 @@ class WalkingSection(Section):
         description="recorded: as recorded people walk, along the path; planned: on footprints along the "
         "path, balanced and executed in the physics engine",
     )
+    footprints: Literal["stepper", "library"] = Field(
+        default="stepper",
+        description="of a planned walk from start to goal: stepper, by rules along the path; library, where "
+        "recorded people's feet stand on the same path, and no faster than they go",
+    )
     start: StandSection | None = Field(
         default=None,
         description="with supports: where the body walks from, to the feet of their first phase; the plan "
