@@ -12,6 +12,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from acknowledgements import THANKS
 from scipy.optimize import minimize_scalar
 from scipy.stats import binomtest
 
@@ -104,19 +105,14 @@ LIMITS = """
 
 * The fit has more than one optimum, as paths leap from one way to another when weights change; intervals
   hold about each. How far the lateral weight is above the forward one differs between them.
-* Turns alone and the other walks ask for different weights: one criterion for both is a compromise.
+* Turns alone and the other walks ask for different weights: one criterion for both is a compromise. What
+  either predicts of goals at rest: [holonomic, nonholonomic, holonomic](patterns.md), where the identified
+  weights are options, `recorded` and `recorded-turns`.
 * Nobody in these recordings was asked to walk to a target; the end of a window is taken for the goal. The
   weight of looking at the goal is told least.
 * Long walks at an even speed are not optimal under (5.6) for any weights: it pays to speed up and to slow
   down again.
 
-"""
-THANKS = """
-## Acknowledgements
-
-The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with funding from
-NSF EIA-0196217. Motion capture data: ACCAD / The Ohio State University, Open Motion Project, CC BY 3.0
-Unported.
 """
 
 

@@ -7,11 +7,12 @@ with a class each) and, in ``mocap``, recordings of the CMU Graphics Lab and of 
 import csv
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+from acknowledgements import THANKS
 from numpy.typing import NDArray
 
 from manikin.locomotion import (
@@ -58,12 +59,12 @@ plus the forward speed of the middle; drifting aside by more than tan {tolerance
 holonomic. *Left*, *right*: share of the frames in which that shoulder goes ahead within the tolerance.
 
 """
-THANKS = """
-## Acknowledgements
-
-The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with funding from
-NSF EIA-0196217. Motion capture data: ACCAD / The Ohio State University, Open Motion Project, CC BY 3.0
-Unported.
+LINES = """
+Function 1 has no case of its own for turns on the spot. Figure 4.3 (d) calls both shoulders nonholonomic
+then, also the one that goes back; so do the constraint (1.1) and the quotient (4.1), which has no quadrants.
+With `either_way` of the rule, off-line agreement is {turns} on turns on the spot, {walks} on walks,
+{all} on walks and runs, and walks backward become nonholonomic ({back} of their frames). So what
+keeps these turns from agreeing is the drift aside, not the sense. The default stays the direction.
 """
 
 
@@ -100,7 +101,7 @@ def shoulders(file: Path) -> ShoulderPaths:
     return ShoulderPaths.of_recording(found)
 
 
-def clips(folder: Path) -> Iterator[Clip]:
+def clips(folder: Path, rule: SegmentationRule) -> Iterator[Clip]:
     """All windows of the table."""
     with (folder / "clips_locomotion.csv").open(newline="") as rows:
         for row in csv.DictReader(rows):
@@ -110,8 +111,8 @@ def clips(folder: Path) -> Iterator[Clip]:
                 row["class"],
                 Path(row["file"]).stem,
                 window,
-                segment_path(paths, online=True),
-                segment_path(paths),
+                segment_path(paths, rule, online=True),
+                segment_path(paths, rule),
             )
 
 
@@ -167,6 +168,19 @@ def drift(found: Sequence[Clip], rule: SegmentationRule) -> Iterator[str]:
         yield from row(name, *values, *(percent(float(share)) for share in ahead), agree, head=False)
 
 
+def lines(folder: Path, rule: SegmentationRule) -> str:
+    """What changes where a shoulder may go back as well as ahead."""
+    found = list(clips(folder, replace(rule, either_way=True)))
+    back = np.concatenate([
+        clip.offline.labels[clip.window] == NONHOLONOMIC for clip in found if clip.kind.startswith("backward")
+    ])  # fmt: skip
+    shares = {"turns": ["turn on spot"], "walks": WALKS, "all": EXPECTED}
+    return LINES.format(
+        back=percent(float(np.mean(back))),
+        **{name: percent(agreement(found, classes)[2]) for name, classes in shares.items()},
+    )
+
+
 def percent(share: float) -> str:
     """In tables."""
     return f"{100 * share:.1f} %"
@@ -185,7 +199,8 @@ def main() -> None:
         raise SystemExit(
             "usage: python docs/segmentation.py FOLDER; valid: a folder with clips_locomotion.csv"
         )
-    rule, found = SegmentationRule(), list(clips(Path(sys.argv[1])))
+    folder, rule = Path(sys.argv[1]), SegmentationRule()
+    found = list(clips(folder, rule))
     assert rule.boundary is not None
     numbers = {
         "tolerance": np.degrees(rule.tolerance), "cutoff": rule.cutoff, "noise": rule.noise,
@@ -194,7 +209,7 @@ def main() -> None:
     tables = ["\n".join(lines) + "\n" for lines in (summary(found), drift(found, rule), by_clip(found))]
     PAGE.write_text(
         TEXT.format(**numbers) + tables[0] + STOPS + DRIFT.format(**numbers) + tables[1]
-        + "\n## By clip\n\nShares of the kinds are off-line.\n\n" + tables[2] + THANKS
+        + lines(folder, rule) + "\n## By clip\n\nShares of the kinds are off-line.\n\n" + tables[2] + THANKS
     )  # fmt: skip
 
 

@@ -31,7 +31,10 @@ PROMISED = {
         ([*TO, "--max-speed", "nan"], "max_speed_m_s is nan"),
         ([*TO, "--max-speed", "-1"], "max_speed_m_s is -1.0"),
         ([*TO, "--max-speed", "0"], "max_speed_m_s is 0.0; valid: a number >= 0.1"),
-        ([*TO, "--weights", "mine"], "weights is 'mine'; valid: 'prose' or 'literal'"),
+        (
+            [*TO, "--weights", "mine"],
+            "weights is 'mine'; valid: 'prose', 'literal', 'recorded' or 'recorded-turns'",
+        ),
         ([*TO, "--stature", "9"], "stature [m] is 9"),
         ([*TO, "--mass", "nan"], "mass_kg is nan"),
         ([*TO, "--sex", "other"], "sex is 'other'"),
@@ -157,3 +160,16 @@ def test_a_walk_without_a_way_is_status_3_with_a_reason_and_files(capfd, tmp_pat
     assert (out / "summary.json").exists()
     assert (out / "scenario.yaml").exists()
     assert not (out / "motion.h5").exists()
+
+
+def test_who_walks_into_somebody_waiting_is_a_failure_and_no_mistake(capfd, tmp_path):
+    file = tmp_path / "rammed.yaml"
+    rammer = {"name": "rammer", "start": {"at": [0, 3]}, "via": [{"at": [0, 0.1]}]}
+    data = {"name": "rammed", "walking": {"wait_s": 8.0, "others": [rammer]}, "task": {
+        "start": {"at": [0, 0]}, "goal": {"at": [3, 0]}}}  # fmt: skip
+    file.write_text(json.dumps(data))
+    assert main(["run", str(file), "--out", str(tmp_path / "run"), "--json"]) == FAILED
+    out, _ = capfd.readouterr()
+    reason = json.loads(out)["failure"]["reason"]
+    assert "obstacle 'rammer' comes within" in reason
+    assert "\n" not in reason

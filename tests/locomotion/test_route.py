@@ -172,12 +172,13 @@ def test_routes_of_any_duration_are_obstacles(duration):
     [
         ([Waypoint((2.0, 0.0, 0.0), wait=5.0), Waypoint((4.0, 0.0, 0.0))], {}, (3.0, 9.0)),
         ([Waypoint((2.0, 0.0, 0.0))], {}, (4.0, 9.0)),
+        ([Waypoint((4.0, 0.0, 0.0))], {"wait": 6.0, "start": (2.0, 0.0, 0.0)}, (4.0, 6.0)),
     ],
-    ids=["while it waits", "after it has come"],
+    ids=["while it waits", "after it has come", "while it waits at the start"],
 )
 def test_who_walks_into_a_standing_walker_blocks_its_route(stops, options, when):
     rammed = WalkObstacle.moving_disc("rammer", [4.0, 8.0], [(2.0, 5.0), (2.0, -5.0)], 0.25)
-    route = walking_route(REST, stops, obstacles=[rammed], **options)
+    route = walking_route(options.pop("start", REST), stops, obstacles=[rammed], **options)
     assert not route.succeeded
     assert "'rammer' comes within" in route.failure
     moment = float(route.failure.split(" at ")[1].split(" s")[0])

@@ -166,6 +166,31 @@ def test_flat_diagonal_steps_are_told_from_straight_walks(aside, turned, kind):
     assert [s.kind for s in plain.segments] == [STANDING, NONHOLONOMIC, STANDING]
 
 
+def test_patterns_name_the_moving_parts():
+    """Standing between two parts of one kind does not part them."""
+    assert segment_path(rest_to_rest(np.radians(10.0), 0.0)).pattern == "H"
+    aside = np.radians(np.repeat([60.0, 10.0, 60.0], [50, 51, 50]))
+    assert segment_path(moved(1.0, aside, duration=1.5)).pattern == "H-N-H"
+    there = moved(1.0, np.radians(60.0))
+    rest = [np.repeat(side[-1:], 50, axis=0) for side in (there.left, there.right)]
+    on = [side + side[-1] - side[0] for side in (there.left, there.right)]
+    paused = ShoulderPaths(
+        np.vstack([there.left, rest[0], on[0]]), np.vstack([there.right, rest[1], on[1]]), RATE
+    )
+    found = segment_path(paused)
+    assert STANDING in [one.kind for one in found.segments]
+    assert found.pattern == "H"
+
+
+@pytest.mark.parametrize(
+    ("degrees", "either"), [(180.0, NONHOLONOMIC), (170.0, NONHOLONOMIC), (160.0, HOLONOMIC)]
+)
+def test_backward_counts_as_ahead_only_where_the_rule_says_so(degrees, either):
+    paths = moved(1.0, np.radians(degrees))
+    assert segment_path(paths).share(HOLONOMIC) == 1.0
+    assert segment_path(paths, SegmentationRule(either_way=True)).share(either) == 1.0
+
+
 def test_walks_that_do_not_begin_at_rest_have_no_boundary():
     assert segment_path(moved(1.0, np.radians(10.0))).share(NONHOLONOMIC) == 1.0
 

@@ -39,7 +39,10 @@ def walk(
     ] = None,
     weights: Annotated[
         str | None,
-        typer.Option(metavar="prose|literal", help="Reading of the thesis' weights. Default: prose."),
+        typer.Option(
+            metavar="NAME",
+            help="Weights: prose or literal of the thesis, recorded or recorded-turns. Default: prose.",
+        ),
     ] = None,
     stature: Annotated[float, typer.Option(metavar="M", help="Stature [m].")] = 1.75,
     mass: Annotated[float, typer.Option(metavar="KG", help="Mass [kg].")] = 70.0,

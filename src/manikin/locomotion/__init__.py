@@ -1,6 +1,12 @@
 """How people walk: paths, footprints, segments, words, whole-body walks ([Truong2010]_ chapters 3 to 6)."""
 
-from manikin.locomotion.categories import CategoryStatistics, Spread, category_of, category_statistics
+from manikin.locomotion.categories import (
+    CategoryStatistics,
+    Spread,
+    category_goals,
+    category_of,
+    category_statistics,
+)
 from manikin.locomotion.controller import WalkController, WalkFrame
 from manikin.locomotion.deviation import HolonomicEnds, PathDeviation, holonomic_ends, path_deviation
 from manikin.locomotion.floor_plan import floor_plan
@@ -8,7 +14,13 @@ from manikin.locomotion.follow import Walk, walk_along
 from manikin.locomotion.footprints import Footprint, Footprints
 from manikin.locomotion.library import MotionLibrary
 from manikin.locomotion.library_file import load_library, save_library
-from manikin.locomotion.objective import LITERAL_ORDER, PROSE_ORDER, WalkObjective
+from manikin.locomotion.objective import (
+    LITERAL_ORDER,
+    PROSE_ORDER,
+    RECORDED_TURNS,
+    RECORDED_WALKS,
+    WalkObjective,
+)
 from manikin.locomotion.obstacles import Walker, WalkObstacle
 from manikin.locomotion.path import WalkingPath, WalkingResiduals, WalkingTask, walked
 from manikin.locomotion.plan import walking_path, walking_paths
@@ -27,6 +39,7 @@ from manikin.locomotion.segmentation import (
 from manikin.locomotion.shoulders import ShoulderPaths
 from manikin.locomotion.stepper import StepRule, place_footprints
 from manikin.locomotion.targets import START, TEST_TARGETS, experiment_targets
+from manikin.locomotion.walked_footprints import walked_footprints
 from manikin.locomotion.zone import HolonomicZone, holonomic_zone
 
 __all__ = [
@@ -35,6 +48,8 @@ __all__ = [
     "LITERAL_ORDER",
     "NONHOLONOMIC",
     "PROSE_ORDER",
+    "RECORDED_TURNS",
+    "RECORDED_WALKS",
     "STANDING",
     "START",
     "TEST_TARGETS",
@@ -63,6 +78,7 @@ __all__ = [
     "WalkingResiduals",
     "WalkingTask",
     "Waypoint",
+    "category_goals",
     "category_of",
     "category_statistics",
     "experiment_targets",
@@ -76,6 +92,7 @@ __all__ = [
     "segment_path",
     "walk_along",
     "walked",
+    "walked_footprints",
     "walking_path",
     "walking_paths",
     "walking_route",

@@ -17,12 +17,14 @@ from manikin.locomotion.segmentation import (
 )
 from manikin.locomotion.shoulders import ShoulderPaths
 from manikin.locomotion.targets import START
-from manikin.spatial import FloatArray, frozen_array
+from manikin.spatial import FloatArray, finite_number, frozen_array
 
 HEADINGS_DEG = {
     "LCF": 45, "MCF": 90, "HCF": 135, "LCS": 0, "MCS": 90, "HCS": 270, "LCB": 315, "MCB": 270, "HCB": 225,
 }  # fmt: skip
 """Final heading by category where the start looks along y and the goal is to the right [deg]."""
+
+_BEARINGS_DEG = {"F": (30.0, 45.0, 60.0), "S": (90.0,), "B": (120.0, 135.0, 150.0)}
 
 BESIDE = 0.25
 """Goals less far ahead or behind are at the side [m]: half of the distance to the next row of goals."""
@@ -67,6 +69,27 @@ def category_of(goal: ArrayLike, start: ArrayLike = START) -> str | None:
         if name[2] == zone and abs(np.angle(np.exp(1j * (heading - np.radians(degrees))))) < NEAR_HEADING:
             return name
     return None
+
+
+def category_goals(distance: float) -> list[tuple[str, FloatArray]]:
+    """Goals of the nine categories at one distance to the right of :data:`START`; mirrored ones are alike.
+
+    The thesis shows the places of its goals in a drawing only (Fig. 4.14). Here they are 30, 45 and 60
+    degrees from straight ahead, aside, and 30, 45 and 60 degrees from straight behind.
+
+    Args:
+        distance: From the start [m], at least 0.5.
+
+    Returns:
+        21 names of categories with goals, (3,) x, y [m], heading [rad].
+    """
+    radius = finite_number(distance, "distance of the goals [m]", at_least=2.0 * BESIDE)
+    goals = []
+    for name, degrees in HEADINGS_DEG.items():
+        for bearing in np.radians(_BEARINGS_DEG[name[2]]):
+            place = (START[0] + radius * np.sin(bearing), START[1] + radius * np.cos(bearing))
+            goals.append((name, np.array([*place, np.radians(degrees)])))
+    return goals
 
 
 @dataclass(frozen=True)
@@ -146,7 +169,6 @@ def category_statistics(
 def _statistics(group: Sequence[Sequence[ShoulderPaths]], rule: SegmentationRule) -> CategoryStatistics:
     segmented = [segment_path(walk, rule) for walks in group for walk in walks]
     ends = [holonomic_ends(one) for one in segmented]
-    orders = [tuple(s.kind for s in one.segments if s.kind in (HOLONOMIC, NONHOLONOMIC)) for one in segmented]
     shares = [
         one.share(HOLONOMIC) / max(1e-9, one.share(HOLONOMIC) + one.share(NONHOLONOMIC)) for one in segmented
     ]
@@ -156,7 +178,7 @@ def _statistics(group: Sequence[Sequence[ShoulderPaths]], rule: SegmentationRule
         walks=len(segmented),
         from_origin=Spread.of([one.from_origin for one in ends]),
         to_goal=Spread.of([one.to_goal for one in ends]),
-        patterned=float(np.mean([order == (HOLONOMIC, NONHOLONOMIC, HOLONOMIC) for order in orders])),
+        patterned=float(np.mean([one.pattern == "H-N-H" for one in segmented])),
         holonomic=float(np.mean(shares)),
         average_deviation=float(np.mean([one.average for one in spreads])) if spreads else None,
         largest_deviation=max(one.largest for one in spreads) if spreads else None,

@@ -197,7 +197,8 @@ def walking_route(
 
     Returns:
         The route, up to the first leg that has no solution, which then is the last one. Where the walker
-        stands or turns on the spot, obstacles that move may come too near: then it is ``blocked``.
+        stands, from the wait at the start on, or turns on the spot, obstacles that move may come too near:
+        then it is ``blocked``.
 
     Raises:
         InputError: If an argument is not usable, the last waypoint is no stop, one is in an obstacle, or one
@@ -223,6 +224,9 @@ def walking_route(
         lack = room - float(clearance(still, walker, place[None], np.zeros(1)).min(initial=np.inf))
         if legs and lack > OVERLOOKED:
             break
+        if not legs and clock > 0.0 and lack > OVERLOOKED:
+            # Somebody came during the wait: the first leg is found without them, and the route is blocked.
+            still = [one for one in still if not one.moves]
         apart = float(np.hypot(*(waypoint.place - place)[:2]))
         turn = abs(float(np.angle(np.exp(1j * (waypoint.place[2] - place[2])))))
         if apart >= NEAREST:

@@ -49,6 +49,9 @@ class SegmentationRule:
             not its cutoff or how long noise lasts. Off-line only.
         boundary: Angle below which two headings are the same [rad]; 1 degree ([Truong2010]_ 4.2.2.2), None
             without this step. Off-line only.
+        either_way: Whether a shoulder that goes straight back counts as one that goes ahead. The thesis says
+            so of turns on the spot only ([Truong2010]_ Fig. 4.3 d); its constraint (1.1) and its quotient
+            (4.1), which has no quadrants, say so of any motion, so that to walk backward is nonholonomic.
     """
 
     tolerance: float = float(np.radians(15.0))
@@ -57,6 +60,7 @@ class SegmentationRule:
     cutoff: float | None = 0.5
     noise: float = 0.2
     boundary: float | None = float(np.radians(1.0))
+    either_way: bool = False
 
     def __post_init__(self) -> None:
         where = "segmentation rule"
@@ -72,6 +76,11 @@ class SegmentationRule:
     def frames(self, rate: float) -> int:
         """Half step of the tangent in frames, at least one."""
         return max(1, round(self.half_step * rate))
+
+    def ahead(self, angles: FloatArray) -> NDArray[np.bool_]:
+        """(...) whether one of the shoulders goes ahead by its deviation, (..., 2) [rad]."""
+        away = np.abs(angles)
+        return np.any((np.minimum(away, np.pi - away) if self.either_way else away) < self.tolerance, axis=-1)
 
 
 THESIS_RULE = SegmentationRule()
@@ -107,6 +116,12 @@ class PathSegments:
     labels: Labels
     deviations: FloatArray
     segments: tuple[PathSegment, ...]
+
+    @property
+    def pattern(self) -> str:
+        """Kinds of the moving stretches in order: ``H-N-H`` is holonomic, nonholonomic, holonomic."""
+        moving = (one.kind for one in self.segments if one.kind != STANDING)
+        return "-".join(kind[0].upper() for kind, _ in itertools.groupby(moving))
 
     def share(self, kind: str) -> float:
         """Share of the frames that are of a kind [-].
@@ -207,9 +222,8 @@ class OnlineSegmentation:
 
 def _function_1(angles: FloatArray, velocities: FloatArray, rule: SegmentationRule) -> Labels:
     """(...) labels of (..., 2) deviations and (..., 2, 2) velocities."""
-    ahead = np.any(np.abs(angles) < rule.tolerance, axis=-1)
     standing = np.all(np.hypot(velocities[..., 0], velocities[..., 1]) < rule.standing_speed, axis=-1)
-    return np.where(standing, STANDING, np.where(ahead, NONHOLONOMIC, HOLONOMIC))
+    return np.where(standing, STANDING, np.where(rule.ahead(angles), NONHOLONOMIC, HOLONOMIC))
 
 
 def _without_noise(labels: Labels, angles: FloatArray, rate: float, rule: SegmentationRule) -> Labels:
@@ -223,8 +237,7 @@ def _without_noise(labels: Labels, angles: FloatArray, rate: float, rule: Segmen
     for joined, first, stop in _runs((labels == NONHOLONOMIC) | noisy):
         if joined and np.any(noisy[first:stop]):
             smooth = _smoothed(angles[first:stop], min(0.99, 1.0 / (rule.noise * rate)))
-            small = np.any(np.abs(smooth) < rule.tolerance, axis=1)
-            cleaned[first:stop][noisy[first:stop] & small] = NONHOLONOMIC
+            cleaned[first:stop][noisy[first:stop] & rule.ahead(smooth)] = NONHOLONOMIC
     return cleaned
 
 

@@ -188,14 +188,24 @@ def _steps(cuts: _Cuts, rule: StepRule, first: str) -> Iterator[tuple[str, Float
         width = rule.width if number < cuts.count else rule.standing_width
         other = next(feet[each] for each in FEET if each != foot)
         wanted = _beside(foot, cuts.place(number), width)
-        placed = _within_reach(wanted, other, SIDE[foot], rule)
+        placed = within_reach(wanted, other, SIDE[foot], rule)
         if np.abs(placed - feet[foot]).max() > _REACHED:
             feet[foot] = placed
             yield foot, placed
 
 
-def _within_reach(wanted: FloatArray, other: FloatArray, side: float, rule: StepRule) -> FloatArray:
-    """The nearest place that the hips allow beside the other foot, both (3,) x, y [m] and yaw [rad]."""
+def within_reach(wanted: FloatArray, other: FloatArray, side: float, rule: StepRule) -> FloatArray:
+    """The nearest place that the hips allow a foot beside the other one.
+
+    Args:
+        wanted: (3,) x, y [m] and yaw [rad] of the foot.
+        other: (3,) the same of the one that stands.
+        side: Of the foot, from :data:`SIDE`.
+        rule: Its limits.
+
+    Returns:
+        (3,) x, y [m] and yaw [rad].
+    """
     outwards = np.clip(side * (wanted[2] - other[2]), -rule.toes_in, rule.toes_out)
     yaw = other[2] + side * outwards
     mean = (yaw + other[2]) / 2

@@ -199,9 +199,16 @@ class ScenarioFile(Section):
         if (self.supports is None) != (self.walking.start is None):
             raise refuse("walking.start", "goes with supports, which it leads to; valid: both or neither")
         if self.walking.is_planned(self.supports):
-            for key in ("via", "others"):
-                if getattr(self.walking, key):
-                    raise refuse(f"walking.{key}", "are given for a planned walk; valid: a recorded one")
+            for key in ("via", "others", "wait_s"):
+                if value := getattr(self.walking, key):
+                    given = f"is {value:g}" if key == "wait_s" else "are given"
+                    raise refuse(f"walking.{key}", f"{given} in a planned walk; valid there: leave it out")
+        if self.walking.footprints == "library" and (
+            self.supports is not None or self.walking.whole_body != "planned"
+        ):
+            raise refuse(
+                "walking.footprints", "is library; valid: in a planned walk (whole_body) without supports"
+            )
         if self.supports is not None:
             return
         if self.task.act is not None:

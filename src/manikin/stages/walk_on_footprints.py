@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from manikin.errors import InputError
-from manikin.locomotion import Footprints, StepRule, place_footprints
+from manikin.locomotion import (
+    Footprints,
+    StepRule,
+    WalkingPath,
+    place_footprints,
+    walk_along,
+    walked_footprints,
+)
+from manikin.locomotion.footprints import FEET
 from manikin.scenarios import Scenario
 from manikin.scenarios.sequence import flat_sequence
 from manikin.scenarios.walked import walk_before, walking_supports
@@ -13,8 +21,6 @@ from manikin.spatial import FloatArray
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report
 from manikin.stages.walking import STAGE, end_of, keep_paths, path_block, place_of, plan_walks
-
-FEET = ("left_foot", "right_foot")
 
 
 def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None:
@@ -45,7 +51,7 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
     height = context.scene.floor_height or 0.0
     try:
         if stance is None:
-            footprints = place_footprints(path, rule, height=height)
+            footprints = _along(path, rule, height, context)
             walked = walking_supports(footprints, bare)
         else:
             rule = replace(rule, standing_width=_apart(stance))
@@ -58,6 +64,14 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
     report.finish(STAGE, path_block(plan) | {"steps": footprints.count})
     report.keep_scenario(walked)
     return RunContext.of(walked, context.settings)
+
+
+def _along(path: WalkingPath, rule: StepRule, height: float, context: RunContext) -> Footprints:
+    """By the rule, or where the feet of the library's walk stand."""
+    section = context.scenario.walking
+    if section is None or section.footprints == "stepper":
+        return place_footprints(path, rule, height=height)
+    return walked_footprints(walk_along(path, context.body, height=height), rule, height=height)
 
 
 def _ends(scenario: Scenario, stance: dict[str, tuple[FloatArray, float]] | None) -> tuple[FloatArray, ...]:

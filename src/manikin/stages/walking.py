@@ -11,6 +11,8 @@ from manikin.errors import InputError
 from manikin.locomotion import (
     LITERAL_ORDER,
     PROSE_ORDER,
+    RECORDED_TURNS,
+    RECORDED_WALKS,
     Walk,
     Walker,
     WalkObjective,
@@ -37,7 +39,10 @@ STAGE = "walk"
 PATH_EVERY = 5
 """Instants of a route for each one that is kept."""
 
-OBJECTIVES = {"prose": PROSE_ORDER, "literal": LITERAL_ORDER}
+OBJECTIVES = {
+    "prose": PROSE_ORDER, "literal": LITERAL_ORDER,
+    "recorded": RECORDED_WALKS, "recorded-turns": RECORDED_TURNS,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

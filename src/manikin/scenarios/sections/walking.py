@@ -48,6 +48,11 @@ class WalkingSection(Section):
         description="recorded: as recorded people walk, along the path; planned: on footprints along the "
         "path, balanced and executed in the physics engine",
     )
+    footprints: Literal["stepper", "library"] = Field(
+        default="stepper",
+        description="of a planned walk from start to goal: stepper, by rules along the path; library, where "
+        "recorded people's feet stand on the same path, and no faster than they go",
+    )
     start: StandSection | None = Field(
         default=None,
         description="with supports: where the body walks from, to the feet of their first phase; the plan "
@@ -59,10 +64,10 @@ class WalkingSection(Section):
     wait_s: NonNegative = Field(default=0.0, description="how long the body stands at the start [s]")
     max_speed_m_s: Speed = Field(default=1.6, description="limit of the speed over the floor [m/s]")
     room_m: NonNegative = Field(default=0.05, description="distance to keep from obstacles and others [m]")
-    weights: Literal["prose", "literal"] = Field(
+    weights: Literal["prose", "literal", "recorded", "recorded-turns"] = Field(
         default="prose",
-        description="weights of the criterion: as the text of Truong (2010) 5.5.1 has them, or as its "
-        "equations (5.5) and (5.8) read literally",
+        description="weights of the criterion: as the text of Truong (2010) 5.5.1 has them, as its "
+        "equations (5.5) and (5.8) read literally, or as identified from recorded walks, all or turns only",
     )
     others: list[WalkerSection] = Field(
         default_factory=list, max_length=LARGEST_WALKERS,
