@@ -261,6 +261,17 @@ def test_mirror_images_are_counted_as_one():
     assert sequence_consistency([]).modal_share == 0.0
 
 
+def test_recordings_that_begin_anywhere_are_compared_from_a_phase():
+    """The first of them begins within a double support, which is not seen from its beginning."""
+    cycle = [(0.2, BOTH), (0.5, RIGHT), (0.2, BOTH), (0.5, LEFT)]
+    walks = [sequence(*cycle * 3), sequence(*cycle[1:], *cycle * 3), sequence(*cycle[3:], *cycle * 3)]
+    assert sequence_consistency(walks, phases=4).mirrored_share == pytest.approx(2 / 3)
+    found = sequence_consistency(walks, phases=4, start="DS")
+    assert (found.modal_share, found.mirrored_share) == (pytest.approx(2 / 3), 1.0)
+    assert initials(found.modal) == "LR L LR R"
+    assert sequence_consistency(walks, start="flight").modal == ()
+
+
 # --- placements
 
 

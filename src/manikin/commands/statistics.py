@@ -59,6 +59,9 @@ def statistics(
     phases: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Compare the first N phases of sequences only.")
     ] = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="KIND", help="Compare sequences from the first such phase on: DS.")
+    ] = None,
     origin: Annotated[
         str,
         typer.Option(metavar="stance|lowest|highest", help="From where placements are seen: stance, or CoM."),
@@ -74,13 +77,20 @@ def statistics(
 ) -> int:
     """Phase durations, sequences, placements, centre of mass over sets of recordings."""
     if published:
-        options = {"FILE": files, "--bar": bar, "--box": box, "--limit": limit, "--phases": phases}
+        options = {
+            "FILE": files,
+            "--bar": bar,
+            "--box": box,
+            "--limit": limit,
+            "--phases": phases,
+            "--start": start,
+        }
         for option, value in options.items():
             refuse(value is not None, option, "the published motions are numbers already")
         return _published(out, by, json=json)
     if not files:
         raise InputError("no FILE is given; valid: recordings, folders or patterns, or --published")
-    settings = _settings(bar, box, limit, effectors, phases, origin)
+    settings = _settings(bar, box, limit, effectors, phases, start, origin)
     _check_by(by)
     if sex not in SEXES:
         raise InputError(f"--sex is {sex!r}; valid: {', '.join(SEXES)}")
@@ -164,8 +174,9 @@ def _check_by(by: str) -> None:
 
 
 def _settings(
-    bar: float | None, box: Box | None, limit: float | None, effectors: str, phases: int | None, origin: str
-) -> "StatisticsSettings":
+    bar: float | None, box: Box | None, limit: float | None, effectors: str, phases: int | None,
+    start: str | None, origin: str,
+) -> "StatisticsSettings":  # fmt: skip
     """What is measured.
 
     Raises:
@@ -189,7 +200,7 @@ def _settings(
         overhead = Overhead(box[4], (box[0], box[1]), (box[2], box[3]))
     within = LIMIT if limit is None else finite_number(limit, "--limit [m]", above=0.0)
     active = None if effectors == "all" else FEET
-    return StatisticsSettings(overhead, within, active, phases, origin=cast("From", origin))
+    return StatisticsSettings(overhead, within, active, phases, start, origin=cast("From", origin))
 
 
 def _print(groups: Mapping[str, "GroupStatistics"], by: "By", limit: float | None) -> None:

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from manikin.figures.style import COLOURS, CYCLE, dress, need, new_grid, readable
+from manikin.figures.groups import group_colours
+from manikin.figures.style import COLOURS, dress, need, new_grid, readable
 from manikin.mocap.recorded_clip import RecordedClip
 from manikin.mocap.spread import Spread
 from manikin.mocap.support_distances import LIMIT, support_distances
@@ -34,8 +35,8 @@ def com_distances_figure(
     known = published or {}
     found = [(clip, one) for clip in clips for one in support_distances(clip)]
     effectors = need(sorted({*known, *(one.effector for _, one in found)}), "a support")
-    groups = list(dict.fromkeys(clip.group for clip in clips))
-    colours = {group: CYCLE[number % len(CYCLE)] for number, group in enumerate(groups)}
+    colours = group_colours(clip.group for clip in clips)
+    groups = list(colours)
     figure, grid = new_grid(
         9.6, 0.9 + 2.5 * len(effectors), "Centre of mass to its supports", len(effectors), 2,
         width_ratios=[3.0, 1.0], top=0.8, between=0.75, across=0.5,

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from manikin.figures.style import COLOURS, CYCLE, dress, need, new_grid
+from manikin.figures.groups import group_colours
+from manikin.figures.style import COLOURS, dress, need, new_grid
 from manikin.mocap.published_phases import published_heights
 from manikin.mocap.statistics import GroupStatistics
 
@@ -55,8 +56,9 @@ def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = 
     shown = need([one for one in groups if one.com], "a height of the centre of mass")
     figure, grid = new_grid(9.6, 4.4, "Lowest centre of mass", 1, 2, top=0.8, across=0.9)
     left, right = (figure.add_subplot(grid[column]) for column in range(2))
+    colours = group_colours(one.group for one in shown)
     for number, one in enumerate(shown):
-        colour = CYCLE[number % len(CYCLE)]
+        colour = colours[one.group]
         _dots(left, number, one.com, colour)
         if one.overhead is not None:
             _dots(right, number, [one.overhead - low for low in one.com], colour)
@@ -67,7 +69,7 @@ def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = 
         left.annotate("standing", (0.0, standing), (2, 2), textcoords="offset points", fontsize=8,
                       xycoords=("axes fraction", "data"), color=COLOURS["soft"])  # fmt: skip
     dress(left, "height above the floor [m]", title="Lowest centre of mass")
-    dress(right, "[m]", title="Room above it (dots) and the body (dashes)")
+    dress(right, "up to what is passed [m]", title="Room above it (dots) and the body (dashes)")
     for axes in (left, right):
         axes.set_xticks(range(len(shown)), [one.group for one in shown])
         axes.set_xlim(-0.6, len(shown) - 0.4)
@@ -83,5 +85,5 @@ def _dots(axes: Axes, number: int, values: Sequence[float], colour: str) -> None
     mean = sum(values) / len(values)
     axes.bar(number, mean, width=0.6, color=colour, alpha=0.35)
     axes.plot([number] * len(values), values, "o", color=colour, markersize=4)
-    axes.annotate(f"{mean:.2f}", (number - 0.29, mean), (0, 2), textcoords="offset points", fontsize=7.5,
-                  ha="left")  # fmt: skip
+    axes.annotate(f"{mean:.2f}", (number, 0.0), (0, 3), textcoords="offset points", fontsize=7.5,
+                  ha="center")  # fmt: skip

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from manikin.errors import FigureError
-from manikin.figures.style import COLOURS, CYCLE, colours_of, dress, need, new_grid
+from manikin.figures.groups import group_colours
+from manikin.figures.style import COLOURS, colours_of, dress, need, new_grid
 from manikin.mocap.recorded_clip import RecordedClip
 from manikin.mocap.support_placements import Origin
 from manikin.spatial import FloatArray
@@ -36,9 +37,9 @@ def com_paths_figure(
         9.6, 7.4, "Ways of the centre of mass", 2, 1, height_ratios=[1.25, 1.0], top=0.8, between=0.7
     )
     side, above = (figure.add_subplot(grid[row]) for row in range(2))
-    groups = list(dict.fromkeys(clip.group for clip in motions))
+    colours = group_colours(clip.group for clip in motions)
     for clip, origin in zip(motions, origins, strict=True):
-        _draw(side, above, clip, origin, CYCLE[groups.index(clip.group) % len(CYCLE)])
+        _draw(side, above, clip, origin, colours[clip.group])
     side.axhline(0.0, color=COLOURS["soft"], linewidth=1.0)
     if overhead is not None:
         side.axhline(overhead, color=COLOURS["ink"], linewidth=1.4, linestyle=(0, (6, 2)))
@@ -46,9 +47,7 @@ def com_paths_figure(
     dress(above, "aside [m]", "along the way [m]", "From above, with the supports")
     above.set_aspect("equal", adjustable="datalim")
     above.sharex(side)
-    keys = [
-        Line2D([], [], color=CYCLE[number % len(CYCLE)], label=group) for number, group in enumerate(groups)
-    ]
+    keys = [Line2D([], [], color=colour, label=group) for group, colour in colours.items()]
     keys.append(Line2D([], [], color=COLOURS["ink"], marker="v", linestyle="", label="lowest"))
     if any("head" in clip.tops for clip in motions):
         keys.append(Line2D([], [], color=COLOURS["soft"], linestyle=":", label="top of the head"))

@@ -7,12 +7,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from manikin.figures.style import COLOURS, CYCLE, dress, label_room, need, new_grid, support_colour
+from manikin.figures.groups import group_colours, group_keys
+from manikin.figures.style import COLOURS, dress, label_room, need, new_grid, support_colour
 from manikin.mocap.phase_durations import By, by_group, phase_durations
 from manikin.mocap.phase_sequence import FLIGHT, PhaseSequence
 
 WIDTH = 0.8
 """Of all bars of one phase, of the distance between two."""
+
+BEYOND = 2.5
+"""Height of the axes per largest mean, beyond which whiskers are cut off."""
 
 
 def phase_durations_figure(sequences: Sequence[PhaseSequence], by: By = "number") -> Figure:
@@ -71,14 +75,13 @@ def _draw_motions(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]]) -> N
 def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By) -> None:
     found = {group: phase_durations(members, by) for group, members in groups.items()}
     names = _in_order([list(each) for each in found.values()])
-    width = WIDTH / len(found)
+    width, colours = WIDTH / len(found), group_colours(found)
     for number, (group, each) in enumerate(found.items()):
-        colour = CYCLE[number % len(CYCLE)]
         for place, name in enumerate(names):
             if name not in each:
                 continue
             spread, x = each[name], place - WIDTH / 2 + (number + 0.5) * width
-            axes.bar(x, spread.mean, width=0.94 * width, color=colour, alpha=0.75, label=group)
+            axes.bar(x, spread.mean, width=0.94 * width, color=colours[group], alpha=0.75)
             ends = [[spread.mean - spread.smallest], [spread.largest - spread.mean]]
             axes.errorbar(x, spread.mean, ends, color=COLOURS["ink"], linewidth=0.8, capsize=2)
             axes.annotate(f"{spread.count}", (x, 0.0), (0, 2), textcoords="offset points", fontsize=6.5,
@@ -87,15 +90,15 @@ def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By
     axes.set_xticks(range(len(names)), [name.replace("+", "\n").replace("_", " ") for name in names])
     axes.grid(False, axis="x")
     axes.set_xlim(-0.6, len(names) - 0.4)
-    axes.set_ylim(bottom=0.0)
-    keys = [
-        Patch(color=CYCLE[number % len(CYCLE)], alpha=0.75, label=group) for number, group in enumerate(found)
-    ]
-    _legend(axes, keys)
+    spreads = [spread for each in found.values() for spread in each.values()]
+    if spreads:
+        highest = max(spread.largest for spread in spreads)
+        axes.set_ylim(0.0, min(1.06 * highest, BEYOND * max(spread.mean for spread in spreads)))
+    _legend(axes, group_keys(colours))
 
 
 def _colour(kind: str, supports: int) -> str:
-    return COLOURS["obstacle"] if kind == FLIGHT else support_colour(supports)
+    return COLOURS["right_hand"] if kind == FLIGHT else support_colour(supports)
 
 
 def _in_order(lists: Sequence[Sequence[str]]) -> list[str]:

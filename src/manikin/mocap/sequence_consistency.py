@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from manikin.mocap.phase_sequence import PhaseSequence, mirrored
+from manikin.mocap.recorded_supports import SupportPhase
 
 Supporting = tuple[frozenset[str], ...]
 """The effectors that support in each phase, one after the other."""
@@ -62,18 +63,26 @@ class SequenceConsistency:
 
 
 def sequence_consistency(
-    motions: Sequence[PhaseSequence], *, phases: int | None = None, shortest: float = SHORTEST
+    motions: Sequence[PhaseSequence],
+    *,
+    phases: int | None = None,
+    shortest: float = SHORTEST,
+    start: str | None = None,
 ) -> SequenceConsistency:
     """Count the sequences of supports and the first steps.
 
     Args:
         motions: Those of one group, or all.
-        phases: How many phases from the beginning are looked at; None for all. Recordings that end
-            anywhere differ in their length and not in their order.
+        phases: How many phases are looked at; None for all. Recordings that end anywhere differ in their
+            length and not in their order.
         shortest: Phases shorter than this are passed over [s].
+        start: Kind of the phase from which on they are looked at, such as ``DS``, for recordings that begin
+            anywhere: the first one that is seen from its beginning. None for the first phase of all.
     """
     lasting = [one.without_short(shortest) for one in motions]
-    sequences = Counter(tuple(frozenset(phase.effectors) for phase in one.phases[:phases]) for one in lasting)
+    sequences = Counter(
+        tuple(frozenset(phase.effectors) for phase in _from(one, start)[:phases]) for one in lasting
+    )
     steps = Counter(one.first_step for one in lasting if one.first_step is not None)
     return SequenceConsistency(dict(sequences.most_common()), dict(steps.most_common()))
 
@@ -86,6 +95,14 @@ def mirror_image(sequence: Supporting) -> Supporting:
 def initials(sequence: Supporting) -> str:
     """A sequence in short: ``LR R LR L``, hands in small letters, others by name, ``-`` in flight."""
     return " ".join("".join(sorted(map(_initial, one), key=_feet_first)) or "-" for one in sequence)
+
+
+def _from(one: PhaseSequence, kind: str | None) -> tuple[SupportPhase, ...]:
+    if kind is None:
+        return one.phases
+    first = 0 if one.start_seen else 1
+    begins = (number for number in range(first, len(one.phases)) if one.kinds[number] == kind)
+    return one.phases[next(begins, len(one.phases)) :]
 
 
 def _initial(effector: str) -> str:

@@ -50,6 +50,7 @@ class StatisticsSettings:
         limit: Distance from the centre of mass to a support within which shares are counted [m].
         active: Effectors by which phases and sequences are told; None for all.
         phases: Number of phases that are compared in sequences; None for all.
+        start: Kind of phase from which on they are compared, such as ``DS``; None for the first of all.
         shortest: Phases shorter than this are passed over in sequences [s].
         origin: From where placements are seen: the first stance, or where the centre of mass was lowest or
             highest.
@@ -60,6 +61,7 @@ class StatisticsSettings:
     limit: float = LIMIT
     active: Collection[str] | None = None
     phases: int | None = None
+    start: str | None = None
     shortest: float = SHORTEST
     origin: From = "stance"
     mirror: bool = True
@@ -168,7 +170,9 @@ def group_statistics(
         group,
         tuple(clip.name for clip in clips),
         _durations(sequences),
-        consistency=sequence_consistency(sequences, phases=how.phases, shortest=how.shortest),
+        consistency=sequence_consistency(
+            sequences, phases=how.phases, shortest=how.shortest, start=how.start
+        ),
         distances=largest_distances(clips),
         within=shares_within(clips, how.limit),
         whole={clip.name: whole_passage(clip) for clip in clips},
