@@ -389,6 +389,19 @@ def test_who_crouches_on_the_spot_passes_no_bar():
     assert whole_passage(clip).com_lowest == pytest.approx(0.65)
 
 
+def test_who_is_low_at_the_beginning_passes_no_bar():
+    """Somebody seated who rises is below a bar, and has not come from before it."""
+    clip, later = walker(), 120
+    rises = replace(
+        clip,
+        time=clip.time[later:],
+        com=clip.com[later:],
+        tops={name: top[later:] for name, top in clip.tops.items()},
+    )
+    assert len(passages(clip, Overhead(1.5))) == 1
+    assert passages(rises, Overhead(1.5)) == ()
+
+
 def test_heights_are_those_above_the_floor():
     clip = walker()
     up = np.array([0.0, 0.0, 2.0])

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from manikin.figures.groups import group_colours
+from manikin.figures.groups import group_colours, legend_below_title, name_groups
 from manikin.figures.style import COLOURS, dress, need, new_grid, readable
 from manikin.mocap.recorded_clip import RecordedClip
 from manikin.mocap.spread import Spread
@@ -38,8 +38,8 @@ def com_distances_figure(
     colours = group_colours(clip.group for clip in clips)
     groups = list(colours)
     figure, grid = new_grid(
-        9.6, 0.9 + 2.5 * len(effectors), "Centre of mass to its supports", len(effectors), 2,
-        width_ratios=[3.0, 1.0], top=0.8, between=0.75, across=0.5,
+        9.6, 1.2 + 2.6 * len(effectors), "Centre of mass to its supports", len(effectors), 2,
+        width_ratios=[3.0, 1.0], top=1.0, between=0.85, across=0.5,
     )  # fmt: skip
     for row, effector in enumerate(effectors):
         axes = figure.add_subplot(grid[row, 0])
@@ -63,13 +63,11 @@ def com_distances_figure(
             panel.axhline(limit, color=COLOURS["ink"], linewidth=1.0, linestyle=(0, (5, 3)))
         dress(axes, "distance [m]", "time from touch-down, or from the beginning [s]", readable(effector))
         dress(most, title="largest of each motion")
-        most.set_xticks(range(len(groups)), groups)
-        most.set_xlim(-0.6, max(len(groups), 1) - 0.4)
+        name_groups(most, groups)
         most.tick_params(labelleft=False)
     keys = [Line2D([], [], color=colour, label=group) for group, colour in colours.items()]
     keys.append(Line2D([], [], color=COLOURS["ink"], linestyle=(0, (5, 3)), label=f"limit, {limit:g} m"))
     if known:
         keys.append(Line2D([], [], color=COLOURS["soft"], label="published mean and range", linewidth=3))
-    figure.legend(handles=keys, loc="upper right", ncols=len(keys), fontsize=8.5, frameon=False,
-                  borderaxespad=0.3)  # fmt: skip
+    legend_below_title(figure, keys)
     return figure

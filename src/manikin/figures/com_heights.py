@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from manikin.figures.groups import group_colours
+from manikin.figures.groups import group_colours, name_groups
 from manikin.figures.style import COLOURS, dress, need, new_grid
 from manikin.mocap.published_phases import published_heights
 from manikin.mocap.statistics import GroupStatistics
@@ -71,8 +71,7 @@ def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = 
     dress(left, "height above the floor [m]", title="Lowest centre of mass")
     dress(right, "up to what is passed [m]", title="Room above it (dots) and the body (dashes)")
     for axes in (left, right):
-        axes.set_xticks(range(len(shown)), [one.group for one in shown])
-        axes.set_xlim(-0.6, len(shown) - 0.4)
+        name_groups(axes, [one.group for one in shown])
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.grid(False, axis="x")
     if not any(one.overhead is not None for one in shown):

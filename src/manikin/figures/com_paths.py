@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from manikin.errors import FigureError
-from manikin.figures.groups import group_colours
+from manikin.figures.groups import group_colours, legend_below_title
 from manikin.figures.style import COLOURS, colours_of, dress, need, new_grid
 from manikin.mocap.recorded_clip import RecordedClip
 from manikin.mocap.support_placements import Origin
@@ -54,8 +54,7 @@ def com_paths_figure(
     if overhead is not None:
         label = f"overhead, {overhead:g} m"
         keys.append(Line2D([], [], color=COLOURS["ink"], linestyle=(0, (6, 2)), label=label))
-    figure.legend(handles=keys, loc="upper right", ncols=len(keys), fontsize=8.5, frameon=False,
-                  borderaxespad=0.3)  # fmt: skip
+    legend_below_title(figure, keys)
     return figure
 
 

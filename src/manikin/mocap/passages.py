@@ -4,7 +4,7 @@ What hangs over the way is a bar or the underside of a box. Of a bar only the he
 was, it was where all of the body was below it. Each part may have passed it where it was lowest itself, so
 the room below a bar is an upper bound. Of a box the place is given as well, and the room is the least one
 while any part is below it; it is negative for who would have hit it.
-Who crouches on the spot passes no bar.
+Who crouches on the spot, or is low when the recording begins or ends, passes no bar.
 """
 
 from collections.abc import Mapping
@@ -107,8 +107,11 @@ def passages(clip: RecordedClip, overhead: Overhead) -> tuple[Passage, ...]:
         under = heights < overhead.height
     else:
         under = np.any([overhead.above(place) for place in (clip.com, *clip.tops.values())], axis=0)
-    found = (_passage(clip, first, stop, overhead) for first, stop in runs(under))
-    return tuple(one for one in found if overhead.x is not None or one.travelled >= CROSSED)
+    found = [(first, stop, _passage(clip, first, stop, overhead)) for first, stop in runs(under)]
+    if overhead.x is not None:
+        return tuple(one for _, _, one in found)
+    last = len(clip.time)
+    return tuple(one for a, b, one in found if a > 0 and b < last and one.travelled >= CROSSED)
 
 
 def _passage(clip: RecordedClip, first: int, stop: int, overhead: Overhead | None) -> Passage:
