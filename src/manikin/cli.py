@@ -31,6 +31,7 @@ from manikin.commands.ergonomics import ergonomics
 from manikin.commands.job import print_summary, run_job
 from manikin.commands.library import library
 from manikin.commands.push import push
+from manikin.commands.statistics import statistics
 from manikin.commands.walk import walk
 from manikin.commands.words import words
 from manikin.errors import InputError, ManikinError
@@ -181,6 +182,7 @@ app.command()(push)
 app.command()(walk)
 app.command()(words)
 app.command()(ergonomics)
+app.command()(statistics)
 app.add_typer(library, name="library")
 
 

@@ -1,6 +1,10 @@
 """Figures of a finished run, of two, or of a recording, one function each; no window and no global state is used."""
+"""Figures of a run, of two, or of recordings, one function each; no window and no global state is used."""
 
 from manikin.figures.com import com_figure
+from manikin.figures.com_distances import com_distances_figure
+from manikin.figures.com_heights import LowestPoints, com_heights_figure, published_lowest
+from manikin.figures.com_paths import com_paths_figure
 from manikin.figures.compare_com import compare_planes_figure, compare_scene_figure
 from manikin.figures.compare_margin import compare_margin_figure
 from manikin.figures.compare_postures import compare_postures_figure
@@ -12,6 +16,8 @@ from manikin.figures.ergonomics import ergonomics_figure
 from manikin.figures.flights import flights_figure
 from manikin.figures.footprints import footprint_figure
 from manikin.figures.margin import margin_figure
+from manikin.figures.phase_durations import phase_durations_figure
+from manikin.figures.placements import placements_figure
 from manikin.figures.planes import planes_figure
 from manikin.figures.postures import postures_figure
 from manikin.figures.push_map import push_map_figure
@@ -29,7 +35,11 @@ __all__ = [
     "COMPARISONS",
     "FIGURES",
     "ChoicePanel",
+    "LowestPoints",
+    "com_distances_figure",
     "com_figure",
+    "com_heights_figure",
+    "com_paths_figure",
     "compare_margin_figure",
     "compare_planes_figure",
     "compare_postures_figure",
@@ -45,8 +55,11 @@ __all__ = [
     "holonomic_ends_figure",
     "holonomic_zone_figure",
     "margin_figure",
+    "phase_durations_figure",
+    "placements_figure",
     "planes_figure",
     "postures_figure",
+    "published_lowest",
     "push_map_figure",
     "scene_figure",
     "support_strip_figure",

@@ -1,7 +1,7 @@
 """Recorded human motion: readers, and the angles of hips and shoulders.
 
 Skeletons are read from BVH and from ASF with AMC, markers from C3D and TRC, force plates from C3D and MOT.
-:func:`reconstruct` makes a motion of our human of any of them.
+:func:`reconstruct` makes a motion of our human of any of them, :func:`statistics_of` measures many.
 """
 
 from manikin.mocap.amc import read_amc
@@ -22,19 +22,46 @@ from manikin.mocap.plate_forces import (
     mass_on_plates,
     plate_forces,
 )
+from manikin.mocap.passages import Overhead, Passage, passages, whole_passage
+from manikin.mocap.phase_durations import phase_durations
+from manikin.mocap.phase_sequence import PhaseSequence
 from manikin.mocap.plate_supports import TimingError, timing_errors
+from manikin.mocap.published_phases import (
+    published_consistency,
+    published_distances,
+    published_grasps,
+    published_heights,
+    published_phases,
+)
 from manikin.mocap.read import read_recording
 from manikin.mocap.reconstruct import person_of, reconstruct
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_dynamics import RecordedDynamics, dynamics_of, with_mass
 from manikin.mocap.recorded_forces import motion_on_contacts
 from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
+from manikin.mocap.recorded_clip import RecordedClip, clip_of
 from manikin.mocap.recorded_motion import motion_of, smoothed
 from manikin.mocap.recorded_stances import recorded_schedule
 from manikin.mocap.recorded_supports import RecordedSupports, Support, SupportPhase
 from manikin.mocap.recording import Recording
 from manikin.mocap.seat_loads import SeatChange, seat_changes
+from manikin.mocap.sequence_consistency import SequenceConsistency, sequence_consistency
+from manikin.mocap.spread import Spread
+from manikin.mocap.statistics import (
+    GroupStatistics,
+    StatisticsSettings,
+    group_statistics,
+    published_statistics,
+    statistics_of,
+)
 from manikin.mocap.subject import Subject
+from manikin.mocap.support_distances import (
+    SupportDistance,
+    largest_distances,
+    shares_within,
+    support_distances,
+)
+from manikin.mocap.support_placements import Origin, Placement, com_extreme, first_stance, support_placements
 from manikin.mocap.supports import supports_of
 from manikin.mocap.targets import Targets
 from manikin.mocap.trc import read_trc
@@ -55,9 +82,24 @@ __all__ = [
     "RecordedSupports",
     "Recording",
     "SeatChange",
+    "GroupStatistics",
+    "MarkerRecording",
+    "Origin",
+    "Overhead",
+    "Passage",
+    "PhaseSequence",
+    "Placement",
+    "Reconstruction",
+    "RecordedClip",
+    "RecordedSupports",
+    "Recording",
+    "SequenceConsistency",
     "Skeleton",
+    "Spread",
+    "StatisticsSettings",
     "Subject",
     "Support",
+    "SupportDistance",
     "SupportPhase",
     "Targets",
     "TimingError",
@@ -71,6 +113,21 @@ __all__ = [
     "motion_on_contacts",
     "person_of",
     "plate_forces",
+    "clip_of",
+    "com_extreme",
+    "first_stance",
+    "group_statistics",
+    "largest_distances",
+    "motion_of",
+    "passages",
+    "person_of",
+    "phase_durations",
+    "published_consistency",
+    "published_distances",
+    "published_grasps",
+    "published_heights",
+    "published_phases",
+    "published_statistics",
     "read_amc",
     "read_asf",
     "read_bvh",
@@ -83,8 +140,14 @@ __all__ = [
     "recorded_schedule",
     "seat_changes",
     "share_by_cause",
+    "sequence_consistency",
+    "shares_within",
     "smoothed",
+    "statistics_of",
+    "support_distances",
+    "support_placements",
     "supports_of",
     "timing_errors",
     "with_mass",
+    "whole_passage",
 ]
