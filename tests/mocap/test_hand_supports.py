@@ -157,7 +157,7 @@ def test_who_climbs_a_structure_holds_on_to_it(recordings_folder):
     assert len(hands) == 6
     assert all(0.9 < one.place[2] < 1.5 for one in hands)
     # On the ladder at least two of hands and feet hold at any time, and mostly three.
-    climbing = [phase for phase in found.phases if 0.6 < phase.start and phase.end < 6.2]
+    climbing = [phase for phase in found.phases if phase.start > 0.6 and phase.end < 6.2]
     assert min(len(phase.effectors) for phase in climbing) >= 2
     three = sum(phase.duration for phase in climbing if len(phase.effectors) >= 3)
     assert three > 0.6 * sum(phase.duration for phase in climbing)

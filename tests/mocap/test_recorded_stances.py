@@ -5,8 +5,6 @@ import pytest
 
 from manikin.body import human
 from manikin.body.configuration import Configuration
-from manikin.contact import ContactKind, SolePart
-from manikin.errors import InputError
 from manikin.mocap import Reconstruction, Targets
 from manikin.mocap.recorded_stances import recorded_schedule
 from manikin.mocap.recorded_supports import RecordedSupports, Support

@@ -15,6 +15,9 @@ from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.gaps import Gap
 from manikin.mocap.markers import Event, MarkerRecording
 from manikin.mocap.mot import read_mot
+from manikin.mocap.passages import Overhead, Passage, passages, whole_passage
+from manikin.mocap.phase_durations import phase_durations
+from manikin.mocap.phase_sequence import PhaseSequence
 from manikin.mocap.plate_forces import (
     PlateComparison,
     PlateForces,
@@ -22,9 +25,6 @@ from manikin.mocap.plate_forces import (
     mass_on_plates,
     plate_forces,
 )
-from manikin.mocap.passages import Overhead, Passage, passages, whole_passage
-from manikin.mocap.phase_durations import phase_durations
-from manikin.mocap.phase_sequence import PhaseSequence
 from manikin.mocap.plate_supports import TimingError, timing_errors
 from manikin.mocap.published_phases import (
     published_consistency,
@@ -36,10 +36,10 @@ from manikin.mocap.published_phases import (
 from manikin.mocap.read import read_recording
 from manikin.mocap.reconstruct import person_of, reconstruct
 from manikin.mocap.reconstruction import Reconstruction
+from manikin.mocap.recorded_clip import RecordedClip, clip_of
 from manikin.mocap.recorded_dynamics import RecordedDynamics, dynamics_of, with_mass
 from manikin.mocap.recorded_forces import motion_on_contacts
 from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
-from manikin.mocap.recorded_clip import RecordedClip, clip_of
 from manikin.mocap.recorded_motion import motion_of, smoothed
 from manikin.mocap.recorded_stances import recorded_schedule
 from manikin.mocap.recorded_supports import RecordedSupports, Support, SupportPhase
@@ -72,27 +72,23 @@ __all__ = [
     "Event",
     "ForcePlate",
     "Gap",
-    "Loss",
-    "MarkerRecording",
-    "PlateComparison",
-    "PlateForces",
-    "Reconstruction",
-    "RecordedDynamics",
-    "RecordedMargins",
-    "RecordedSupports",
-    "Recording",
-    "SeatChange",
     "GroupStatistics",
+    "Loss",
     "MarkerRecording",
     "Origin",
     "Overhead",
     "Passage",
     "PhaseSequence",
     "Placement",
+    "PlateComparison",
+    "PlateForces",
     "Reconstruction",
     "RecordedClip",
+    "RecordedDynamics",
+    "RecordedMargins",
     "RecordedSupports",
     "Recording",
+    "SeatChange",
     "SequenceConsistency",
     "Skeleton",
     "Spread",
@@ -106,22 +102,20 @@ __all__ = [
     "anatomy_of",
     "balance_losses",
     "ball_joint_angles",
-    "compare_with_plates",
-    "dynamics_of",
-    "mass_on_plates",
-    "motion_of",
-    "motion_on_contacts",
-    "person_of",
-    "plate_forces",
     "clip_of",
     "com_extreme",
+    "compare_with_plates",
+    "dynamics_of",
     "first_stance",
     "group_statistics",
     "largest_distances",
+    "mass_on_plates",
     "motion_of",
+    "motion_on_contacts",
     "passages",
     "person_of",
     "phase_durations",
+    "plate_forces",
     "published_consistency",
     "published_distances",
     "published_grasps",
@@ -139,8 +133,8 @@ __all__ = [
     "recorded_margins",
     "recorded_schedule",
     "seat_changes",
-    "share_by_cause",
     "sequence_consistency",
+    "share_by_cause",
     "shares_within",
     "smoothed",
     "statistics_of",
@@ -148,6 +142,6 @@ __all__ = [
     "support_placements",
     "supports_of",
     "timing_errors",
-    "with_mass",
     "whole_passage",
+    "with_mass",
 ]
