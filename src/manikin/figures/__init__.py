@@ -1,4 +1,4 @@
-"""Figures of a finished run, of two, or of a recording, one function each; no window and no global state is used."""
+"""Figures of a finished run, of two or of a recording; no window and no global state is used."""
 
 from manikin.figures.com import com_figure
 from manikin.figures.compare_com import compare_planes_figure, compare_scene_figure
