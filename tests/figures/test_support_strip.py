@@ -11,7 +11,7 @@ from manikin.mocap import Reconstruction, RecordedSupports, Support, Targets
 
 @pytest.fixture(scope="module")
 def stood():
-    """A second of standing, on the right foot alone from the middle on, with the left knee down at the end."""
+    """A second of standing, on the right foot alone from the middle on, the left knee down at the end."""
     body = human(1.75, 75.0)
     time = np.arange(21) / 20.0
     q = np.tile(body.standing_posture(), (21, 1))
@@ -25,7 +25,8 @@ def stood():
 
 
 def test_a_strip_has_a_bar_for_each_support(stood):
-    _, heights, bars = support_strip_figure(*stood, "stood").axes
+    found, supports = stood
+    _, heights, bars = support_strip_figure(found, supports, "stood").axes
     names = [label.get_text() for label in bars.get_yticklabels()]
     assert names == ["left foot", "right foot", "left hand", "right hand", "left knee"]
     drawn = [[path.get_extents().intervalx for path in row.get_paths()] for row in bars.collections]
@@ -36,9 +37,11 @@ def test_a_strip_has_a_bar_for_each_support(stood):
 
 
 def test_a_strip_shows_a_part(stood):
-    assert support_strip_figure(*stood, "stood", (0.2, 0.6)).axes[2].get_xlim() == (0.2, 0.6)
+    found, supports = stood
+    assert support_strip_figure(found, supports, "stood", (0.2, 0.6)).axes[2].get_xlim() == (0.2, 0.6)
 
 
 def test_a_strip_of_no_instant_is_refused(stood):
+    found, supports = stood
     with pytest.raises(FigureError, match="valid: from 0 to 1 s"):
-        support_strip_figure(*stood, "stood", (2.0, 3.0))
+        support_strip_figure(found, supports, "stood", (2.0, 3.0))

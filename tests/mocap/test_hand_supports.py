@@ -1,4 +1,4 @@
-"""Hands, knees, elbows and the trunk as supports: bodies whose hands are told where to be, and recorded ones."""
+"""Hands, knees, elbows and the trunk as supports: of bodies told where to be, and of recorded people."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -198,8 +198,6 @@ def test_who_squats_on_the_toes_stays_on_one_floor(recordings_folder):
     assert found.phases[-1].duration > 2.0
 
 
-def test_a_body_without_named_parts_has_no_further_supports(recordings_folder):
-    found = reconstruction(standing(1.0))
-    assert "left_hand" not in {
-        one.effector for one in supports_of(replace(found, neutral=("left_hand",))).supports
-    }
+def test_a_hand_of_which_nothing_was_recorded_supports_nothing():
+    found = replace(passing(0.4, 1.0, 2.0), neutral=("left_hand",))
+    assert supports_of(found).of("left_hand") == ()

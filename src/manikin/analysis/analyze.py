@@ -10,6 +10,7 @@ from manikin.analysis.analysis import Analysis
 from manikin.analysis.on_plates import PlateReport, measured_mass, plate_report
 from manikin.analysis.remarks import remarks_on
 from manikin.analysis.walking import walked_segments
+from manikin.body.further_contacts import with_knees_and_elbows
 from manikin.ergonomics import Circumstances, ergonomics_of, upright_neck
 from manikin.errors import InputError
 from manikin.mocap.markers import MarkerRecording
@@ -107,6 +108,8 @@ def analyze(
             f"valid: at least {FEWEST_FRAMES}"
         )
     supports = supports_of(found, start=start)
+    if not {one.effector for one in supports.supports} <= set(found.body.effectors):
+        found = replace(found, body=with_knees_and_elbows(found.body))
     schedule = recorded_schedule(found, supports, friction=given.friction)
     dynamics = dynamics_of(found)
     mass = None if given.mass is not None else measured_mass(recording, dynamics, schedule, supports.start)

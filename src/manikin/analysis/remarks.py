@@ -62,7 +62,6 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         lines.append(
             f"balanced in {share:.0f} % of the frames only: running, or supports that were not found"
         )
-    if isinstance(recording, MarkerRecording) and recording.plates and analysis.plates is not None:
-        if not analysis.plates.compared.any():
-            lines.append("no instant has all supports on force plates: their forces are not compared")
+    if analysis.plates is not None and not analysis.plates.compared.any():
+        lines.append("no instant has all supports on force plates: their forces are not compared")
     return tuple(lines)

@@ -136,11 +136,15 @@ def _draw_postures(
         view: View = ALONG_Y.moved(pitch * number - float(turned[sample, 0]), 0.0)
         draw_body(axes, found.body, turned[sample], view)
         on = [
-            one.effector for one in supports.supports if one.start <= time[sample] + 1e-9 and time[sample] <= one.end
+            one.effector
+            for one in supports.supports
+            if one.start <= time[sample] + 1e-9 and time[sample] <= one.end
         ]
         if on:
             for name, place in zip(on, effector_places(found.body, turned[[sample]], on)[:, 0], strict=True):
-                axes.plot(*view(place), "o", color=colours[name], markersize=6, markeredgecolor="black", zorder=6)
+                axes.plot(
+                    *view(place), "o", color=colours[name], markersize=6, markeredgecolor="black", zorder=6
+                )
         axes.annotate(f"{time[sample]:.2f} s", (pitch * number, high), fontsize=8, ha="center", va="bottom")
     for height in supports.surfaces:
         axes.axhline(height, color=COLOURS["soft"], linewidth=0.7, zorder=0.5)
@@ -164,9 +168,7 @@ def _draw_heights(
     axes.tick_params(labelbottom=False)
 
 
-def _draw_bars(
-    axes: Axes, supports: RecordedSupports, names: Sequence[str], colours: dict[str, str]
-) -> None:
+def _draw_bars(axes: Axes, supports: RecordedSupports, names: Sequence[str], colours: dict[str, str]) -> None:
     for row, name in enumerate(names):
         bars = [(one.start, one.duration) for one in supports.of(name)]
         axes.broken_barh(bars, (row + 0.12, 0.76), facecolors=colours[name], alpha=0.85)

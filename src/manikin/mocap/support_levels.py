@@ -193,7 +193,7 @@ def _rests(
 
 @dataclass(frozen=True)
 class _Rest:
-    """A time for which the sole of a foot rests: its height, its toes above its heel, whether alone, whether lying."""
+    """A time for which a sole rests: its height, its toes above its heel, whether alone, whether lying."""
 
     foot: int
     height: float

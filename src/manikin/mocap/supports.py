@@ -1,10 +1,11 @@
-"""Which feet support a recorded person, when and at which height.
+"""What supports a recorded person, when and at which height: here the feet, and all others with them.
 
 A foot supports while its heel or its toes do. Each of the two points is followed by a switch with
 hysteresis: it closes where the point is slow and near a surface, and opens where it is fast or away from
 it. Speeds are compared with the highest one of the swing, for the low-pass filter turns the stop of a
 fast foot into a slope that is as high as the foot was fast. Surfaces are found from the recording itself
-(:mod:`manikin.mocap.support_levels`), so stairs need no description.
+(:mod:`manikin.mocap.support_levels`), so stairs need no description. Others:
+:mod:`manikin.mocap.seat_supports`, :mod:`manikin.mocap.ground_supports`, :mod:`manikin.mocap.hand_supports`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -49,7 +50,7 @@ SHORTEST = 0.08
 
 
 def supports_of(found: Reconstruction, *, start: float = 0.0, cutoff: float = CUTOFF) -> RecordedSupports:
-    """Supports of feet and seat of a reconstructed recording, markers or skeleton.
+    """Supports of feet, seat, hands, knees, elbows and trunk of a reconstructed recording.
 
     Args:
         found: At least four instants at an even rate, not yet smoothed.
@@ -132,9 +133,7 @@ def sole_points(found: Reconstruction) -> dict[str, tuple[FloatArray, FloatArray
     return {name: (ends[foot, 0], ends[foot, 1]) for foot, name in enumerate(FEET)}
 
 
-def floor_under(
-    soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Sequence[float]
-) -> FloatArray:
+def floor_under(soles: Mapping[str, tuple[FloatArray, FloatArray]], surfaces: Sequence[float]) -> FloatArray:
     """(n,) height of the surface under the lower foot [m]; under its sole where no surface is known.
 
     Args:
@@ -180,7 +179,7 @@ def _height_above(heights: FloatArray, levels: FloatArray) -> FloatArray:
 
 
 def _toes_above(points: tuple[Track, Track], toes: FloatArray, levels: FloatArray) -> FloatArray:
-    """(n,) from the nearest level, of the toes, or of what a steep sole stands on where that is nearer [m]."""
+    """(n,) of the toes from the nearest level, or of what a steep sole stands on where that is nearer [m]."""
     above = _height_above(toes, levels)
     ball = np.where(sole_rise(*points) > STEEP, _height_above(sole_height(*points), levels), np.inf)
     return np.where(np.abs(ball) < np.abs(above), ball, above)
