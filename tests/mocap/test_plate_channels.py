@@ -16,7 +16,7 @@ FORCE, PLACE = np.array([30.0, -20.0, 700.0]), np.array([0.12, -0.05, 0.0])
 def six_channels(free):
     """Force and moment about the sensors' origin, which is :data:`DEPTH` below the surface."""
     from_sensors = PLACE - [0.0, 0.0, DEPTH]
-    return np.concatenate([FORCE, np.cross(from_sensors, FORCE) + [0.0, 0.0, free]])
+    return np.concatenate([FORCE, np.cross(from_sensors, FORCE) + free * np.eye(3)[2]])
 
 
 def eight_channels(a, b):
@@ -45,5 +45,5 @@ def test_one_load_on_plates_of_every_type(kind, sign):
         channels = np.linalg.solve(calibration, channels) if kind == 4 else channels
     force, moment = plate_load(kind, np.tile(channels, (3, 1)).T, CORNERS, origin, calibration)
     np.testing.assert_allclose(force, [TURN @ FORCE] * 3, atol=1e-9)
-    wanted = TURN @ (np.cross(PLACE, FORCE) + [0.0, 0.0, free])
+    wanted = TURN @ (np.cross(PLACE, FORCE) + free * np.eye(3)[2])
     np.testing.assert_allclose(moment, [wanted] * 3, atol=1e-9)

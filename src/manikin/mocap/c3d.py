@@ -250,11 +250,8 @@ def _plates(
         surface, where = unit * surface @ turn.T, f"{layout.file}: {name}"
         middle, normal = surface.mean(axis=0), _normal(surface, where)
         wrenches = wrench_at_world_origin(force @ turn.T, unit * moment @ turn.T, middle)
-        found.append(
-            ForcePlate(
-                where, wrenches, middle, rate * layout.samples, (layout.first_frame - 1) / rate, normal, surface
-            )
-        )  # fmt: skip
+        sampled, start = rate * layout.samples, (layout.first_frame - 1) / rate
+        found.append(ForcePlate(where, wrenches, middle, sampled, start, normal, surface))
     return tuple(found)
 
 

@@ -1,8 +1,8 @@
 """Force and moment on a force plate from the channels that a C3D file keeps of it (c3d.org, user guide).
 
-In a plate's own axes x points from its second corner to the first one, y from the fourth to the first, and z
-away from both, into the ground of most plates. Its origin is the middle of the surface seen from the origin of
-its sensors, which lie deeper; some programs write the opposite, told by its sign.
+In a plate's own axes x points from its second corner to the first one, y from the fourth to the first, and
+z at right angles to both, into the ground of most plates. Its origin is the middle of the surface seen from
+that of its sensors, which lie deeper; some programs write the opposite, told by its sign.
 """
 
 import numpy as np
