@@ -1,7 +1,6 @@
 """Reading of recorded markers, reconstruction, and the motion with velocities and accelerations.
 
-A walk of 8 s at 120 Hz by 36 markers with 3 mm of noise, made here: no recordings are needed. One thread, idle
-machine, medians, before and after frames were found many at once.
+A walk of 8 s at 120 Hz by 36 markers with 3 mm of noise, made here: no recordings are needed.
 """
 
 import numpy as np
