@@ -17,6 +17,7 @@ from manikin.mocap.axes import metres_per, rotation_to_z_up
 from manikin.mocap.c3d_layout import C3dLayout, c3d_layout
 from manikin.mocap.force_plate import ForcePlate, wrench_at_world_origin
 from manikin.mocap.markers import Event, MarkerRecording, unique_names, without_unseen
+from manikin.mocap.plate_channels import plate_load
 from manikin.mocap.subject import Subject
 from manikin.mocap.text import LARGEST
 from manikin.spatial import FloatArray
@@ -45,7 +46,7 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     layout = c3d_layout(_content(path), file)
     with_plates = plates and _has_plates(layout)
     try:
-        found = ezc3d.c3d(file, extract_forceplat_data=with_plates)
+        found = ezc3d.c3d(file)
     except (OSError, RuntimeError, ValueError, IndexError, KeyError, TypeError, MemoryError) as error:
         reason = " ".join(str(error).split())[:100]
         raise InputError(f"{file}: cannot be read ({reason}); valid: a complete C3D file") from None
@@ -62,7 +63,7 @@ def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> Ma
     positions = unit * _finite(points[:3, kept], file, "a point").transpose(2, 1, 0) @ turn.T
     return MarkerRecording(
         Path(path).name, names, without_unseen(positions), rate, start,
-        _plates(found["data"]["platform"], layout, unit, turn, rate, start) if with_plates else (),
+        _plates(parameters, found["data"]["analogs"][0], layout, unit, turn) if with_plates else (),
         _events(parameters, layout), _subject(parameters, unit),
     )  # fmt: skip
 
@@ -222,30 +223,45 @@ def _check_matrices(layout: C3dLayout, count: int, needed: bool) -> None:
 
 
 def _plates(
-    platforms: list[Mapping[str, Any]],
-    layout: C3dLayout,
-    unit: float,
-    turn: FloatArray,
-    rate: float,
-    start: float,
+    parameters: Mapping[str, Any], channels: FloatArray, layout: C3dLayout, unit: float, turn: FloatArray
 ) -> tuple[ForcePlate, ...]:
-    """Plates of what the library computed: moments about the middle of the corners, in the file's unit."""
+    """Plates by their channels (c, n), their moments in the file's unit of length."""
+    types = layout.integers("FORCE_PLATFORM", "TYPE")
+    count = int(layout.integers("FORCE_PLATFORM", "USED")[0])
+    each = layout.parameters["FORCE_PLATFORM", "CHANNEL"].dimensions[0]
+    used = layout.integers("FORCE_PLATFORM", "CHANNEL").reshape(-1, each) - 1
+    corners, origins = (_reals(parameters, layout, name) for name in ("CORNERS", "ORIGIN"))
+    force_unit = next(iter(_texts(parameters, "FORCE_PLATFORM", "UNITS")), "N")
+    rate = layout.real("POINT", "RATE")
+    if force_unit not in ("N", "") or channels.shape[1] != layout.frames * layout.samples:
+        raise layout.error(f"force plates in {force_unit[:20]!r}", "N, every sample")
     found = []
-    for number, platform in enumerate(platforms, start=1):
-        name = f"{layout.file}: force plate {number}"
-        force, moment, corners = (
-            _finite(np.asarray(platform[key]).T, layout.file, f"force plate {number}")
-            for key in ("force", "moment", "corners")
-        )
-        if platform["unit_force"].strip() not in ("N", "") or len(force) != layout.frames * layout.samples:
-            raise layout.error(f"force plate {number} in {platform['unit_force'][:20]!r}", "N, every sample")
-        if any(np.isnan(values).any() for values in (force, moment, corners)):
-            raise layout.error(f"force plate {number} is described or measured by NaN", "finite numbers")
-        corners = unit * corners @ turn.T
-        middle, normal = corners.mean(axis=0), _normal(corners, name)
+    for plate, kind in enumerate(types[:count].tolist()):
+        name = f"force plate {plate + 1}"
+        calibration = _reals(parameters, layout, "CAL_MATRIX") if kind == 4 else None
+        if calibration is not None:
+            size = layout.parameters["FORCE_PLATFORM", "CAL_MATRIX"].dimensions
+            calibration = calibration.reshape(size, order="F")[:6, :6, plate]
+        surface = corners[12 * plate : 12 * plate + 12].reshape(4, 3)
+        own = _finite(channels[used[plate, : CHANNELS[kind]]], layout.file, name)
+        force, moment = plate_load(kind, own, surface, origins[3 * plate : 3 * plate + 3], calibration)
+        if any(np.isnan(values).any() for values in (force, moment, surface)):
+            raise layout.error(f"{name} is described or measured by NaN", "finite numbers")
+        surface, where = unit * surface @ turn.T, f"{layout.file}: {name}"
+        middle, normal = surface.mean(axis=0), _normal(surface, where)
         wrenches = wrench_at_world_origin(force @ turn.T, unit * moment @ turn.T, middle)
-        found.append(ForcePlate(name, wrenches, middle, rate * layout.samples, start, normal, corners))
+        sampled, start = rate * layout.samples, (layout.first_frame - 1) / rate
+        found.append(ForcePlate(where, wrenches, middle, sampled, start, normal, surface))
     return tuple(found)
+
+
+def _reals(parameters: Mapping[str, Any], layout: C3dLayout, name: str) -> FloatArray:
+    """(n,) values of a parameter of the force plates, none absurd."""
+    try:
+        values = np.ravel(parameters["FORCE_PLATFORM"][name]["value"], order="F").astype(np.float64)
+    except (KeyError, ValueError):
+        raise layout.error(f"FORCE_PLATFORM:{name} is no number", "numbers") from None
+    return _finite(values, layout.file, f"FORCE_PLATFORM:{name}")
 
 
 def _normal(corners: FloatArray, name: str) -> FloatArray:

@@ -73,24 +73,28 @@ class _Following:
             before = self.q[frame - 1] if frame else self._starts[0]
             q, cost = search(self._cost, before[None], self._wanted[frame : frame + 1], before[None])
             self._keep(frame, q)
-            if frame and self._is_poor(frame):
-                self._try_start(frame, cost[0])
+            if frame:
+                self._better_start(frame, cost)
         return min(stop, len(self.q))
 
-    def _try_start(self, frame: int, cost: float) -> bool:
-        """Whether the search from the frame's own start is clearly better; then it is kept."""
-        start = self._starts[frame : frame + 1]
-        other, other_cost = search(self._cost, start, self._wanted[frame : frame + 1], start)
-        if better := bool(other_cost[0] < 0.9 * cost):
-            self._keep(frame, other)
-        return better
+    def _better_start(self, first: int, costs: FloatArray) -> int | None:
+        """The first of the poor frames whose own start leads to a clearly better posture, which it gets."""
+        worst = np.nanmax(self.residual[first : first + len(costs), self._heavy], axis=1, initial=0.0)
+        poor = first + np.flatnonzero(worst > POOR)
+        if not poor.size:
+            return None
+        starts = self._starts[poor]
+        others, other_costs = search(self._cost, starts, self._wanted[poor], starts)
+        better = np.flatnonzero(other_costs < 0.9 * costs[poor - first])
+        if not better.size:
+            return None
+        frame = int(poor[better[0]])
+        self._keep(frame, others[better[:1]])
+        return frame
 
     def _keep(self, first: int, q: FloatArray) -> None:
         frames = slice(first, first + len(q))
         self.q[frames], self.residual[frames] = q, self._cost.distances(q, self._wanted[frames])
-
-    def _is_poor(self, frame: int) -> bool:
-        return bool(np.nanmax(self.residual[frame, self._heavy], initial=0.0) > POOR)
 
     # --- together
 
@@ -99,20 +103,17 @@ class _Following:
         guess = self._guess(first, stop)
         q, costs = search(self._cost, guess[1:], self._wanted[first:stop], guess[:-1])
         self._keep(first, q)
-        for frame in range(first, stop):
-            if self._is_poor(frame) and self._try_start(frame, costs[frame - first]):
-                return frame + 1
-        return stop
+        found = self._better_start(first, costs)
+        return stop if found is None else found + 1
 
     def _guess(self, first: int, stop: int) -> FloatArray:
         """Postures from the frame before the first, on a curve through some that are searched roughly."""
         knots, q = [first - 1], [self.q[first - 1]]
         for frame in [*range(first - 1 + self._apart, stop - 1, self._apart), stop - 1]:
             before = self._cost.later(q[-1], frame - knots[-1] - 1)
-            found = search(self._cost, q[-1][None], self._wanted[frame : frame + 1], before[None], ROUGH)[0][
-                0
-            ]
-            found[3:7] *= np.sign(found[3:7] @ q[-1][3:7])
+            wanted = self._wanted[frame : frame + 1]
+            found = search(self._cost, q[-1][None], wanted, before[None], ROUGH)[0][0]
+            found[3:7] *= np.copysign(1.0, found[3:7] @ q[-1][3:7])
             knots.append(frame)
             q.append(found)
         curve = CubicSpline(knots, q)(np.arange(first - 1, stop))

@@ -15,7 +15,7 @@ def projected_step(
 ) -> FloatArray:
     """Solution of ``(matrix + damping) @ step = right`` within bounds.
 
-    Unknowns that would leave their bounds are put on them, the others are solved for again, until none leaves. An
+    Unknowns that would leave their bounds are put on them, the others solved for again, until none leaves. An
     unknown that is on its bound and pushed outward stays there (Bertsekas, "Projected Newton methods for
     optimization problems with simple constraints", 1982).
 

@@ -47,7 +47,7 @@ def numbers(words: list[str], where: str, gaps: bool = False) -> FloatArray:
         InputError: If a word is no such number.
     """
     try:
-        values = np.array([float(word) for word in words], dtype=np.float64)
+        values = np.array(list(map(float, words)), dtype=np.float64)
     except ValueError:
         wrong = next(word for word in words if not _is_number(word))
         raise InputError(f"{where}: {wrong[:40]!r} is no number; valid: finite numbers") from None

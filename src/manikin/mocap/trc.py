@@ -87,7 +87,7 @@ def _names(line: str, markers: int, file: str) -> tuple[str, ...]:
 
 def _table(lines: list[str], width: int, file: str) -> FloatArray:
     """(n, width) numbers, NaN in empty cells."""
-    rows = []
+    words: list[str] = []
     for number, line in enumerate(lines, start=6):
         if not line.strip():
             continue
@@ -96,9 +96,11 @@ def _table(lines: list[str], width: int, file: str) -> FloatArray:
             raise InputError(
                 f"{file}: line {number}: {len(cells)} cells; valid: {width} (is the file cut short?)"
             )
-        rows.append(cells[:width])
-    words = [cell if cell and not cell.isspace() else "nan" for cells in rows for cell in cells]
-    table = numbers(words, f"{file}: a frame", gaps=True).reshape(len(rows), width)
+        row = cells[:width]
+        if " " in line or not all(row):
+            row = [cell if cell.strip() else "nan" for cell in row]
+        words += row
+    table = numbers(words, f"{file}: a frame", gaps=True).reshape(-1, width)
     if np.any(np.isnan(table[:, :2])):
         raise InputError(f"{file}: a frame without number or time; valid: both in every row")
     return table
