@@ -1,6 +1,4 @@
-"""Figures of a finished run, of two, or of a recording, one function each; no window and no global state is used."""
-"""Figures of a run, of two, or of recordings, one function each; no window and no global state is used."""
-"""Figures of a finished run, of two or of a recording; no window and no global state is used."""
+"""Figures of runs and of recordings, one function each; no window and no global state is used."""
 
 from manikin.figures.com import com_figure
 from manikin.figures.com_distances import com_distances_figure
