@@ -11,18 +11,19 @@ from manikin.analysis.on_plates import PlateReport, measured_mass, plate_report
 from manikin.analysis.remarks import remarks_on
 from manikin.analysis.walking import walked_segments
 from manikin.body.further_contacts import with_knees_and_elbows
-from manikin.ergonomics import Circumstances, ergonomics_of, upright_neck
+from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, upright_neck
 from manikin.errors import InputError
 from manikin.mocap.markers import MarkerRecording
 from manikin.mocap.read import read_recording
 from manikin.mocap.reconstruct import reconstruct
 from manikin.mocap.recorded_dynamics import dynamics_of, with_mass
 from manikin.mocap.recorded_forces import motion_on_contacts
-from manikin.mocap.recorded_margins import recorded_margins
+from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
 from manikin.mocap.recorded_stances import FRICTION, recorded_schedule
 from manikin.mocap.recording import Recording
 from manikin.mocap.supports import supports_of
 from manikin.mocap.untold_segments import untold_upright
+from manikin.motion import Motion
 from manikin.spatial import finite_number
 
 SEXES = ("male", "female")
@@ -118,7 +119,7 @@ def analyze(
         schedule = recorded_schedule(found, supports, friction=given.friction)
         dynamics = dynamics_of(found)
     margins = recorded_margins(dynamics, schedule, supports.start)
-    motion = motion_on_contacts(dynamics, schedule, supports.start)
+    motion = motion_on_contacts(dynamics, schedule, supports.start, margins)
     ground = min(supports.surfaces, default=0.0)
     report: PlateReport | None = None
     if plates:
@@ -128,7 +129,7 @@ def analyze(
         load_kg=given.load, neck_upright_deg=0.0 if neck is None else float(np.degrees(neck))
     )
     ergonomics = ergonomics_of(
-        found.body, motion, schedule=schedule, given=circumstances, friction=given.friction
+        found.body, motion, given=circumstances, untold=found.neutral, lowest=_lowest(motion, margins)
     )
     analysis = Analysis(
         name=name or recording.name, source=recording.name, rate=recording.rate, sex=given.sex, found=found,
@@ -137,3 +138,14 @@ def analyze(
         segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
     )  # fmt: skip
     return replace(analysis, remarks=remarks_on(analysis, recording), wall=clock.perf_counter() - began)
+
+
+def _lowest(motion: Motion, margins: RecordedMargins) -> LowestMargin:
+    """The lowest margin of a motion, with its limiting contact."""
+    frame = margins.lowest
+    value = float(margins.whole_body[frame])
+    on = tuple(name for name, held in zip(motion.contact_names, motion.support[frame], strict=True) if held)
+    return LowestMargin(
+        value, motion.margin_unit, float(motion.time[frame]), on, margins.limiting(frame), value,
+        "recorded contacts" if on else None, None if on else "nothing is in contact at that instant",
+    )  # fmt: skip

@@ -101,6 +101,7 @@ def ergonomics_of(
     fraction: float = LOADED,
     friction: float = FRICTION,
     untold: Sequence[str] = (),
+    lowest: LowestMargin | None = None,
 ) -> Ergonomics:
     """Judge a motion, recorded, planned or executed.
 
@@ -113,6 +114,7 @@ def ergonomics_of(
         friction: Of contacts that the schedule does not tell of.
         untold: Segments about which a recording says nothing, as
             :attr:`manikin.mocap.reconstruction.Reconstruction.neutral`; without the trunk no scores.
+        lowest: The lowest margin, where it is known already.
 
     Raises:
         BodyError: If the motion is of another body.
@@ -136,7 +138,7 @@ def ergonomics_of(
     for name, part in (("strength", strength), ("effort", effort)):
         if part is None:
             missing[name] = "the body has no joints" if not body.joint_names else NO_TORQUES
-    margin = lowest_margin(body, motion, schedule, friction=friction)
+    margin = lowest or lowest_margin(body, motion, schedule, friction=friction)
     if margin is None:
         missing["margin"] = "the motion has no margin"
     elif margin.unknown is not None:

@@ -71,8 +71,16 @@ def recorded_margins(
         start: The schedule's clock at the motion's first instant [s].
     """
     phases = schedule.phase_at(dynamics.time + start)
+    known: dict[tuple[int, ...], WrenchPolytope] = {}  # the same contacts come back, as both feet and a hand
+
+    def polytope_of(stance: Stance) -> WrenchPolytope:
+        key = tuple(map(id, stance))
+        if key not in known:
+            known[key] = _polytope(stance)
+        return known[key]
+
     polytopes = tuple(
-        _polytope(phase.stance) if len(phase.stance) and np.any(phases == number) else None
+        polytope_of(phase.stance) if len(phase.stance) and np.any(phases == number) else None
         for number, phase in enumerate(schedule.sequence)
     )
     body = margins_of_wrenches(polytopes, phases, dynamics.wrench, dynamics.com)

@@ -4,15 +4,18 @@ A foot is a rectangular sole of the body's size, flat on its surface where the f
 as it supports: so it stays at one place, as every stance here. A recorded foot rolls, though. While its heel
 is lifted only what lies before the hinge of the toes can carry, while its toes are only the heel;
 :func:`recorded_schedule` splits phases there if asked to. It tells by the height of both ends of a stiff
-sole above their height in flat stance. Who sits presses on a seat with a rectangle under the hips, and a hand
-holds a grasp, for a recording does not tell how its surface lies.
+sole above their height in flat stance. Who sits presses on a seat with a rectangle under the hips, who lies
+with one under the trunk. A hand, knee or elbow on the ground is a point; a hand anywhere else holds a grasp,
+for a recording does not tell how its surface lies.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
@@ -24,10 +27,12 @@ from manikin.contact import (
     Stance,
     StanceSequence,
     grasp,
+    point,
     sole,
     sole_part,
 )
 from manikin.errors import InputError
+from manikin.mocap.ground_supports import TRUNK
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_supports import RecordedSupports, Support
 from manikin.mocap.runs import runs
@@ -44,6 +49,12 @@ STRONGEST = 4.0
 
 HAND_FORCE = 100.0
 """Largest force of a hand along each axis ([Qiu2012]_ 7.2) [N]."""
+
+ON_GROUND = 0.2
+"""Height above a surface up to which a hand, knee or elbow rests on it, and does not hold something [m]."""
+
+TRUNK_LENGTH = 0.29
+"""From the hips to the shoulders, per stature: what of the trunk lies on the ground."""
 
 LIFTED = 0.025
 """Height above that in flat stance from which an end of a sole has lifted [m]."""
@@ -101,7 +112,7 @@ def recorded_schedule(
             if rolling:
                 table[frames, column] = ends.parts()
         else:
-            contacts.append(_other_contact(found, support, frames, friction))
+            contacts.append(_other_contact(found, support, frames, friction, supports.surfaces))
     firsts = np.concatenate([[0], np.flatnonzero(np.any(np.diff(table[:-1], axis=0), axis=1)) + 1])
     instants = supports.start + np.append(found.time[firsts], found.time[-1])
     cap = STRONGEST * found.body.mass * GRAVITY
@@ -151,15 +162,30 @@ class _SoleEnds:
         return parts
 
 
-def _other_contact(found: Reconstruction, support: Support, frames: slice, friction: float) -> Contact:
-    """Of a seat, or else of a hand."""
-    if support.effector != SEAT or found.body.stature is None:
-        return grasp(support.effector, support.place, max_force=HAND_FORCE)
-    x, y, z, w = found.q[frames, 3:7].T
-    ahead = np.mean([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w)], axis=1)
+def _other_contact(
+    found: Reconstruction, support: Support, frames: slice, friction: float, surfaces: Sequence[float]
+) -> Contact:
+    """Of a seat, of the trunk or a limb on the ground, or else of a hand that holds something."""
+    name, place, stature = support.effector, support.place, found.body.stature
+    below = [height for height in surfaces if abs(place[2] - height) < ON_GROUND]
+    if below:
+        place = np.array([place[0], place[1], below[0]])
+    if stature is None or (name != SEAT and not below):
+        return grasp(name, place, max_force=HAND_FORCE)
+    if name not in (SEAT, TRUNK):
+        return point(name, place, friction=friction)
+    size = (SEAT_LENGTH, SEAT_WIDTH) if name == SEAT else (TRUNK_LENGTH, SEAT_WIDTH)
+    # Who sits looks along x of the pelvis, who lies has the shoulders along its z.
+    along = Rotation.from_quat(found.q[frames, 3:7]).apply(
+        [1.0, 0.0, 0.0] if name == SEAT else [0.0, 0.0, 1.0]
+    )
+    ahead = along.mean(axis=0)
+    if name == TRUNK:
+        level = ahead[:2] / max(float(np.linalg.norm(ahead[:2])), 1e-9)
+        place = place + 0.5 * TRUNK_LENGTH * stature * np.append(level, 0.0)
     return sole(
-        SEAT, support.place, float(np.arctan2(ahead[1], ahead[0])),
-        length=SEAT_LENGTH * found.body.stature, width=SEAT_WIDTH * found.body.stature, friction=friction,
+        name, place, float(np.arctan2(ahead[1], ahead[0])), length=size[0] * stature, width=size[1] * stature,
+        friction=friction,
     )  # fmt: skip
 
 
