@@ -1,5 +1,6 @@
-"""Recordings measured side by side, each in a process beside this one; a bad file stops none of the others."""
+"""Recordings measured side by side in processes beside this one; a bad file stops none of the others."""
 
+import gc
 import multiprocessing
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -75,7 +76,7 @@ def analyze_files(
         return
     # Fresh processes: copies of this one would share the threads and locks of its libraries.
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(workers, len(jobs)), context, prepare_worker)
+    pool = ProcessPoolExecutor(min(workers, len(jobs)), context, _prepare)
     try:
         for future in as_completed([pool.submit(analyze_one, job, options) for job in jobs]):
             yield future.result()
@@ -83,6 +84,11 @@ def analyze_files(
         raise ManikinError("a process of the analysis ended before its time, for want of memory?") from None
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _prepare() -> None:
+    prepare_worker()
+    gc.freeze()  # what the libraries brought along is not looked through again with every collection
 
 
 def analyze_one(job: AnalysisJob, options: AnalysisOptions) -> AnalysisEntry:

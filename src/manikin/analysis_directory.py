@@ -71,7 +71,7 @@ def write_analysis(found: Analysis, directory: Path, *, draw: bool = True) -> No
     """
     make_directory(directory)
     summary = found.as_dict()
-    figure = png_of(recording_figure(found)) if draw else None
+    figure = png_of(recording_figure(found), 1) if draw else None
     write_motions(directory / MOTION, MotionFile(recorded=found.motion, body=found.body))
     _write(directory / SERIES, _series_text(found))
     _write(directory / REPORT, report_page(found, summary, figure))

@@ -10,8 +10,8 @@ from manikin.version import __version__
 
 WORDS = (
     "Times are seconds from the first frame of the recording's clock. The margin is the distance of the "
-    "wrench that the motion needs to the faces of what the contacts can give (Qiu 2012, 4.2.9), moments about "
-    "the ground below the centre of mass, alpha = 1 m: below 0 the contacts, as they were found, could not "
+    "wrench that the motion needs to the faces of what the contacts can give (Qiu 2012, 4.2.9), moments "
+    "about the middle of the contacts, alpha = 1 m: below 0 the contacts, as they were found, could not "
     "give it."
 )
 STRONGEST_SHOWN = 8
@@ -36,8 +36,8 @@ def report_page(found: Analysis, summary: Mapping[str, Any], figure: bytes | Non
     page.table(
         ("effector", "from [s]", "to [s]", "duration [s]", "place x, y, z [m]"),
         [
-            (readable(one["effector"]), _time(one["start_s"], one["start_seen"]), _time(one["end_s"], one["end_seen"]),
-             one["end_s"] - one["start_s"], tuple(one["place_m"]))
+            (readable(one["effector"]), _time(one["start_s"], one["start_seen"]),
+             _time(one["end_s"], one["end_seen"]), one["end_s"] - one["start_s"], tuple(one["place_m"]))
             for one in summary["supports"]
         ],
     )  # fmt: skip

@@ -6,7 +6,8 @@ from html import escape
 from typing import Any
 
 STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; max-width: 72rem; margin: 2rem auto; padding: 0 1rem }
+body { font: 15px/1.45 system-ui, sans-serif; color: #222; max-width: 72rem }
+body { margin: 2rem auto; padding: 0 1rem }
 h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.1rem; margin: 1.8rem 0 .4rem }
 p.sub { color: #666; margin: .2rem 0 1rem }
 table { border-collapse: collapse; margin: .3rem 0 } th { text-align: left; font-weight: 600 }

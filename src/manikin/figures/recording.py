@@ -5,12 +5,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from manikin.analysis import Analysis
+from manikin.body import BodyModel
 from manikin.figures.style import COLOURS, colours_of, dress, new_grid, readable
-from manikin.figures.views import ALONG_Y, draw_body
+from manikin.figures.views import side_colour
 from manikin.spatial import FloatArray
 
 POSTURES = 9
@@ -56,9 +58,15 @@ def _postures(axes: Axes, analysis: "Analysis") -> None:
     frames = np.unique(np.linspace(0, len(analysis.time) - 1, POSTURES).round().astype(int))
     turned = _turned(analysis.motion.q[frames], -_heading(analysis))
     floor = min(analysis.supports.surfaces, default=0.0)
-    for number, q in enumerate(turned):
-        q[:2] = 0.0
-        draw_body(axes, analysis.body, q, ALONG_Y.moved(STEP * number, -floor))
+    turned[:, :2] = 0.0
+    places = [np.array([STEP * number, -floor]) for number in range(len(turned))]
+    lines = [place + _bones(analysis.body, q) for place, q in zip(places, turned, strict=True)]
+    colours = [side_colour(segment.name) for segment in analysis.body.segments[1:]]
+    axes.add_collection(
+        LineCollection(np.concatenate(lines), colors=colours * len(lines), linewidths=3.5, capstyle="round"),
+        autolim=False,
+    )
+    for number in range(len(turned)):
         axes.text(STEP * number, -0.16, f"{analysis.time[frames[number]]:.2f} s", ha="center", fontsize=7.5)
     axes.axhline(0.0, color=COLOURS["soft"], linewidth=0.8)
     axes.set_aspect("equal")
@@ -66,6 +74,14 @@ def _postures(axes: Axes, analysis: "Analysis") -> None:
     top = float(np.max(turned[:, 2])) - floor + 0.55 * (analysis.body.stature or 1.75)
     axes.set_ylim(-0.25, top)
     axes.axis("off")
+
+
+def _bones(body: BodyModel, q: FloatArray) -> FloatArray:
+    """(k, 2, 2) lines from the origin of each segment's parent to its own, seen from the right [m]."""
+    model, data = body.pinocchio, body.pinocchio.createData()
+    pin.framesForwardKinematics(model, data, q)
+    places = {one.name: data.oMf[body.segment_frame(one.name)].translation[[0, 2]] for one in body.segments}
+    return np.array([[places[one.parent or ""], places[one.name]] for one in body.segments[1:]])
 
 
 def _heading(analysis: "Analysis") -> float:

@@ -113,7 +113,8 @@ def motion_on_contacts(
     return Motion(
         time=dynamics.time, q=dynamics.q, v=dynamics.v, a=dynamics.a, tau=torques, com=dynamics.com,
         angular_momentum=dynamics.angular_momentum,
-        margin=margins.whole_body, support=schedule.support(times, names), contact_force=forces, contact_names=names,
+        margin=margins.whole_body, support=schedule.support(times, names), contact_force=forces,
+        contact_names=names,
         joint_names=tuple(dynamics.body.joint_names),
     )  # fmt: skip
 

@@ -1,0 +1,124 @@
+"""One recording measured from beginning to end."""
+
+import numpy as np
+import pytest
+
+from manikin.analysis import AnalysisOptions, analyze, analyze_file
+from manikin.balance import evaluate_balance
+from manikin.contact import Stance, sole
+from manikin.errors import InputError
+from manikin.mocap import read_recording
+from manikin.mocap.recorded_stances import STRONGEST
+from manikin.spatial import GRAVITY
+
+
+@pytest.fixture(scope="module")
+def standing(standing_file):
+    return analyze_file(standing_file)
+
+
+def test_who_stands_is_pushed_by_their_weight_below_their_centre_of_mass(standing):
+    """Rounding of the file (six decimals of a degree and of a centimetre) is all that moves."""
+    assert standing.body.stature == pytest.approx(1.75, abs=1e-6)
+    np.testing.assert_allclose(standing.vertical_force, standing.weight, rtol=1e-4)
+    np.testing.assert_allclose(standing.cop, standing.motion.com[:, :2], atol=1e-4)
+    np.testing.assert_allclose(standing.motion.angular_momentum, 0.0, atol=1e-3)
+    assert [one.effectors for one in standing.supports.phases] == [("left_foot", "right_foot")]
+    assert standing.segments is not None
+    assert {one.kind for one in standing.segments.segments} == {"standing"}
+
+
+def test_margin_is_that_of_the_stance_found(standing):
+    """Built by hand from the places of the feet, about the middle between them."""
+    body, frame = standing.body, 30
+    feet = [standing.supports.of(name)[0] for name in ("left_foot", "right_foot")]
+    soles = [
+        sole(one.effector, one.place, 0.0, length=body.sole_length, width=body.sole_width, friction=0.8)
+        for one in feet
+    ]
+    stance = Stance(soles, STRONGEST * body.mass * GRAVITY)
+    middle = np.mean([contact.position for contact in soles], axis=0)
+    report = evaluate_balance(stance, body.mass, standing.motion.com[frame], reference=middle)
+    assert standing.motion.margin[frame] == pytest.approx(report.margin, rel=1e-4)
+    assert standing.point_mass_margin[frame] == pytest.approx(report.margin, rel=1e-4)
+
+
+def test_torques_balance_the_weight_on_each_leg(standing):
+    """Both ankles together hold the body over the middle of the soles: M = m g (x_com - x_ankle) but the feet's."""
+    names = standing.motion.joint_names
+    ankles = [6 + names.index(f"{side}_ankle_dorsiflexion") for side in ("left", "right")]
+    torque = standing.motion.tau[30, ankles]
+    assert torque[0] == pytest.approx(torque[1], abs=0.05)
+    np.testing.assert_allclose(standing.motion.tau[:, :6], 0.0, atol=1e-9)
+    lever = standing.motion.com[30, 0] - standing.motion.q[30, 0]
+    assert abs(torque.sum()) < standing.weight * (abs(lever) + 0.12)
+    np.testing.assert_allclose(standing.motion.contact_force[30, 0], standing.motion.contact_force[30, 1] * [1, -1, 1, -1, 1, -1], atol=0.05)
+
+
+def test_summary_has_what_the_command_promises(standing):
+    summary = standing.as_dict()
+    promised = {
+        "duration_s", "frames", "supports", "key_frames_s", "phase_durations_s", "com_height_min_m",
+        "reconstruction_residual_m", "segments", "margin", "force_plates",
+    }  # fmt: skip
+    assert promised <= set(summary)
+    assert summary["frames"] == 60
+    assert summary["duration_s"] == pytest.approx(59 / 50.0)
+    assert summary["margin"]["share_positive"] == 1.0
+    assert summary["margin"]["form"] == "whole-body"
+    assert summary["reconstruction_residual_m"]["max"] < 1e-4
+    assert summary["force_plates"] is None
+    assert sum(summary["phase_durations_s"]) == pytest.approx(summary["duration_s"])
+    columns = standing.series()
+    assert {len(column) for column in columns.values()} == {60}
+    assert next(iter(columns)) == "time_s"
+
+
+def test_same_file_same_numbers(standing, standing_file):
+    again = analyze_file(standing_file)
+    assert {name: one.tolist() for name, one in standing.series().items()} == {
+        name: one.tolist() for name, one in again.series().items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"sex": "child"}, "sex is 'child'; valid: male, female"),
+        ({"mass": -3.0}, "mass"),
+        ({"friction": 0.0}, "friction"),
+        ({"load": float("nan")}, "load"),
+    ],
+)
+def test_bad_options_are_refused(given, told):
+    with pytest.raises(InputError, match=told):
+        AnalysisOptions(**given)
+
+
+def test_too_few_frames_are_refused(standing_file):
+    with pytest.raises(InputError, match=r"has 9 frame\(s\); valid: at least 10"):
+        analyze(read_recording(standing_file, (0, 9)))
+    with pytest.raises(InputError, match=r"standing\.bvh: .*1 frame"):
+        analyze_file(standing_file, AnalysisOptions(frames=(0, 1)))
+
+
+def test_a_recorded_walk_beside_its_plates(recordings_folder):
+    """Of the bars for recorded walks: supports within 30 ms, forces within 10 % of body weight."""
+    found = analyze_file(recordings_folder / "grf/btkdata/FunctionalWalk.c3d")
+    plates = found.as_dict()["force_plates"]
+    assert plates["timing_median_s"] < 0.030
+    assert plates["vertical_rms_body_weight"] < 0.10
+    assert found.as_dict()["margin"]["share_positive"] > 0.9
+    assert found.plates is not None
+    both = found.plates.compared
+    assert np.median(found.plates.vertical_force[both]) == pytest.approx(found.weight, rel=0.1)
+
+
+def test_who_crawls_is_held_by_points_on_the_ground(recordings_folder):
+    """Knees and elbows are contacts of the body then, and most of the weight can be given."""
+    found = analyze_file(recordings_folder / "accad_male1_bvh/Male1_A11_CrawlForward.bvh")
+    names = set(found.motion.contact_names)
+    assert {"left_hand", "right_hand"} <= names
+    assert names & {"left_knee", "right_knee"}
+    assert names <= set(found.body.effectors)
+    assert np.median(found.vertical_force) == pytest.approx(found.weight, rel=0.1)
