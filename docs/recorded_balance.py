@@ -261,7 +261,8 @@ def com_text(trials: list[Trial]) -> Iterator[str]:
             f"angular momentum the centre of pressure is off by {1e3 * np.sqrt(np.mean(off**2)):.0f} mm, "
             f"with ours by "
             f"{1e3 * one.comparison.cop_rms if one.comparison else np.nan:.0f} mm. Hips, knees, ankles "
-            "and shoulders agree to 3 cm; the laboratory's centre of mass with Plug-in Gait's masses asks for a "
+            "and shoulders agree to 3 cm; the laboratory's centre of mass with "
+            "Plug-in Gait's masses asks for a "
             "thorax whose centre is 11 cm before "
             "the hips, in front of the marker on the sternum. The bar of 3 cm is missed along the walk for "
             "that "
@@ -272,7 +273,8 @@ def com_text(trials: list[Trial]) -> Iterator[str]:
             "its joints; Dumas, Chèze and Verriest (2007) list offsets from it, which are not used here.\n\n"
             "The vertical force is within 10 % of the weight in all files. The centre of pressure is within "
             "3 cm in single support in one of the four files in bold, the one whose whole body has markers. "
-            "Arms are untold in `walking2` and `walking5`, trunk and arms in `FunctionalWalk`; besides, the last "
+            "Arms are untold in `walking2` and `walking5`, trunk and arms in "
+            "`FunctionalWalk`; besides, the last "
             "twentieth of a second before a touch-down is smeared by the low-pass.\n"
         )
 
