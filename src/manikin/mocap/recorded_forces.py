@@ -76,9 +76,11 @@ def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches:
 
 
 def motion_on_contacts(
-    dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0,
+    dynamics: RecordedDynamics,
+    schedule: ContactSchedule,
+    start: float = 0.0,
     margins: RecordedMargins | None = None,
-) -> Motion:  # fmt: skip
+) -> Motion:
     """The recorded motion with contacts, their forces, joint torques and the margin of balance.
 
     The margin is that of the whole body about the middle of the contacts of each phase, see
@@ -91,9 +93,8 @@ def motion_on_contacts(
         dynamics: The motion.
         schedule: Its stances, of :func:`manikin.mocap.recorded_stances.recorded_schedule`.
         start: The schedule's clock at the motion's first instant [s].
-        margins: Of the same, where they are known already.
+        margins: Of the same motion on the same stances, where they are known already.
     """
-    margins = margins or recorded_margins(dynamics, schedule, start)
     names = schedule.sequence.effectors
     times = dynamics.time + start
     phases = schedule.phase_at(times)
@@ -113,8 +114,8 @@ def motion_on_contacts(
     return Motion(
         time=dynamics.time, q=dynamics.q, v=dynamics.v, a=dynamics.a, tau=torques, com=dynamics.com,
         angular_momentum=dynamics.angular_momentum,
-        margin=margins.whole_body, support=schedule.support(times, names), contact_force=forces,
-        contact_names=names,
+        margin=(margins or recorded_margins(dynamics, schedule, start)).whole_body,
+        support=schedule.support(times, names), contact_force=forces, contact_names=names,
         joint_names=tuple(dynamics.body.joint_names),
     )  # fmt: skip
 
