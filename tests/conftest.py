@@ -4,9 +4,13 @@ import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from manikin.body import human
+from manikin.export.bvh import to_bvh
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
 
@@ -74,3 +78,28 @@ def aside():
     places = np.column_stack([0.0 * share, 1.2 * way, 0.0 * share])
     spline = BSpline.fit(path.spline.degree, path.spline.knots, share, places)
     return replace(path, spline=spline, duration=6.0)
+
+
+@pytest.fixture(scope="session")
+def recordings_folder() -> Path:
+    """Folder of real recordings that stands beside the repository, not in it."""
+    folder = Path(__file__).resolve().parents[1].parent / "shared" / "data" / "mocap"
+    if not folder.is_dir():
+        pytest.skip("the real recordings are not beside this repository")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def standing_file(tmp_path_factory) -> Path:
+    """BVH of somebody of 1.75 m who stands for 60 frames at 50 Hz."""
+    body, n = human(1.75, 79.0, "male"), 60
+    flat, nv = np.zeros((n, 3)), body.nv
+    motion = Motion(
+        time=np.arange(n) / 50.0, q=np.tile(body.standing_posture(), (n, 1)), v=np.zeros((n, nv)),
+        a=np.zeros((n, nv)), tau=np.zeros((n, nv)), com=flat, angular_momentum=flat, margin=np.zeros(n),
+        support=np.zeros((n, 0), dtype=bool), contact_force=np.zeros((n, 0, 6)), contact_names=(),
+        joint_names=tuple(body.joint_names),
+    )  # fmt: skip
+    file = tmp_path_factory.mktemp("recordings") / "standing.bvh"
+    file.write_text(to_bvh(body, motion))
+    return file

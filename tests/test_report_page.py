@@ -47,7 +47,9 @@ def test_any_text_is_shown_as_it_is(text):
 def test_a_page_needs_no_other_file():
     page = ReportPage("A page")
     page.picture(b"\x89PNG not quite", "a picture")
-    page.table(("file", "value"), [("walk.bvh", 0.123456), ("none", None)], links={"walk.bvh": "walk/report.html"})
+    page.table(
+        ("file", "value"), [("walk.bvh", 0.123456), ("none", None)], links={"walk.bvh": "walk/report.html"}
+    )
     read = Reader(page.html())
     (picture,) = [attributes for tag, attributes in read.seen if tag == "img"]
     kind, data = picture["src"].split(",")

@@ -5,47 +5,15 @@ import multiprocessing
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
 from os.path import commonpath
 from pathlib import Path
-from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from manikin.analysis import AnalysisOptions, analyze_file
+from manikin.analysis import AnalysisEntry, AnalysisJob, AnalysisOptions, analyze_file
 from manikin.analysis_directory import write_analysis
 from manikin.errors import InputError, ManikinError
 from manikin.worker import prepare_worker
-
-
-@dataclass(frozen=True)
-class AnalysisJob:
-    """One file to measure.
-
-    Attributes:
-        path: The recording.
-        directory: For its files; None to write none.
-        draw: Whether the report has its figure.
-    """
-
-    path: Path
-    directory: Path | None = None
-    draw: bool = True
-
-
-@dataclass(frozen=True)
-class AnalysisEntry:
-    """What came of one file.
-
-    Attributes:
-        job: The file.
-        summary: As :meth:`manikin.analysis.Analysis.as_dict`; None where it was refused.
-        refusal: Why, in one line.
-    """
-
-    job: AnalysisJob
-    summary: dict[str, Any] | None
-    refusal: str = ""
 
 
 def analyze_files(

@@ -16,11 +16,11 @@ import csv
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from manikin.analysis import Analysis
+from manikin.analysis import Analysis, AnalysisEntry
 from manikin.analysis_report import overview_page, report_page
 from manikin.atomic import write_text
 from manikin.errors import MotionFileError
@@ -28,9 +28,6 @@ from manikin.figures.recording import recording_figure
 from manikin.figures.write import png_of
 from manikin.motion.file import MotionFile, write_motions
 from manikin.output import MOTION, SUMMARY, make_directory, to_json
-
-if TYPE_CHECKING:
-    from manikin.analysis_batch import AnalysisEntry
 
 REPORT = "report.html"
 SERIES = "series.csv"
@@ -78,7 +75,7 @@ def write_analysis(found: Analysis, directory: Path, *, draw: bool = True) -> No
     _write(directory / SUMMARY, to_json(summary) + "\n")
 
 
-def write_overview(entries: Sequence["AnalysisEntry"], overview: dict[str, Any], directory: Path) -> None:
+def write_overview(entries: Sequence[AnalysisEntry], overview: dict[str, Any], directory: Path) -> None:
     """Write the table of several recordings as a page, as CSV and as JSON.
 
     Args:
@@ -104,7 +101,7 @@ def write_overview(entries: Sequence["AnalysisEntry"], overview: dict[str, Any],
     _write(directory / ANALYSES, to_json(overview) + "\n")
 
 
-def _row(entry: "AnalysisEntry") -> dict[str, Any]:
+def _row(entry: AnalysisEntry) -> dict[str, Any]:
     """A recording in one line; empty where it was refused."""
     found = entry.summary or {}
     margin, residual = found.get("margin") or {}, found.get("reconstruction_residual_m") or {}

@@ -84,11 +84,10 @@ class ReportPage:
 
 
 def _cell(value: Any, links: Mapping[str, str]) -> str:
-    if isinstance(value, bool) or value is None or isinstance(value, str):
-        text = "-" if value is None else escape(str(value))
-        return (
-            f'<td><a href="{escape(links[value])}">{text}</a></td>' if value in links else f"<td>{text}</td>"
-        )
+    if isinstance(value, str) and value in links:
+        return f'<td><a href="{escape(links[value])}">{escape(value)}</a></td>'
+    if isinstance(value, bool | str) or value is None:
+        return f"<td>{'-' if value is None else escape(str(value))}</td>"
     if isinstance(value, float):
         return f'<td class="number">{value:.4g}</td>'
     if isinstance(value, int):

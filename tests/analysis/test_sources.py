@@ -21,5 +21,5 @@ def test_folders_are_searched_and_files_are_taken_as_they_are(tmp_path):
 def test_what_is_not_there_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"no\.bvh: there is no such file"):
         recordings_in([tmp_path / "no.bvh"])
-    with pytest.raises(InputError, match="holds no recording; valid: files .bvh, .amc, .c3d, .trc"):
+    with pytest.raises(InputError, match=r"holds no recording; valid: files \.bvh, \.amc, \.c3d, \.trc"):
         recordings_in([tmp_path])

@@ -8,8 +8,6 @@ import pytest
 from manikin.cli import BAD_INPUT, DONE, main
 from manikin.motion.file import read_motions
 
-pytest_plugins = ["tests.analysis.conftest"]
-
 
 def damaged(text: str) -> dict[str, bytes]:
     """What may come instead of a recording, by file name."""
@@ -74,7 +72,9 @@ def test_bad_files_are_one_line_each_and_stop_no_other(standing_file, tmp_path, 
     assert "good/standing/report.html" in (out / "index.html").read_text()
 
 
-@pytest.mark.parametrize("name", ["cut.bvh", "empty.bvh", "junk.bvh", "single.bvh", "mislabelled.c3d", "nan.bvh"])
+@pytest.mark.parametrize(
+    "name", ["cut.bvh", "empty.bvh", "junk.bvh", "single.bvh", "mislabelled.c3d", "nan.bvh"]
+)
 def test_a_bad_file_alone_is_one_line(standing_file, tmp_path, capsys, name):
     path = tmp_path / name
     path.write_bytes(damaged(standing_file.read_text())[name])

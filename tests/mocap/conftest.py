@@ -1,7 +1,5 @@
 """Small skeletons written by hand, and the real recordings beside the repository."""
 
-from pathlib import Path
-
 import pytest
 
 BVH = """HIERARCHY
@@ -100,12 +98,3 @@ def amc_file(tmp_path):
     file = tmp_path / "person_1.amc"
     file.write_text(AMC)
     return file
-
-
-@pytest.fixture(scope="session")
-def recordings_folder() -> Path:
-    """Folder of real recordings that stands beside the repository, not in it."""
-    folder = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "mocap"
-    if not folder.is_dir():
-        pytest.skip("the real recordings are not beside this repository")
-    return folder

@@ -2,6 +2,15 @@
 
 from manikin.analysis.analysis import Analysis
 from manikin.analysis.analyze import AnalysisOptions, analyze, analyze_file
+from manikin.analysis.entry import AnalysisEntry, AnalysisJob
 from manikin.analysis.sources import recordings_in
 
-__all__ = ["Analysis", "AnalysisOptions", "analyze", "analyze_file", "recordings_in"]
+__all__ = [
+    "Analysis",
+    "AnalysisEntry",
+    "AnalysisJob",
+    "AnalysisOptions",
+    "analyze",
+    "analyze_file",
+    "recordings_in",
+]

@@ -124,7 +124,8 @@ def _several(
     paths: Sequence[Path], directory: Path | None, options: Any, interruption: Interruption,
     jobs: int | None, *, draw: bool, json: bool,
 ) -> int:  # fmt: skip
-    from manikin.analysis_batch import AnalysisJob, analyze_files, directories_for
+    from manikin.analysis import AnalysisJob
+    from manikin.analysis_batch import analyze_files, directories_for
     from manikin.analysis_directory import check_directory, write_overview
     from manikin.batch import usable_cores
     from manikin.progress import StageProgress

@@ -62,10 +62,9 @@ def _postures(axes: Axes, analysis: "Analysis") -> None:
     places = [np.array([STEP * number, -floor]) for number in range(len(turned))]
     lines = [place + _bones(analysis.body, q) for place, q in zip(places, turned, strict=True)]
     colours = [side_colour(segment.name) for segment in analysis.body.segments[1:]]
-    axes.add_collection(
-        LineCollection(np.concatenate(lines), colors=colours * len(lines), linewidths=3.5, capstyle="round"),
-        autolim=False,
-    )
+    drawn = list(np.concatenate(lines))
+    bones = LineCollection(drawn, colors=colours * len(lines), linewidths=3.5, capstyle="round")
+    axes.add_collection(bones, autolim=False)
     for number in range(len(turned)):
         axes.text(STEP * number, -0.16, f"{analysis.time[frames[number]]:.2f} s", ha="center", fontsize=7.5)
     axes.axhline(0.0, color=COLOURS["soft"], linewidth=0.8)

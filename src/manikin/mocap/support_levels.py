@@ -128,7 +128,7 @@ def track(positions: FloatArray, rate: float, cutoff: float = CUTOFF) -> Track:
 @lru_cache(maxsize=16)
 def _low_pass(cutoff: float, rate: float) -> FloatArray:
     """Second-order sections of the low-pass: the same for every point of a recording."""
-    return butter(2, cutoff, fs=rate, output="sos")
+    return np.asarray(butter(2, cutoff, fs=rate, output="sos"), dtype=np.float64)
 
 
 def surface_heights(
