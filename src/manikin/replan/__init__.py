@@ -1,0 +1,7 @@
+"""Recorded motions planned anew on their own stances, and executed ([Qiu2012]_ 5.3.3, 7.3)."""
+
+from manikin.replan.against import against_recording
+from manikin.replan.com import METHODS, Method
+from manikin.replan.replan import Replan, replan
+
+__all__ = ["METHODS", "Method", "Replan", "against_recording", "replan"]
