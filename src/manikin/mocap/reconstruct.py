@@ -13,6 +13,7 @@ from manikin.mocap.proportions import human_of
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recording import Recording
 from manikin.mocap.skeleton_reconstruction import reconstruct_skeleton
+from manikin.mocap.untold_segments import untold_upright
 from manikin.spatial import FloatArray
 
 FEWEST_FRAMES = 2
@@ -28,7 +29,8 @@ def reconstruct(
     """Motion of our human that follows a recording, by inverse kinematics within joint limits.
 
     Of a skeleton the joint centres are followed (:mod:`manikin.mocap.skeleton_reconstruction`), of markers
-    the markers themselves (:mod:`manikin.mocap.marker_reconstruction`).
+    the markers themselves (:mod:`manikin.mocap.marker_reconstruction`). What no marker tells is held as in
+    standing, trunk and head upright and arms hanging (:mod:`manikin.mocap.untold_segments`).
 
     Args:
         recording: Motion of a skeleton or of markers, at least two frames.
@@ -45,7 +47,7 @@ def reconstruct(
     """
     _check(recording)
     if isinstance(recording, MarkerRecording):
-        return reconstruct_markers(recording, body, sex, mass)
+        return untold_upright(reconstruct_markers(recording, body, sex, mass))
     return reconstruct_skeleton(recording, body, sex, mass)
 
 

@@ -31,6 +31,17 @@ def smoothed(found: Reconstruction, cutoff: float = CUTOFF) -> Reconstruction:
     Raises:
         InputError: If there are too few instants, or the cutoff is not below half their rate.
     """
+    q = smoothed_postures(found, cutoff)
+    places = InverseKinematics(found.body, found.targets).places
+    residual = [
+        np.linalg.norm(places(one) - there, axis=1)
+        for one, there in zip(q, found.targets.positions, strict=True)
+    ]
+    return replace(found, q=q, residual=np.array(residual))
+
+
+def smoothed_postures(found: Reconstruction, cutoff: float = CUTOFF) -> FloatArray:
+    """(n, nq) postures of :func:`smoothed`, without their residuals."""
     rate = _rate(found)
     finite_number(cutoff, "cutoff [Hz]", above=0.0)
     if cutoff >= 0.5 * rate:
@@ -43,12 +54,7 @@ def smoothed(found: Reconstruction, cutoff: float = CUTOFF) -> Reconstruction:
     q = sosfiltfilt(sections, q, axis=0, padlen=padding)
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
-    places = InverseKinematics(found.body, found.targets).places
-    residual = [
-        np.linalg.norm(places(one) - there, axis=1)
-        for one, there in zip(q, found.targets.positions, strict=True)
-    ]
-    return replace(found, q=q, residual=np.array(residual))
+    return q
 
 
 def motion_of(found: Reconstruction, cutoff: float | None = CUTOFF) -> Motion:
@@ -64,10 +70,9 @@ def motion_of(found: Reconstruction, cutoff: float | None = CUTOFF) -> Motion:
     Raises:
         InputError: As :func:`smoothed`.
     """
-    rate = _rate(found)
-    q = found.q if cutoff is None else smoothed(found, cutoff).q
-    v = _velocities(found, q) * rate
-    a = np.gradient(v, 1.0 / rate, axis=0, edge_order=2)
+    _rate(found)
+    q = found.q if cutoff is None else smoothed_postures(found, cutoff)
+    v, a = rates_of(found, q)
     model, data, n = found.body.pinocchio, found.body.pinocchio.createData(), len(q)
     com, spin = np.empty((n, 3)), np.empty((n, 3))
     for frame in range(n):
@@ -80,12 +85,19 @@ def motion_of(found: Reconstruction, cutoff: float | None = CUTOFF) -> Motion:
     )  # fmt: skip
 
 
-def _velocities(found: Reconstruction, q: FloatArray) -> FloatArray:
-    """(n, nv) change per frame; at both ends the one that continues the line of the next two."""
-    model = found.body.pinocchio
+def rates_of(found: Reconstruction, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, nv) velocities and accelerations of postures at the instants of a reconstruction.
+
+    By central differences on the configuration space; at both ends velocities continue the line of the next two.
+
+    Raises:
+        InputError: If there are too few instants.
+    """
+    model, rate = found.body.pinocchio, _rate(found)
     inner = [0.5 * pin.difference(model, before, after) for before, after in zip(q[:-2], q[2:], strict=True)]
     first, last = pin.difference(model, q[0], q[1]), pin.difference(model, q[-2], q[-1])
-    return np.vstack([2.0 * first - inner[0], inner, 2.0 * last - inner[-1]])
+    v = rate * np.vstack([2.0 * first - inner[0], inner, 2.0 * last - inner[-1]])
+    return v, np.gradient(v, 1.0 / rate, axis=0, edge_order=2)
 
 
 def _rate(found: Reconstruction) -> float:

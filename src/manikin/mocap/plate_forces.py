@@ -1,0 +1,196 @@
+"""Forces that plates measured, beside those that a recorded motion needs.
+
+Plates tell all that pushes a person only while every support is wholly on one of them. A plate that is not
+loaded tells its own offset, which is taken off.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from manikin.balance import zero_moment_point
+from manikin.contact import Contact, ContactKind, ContactSchedule
+from manikin.mocap.force_plate import ForcePlate
+from manikin.mocap.recorded_dynamics import RecordedDynamics
+from manikin.mocap.recorded_margins import RecordedMargins, margins_of_wrenches
+from manikin.spatial import GRAVITY, FloatArray, frozen_array
+
+CUTOFF = 20.0
+"""Low-pass of the plates, of second order, forward and backward [Hz]."""
+
+LEAST_UNLOADED = 0.1
+"""Time without load that tells the offset of a plate [s]."""
+
+OVERHANG = 0.02
+"""How far a sole may be beyond the edge of the plate that is to carry it [m]."""
+
+BESIDE = 0.1
+"""How far beside a sole the centre of pressure may be that is its own [m]."""
+
+UNSURE = 0.03
+"""Time about a support off the plates whose frames are left out: supports are known that well [s]."""
+
+SHORTEST = 0.3
+"""Shortest time on the plates from which a mass is told [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlateForces:
+    """What plates say at the instants of a motion.
+
+    Attributes:
+        wrench: (n, 6) of all plates about the world's origin, without their offsets [N, N.m].
+        covered: (n,) whether every support is on a plate, so that the wrench is all there is.
+        single: (n,) whether one foot alone supports.
+    """
+
+    wrench: FloatArray
+    covered: NDArray[np.bool_]
+    single: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class PlateComparison:
+    """Forces of a motion beside those of plates, in frames in which all supports are on plates.
+
+    Attributes:
+        frames: Compared.
+        single_frames: Of them in single support.
+        vertical_rms: Of the vertical force, per body weight.
+        vertical_rms_single: The same in single support.
+        cop_rms: Distance of the centres of pressure in single support, root mean square [m].
+        cop_mean: Mean offset of ours in world x and y [m].
+        margin_share: Share of the frames in which the plates' wrench has a positive margin on our stances.
+        margin_difference: Median of how far the margins are apart, about the middle of the contacts [N.m].
+    """
+
+    frames: int
+    single_frames: int
+    vertical_rms: float
+    vertical_rms_single: float
+    cop_rms: float
+    cop_mean: tuple[float, float]
+    margin_share: float
+    margin_difference: float
+
+
+def plate_forces(
+    plates: Sequence[ForcePlate], times: FloatArray, schedule: ContactSchedule, cutoff: float = CUTOFF
+) -> PlateForces:
+    """The wrench of all plates at the instants of a motion, and where it is all there is.
+
+    A foot is on a plate if its sole is within the plate's edges, where they are known, and its centre of
+    pressure stays close to the sole for most of the support.
+
+    Args:
+        plates: Of the same recording, at least one.
+        times: (n,) instants on their clock [s].
+        schedule: Stances on the same clock.
+        cutoff: Of the low-pass [Hz].
+    """
+    wrench = sum((_sampled(plate, times, cutoff) for plate in plates), np.zeros((len(times), 6)))
+    phases = schedule.phase_at(times)
+    covered, single = np.ones(len(times), dtype=bool), np.zeros(len(times), dtype=bool)
+    known: dict[tuple[str, bytes], bool] = {}
+    for number, phase in enumerate(schedule.sequence):
+        begin, end = schedule.instants[number : number + 2]
+        single[phases == number] = len(phase.stance) == 1
+        on_plates = bool(len(phase.stance))
+        for contact in phase.stance:
+            key = contact.effector, contact.position.tobytes()
+            if key not in known:
+                known[key] = any(_carries(plate, contact, schedule) for plate in plates)
+            on_plates &= known[key]
+        if not on_plates:
+            covered[(times > begin - UNSURE) & (times < end + UNSURE)] = False
+    return PlateForces(frozen_array(wrench, "wrench"), covered, single)
+
+
+def mass_on_plates(dynamics: RecordedDynamics, measured: PlateForces) -> float | None:
+    """Mass of a person by the forces under them; None where too little of the motion is on plates.
+
+    The impulse of the plates over all covered frames, divided by that of a body of one kilogram with the
+    recorded motion of the centre of mass: weight, and change of velocity.
+    """
+    step = float(dynamics.time[1] - dynamics.time[0])
+    if measured.covered.sum() * step < SHORTEST:
+        return None
+    per_mass = dynamics.com_acceleration[measured.covered, 2] + GRAVITY
+    return float(measured.wrench[measured.covered, 2].sum() / per_mass.sum())
+
+
+def compare_with_plates(
+    dynamics: RecordedDynamics, margins: RecordedMargins, measured: PlateForces, height: float = 0.0
+) -> PlateComparison | None:
+    """Compare forces, centres of pressure and margins; None where no frame is covered in single support.
+
+    Args:
+        dynamics: The motion, with the person's mass.
+        margins: Its margins.
+        measured: The plates.
+        height: Of the plates' surfaces, where centres of pressure are compared [m].
+    """
+    both = measured.covered & measured.single
+    if not both.any():
+        return None
+    weight = GRAVITY * dynamics.body.mass
+    lift = (dynamics.vertical_force - measured.wrench[:, 2]) / weight
+    apart = dynamics.zero_moment_point(height)[both] - zero_moment_point(measured.wrench[both], height)
+    theirs, _ = margins_of_wrenches(margins.polytopes, margins.phase, measured.wrench, dynamics.com)
+    mean = apart.mean(axis=0)
+    return PlateComparison(
+        int(measured.covered.sum()), int(both.sum()), _rms(lift[measured.covered]), _rms(lift[both]),
+        _rms(np.linalg.norm(apart, axis=1)), (float(mean[0]), float(mean[1])),
+        float(np.mean(theirs[measured.covered] > 0.0)),
+        float(np.median(np.abs(theirs - margins.whole_body)[measured.covered])),
+    )  # fmt: skip
+
+
+def _sampled(plate: ForcePlate, times: FloatArray, cutoff: float) -> FloatArray:
+    """(n, 6) low-passed wrench of one plate without its offset; 0 while nobody is on it."""
+    wrenches, free = plate.wrenches, ~plate.pressed
+    if free.sum() >= LEAST_UNLOADED * plate.rate:
+        wrenches = wrenches - wrenches[free].mean(axis=0)
+    if 2.0 * cutoff < plate.rate and len(plate) > 4:
+        sections = butter(2, cutoff, fs=plate.rate, output="sos")
+        padding = min(len(plate) - 1, int(np.ceil(2.0 * plate.rate / cutoff)))
+        wrenches = sosfiltfilt(sections, wrenches, axis=0, padlen=padding)
+    loaded = np.interp(times, plate.time, plate.pressed) > 0.5
+    found = np.stack([np.interp(times, plate.time, column) for column in wrenches.T], axis=1)
+    return np.where(loaded[:, None], found, 0.0)
+
+
+def _carries(plate: ForcePlate, contact: Contact, schedule: ContactSchedule) -> bool:
+    """Whether a plate carries a contact over the time for which it is held."""
+    if contact.kind is not ContactKind.SOLE or not _within(plate, contact.points_in_world):
+        return False
+    held = [phase.stance for phase in schedule.sequence]
+    mine = [contact.effector in stance and stance[contact.effector].same_place(contact) for stance in held]
+    alone = np.array([here and len(stance) == 1 for here, stance in zip(mine, held, strict=True)])
+    phases = schedule.phase_at(plate.time)
+    inside = (plate.time >= schedule.instants[0]) & (plate.time <= schedule.instants[-1])
+    frames = inside & (alone if alone.any() else np.array(mine))[phases]
+    if not frames.any() or np.mean(plate.pressed[frames]) < 0.5:
+        return False
+    local = (plate.cop[frames & plate.pressed] - contact.position) @ contact.rotation_contact_to_world
+    near = np.abs(local[:, :2]) < 0.5 * np.array([contact.length, contact.width]) + BESIDE
+    return bool(np.mean(near.all(axis=1)) > 0.5)
+
+
+def _within(plate: ForcePlate, points: FloatArray) -> bool:
+    if plate.corners is None:
+        return True
+    corners = plate.corners[:, :2]
+    sides = np.roll(corners, -1, axis=0) - corners
+    turning = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
+    inward = np.sign(turning) * np.stack([-sides[:, 1], sides[:, 0]], axis=1)
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    depth = np.einsum("pkj,kj->pk", points[:, None, :2] - corners, inward)
+    return bool(depth.min() > -OVERHANG)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,117 @@
+"""What has to push a recorded person so that they move as they did: the external wrench, frame by frame.
+
+Everything follows from the smoothed postures, their velocities and accelerations: one pass of the recursive
+Newton-Euler equations gives the torques that a body without contacts would need, and its first six
+components, those of the free pelvis, are the wrench that the ground has to supply.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+from scipy.spatial.transform import Rotation
+
+from manikin.balance import pseudo_wrench, zero_moment_point
+from manikin.balance.friction import cross
+from manikin.body import BodyModel
+from manikin.body.human import body_from_signature
+from manikin.mocap.reconstruction import Reconstruction
+from manikin.mocap.recorded_motion import rates_of, smoothed_postures
+from manikin.spatial import GRAVITY_VECTOR, FloatArray, frozen_array
+
+CUTOFF = 4.0
+"""Low-pass of postures that are differentiated twice [Hz]. One for all recordings: of 3, 3.5, 4, 5 and 6 Hz it
+gives the walks on force plates the most frames with a positive margin."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedDynamics:
+    """A recorded motion and the wrench that it needs; world frame, but ``v`` and ``a`` as in Pinocchio.
+
+    Attributes:
+        body: With the mass used.
+        time: (n,) instants, 0 at the first [s].
+        q: (n, nq) smoothed postures.
+        v: (n, nv) velocities.
+        a: (n, nv) accelerations.
+        com: (n, 3) centre of mass [m].
+        angular_momentum: (n, 3) about the centre of mass [kg.m^2/s].
+        free_torque: (n, nv) generalised forces without contacts [N, N.m]; the first six in the pelvis' frame.
+        wrench: (n, 6) external force [N] and moment about the world's origin [N.m], without gravity.
+        jacobians: (n, 6, nv) of all joints: velocity of the point at the world's origin, and angular one.
+    """
+
+    body: BodyModel
+    time: FloatArray
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+    com: FloatArray
+    angular_momentum: FloatArray
+    free_torque: FloatArray
+    wrench: FloatArray
+    jacobians: FloatArray
+
+    def __len__(self) -> int:
+        """Number of instants."""
+        return len(self.time)
+
+    @cached_property
+    def com_acceleration(self) -> FloatArray:
+        """(n, 3) of the centre of mass [m/s^2]."""
+        return frozen_array(self.wrench[:, :3] / self.body.mass + GRAVITY_VECTOR, "com_acceleration")
+
+    @cached_property
+    def angular_momentum_rate(self) -> FloatArray:
+        """(n, 3) about the centre of mass [N.m]."""
+        return frozen_array(self.wrench[:, 3:] - cross(self.com, self.wrench[:, :3]), "rate")
+
+    @cached_property
+    def point_mass_wrench(self) -> FloatArray:
+        """(n, 6) of a point mass, about the world's origin ([Qiu2012]_ 4.54, 4.56)."""
+        return frozen_array(pseudo_wrench(self.body.mass, self.com, self.com_acceleration), "wrench")
+
+    @property
+    def vertical_force(self) -> FloatArray:
+        """(n,) of the ground on the person [N]."""
+        return self.wrench[:, 2]
+
+    def zero_moment_point(self, height: float) -> FloatArray:
+        """(n, 2) centre of pressure on level ground of a height [m]; NaN without vertical force."""
+        return zero_moment_point(self.wrench, height)
+
+
+def dynamics_of(found: Reconstruction, cutoff: float = CUTOFF) -> RecordedDynamics:
+    """Smooth a reconstruction, differentiate it twice and find the wrench that it needs.
+
+    Args:
+        found: At least four instants at an even rate, not yet smoothed.
+        cutoff: Of the low-pass of the postures [Hz].
+
+    Raises:
+        InputError: If there are too few instants, or the cutoff is not below half their rate.
+    """
+    q = smoothed_postures(found, cutoff)
+    v, a = rates_of(found, q)
+    model, data, n = found.body.pinocchio, found.body.pinocchio.createData(), len(q)
+    com, spin = np.empty((n, 3)), np.empty((n, 3))
+    torque, jacobians = np.empty_like(v), np.empty((n, 6, model.nv))
+    for frame in range(n):
+        torque[frame] = pin.rnea(model, data, q[frame], v[frame], a[frame])
+        spin[frame] = pin.computeCentroidalMomentum(model, data, q[frame], v[frame]).angular
+        com[frame] = data.com[0]
+        jacobians[frame] = pin.computeJointJacobians(model, data, q[frame])
+    turn = Rotation.from_quat(q[:, 3:7])
+    force, moment = turn.apply(torque[:, :3]), turn.apply(torque[:, 3:6])
+    wrench = np.hstack([force, moment + cross(q[:, :3], force)])
+    return RecordedDynamics(found.body, found.time, q, v, a, com, spin, torque, wrench, jacobians)
+
+
+def with_mass(found: Reconstruction, mass: float) -> Reconstruction:
+    """The same postures of a body of another mass [kg], its shares of segments kept.
+
+    Raises:
+        BodyError: If it is not the mass of an adult.
+    """
+    return replace(found, body=body_from_signature(found.body.signature() | {"mass": mass}))
