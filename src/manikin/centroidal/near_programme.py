@@ -8,6 +8,7 @@ linearised about the last solution. Both our own.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import piqp
@@ -93,7 +94,7 @@ class NearProgramme:
             wanted: (f, 3) CoM there [m].
         """
         quadratic, linear = self._objective(shares, wanted)
-        return np.linalg.solve(quadratic, -linear)
+        return np.asarray(np.linalg.solve(quadratic, -linear), dtype=np.float64)
 
     def solve(
         self, shares: FloatArray, wanted: FloatArray, margin: FloatArray, near: FloatArray
@@ -124,7 +125,7 @@ class NearProgramme:
         pull = PULL / len(shares) * basis.T
         return self.smoothness + pull @ basis, -pull @ wanted
 
-    def _balance(self, margin: FloatArray, near: FloatArray) -> tuple[sparse.csc_matrix, FloatArray]:
+    def _balance(self, margin: FloatArray, near: FloatArray) -> tuple[Any, FloatArray]:
         """Rows and bounds of unit length; ``p x b`` is ``p0 x b + p x b0 - p0 x b0`` with ``b = a - g``."""
         blocks, bounds = [], []
         gravity = np.array([0.0, 0.0, -GRAVITY])

@@ -1,4 +1,4 @@
-"""A plan against the recording on whose stances it was made ([Qiu2012]_ 7.3, Table 7.7, Fig. 7.16 to 7.18)."""
+"""A plan against the recording on whose stances it was made ([Qiu2012]_ Table 7.7, Fig. 7.16 to 7.18)."""
 
 import numpy as np
 

@@ -20,8 +20,8 @@ Method = Literal["keyframes", "timing-free"]
 METHODS: tuple[Method, ...] = get_args(Method)
 
 SHORTEST, LONGEST = 0.5, 2.0
-"""Bounds of a phase that is planned timing-free, as shares of its recorded duration: nobody swings a leg in no
-time, and phases of a walk are no places to stay."""
+"""Bounds of a phase that is planned timing-free, as shares of its recorded duration: nobody swings a leg in
+no time, and phases of a walk are no places to stay."""
 
 
 def plan_recorded_com(

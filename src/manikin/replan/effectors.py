@@ -8,6 +8,7 @@ to its next contact, the tips of a foot kept off the surface. All this is our ow
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -58,7 +59,9 @@ class EffectorPaths:
     toes: dict[int, FloatArray]
 
 
-def effector_paths(body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray) -> EffectorPaths:
+def effector_paths(
+    body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray
+) -> EffectorPaths:
     """Adapt the recorded paths of the effectors to their contacts.
 
     Args:
@@ -196,7 +199,5 @@ def _parts(contacts: list[Contact]) -> Iterator[tuple[SolePart, int, int]]:
     """Part of a contact with the first and the last but one phase in which it is the one."""
     changes = [i for i in range(1, len(contacts)) if contacts[i].part is not contacts[i - 1].part]
     bounds = [0, *changes, len(contacts)]
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in pairwise(bounds):
         yield contacts[begin].part, begin, end
-
-
