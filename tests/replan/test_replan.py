@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from manikin.balance import pseudo_wrench, wrench_polytope
-from manikin.contact import SolePart
+from manikin.contact import ContactSchedule, Phase, SolePart, Stance, StanceSequence, sole
 from manikin.errors import InputError
 from manikin.mocap import recorded_schedule, smoothed
 from manikin.motion.file import read_motions, write_motions
-from manikin.replan import against_recording, replan
-from manikin.replan.contacts import landing_flat, scene_under
+from manikin.replan import against_recording, replan, window
+from manikin.replan.contacts import landing_flat, on_one_seat, scene_under
 from manikin.replan.effectors import effector_paths
 
 
@@ -53,6 +53,34 @@ def test_heels_land_flat_and_nothing_else_changes(walk):
         for name in after.effectors:
             np.testing.assert_array_equal(before[name].position, after[name].position)
     assert flat.instants[[0, -1]].tolist() == recorded.instants[[0, -1]].tolist()
+
+
+def test_a_chair_does_not_move():
+    """Places of one seat become their median; one a metre away is another seat."""
+    places = [(0.0, 0.0, 0.40), (0.02, 0.0, 0.42), (0.01, 0.03, 0.41), (1.0, 0.0, 0.5)]
+    foot = sole("left_foot", (0.5, 0.0, 0.0), length=0.26, width=0.11, friction=0.8)
+    phases = []
+    for place in places:
+        seat = sole("buttocks", place, length=0.2, width=0.3, friction=0.8)
+        phases += [Phase(Stance([foot, seat], 2000.0)), Phase(Stance([foot], 2000.0))]
+    schedule = ContactSchedule(StanceSequence(phases), np.arange(9.0))
+    changed = on_one_seat(schedule)
+    found = [phase.stance["buttocks"].position.tolist() for phase in list(changed.sequence)[::2]]
+    assert found == [[0.01, 0.0, 0.41]] * 3 + [[1.0, 0.0, 0.5]]
+    assert all("buttocks" not in phase.stance for phase in list(changed.sequence)[1::2])
+
+
+def test_a_window_is_a_recording_of_its_own(walk):
+    found, supports = walk
+    part, held = window(found, supports, supports.start + 0.3, supports.start + 0.9)
+    assert part.time[[0, -1]] == pytest.approx([0.0, 0.6], abs=1e-9)
+    whole = recorded_schedule(found, supports)
+    cut = recorded_schedule(part, held)
+    for time in np.linspace(0.05, 0.55, 11):
+        before, after = whole.stance_at(time + 0.3 + supports.start), cut.stance_at(time)
+        assert set(before.effectors) == set(after.effectors)
+    with pytest.raises(InputError, match="valid: at least 4"):
+        window(found, supports, 90.0, 91.0)
 
 
 def test_every_contact_lies_on_the_scene(walk):

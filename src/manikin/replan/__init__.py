@@ -2,6 +2,7 @@
 
 from manikin.replan.against import against_recording
 from manikin.replan.com import METHODS, Method
-from manikin.replan.replan import Replan, replan
+from manikin.replan.planned_anew import Replan, replan
+from manikin.replan.window import window
 
-__all__ = ["METHODS", "Method", "Replan", "against_recording", "replan"]
+__all__ = ["METHODS", "Method", "Replan", "against_recording", "replan", "window"]

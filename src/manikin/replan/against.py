@@ -7,7 +7,7 @@ from manikin.centroidal.certificate import phase_margins, phase_times
 from manikin.comparison.compare import RunComparison, compare_runs
 from manikin.motion.file import MotionFile
 from manikin.record import ComTrack, RunRecord
-from manikin.replan.replan import Replan
+from manikin.replan.planned_anew import Replan
 from manikin.spatial import FloatArray
 from manikin.wholebody.full_motion import margins
 

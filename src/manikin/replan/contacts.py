@@ -7,10 +7,15 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance, StanceSequence
 from manikin.contact.contact import sole
+from manikin.mocap.seat_supports import SEAT
 from manikin.scene import Box, Obstacle, Scene
+from manikin.spatial import frozen_array
 
 RAISED = 0.02
 """A contact this far above the floor has a block under it [m]."""
+
+SAME_SEAT = 0.15
+"""Seats nearer to each other are one [m]."""
 
 ROOM = 0.03
 """How far a block reaches beyond its contact [m]."""
@@ -36,6 +41,32 @@ def landing_flat(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
         phases.append(Phase(stance, duration, duration))
         instants.append(float(end))
     return ContactSchedule(StanceSequence(phases), instants)
+
+
+def on_one_seat(schedule: ContactSchedule) -> ContactSchedule:
+    """The same with all contacts of a seat that lie near each other at one place: chairs do not move."""
+    seats = [
+        (index, contact)
+        for index, phase in enumerate(schedule.sequence)
+        for contact in phase.stance
+        if contact.effector == SEAT
+    ]
+    changed: dict[int, Contact] = {}
+    while seats:
+        near = [one for one in seats if np.linalg.norm(one[1].position - seats[0][1].position) < SAME_SEAT]
+        place = frozen_array(np.median([contact.position for _, contact in near], axis=0), "seat place [m]")
+        turn = seats[0][1].rotation_contact_to_world
+        for index, contact in near:
+            changed[index] = replace(contact, position=place, rotation_contact_to_world=turn)
+        seats = [one for one in seats if one[0] not in changed]
+    phases = [
+        replace(phase, stance=Stance(
+            [changed[index] if contact.effector == SEAT else contact for contact in phase.stance],
+            phase.stance.normal_force_cap,
+        ))
+        for index, phase in enumerate(schedule.sequence)
+    ]  # fmt: skip
+    return ContactSchedule(StanceSequence(phases), schedule.instants)
 
 
 def scene_under(schedule: ContactSchedule, floor: float) -> Scene:

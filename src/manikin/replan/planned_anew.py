@@ -15,7 +15,7 @@ from manikin.mocap.recorded_stances import FRICTION
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
 from manikin.replan.com import METHODS, Method, plan_recorded_com
-from manikin.replan.contacts import landing_flat, scene_under
+from manikin.replan.contacts import landing_flat, on_one_seat, scene_under
 from manikin.replan.whole_body import AdaptedMotion, adapt_postures
 from manikin.scene import Scene
 from manikin.simulation import Execution, execute
@@ -152,7 +152,7 @@ def replan(
         raise InputError(f"replan method is {method!r}; valid: {', '.join(METHODS)}")
     even, recorded = smoothed(found), motion_of(found)
     stances = recorded_schedule(even, supports, friction=friction, rolling=rolling)
-    stances = landing_flat(stances, found.body)
+    stances = on_one_seat(landing_flat(stances, found.body))
     recording = Recording(supports.start + found.time, recorded.com, stances.sequence, stances.instants)
     velocity = np.gradient(recorded.com, recorded.time, axis=0, edge_order=2)[[0, -1]]
     com = plan_recorded_com(found.body.mass, recording, velocity, method, required_margin)
