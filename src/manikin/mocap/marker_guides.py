@@ -138,10 +138,14 @@ def _thorax(
     both = turns[:, 0, 0] + up[:, 0] + pelvis[:, 0, 0]
     if np.all(np.isnan(both)):
         return None
+    if "left_upper_arm" not in centres:
+        # Who walks sways over the hips, the same to both sides: the mean of the straightest half.
+        length = np.where(np.isnan(both), np.nan, np.linalg.norm(up, axis=1))
+        tall = length >= np.nanmedian(length)
+        local = [np.einsum("nji,nj->ni", turns, axis)[tall].mean(axis=0) for axis in (up, pelvis[:, :, 1])]
+        return turns @ frames(local[0][None], local[1][None], keep_y=False)[0]
     straight = _straightest(up + turns[:, :, 0] * 0.0, centres, pelvis)
-    aside = pelvis[:, :, 1]
-    if "left_upper_arm" in centres:
-        aside = centres["left_upper_arm"] - centres["right_upper_arm"]
+    aside = centres["left_upper_arm"] - centres["right_upper_arm"]
     there = frames(up[straight][None], aside[straight][None], keep_y=True)[0]
     return turns @ turns[straight].T @ there
 
@@ -154,8 +158,12 @@ def _thorax_guides(
         base = np.array(body.segment("left_upper_arm").origin) * [1.0, 0.0, 1.0]
         place = middle(centres, "upper_arm")
         return [("thorax", base + ARM * np.eye(3)[0], place + ARM * thorax[:, :, 0])]
-    base = np.array(body.segment("neck").origin)
-    place = 0.5 * (marks["c7"] + marks["notch"])
+    # As far from the hips as in our straight trunk: markers are not where our neck begins, and a trunk that
+    # is pressed together or pulled apart would bend to its limits.
+    base, hips = np.array(body.segment("neck").origin), middle(centres, "thigh")
+    up = 0.5 * (marks["c7"] + marks["notch"]) - hips
+    rise = float(np.linalg.norm(base + body.segment("thorax").origin + body.segment("lumbar").origin))
+    place = hips + rise * up / np.linalg.norm(up, axis=1, keepdims=True)
     return [
         ("thorax", base + ARM * axis, place + ARM * np.einsum("nij,j->ni", thorax, axis))
         for axis in np.eye(3)

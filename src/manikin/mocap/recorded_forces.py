@@ -15,7 +15,7 @@ from manikin.balance.friction import contact_to_world, cross, edge_wrenches
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactKind, ContactSchedule, Stance
 from manikin.mocap.recorded_dynamics import RecordedDynamics
-from manikin.mocap.recorded_margins import recorded_margins, wrench_at
+from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins, wrench_at
 from manikin.motion.motion import Motion
 from manikin.spatial import GRAVITY, FloatArray
 
@@ -75,7 +75,12 @@ def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches:
     return torques
 
 
-def motion_on_contacts(dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0) -> Motion:
+def motion_on_contacts(
+    dynamics: RecordedDynamics,
+    schedule: ContactSchedule,
+    start: float = 0.0,
+    margins: RecordedMargins | None = None,
+) -> Motion:
     """The recorded motion with contacts, their forces, joint torques and the margin of balance.
 
     The margin is that of the whole body about the middle of the contacts of each phase, see
@@ -88,6 +93,7 @@ def motion_on_contacts(dynamics: RecordedDynamics, schedule: ContactSchedule, st
         dynamics: The motion.
         schedule: Its stances, of :func:`manikin.mocap.recorded_stances.recorded_schedule`.
         start: The schedule's clock at the motion's first instant [s].
+        margins: Of the same motion on the same stances, where they are known already.
     """
     names = schedule.sequence.effectors
     times = dynamics.time + start
@@ -108,7 +114,7 @@ def motion_on_contacts(dynamics: RecordedDynamics, schedule: ContactSchedule, st
     return Motion(
         time=dynamics.time, q=dynamics.q, v=dynamics.v, a=dynamics.a, tau=torques, com=dynamics.com,
         angular_momentum=dynamics.angular_momentum,
-        margin=recorded_margins(dynamics, schedule, start).whole_body,
+        margin=(margins or recorded_margins(dynamics, schedule, start)).whole_body,
         support=schedule.support(times, names), contact_force=forces, contact_names=names,
         joint_names=tuple(dynamics.body.joint_names),
     )  # fmt: skip

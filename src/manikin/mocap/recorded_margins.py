@@ -116,8 +116,8 @@ def _polytope(stance: Stance) -> WrenchPolytope:
 def _margins(polytope: WrenchPolytope, wrench: FloatArray, arm: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n,) margins about the reference and about points ``arm`` (n, 3) away from it.
 
-    A row of unit length about the reference has the length ``sqrt(|H1 + H2 x arm|^2 + |H2|^2)`` about the other
-    point, a quadratic of the arm.
+    A row of unit length about the reference has the length ``sqrt(|H1 + H2 x arm|^2 + |H2|^2)`` about the
+    other point, a quadratic of the arm.
     """
     ours, abouts = np.empty(len(wrench)), np.empty(len(wrench))
     force, moment = polytope.H[:, :3], polytope.H[:, 3:]
@@ -125,10 +125,8 @@ def _margins(polytope: WrenchPolytope, wrench: FloatArray, arm: FloatArray) -> t
     for part in _blocks(len(wrench)):
         distances = polytope.distances(wrench[part])
         ours[part] = distances.min(axis=1)
-        lever = (
-            1.0 + arm[part] @ linear.T + np.sum(arm[part] ** 2, axis=1)[:, None] * np.sum(moment**2, axis=1)
-        )
-        lever -= (arm[part] @ moment.T) ** 2
+        lever = 1.0 + arm[part] @ linear.T - (arm[part] @ moment.T) ** 2
+        lever += np.outer(np.sum(arm[part] ** 2, axis=1), np.sum(moment**2, axis=1))
         abouts[part] = (distances / np.sqrt(np.maximum(lever, 1e-12))).min(axis=1)
     return ours, abouts
 

@@ -40,8 +40,18 @@ def smoothed(found: Reconstruction, cutoff: float = CUTOFF) -> Reconstruction:
     return replace(found, q=q, residual=np.array(residual))
 
 
-def smoothed_postures(found: Reconstruction, cutoff: float = CUTOFF) -> FloatArray:
-    """(n, nq) postures of :func:`smoothed`, without their residuals."""
+def smoothed_postures(found: Reconstruction, cutoff: float = CUTOFF, limits: bool = True) -> FloatArray:
+    """(n, nq) postures of :func:`smoothed`, without their residuals.
+
+    Args:
+        found: As there.
+        cutoff: As there [Hz].
+        limits: Whether hinges are kept to their limits afterwards. Where a smooth angle meets its limit it
+            gets a kink, so what is differentiated twice had better overshoot a little.
+
+    Raises:
+        InputError: As there.
+    """
     rate = _rate(found)
     finite_number(cutoff, "cutoff [Hz]", above=0.0)
     if cutoff >= 0.5 * rate:
@@ -53,7 +63,8 @@ def smoothed_postures(found: Reconstruction, cutoff: float = CUTOFF) -> FloatArr
     padding = min(len(q) - 1, int(np.ceil(2.0 * rate / cutoff)))
     q = sosfiltfilt(sections, q, axis=0, padlen=padding)
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
-    q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
+    if limits:
+        q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
     return q
 
 
@@ -88,7 +99,8 @@ def motion_of(found: Reconstruction, cutoff: float | None = CUTOFF) -> Motion:
 def rates_of(found: Reconstruction, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n, nv) velocities and accelerations of postures at the instants of a reconstruction.
 
-    By central differences on the configuration space; at both ends velocities continue the line of the next two.
+    By central differences on the configuration space; at both ends velocities continue the line of the
+    next two.
 
     Raises:
         InputError: If there are too few instants.

@@ -48,6 +48,9 @@ HAND_FORCE = 100.0
 LIFTED = 0.025
 """Height above that in flat stance from which an end of a sole has lifted [m]."""
 
+LOWEST = 0.005
+"""Height of the middle of a sole above its lowest quarter up to which it lies flat [m]."""
+
 HEEL_SHARE = 0.25
 """Share of a sole's length that touches while the toes are lifted: a heel is round, and gives way."""
 
@@ -123,8 +126,10 @@ class _SoleEnds:
         ]
         speed = np.max(speeds, axis=0)
         self.heel, self.toes, self.rate = heel[frames], toes[frames], rate
-        # Frames in which both rest; the slowest tenth where there is none.
-        self.flat = speed <= max(REST, float(np.quantile(speed, 0.1)))
+        # Frames in which both rest (the slowest tenth where there is none) and their middle is lowest.
+        slow = speed <= max(REST, float(np.quantile(speed, 0.1)))
+        height = 0.5 * (self.heel + self.toes)[:, 2]
+        self.flat = slow & (height <= float(np.quantile(height[slow], 0.25)) + LOWEST)
 
     def contact(self, support: Support, length: float, width: float, friction: float) -> Contact:
         """The full sole where the foot lies flat."""
