@@ -2,6 +2,8 @@
 
 from typing import Literal, get_args
 
+import numpy as np
+
 from manikin.centroidal import (
     CentroidalProblem,
     CentroidalResult,
@@ -15,7 +17,7 @@ from manikin.spatial import FloatArray
 
 Method = Literal["keyframes", "timing-free"]
 """``keyframes``: near the recorded positions at the recorded instants (5.3), kept in balance all along;
-``timing-free``: only the stances and both ends are kept (5.4)."""
+``timing-free``: only the stances, both ends and the reach are kept (5.4)."""
 
 METHODS: tuple[Method, ...] = get_args(Method)
 
@@ -46,8 +48,21 @@ def plan_recorded_com(
         CentroidalProblem(
             mass, _free_durations(recording), recording.com[0], recording.com[-1],
             start_velocity=velocity[0], goal_velocity=velocity[1], required_margin=required_margin,
+            support_distance=farthest_support(recording),
         )
     )  # fmt: skip
+
+
+def farthest_support(recording: Recording) -> float:
+    """Largest distance of the recorded centre of mass from a contact ([Qiu2012]_ Table 3.5, 5.26) [m]."""
+    phases, farthest = recording.schedule.phase_at(recording.time), 0.0
+    for index, phase in enumerate(recording.sequence):
+        # The last sample of a phase is the first of the next one.
+        rows = np.flatnonzero(phases == index)
+        com = recording.com[rows[0] : rows[-1] + 2]
+        for contact in phase.stance:
+            farthest = max(farthest, float(np.linalg.norm(com - contact.position, axis=1).max()))
+    return farthest
 
 
 def _free_durations(recording: Recording) -> StanceSequence:
