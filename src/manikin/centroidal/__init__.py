@@ -6,6 +6,7 @@ from manikin.centroidal.feasibility import Failure, Feasibility, assess_feasibil
 from manikin.centroidal.key_planes import KeyPlane
 from manikin.centroidal.keyframe_problem import KeyframeProblem
 from manikin.centroidal.keyframes import KeyframeResult, plan_com_through_key_frames
+from manikin.centroidal.near_key_frames import NearKeyFramesResult, plan_com_near_key_frames
 from manikin.centroidal.overhead import CeilingHeight, Zone, height_below, keep_out
 from manikin.centroidal.problem import CentroidalProblem, MarginSpace, Weights
 from manikin.centroidal.recording import Recording
@@ -25,6 +26,7 @@ __all__ = [
     "KeyframeProblem",
     "KeyframeResult",
     "MarginSpace",
+    "NearKeyFramesResult",
     "Recording",
     "Residual",
     "Residuals",
@@ -36,5 +38,6 @@ __all__ = [
     "intersection_radii",
     "keep_out",
     "plan_com",
+    "plan_com_near_key_frames",
     "plan_com_through_key_frames",
 ]

@@ -99,8 +99,8 @@ def effector_targets(
                 )
                 if end - start < LONG_FLIGHT:
                     place = turn = leave = 0.25
-                weight[rows] = _flight_weight(share, FLIGHT_POSITION_WEIGHT, place, place)
-                rotation_weight[rows] = _flight_weight(share, FLIGHT_ROTATION_WEIGHT, leave, turn)
+                weight[rows] = flight_weight(share, FLIGHT_POSITION_WEIGHT, place, place)
+                rotation_weight[rows] = flight_weight(share, FLIGHT_ROTATION_WEIGHT, leave, turn)
                 if item.method == "reach":
                     held = share if item.swing.start is None else 1.0 - share
                     weight[rows] = _reach_weight(held, place)
@@ -226,10 +226,10 @@ def _reach_weight(share: FloatArray, ramp: float) -> FloatArray:
     """Importance from a free end (0) to the contact (1): none, then that of a flight, then full."""
     blend = np.clip(share / 0.75, 0.0, 1.0)
     rising = blend**2 * (3.0 - 2.0 * blend)
-    return rising * _flight_weight(np.maximum(share, 0.5), FLIGHT_POSITION_WEIGHT, ramp, ramp)
+    return rising * flight_weight(np.maximum(share, 0.5), FLIGHT_POSITION_WEIGHT, ramp, ramp)
 
 
-def _flight_weight(share: FloatArray, middle: float, leaving: float, landing: float) -> FloatArray:
+def flight_weight(share: FloatArray, middle: float, leaving: float, landing: float) -> FloatArray:
     """Importance during a flight: full at its ends, so that contacts are left and met well."""
     blend = np.clip(np.minimum(share / leaving, (1.0 - share) / landing), 0.0, 1.0)
     inside = ALMOST - (1.0 - middle) * blend**2 * (3.0 - 2.0 * blend)

@@ -1,0 +1,265 @@
+"""Plan recorded motions anew, and execute them: writes ``replanning.md`` and its figures.
+
+Run ``python docs/replanning.py FOLDER``, where FOLDER holds the recordings named below: walks over force
+plates (btk, OpenSim, OpenCap) and motions of the ACCAD Open Motion Project and the CMU Graphics Lab.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from manikin.centroidal import KeyframeProblem, plan_com_through_key_frames
+from manikin.figures.compare_com import compare_planes_figure, compare_scene_figure
+from manikin.figures.compare_timing import compare_timing_figure
+from manikin.figures.style import dress, new_grid
+from manikin.figures.write import save_figure
+from manikin.mocap import Reconstruction, RecordedSupports, read_recording, reconstruct, supports_of
+from manikin.replan import Replan, against_recording, replan, window
+
+PAGE = Path(__file__).with_suffix(".md")
+IMAGES = PAGE.parent / "images"
+WALKS = (
+    "grf/btkdata/FunctionalWalk.c3d",
+    "grf/btkdata/PiG_Motion-FlatFoot-One.c3d",
+    "grf/opensim_core/walking2.c3d",
+    "grf/opensim_core/walking5.c3d",
+    "grf/nimble_opencap_s4/walking1.trc",
+)
+OTHERS = {
+    "cmu_asf_amc/17_03.amc": (True, np.inf),
+    "grf/nimble_opencap_s4/STS1.trc": (False, 5.0),
+    "accad_male1_bvh/Male1_A5_PickUpBox.bvh": (False, np.inf),
+    "accad_male1_bvh/Male1_A2_Sway.bvh": (False, np.inf),
+    "accad_male1_bvh/Male1_B22_SideStepLeft.bvh": (True, np.inf),
+}
+"""A stealthy walk; standing up, sitting down and standing up; a box picked up from low; swaying; a leap to
+the side. Whether feet stand on toes, and up to when [s]."""
+
+SHOWN = WALKS[1]
+"""The walk of the figures and of the table of phases."""
+
+TEXT = """# Recorded motions planned anew
+
+What people did, on the very stances they did it on, planned by both methods of Qiu (2012, chapter 5) and
+executed by our controller in the physics engine. By `docs/replanning.py`; in Python:
+
+```text
+from manikin.replan import against_recording, replan
+result = replan(found, supports, method="keyframes", execute=True)   # of manikin.mocap
+result.as_dict(), result.planned, result.executed, result.schedule
+against_recording(result).as_dict()                                  # timing, centre of mass, margins
+```
+
+## The key frame method (5.3)
+
+The thesis passes the recorded CoM exactly at every change of support and adds recorded positions as key
+frames where balance is lost in between. *Exact* says what that comes to on each walk, whole soles, margin ≥
+0 all along. A walk's double supports last a tenth of a second: a centimetre of error in a CoM that is fixed
+there asks for accelerations that no foot can give, and a further fixed position makes it worse. So
+`plan_com_near_key_frames` lets the key frames pull, imposes balance every 10 ms (the wrench, bilinear,
+linearised about the last solution), measures it every millisecond, and adds the sample that is farthest off
+as one more key frame where the plan strays by more than 1 cm. The point-mass margin is about the world
+origin; feet stand on their whole soles, or on their toes once the heel has lifted.
+
+"""
+EXECUTED = """
+## Executed
+
+The recorded postures are adapted to that CoM and to the exact stances in one smooth fit (feet, CoM,
+distances, a rate of angular momentum near that of the point mass), and the controller executes the result
+at the recorded speed from the first frame to the last. *Posture*: root mean square deviation of all hinges
+from the recording. *Balanced*: share of the control steps with a positive margin of the measured contact
+forces. CoM and feet: errors from the plan.
+
+"""
+NOTES = """
+What the adapted postures deviate in is mostly the arms: the CoM is planned as that of a point mass, and
+arms and trunk then take up the angular momentum of the legs, with shoulders up to their strength and beyond
+in the fast walks (*torque*: largest share of a joint's strength in the plan). A stiff sole lands flat,
+where a recorded heel rolls down within some 60 ms. `STS1` is its first five seconds: rise, sit down, rise;
+a seat is rigid and at one place.
+
+None of this is robust yet. A clip's ends are free, so that trunk and arms turn away there, by up to some
+thirty degrees in the first tenths of a second; of three sets of posture weights that hold them there one lets
+`PiG_Motion-FlatFoot-One` fall at 1.3 s, with a fit that misses CoM and soles by 6 to 8 mm. `walking2` and
+`walking5`, at 1.6 m/s, and `walking1` come to the end with limbs that brush each other. Without double
+support between two single ones, as in the leap of `SideStepLeft`, there is no plan. Planning the CoM with the
+recorded rate of angular momentum, in place of a point mass, should spare arms and trunk. Timing-free, a
+walk on whole soles (`walking1`) falls at 1.3 s, with a fit that misses soles by 2.5 cm and the CoM by 1.5 cm.
+
+"""
+AGAINST = """
+## Plan against recording (7.3)
+
+The same stances on whole soles, timing-free: durations between half and twice the recorded ones, position
+and velocity of both ends as recorded, the CoM no farther from a foot than it was recorded. CoM: root mean
+square distance at equal shares of each phase. *Recorded* margin: that of a point mass with the recorded
+acceleration, which a recording with noise need not keep.
+
+"""
+PHASES = """
+As in the thesis (Table 7.7, Fig. 7.16), small polytopes make short phases: double supports last up to their
+longest and the plan takes longer than the person did. Single supports are cut up to 1.3 m/s, at 1.6 m/s they
+are not. Phases of `{name}`:
+
+"""
+FIGURES = """
+![CoM of recording and plan](images/replanning-planes.png)
+
+![CoM of recording and plan in space](images/replanning-scene.png)
+
+![Timing of recording and plan](images/replanning-timing.png)
+"""
+
+
+def read(path: Path) -> tuple[Reconstruction, RecordedSupports]:
+    """Postures and supports of a recording."""
+    found = reconstruct(read_recording(path))
+    return found, supports_of(found)
+
+
+def exact(plan: Replan) -> str:
+    """What becomes of the method that passes every key frame."""
+    com = plan.recorded.com
+    velocity = np.gradient(com, plan.recorded.time, axis=0, edge_order=2)
+    asked = KeyframeProblem(
+        plan.body.mass, plan.recording, start_velocity=velocity[0], goal_velocity=velocity[-1]
+    )
+    found = plan_com_through_key_frames(asked)
+    if found.trajectory is None:
+        return "none at the key frames" if found.certificate is None else "lost between them"
+    away = np.linalg.norm(found.trajectory.position(plan.recording.time) - plan.recording.com, axis=1)
+    return f"{1e3 * np.sqrt(np.mean(away**2)):.1f} mm"
+
+
+def row(*cells: object) -> str:
+    """A row of a table."""
+    return "| " + " | ".join(str(cell) for cell in cells) + " |\n"
+
+
+def head(*cells: str) -> str:
+    """The head of a table whose first column is text."""
+    return row(*cells) + row("---", *["--:"] * (len(cells) - 1))
+
+
+def near_row(name: str, whole: Replan, rolling: Replan) -> str:
+    """Numbers of the key frame method on one walk."""
+    made = rolling.as_dict()
+    return row(
+        f"`{name}`", f"{made['recorded_duration_s']:.2f}", exact(whole), made["key_frames"],
+        made["added_key_frames"], f"{1e3 * whole.as_dict()['com_rms_m']:.1f}",
+        f"{1e3 * made['com_rms_m']:.1f}", f"{1e3 * made['com_max_m']:.1f}", f"{made['min_margin']:.2f}",
+    )  # fmt: skip
+
+
+def executed_row(name: str, plan: Replan) -> str:
+    """Numbers of one execution."""
+    made = plan.as_dict()
+    fit, ran = made["wholebody"], made["execution"]
+    if fit is None or ran is None:
+        return row(f"`{name}`", made["failure"], *[""] * 8)
+    return row(
+        f"`{name}`", ran["failure"] or "to the end", f"{ran['executed_s']:.2f}",
+        f"{np.degrees(fit['posture_rms_rad']):.1f}", f"{fit['max_torque_share']:.2f}",
+        f"{1e3 * ran['com_rms_error_m']:.1f}", f"{1e3 * ran['com_max_error_m']:.1f}",
+        f"{1e3 * ran['max_foot_error_m']:.0f}", f"{100.0 * ran['share_positive_margin']:.1f}",
+        f"{ran['min_margin']:.1f}",
+    )  # fmt: skip
+
+
+def against_row(name: str, plan: Replan) -> str:
+    """Numbers of one timing-free plan."""
+    made = plan.as_dict()
+    if not made["succeeded"]:
+        return row(f"`{name}`", f"{made['recorded_duration_s']:.2f}", made["failure"], *[""] * 6)
+    counts = np.array([len(held) for held in made["supports"]])
+    mine, theirs = np.array(made["phase_durations_s"]), np.array(made["recorded_phase_durations_s"])
+    compared = against_recording(plan).as_dict()["margins"]["point_mass"]
+    return row(
+        f"`{name}`", f"{made['recorded_duration_s']:.2f}", f"{made['duration_s']:.2f}",
+        *(f"{values[counts == count].mean():.2f}" for count in (1, 2) for values in (theirs, mine)),
+        f"{1e2 * made['com_rms_m']:.1f}", f"{compared['min_first']:.0f}", f"{compared['min_second']:.0f}",
+    )  # fmt: skip
+
+
+def phase_table(plan: Replan) -> str:
+    """Key instants of recording and plan, as Table 7.7."""
+    made = plan.as_dict()
+    theirs, mine = plan.recording.key_times, plan.schedule.instants
+    lines = [head("feet", "recorded from [s]", "planned from [s]", "recorded [s]", "planned [s]")]
+    for index, held in enumerate(made["supports"]):
+        feet = " and ".join(name.removesuffix("_foot") for name in held)
+        lines.append(row(
+            feet, f"{theirs[index]:.2f}", f"{mine[index]:.2f}",
+            f"{made['recorded_phase_durations_s'][index]:.2f}", f"{made['phase_durations_s'][index]:.2f}",
+        ))  # fmt: skip
+    return "".join(lines)
+
+
+def key_frame_figure(plan: Replan) -> Figure:
+    """Recorded and planned CoM with the key frames, and both margins (Fig. 5.3 and 5.5)."""
+    figure, grid = new_grid(9.0, 9.0, "A recorded centre of mass and the plan near its key frames", 4, 1)
+    axes = [figure.add_subplot(grid[number]) for number in range(4)]
+    compared = against_recording(plan)
+    first, second = compared.first.plan, compared.second.plan
+    frames = list(getattr(plan.com, "frames", ()))
+    if first is None or second is None:
+        return figure
+    for axis, panel, name in zip(range(3), axes, "xyz", strict=False):
+        panel.plot(first.time, first.position[:, axis], label="recorded", linewidth=2.5, color="0.7")
+        panel.plot(second.time, second.position[:, axis], label="planned", linewidth=1.2)
+        panel.plot(first.time[frames], first.position[frames, axis], "k*", markersize=5, label="key frames")
+        dress(panel, ylabel=f"{name} [m]")
+    axes[0].legend(fontsize=8, frameon=False, ncols=3)
+    axes[3].plot(first.time, first.margin, linewidth=2.0, color="0.7")
+    axes[3].plot(second.time, second.margin, linewidth=1.2)
+    axes[3].axhline(0.0, color="k", linewidth=0.6)
+    dress(axes[3], ylabel="margin [N.m]", xlabel="time [s]")
+    return figure
+
+
+def main(folder: Path) -> None:
+    """Measure everything and write page and figures."""
+    near, ran, against, shown = [], [], [], {}
+    for path in (*WALKS, *OTHERS):
+        toes, end = OTHERS.get(path, (True, np.inf))
+        found, supports = window(*read(folder / path), 0.0, end)
+        name = Path(path).stem
+        print(name, file=sys.stderr)
+        rolling = replan(found, supports, execute=True, rolling=toes)
+        ran.append(executed_row(name, rolling))
+        if path not in WALKS:
+            continue
+        whole = replan(found, supports, rolling=False)
+        near.append(near_row(name, whole, rolling))
+        free = replan(found, supports, method="timing-free", rolling=False)
+        against.append(against_row(name, free))
+        if path == SHOWN:
+            shown = {"near": whole, "free": free}
+    for name, figure in (
+        ("keyframes", key_frame_figure(shown["near"])),
+        ("planes", compare_planes_figure(against_recording(shown["free"]))),
+        ("scene", compare_scene_figure(against_recording(shown["free"]))),
+        ("timing", compare_timing_figure(against_recording(shown["free"]))),
+    ):
+        save_figure(figure, IMAGES / f"replanning-{name}.png")
+    PAGE.write_text(
+        TEXT
+        + head("walk", "duration [s]", "exact", "key frames", "of them added", "RMS, whole soles [mm]",
+               "RMS, with toes [mm]", "largest [mm]", "least margin [N.m]")
+        + "".join(near) + "\n![Key frames](images/replanning-keyframes.png)\n" + EXECUTED
+        + head("recording", "outcome", "executed [s]", "posture [°]", "torque", "CoM RMS [mm]",
+               "CoM largest [mm]", "feet largest [mm]", "balanced [%]", "least margin [N.m]")
+        + "".join(ran) + NOTES + AGAINST.lstrip("\n")
+        + head("walk", "recorded [s]", "planned [s]", "single, recorded [s]", "single, planned [s]",
+               "double, recorded [s]", "double, planned [s]", "CoM RMS [cm]", "least margin, recorded [N.m]",
+               "least margin, planned [N.m]")
+        + "".join(against) + PHASES.format(name=Path(SHOWN).stem) + phase_table(shown["free"]) + FIGURES,
+        encoding="utf-8",
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

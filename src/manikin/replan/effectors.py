@@ -1,0 +1,203 @@
+"""Where each effector goes: on its contact while it holds one, and as recorded in between.
+
+A foot that only stands on its toes tilts about their hinge. What it was recorded to tilt
+counts up to some thirty degrees: a recorded foot leaves on the tips of its toes at several hundred degrees
+per second. In flight each effector goes smoothly from its contact to the recorded path and from there
+to its next contact, the tips of a foot kept off the surface. All this is our own.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from scipy.spatial.transform import Rotation
+
+from manikin.body import BodyModel
+from manikin.body.limb import hanging_segment
+from manikin.body.segments import Segment
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.locomotion.stance_foot import smooth_step
+from manikin.mocap.runs import runs
+from manikin.spatial import FloatArray
+from manikin.wholebody.targets import GRASP_ROTATION_WEIGHT, EffectorTarget, flight_weight
+
+LARGEST_TILT = float(np.deg2rad(35.0))
+"""Tilt of a foot that stands on its toes, approached but not reached [rad]."""
+
+TILTING = 0.08
+"""Longest time over which the recorded tilt sets in [s]."""
+
+JOINING = 0.45
+"""Share of a flight at either end in which it leaves, or joins, the recorded path."""
+
+SWING_HEIGHT = 0.03
+"""Least height of a foot's lowest point in the middle of its flight [m]."""
+
+ROUNDING = 0.005
+"""Width of the bend between a flight that is lifted to that height and one that is not [m]."""
+
+TOES_BACK = 0.5
+"""Share of the flight after which bent toes are straight again."""
+
+FLIGHT_POSITION, FLIGHT_ROTATION, FLIGHT_END = 0.2, 0.1, 0.25
+"""Importance of position and orientation in the middle of a flight, and the share at either end of it in
+which they matter more."""
+
+
+@dataclass(frozen=True, eq=False)
+class EffectorPaths:
+    """Targets of every effector of a schedule.
+
+    Attributes:
+        targets: By effector.
+        toes: (n,) angle of each joint of toes, by its index among the hinges [rad].
+    """
+
+    targets: dict[str, EffectorTarget]
+    toes: dict[int, FloatArray]
+
+
+def effector_paths(
+    body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray
+) -> EffectorPaths:
+    """Adapt the recorded paths of the effectors to their contacts.
+
+    Args:
+        body: The body.
+        schedule: Its contacts in time.
+        time: (n,) [s].
+        q: (n, nq) recorded postures then.
+    """
+    targets, toes = {}, {}
+    for name in schedule.sequence.effectors:
+        path = _Path(body, schedule, time, q, name)
+        targets[name] = path.target()
+        if path.toe_joint is not None:
+            toes[path.toe_joint] = path.toes
+    return EffectorPaths(targets, toes)
+
+
+class _Path:
+    """One effector; recorded first, and then changed in place."""
+
+    def __init__(
+        self, body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray, name: str
+    ) -> None:
+        self.body, self.schedule, self.time, self.name = body, schedule, time, name
+        self.phases = schedule.phase_at(time)
+        self.recorded = _placements(body, q, name)
+        self.position, self.rotation = (np.array(part) for part in self.recorded)
+        n = len(time)
+        self.weight, self.rotation_weight, self.toes = np.zeros(n), np.ones(n), np.zeros(n)
+        hanging = hanging_segment(body, body.effector(name).segment)
+        self.toe_joint = None if hanging is None else body.joint_index(hanging.hinges[0].name)
+        self.hinge = None if hanging is None else _hinge(body, name, hanging)
+
+    def target(self) -> EffectorTarget:
+        held = np.array([self.name in phase.stance for phase in self.schedule.sequence])
+        for first, stop in runs(held):
+            self._hold(first, stop)
+        for first, stop in runs(self.weight == 0.0):
+            self._fly(first, stop)
+        return EffectorTarget(self.position, self.rotation, self.weight, self.rotation_weight)
+
+    def _hold(self, first: int, stop: int) -> None:
+        """Place it on one of its contacts, which lasts from a phase up to another."""
+        tilt = _pitch(self.recorded[1])
+        contacts = [self.schedule.sequence[phase].stance[self.name] for phase in range(first, stop)]
+        flat = np.isin(self.phases, [first + i for i, c in enumerate(contacts) if c.part is SolePart.FULL])
+        rest = float(np.median(tilt[flat])) if np.any(flat) else 0.0
+        for part, begin, end in _parts(contacts):
+            rows = (self.phases >= first + begin) & (self.phases < first + end)
+            contact = contacts[begin]
+            place = np.tile(contact.position, (int(rows.sum()), 1))
+            turn = np.tile(contact.rotation_contact_to_world, (len(place), 1, 1))
+            if part is SolePart.TOES and self.hinge is not None:
+                start, over = self.schedule.instants[[first + begin, first + end]]
+                share = (self.time[rows] - start) / min(TILTING, over - start)
+                angle = LARGEST_TILT * np.tanh(np.maximum(tilt[rows] - rest, 0.0) / LARGEST_TILT)
+                angle *= smooth_step(share) if begin > 0 else 1.0
+                turn = turn @ Rotation.from_rotvec(np.outer(angle, [0.0, 1.0, 0.0])).as_matrix()
+                place = place + contact.rotation_contact_to_world @ self.hinge - turn @ self.hinge
+                self.toes[rows] = angle
+            self.position[rows], self.rotation[rows], self.weight[rows] = place, turn, 1.0
+            if contact.kind is ContactKind.GRASP:
+                self.rotation_weight[rows] = 0.0
+
+    def _fly(self, first: int, stop: int) -> None:
+        """Join contact and recording in a flight of some samples; a clip's ends have no contact."""
+        rows = slice(first, stop)
+        leaves, lands = first > 0, stop < len(self.time)
+        start, end = self.time[max(first - 1, 0)], self.time[min(stop, len(self.time) - 1)]
+        share = (self.time[rows] - start) / max(end - start, 1e-9)
+        position, rotation = self.position[rows].copy(), self.rotation[rows].copy()
+        turn = np.zeros((stop - first, 3))
+        for there, at, along in ((leaves, first - 1, share), (lands, stop, 1.0 - share)):
+            if there:
+                rest = 1.0 - smooth_step(along / JOINING)
+                position += rest[:, None] * (self.position[at] - self.position[rows])
+                away = self.rotation[at] @ self.rotation[rows].transpose(0, 2, 1)
+                turn += rest[:, None] * Rotation.from_matrix(away).as_rotvec()
+        self.position[rows] = position
+        self.rotation[rows] = Rotation.from_rotvec(turn).as_matrix() @ rotation
+        if leaves:
+            self.toes[rows] = self.toes[first - 1] * (1.0 - smooth_step(share / TOES_BACK))
+        near = np.maximum(share, 0.5 if not leaves else 0.0)
+        near = np.clip(np.minimum(near, 0.5 if not lands else 1.0), 1e-6, 1.0 - 1e-6)
+        if self.hinge is not None:
+            self._lift(rows, np.minimum(near, 1.0 - near))
+        self.weight[rows] = flight_weight(near, FLIGHT_POSITION, FLIGHT_END, FLIGHT_END)
+        self.rotation_weight[rows] = flight_weight(near, FLIGHT_ROTATION, FLIGHT_END, FLIGHT_END)
+        if self._grasps():
+            self.rotation_weight[rows] = GRASP_ROTATION_WEIGHT
+
+    def _lift(self, rows: slice, share: FloatArray) -> None:
+        """Keep heel, hinge and tips of a foot off the surface in flight."""
+        tilt, half = _pitch(self.rotation[rows]), 0.5 * (self.body.sole_length or 0.0)
+        height, hinge = self.position[rows, 2], 0.0 if self.hinge is None else float(self.hinge[0])
+        ball = height - hinge * np.sin(tilt)
+        tips = ball - (half - hinge) * np.sin(tilt - self.toes[rows])
+        surface = min(c.position[2] for c in self._contacts())
+        low = np.minimum(np.minimum(height + half * np.sin(tilt), ball), tips) - surface
+        missing = SWING_HEIGHT * np.minimum(1.0, 4.0 * share) - low
+        lift = ROUNDING * np.logaddexp(0.0, missing / ROUNDING)
+        self.position[rows, 2] += lift * np.minimum(1.0, 8.0 * share)
+
+    def _contacts(self) -> Iterator[Contact]:
+        for phase in self.schedule.sequence:
+            if self.name in phase.stance:
+                yield phase.stance[self.name]
+
+    def _grasps(self) -> bool:
+        return all(contact.kind is ContactKind.GRASP for contact in self._contacts())
+
+
+def _placements(body: BodyModel, q: FloatArray, name: str) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) positions and (n, 3, 3) rotations of an effector in the world."""
+    data, frame = body.pinocchio.createData(), body.effector_frame(name)
+    position, rotation = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+    for row, one in enumerate(q):
+        pin.framesForwardKinematics(body.pinocchio, data, one)
+        position[row], rotation[row] = data.oMf[frame].translation, data.oMf[frame].rotation
+    return position, rotation
+
+
+def _hinge(body: BodyModel, name: str, toes: Segment) -> FloatArray:
+    """(3,) middle of the hinge of a foot's toes in the frame of its sole [m]."""
+    frame = body.effector(name)
+    return frame.rotation.T @ (toes.origin - frame.translation)
+
+
+def _pitch(rotation: FloatArray) -> FloatArray:
+    """(n,) of soles, heel up when positive [rad]."""
+    return np.arcsin(np.clip(-rotation[:, 2, 0], -1.0, 1.0))
+
+
+def _parts(contacts: list[Contact]) -> Iterator[tuple[SolePart, int, int]]:
+    """Part of a contact with the first and the last but one phase in which it is the one."""
+    changes = [i for i in range(1, len(contacts)) if contacts[i].part is not contacts[i - 1].part]
+    bounds = [0, *changes, len(contacts)]
+    for begin, end in pairwise(bounds):
+        yield contacts[begin].part, begin, end

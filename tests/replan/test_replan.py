@@ -1,0 +1,149 @@
+"""Recorded motions planned anew: their stances, their centre of mass, and what becomes of them."""
+
+import json
+
+import numpy as np
+import pytest
+
+from manikin.balance import pseudo_wrench, wrench_polytope
+from manikin.contact import ContactSchedule, Phase, SolePart, Stance, StanceSequence, sole
+from manikin.errors import InputError
+from manikin.mocap import recorded_schedule, smoothed
+from manikin.motion.file import read_motions, write_motions
+from manikin.replan import against_recording, replan, window
+from manikin.replan.contacts import landing_flat, on_one_seat, scene_under
+from manikin.replan.effectors import effector_paths
+
+
+def test_who_stands_and_nods_is_planned_and_executed(nod):
+    """Both feet flat all along: plan and execution are exact to millimetres, and balanced."""
+    told = nod.as_dict()
+    assert told["com_rms_m"] < 0.005
+    assert told["min_margin"] > 0.0
+    assert told["wholebody"]["max_support_error_m"] < 1e-3
+    assert told["execution"]["failure"] is None
+    assert told["execution"]["com_rms_error_m"] < 0.005
+    assert told["execution"]["min_margin"] > 0.0
+
+
+def test_the_result_is_plain_and_fits_a_motion_file(nod, tmp_path):
+    assert json.loads(json.dumps(nod.as_dict(), allow_nan=False))["method"] == "keyframes"
+    write_motions(tmp_path / "motion.h5", nod.content)
+    back = read_motions(tmp_path / "motion.h5")
+    assert back.planned is not None
+    assert back.executed is not None
+    np.testing.assert_array_equal(back.schedule.instants, nod.schedule.instants)
+
+
+def test_an_unknown_method_is_refused(walk):
+    with pytest.raises(InputError, match="valid: keyframes, timing-free"):
+        replan(*walk, method="guessing")
+
+
+def test_heels_land_flat_and_nothing_else_changes(walk):
+    found, supports = walk
+    recorded = recorded_schedule(smoothed(found), supports, rolling=True)
+    flat = landing_flat(recorded, found.body)
+    parts = {contact.part for phase in flat.sequence for contact in phase.stance}
+    assert parts == {SolePart.FULL, SolePart.TOES}
+    middles = 0.5 * (flat.instants[:-1] + flat.instants[1:])
+    for time in middles:
+        before, after = recorded.stance_at(time), flat.stance_at(time)
+        assert set(before.effectors) == set(after.effectors)
+        for name in after.effectors:
+            np.testing.assert_array_equal(before[name].position, after[name].position)
+    assert flat.instants[[0, -1]].tolist() == recorded.instants[[0, -1]].tolist()
+
+
+def test_a_chair_does_not_move():
+    """Places of one seat become their median; one a metre away is another seat."""
+    places = [(0.0, 0.0, 0.40), (0.02, 0.0, 0.42), (0.01, 0.03, 0.41), (1.0, 0.0, 0.5)]
+    foot = sole("left_foot", (0.5, 0.0, 0.0), length=0.26, width=0.11, friction=0.8)
+    phases = []
+    for place in places:
+        seat = sole("buttocks", place, length=0.2, width=0.3, friction=0.8)
+        phases += [Phase(Stance([foot, seat], 2000.0)), Phase(Stance([foot], 2000.0))]
+    schedule = ContactSchedule(StanceSequence(phases), np.arange(9.0))
+    changed = on_one_seat(schedule)
+    found = [phase.stance["buttocks"].position.tolist() for phase in list(changed.sequence)[::2]]
+    assert found == [[0.01, 0.0, 0.41]] * 3 + [[1.0, 0.0, 0.5]]
+    assert all("buttocks" not in phase.stance for phase in list(changed.sequence)[1::2])
+
+
+def test_a_window_is_a_recording_of_its_own(walk):
+    found, supports = walk
+    part, held = window(found, supports, supports.start + 0.3, supports.start + 0.9)
+    assert part.time[[0, -1]] == pytest.approx([0.0, 0.6], abs=1e-9)
+    whole = recorded_schedule(found, supports)
+    cut = recorded_schedule(part, held)
+    for time in np.linspace(0.05, 0.55, 11):
+        before, after = whole.stance_at(time + 0.3 + supports.start), cut.stance_at(time)
+        assert set(before.effectors) == set(after.effectors)
+    with pytest.raises(InputError, match="valid: at least 4"):
+        window(found, supports, 90.0, 91.0)
+
+
+def test_every_contact_lies_on_the_scene(walk):
+    found, supports = walk
+    schedule = recorded_schedule(smoothed(found), supports)
+    scene = scene_under(schedule, supports.surfaces[0] - 0.3)  # as if all of it were on a stage
+    assert {scene.touched_obstacle(c) for phase in schedule.sequence for c in phase.stance} <= set(
+        scene.names
+    )
+    assert len(scene) == 1 + len(supports.supports)
+
+
+def test_feet_keep_to_their_contacts_and_fly_clear_of_the_floor(walk):
+    """On their contacts exactly while they lie flat; in flight no heel is below the floor."""
+    found, supports = walk
+    even = smoothed(found)
+    schedule = landing_flat(recorded_schedule(even, supports, rolling=True), found.body)
+    # The schedule's clock is the supports', here the reconstruction's too.
+    paths = effector_paths(found.body, schedule, supports.start + found.time, even.q)
+    phases = schedule.phase_at(supports.start + found.time)
+    floor = supports.surfaces[0]
+    for name, target in paths.targets.items():
+        for row, phase in enumerate(phases):
+            stance = schedule.sequence[phase].stance
+            if name in stance and stance[name].part is SolePart.FULL:
+                np.testing.assert_allclose(target.position[row], stance[name].position, atol=1e-12)
+                assert target.weight[row] == 1.0
+        flying = target.weight < 1.0
+        half = 0.5 * found.body.sole_length
+        heels = target.position[flying, 2] - half * target.rotation[flying, 2, 0]
+        assert heels.min() > floor - 0.005
+
+
+def test_a_walk_over_plates_is_reproduced_in_balance(walked):
+    """The bar of the key frame method: 1.5 cm, with a margin that is never negative, measured here again."""
+    told = walked.as_dict()
+    assert told["com_rms_m"] <= 0.015
+    trajectory = walked.com.trajectory
+    times = np.linspace(0.0, trajectory.duration, 200)
+    wrench = pseudo_wrench(walked.body.mass, trajectory.position(times), trajectory.acceleration(times))
+    polytopes = [wrench_polytope(phase.stance) for phase in walked.schedule.sequence]
+    phases = walked.schedule.phase_at(times)
+    assert min(polytopes[p].margin(w) for p, w in zip(phases, wrench, strict=True)) >= 0.0
+
+
+def test_the_walk_is_executed_at_its_own_speed(walked):
+    """The controller follows it through both steps; 2 cm of CoM is a tenth of what a fall begins with."""
+    ran = walked.execution
+    assert not ran.fell
+    assert ran.motion.duration == pytest.approx(walked.recording.time[-1], abs=0.01)
+    assert ran.com_max_error_m < 0.02
+    assert np.mean(ran.motion.margin > 0.0) > 0.9
+
+
+def test_planned_timing_free_double_supports_last_longer(walk):
+    """As the thesis found (7.3.1): where polytopes are large the plan waits, and hurries on one foot."""
+    found = replan(*walk, method="timing-free", rolling=False)
+    told = found.as_dict()
+    counts = np.array([len(held) for held in told["supports"]])
+    mine, theirs = np.array(told["phase_durations_s"]), np.array(told["recorded_phase_durations_s"])
+    assert np.all(mine[counts == 2] > theirs[counts == 2])
+    assert np.all(mine[counts == 1] < theirs[counts == 1])
+    compared = against_recording(found).as_dict()
+    assert compared["matched_phases"] == len(counts)
+    assert compared["margins"]["point_mass"]["min_second"] == pytest.approx(told["min_margin"], abs=1e-9)
+    assert compared["com"]["point_mass"]["rms_distance_m"] == pytest.approx(told["com_rms_m"], rel=0.2)
