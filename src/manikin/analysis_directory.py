@@ -15,6 +15,7 @@ Each file is written atomically.
 import csv
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +26,13 @@ from manikin.analysis_report import overview_page, report_page
 from manikin.atomic import write_text
 from manikin.errors import MotionFileError
 from manikin.figures.recording import recording_figure
-from manikin.figures.write import png_of
+from manikin.figures.write import comparison_pictures, png_of
 from manikin.motion.file import MotionFile, write_motions
 from manikin.output import MOTION, SUMMARY, make_directory, to_json
+from manikin.replan import Replan, against_recording
 
+SHEET = "Postures, supports, forces, margins, height and scores over time"
+"""What the first picture of a report shows."""
 REPORT = "report.html"
 SERIES = "series.csv"
 OVERVIEW = "index.html"
@@ -55,23 +59,38 @@ def check_directory(path: Path) -> None:
         )
 
 
-def write_analysis(found: Analysis, directory: Path, *, draw: bool = True) -> None:
+def summary_of(found: Analysis, plan: Replan | None = None) -> dict[str, Any]:
+    """Content of ``summary.json``: the analysis, and ``plan`` where one was made."""
+    return found.as_dict() | {"plan": None if plan is None else plan.as_dict()}
+
+
+def write_analysis(
+    found: Analysis, directory: Path, *, draw: bool = True, plan: Replan | None = None
+) -> None:
     """Write the files of one recording; the summary comes last.
 
     Args:
         found: What was measured.
         directory: Created if it is not there.
-        draw: Whether the report has its figure.
+        draw: Whether the report has its figures.
+        plan: The recording planned anew.
 
     Raises:
         MotionFileError: If they cannot be written.
     """
     make_directory(directory)
-    summary = found.as_dict()
-    figure = png_of(recording_figure(found), 1) if draw else None
-    write_motions(directory / MOTION, MotionFile(recorded=found.motion, body=found.body))
+    summary = summary_of(found, plan)
+    pictures: dict[str, bytes] = {}
+    if draw:
+        pictures[SHEET] = png_of(recording_figure(found), 1)
+        if plan is not None and plan.com.trajectory is not None:
+            pictures |= comparison_pictures(against_recording(plan))
+    content = MotionFile(recorded=found.motion, body=found.body)
+    if plan is not None:
+        content = replace(plan.content, recorded=found.motion)
+    write_motions(directory / MOTION, content)
     _write(directory / SERIES, _series_text(found))
-    _write(directory / REPORT, report_page(found, summary, figure))
+    _write(directory / REPORT, report_page(found, summary, pictures))
     _write(directory / SUMMARY, to_json(summary) + "\n")
 
 

@@ -18,19 +18,20 @@ STRONGEST_SHOWN = 8
 """Joints in the table of torques, those first that come nearest to their strength."""
 
 
-def report_page(found: Analysis, summary: Mapping[str, Any], figure: bytes | None) -> str:
+def report_page(found: Analysis, summary: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
     """HTML of one recording.
 
     Args:
         found: What was measured.
         summary: Its numbers.
-        figure: Content of a PNG file; None without.
+        pictures: Contents of PNG files by what they show: the sheet of the recording, then those of a plan.
     """
     page = ReportPage(found.name, f"{summary['file']}, measured by manikin {__version__}")
     page.remarks(summary["remarks"])
     page.numbers(_headline(summary))
-    if figure is not None:
-        page.picture(figure, "Postures, supports, forces, margins, height and scores over time")
+    sheet, *others = [*pictures.items(), ("", b"")]
+    if sheet[1]:
+        page.picture(sheet[1], sheet[0])
     page.text(WORDS)
     page.heading("Supports")
     page.table(
@@ -61,6 +62,11 @@ def report_page(found: Analysis, summary: Mapping[str, Any], figure: bytes | Non
     if summary["force_plates"] is not None:
         page.heading("Against force plates")
         page.numbers(summary["force_plates"])
+    if summary["plan"] is not None:
+        _plan(page, summary["plan"])
+        for words, picture in others:
+            if picture:
+                page.picture(picture, words)
     return page.html()
 
 
@@ -100,6 +106,37 @@ def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
         else f"{100.0 * margin['share_positive']:.1f} %",
         "limited by": margin["limiting"],
     }
+
+
+def _plan(page: ReportPage, plan: Mapping[str, Any]) -> None:
+    page.heading(f"Planned anew on the same stances ({plan['method']})")
+    page.remarks([plan["failure"]] if plan["failure"] else [])
+    page.numbers({
+        "recorded duration [s]": plan["recorded_duration_s"],
+        "planned duration [s]": plan["duration_s"],
+        "centre of mass from the recorded one, RMS [m]": plan["com_rms_m"],
+        "largest [m]": plan["com_max_m"],
+        f"least margin [{plan['margin_unit']}]": plan["min_margin"],
+    })  # fmt: skip
+    if plan["phase_durations_s"] is not None:
+        page.table(
+            ("phase", "recorded [s]", "planned [s]", "supports"),
+            [
+                (number, recorded, planned, ", ".join(map(readable, supports)))
+                for number, (recorded, planned, supports) in enumerate(
+                    zip(
+                        plan["recorded_phase_durations_s"], plan["phase_durations_s"], plan["supports"],
+                        strict=True,
+                    )
+                )
+            ],
+        )  # fmt: skip
+    if plan["execution"] is not None:
+        page.numbers({
+            f"executed: {name.replace('_', ' ')}": value
+            for name, value in plan["execution"].items()
+            if not isinstance(value, Mapping | list)
+        })  # fmt: skip
 
 
 def _time(instant: float, seen: bool) -> str:

@@ -10,6 +10,7 @@ import typer
 from manikin.commands.console import (
     BAD_INPUT,
     DONE,
+    FAILED,
     JsonOption,
     complain,
     print_json,
@@ -42,6 +43,14 @@ def analyze(
     sex: Annotated[str, typer.Option(metavar="male|female", help="Table of segment masses.")] = "male",
     friction: Annotated[float, typer.Option(metavar="MU", help="Of soles on the ground.")] = 0.8,
     load: Annotated[float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands.")] = 0.0,
+    plan: Annotated[
+        str | None,
+        typer.Option(metavar="keyframes|timing-free", help="Plan the recording anew on its own stances."),
+    ] = None,
+    execute: Annotated[
+        bool,
+        typer.Option("--execute", help="With --plan: the whole body, executed in the physics engine."),
+    ] = False,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Files at a time; default: one per core.")
     ] = None,
@@ -57,31 +66,46 @@ def analyze(
     if single:
         refuse(jobs is not None, "--jobs", "there is one file")
         directory = out if out is not None else None if json else Path("runs/analysis") / paths[0].stem
-        return _one(paths[0], directory, options, draw=figures, json=json)
+        refuse(execute and plan is None, "--execute", "it needs --plan")
+        return _one(paths[0], directory, options, (plan, execute), draw=figures, json=json)
+    refuse(plan is not None or execute, "--plan", "there are several files")
     refuse(frames is not None, "--frames", "there are several files")
     directory = out if out is not None else None if json else Path("runs/analysis")
     return _several(paths, directory, options, context.obj, jobs, draw=figures, json=json)
 
 
-def _one(path: Path, directory: Path | None, options: Any, *, draw: bool, json: bool) -> int:
+def _one(
+    path: Path, directory: Path | None, options: Any, plan: tuple[str | None, bool], *, draw: bool, json: bool
+) -> int:
+    method, execute = plan
     with stdout_kept_clean():
         from manikin.analysis import analyze_file
-        from manikin.analysis_directory import check_directory, write_analysis
+        from manikin.analysis_directory import check_directory, summary_of, write_analysis
+        from manikin.replan import METHODS, replan
 
+        if method is not None and method not in METHODS:
+            raise InputError(f"--plan is {method!r}; valid: {', '.join(METHODS)}")
         if directory is not None:
             check_directory(directory)
-        found = analyze_file(path, options)
+        found, planned = analyze_file(path, options), None
+        if method is not None:
+            planned = replan(
+                found.found, found.supports, method=method, execute=execute, friction=options.friction
+            )
         if directory is not None:
-            write_analysis(found, directory, draw=draw)
-    summary = found.as_dict()
+            write_analysis(found, directory, draw=draw, plan=planned)
+    summary = summary_of(found, planned)
+    failure = None if planned is None else summary["plan"]["failure"]
     if json:
         print_json(summary)
-        return DONE
+        return FAILED if failure else DONE
     print_table(_shown(summary))
     for remark in summary["remarks"]:
         typer.echo(f"note: {remark}", err=True)
+    if failure:
+        typer.echo(f"no plan: {failure}", err=True)
     typer.echo(f"report in {directory}/report.html; see the motion with: manikin view {directory}", err=True)
-    return DONE
+    return FAILED if failure else DONE
 
 
 def _shown(summary: dict[str, Any]) -> dict[str, Any]:
@@ -108,6 +132,12 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
         one = effort["strength"]
         shown["largest torque"] = (
             f"{100.0 * one['max_share']:.0f} % of strength, {one['max_joint']} at {one['max_at_s']:.2f} s"
+        )
+    if summary["plan"] is not None and summary["plan"]["duration_s"] is not None:
+        one = summary["plan"]
+        shown["plan"] = (
+            f"{one['duration_s']:.2f} s, CoM {1e3 * one['com_rms_m']:.1f} mm from the recorded one (RMS), "
+            f"margin at least {one['min_margin']:.2f} {one['margin_unit']}"
         )
     plates = summary["force_plates"]
     if plates is not None and plates["timing_median_s"] is not None:

@@ -1,6 +1,7 @@
 """Writing every figure that a run has the data for."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import TypeVar
@@ -92,6 +93,15 @@ def write_comparison(
         MotionFileError: If the folder cannot be written to.
     """
     return _write(COMPARISONS, comparison, Path(folder), on_done)
+
+
+def comparison_pictures(comparison: RunComparison) -> dict[str, bytes]:
+    """PNG files of the figures of two runs that apply, by what they show."""
+    found = {}
+    for name, draw in COMPARISONS.items():
+        with suppress(FigureError):
+            found[name.replace("_", " ")] = png_of(draw(comparison))
+    return found
 
 
 def _write(
