@@ -17,7 +17,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,7 +29,9 @@ from manikin.figures.recording import recording_figure
 from manikin.figures.write import comparison_pictures, png_of
 from manikin.motion.file import MotionFile, write_motions
 from manikin.output import MOTION, SUMMARY, make_directory, to_json
-from manikin.replan import Replan, against_recording
+
+if TYPE_CHECKING:
+    from manikin.replan import Replan
 
 SHEET = "Postures, supports, forces, margins, height and scores over time"
 """What the first picture of a report shows."""
@@ -59,13 +61,13 @@ def check_directory(path: Path) -> None:
         )
 
 
-def summary_of(found: Analysis, plan: Replan | None = None) -> dict[str, Any]:
+def summary_of(found: Analysis, plan: "Replan | None" = None) -> dict[str, Any]:
     """Content of ``summary.json``: the analysis, and ``plan`` where one was made."""
     return found.as_dict() | {"plan": None if plan is None else plan.as_dict()}
 
 
 def write_analysis(
-    found: Analysis, directory: Path, *, draw: bool = True, plan: Replan | None = None
+    found: Analysis, directory: Path, *, draw: bool = True, plan: "Replan | None" = None
 ) -> None:
     """Write the files of one recording; the summary comes last.
 
@@ -84,6 +86,8 @@ def write_analysis(
     if draw:
         pictures[SHEET] = png_of(recording_figure(found), 1)
         if plan is not None and plan.com.trajectory is not None:
+            from manikin.replan import against_recording
+
             pictures |= comparison_pictures(against_recording(plan))
     content = MotionFile(recorded=found.motion, body=found.body)
     if plan is not None:

@@ -81,14 +81,15 @@ def _one(
     with stdout_kept_clean():
         from manikin.analysis import analyze_file
         from manikin.analysis_directory import check_directory, summary_of, write_analysis
-        from manikin.replan import METHODS, replan
 
-        if method is not None and method not in METHODS:
-            raise InputError(f"--plan is {method!r}; valid: {', '.join(METHODS)}")
+        if method is not None:
+            _check_method(method)
         if directory is not None:
             check_directory(directory)
         found, planned = analyze_file(path, options), None
         if method is not None:
+            from manikin.replan import replan
+
             planned = replan(
                 found.found, found.supports, method=method, execute=execute, friction=options.friction
             )
@@ -106,6 +107,13 @@ def _one(
         typer.echo(f"no plan: {failure}", err=True)
     typer.echo(f"report in {directory}/report.html; see the motion with: manikin view {directory}", err=True)
     return FAILED if failure else DONE
+
+
+def _check_method(method: str) -> None:
+    from manikin.replan import METHODS
+
+    if method not in METHODS:
+        raise InputError(f"--plan is {method!r}; valid: {', '.join(METHODS)}")
 
 
 def _shown(summary: dict[str, Any]) -> dict[str, Any]:

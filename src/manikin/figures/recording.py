@@ -1,5 +1,11 @@
-"""A recorded person on one sheet: postures, supports, forces, balance, height, joint scores."""
+"""A recorded person on one sheet: postures, supports, forces, balance, height, scores.
 
+All curves are drawn in one pair of axes, band above band: a page of axes takes three times as long, and there
+is a sheet for every recording of a folder.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -7,13 +13,15 @@ import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from manikin.body import BodyModel
+from manikin.figures.style import COLOURS, colours_of, new_grid, readable
+from manikin.figures.views import side_colour
+from manikin.spatial import FloatArray
 
 if TYPE_CHECKING:
     from manikin.analysis import Analysis
-from manikin.body import BodyModel
-from manikin.figures.style import COLOURS, colours_of, dress, new_grid, readable
-from manikin.figures.views import side_colour
-from manikin.spatial import FloatArray
 
 POSTURES = 9
 """Postures drawn, at even times."""
@@ -22,35 +30,108 @@ STEP = 1.0
 """From one posture to the next on the sheet [m]."""
 
 WIDTH = 11.0
-HEIGHTS = (2.0, 0.75, 1.35, 1.35, 1.1, 1.1)
-"""Of the panels [inch]."""
+STRIP, ROW, BAND, GAP = 2.0, 0.25, 1.15, 0.42
+"""Heights of the postures, a row of supports, a band of curves, and between bands [inch]."""
+
+Curves = Mapping[str, tuple[FloatArray, str]]
+
+
+@dataclass(frozen=True)
+class _Band:
+    """Curves over time on a common scale.
+
+    Attributes:
+        title: What they are, with the unit.
+        curves: Values (n,) and colour by name; the first is drawn last.
+        low: Lower end of the scale.
+        high: Upper end.
+    """
+
+    title: str
+    curves: Curves
+    low: float
+    high: float
 
 
 def recording_figure(analysis: "Analysis") -> Figure:
     """Draw what was measured of a recording over time."""
-    names = analysis.motion.contact_names
-    heights = (*HEIGHTS[:1], max(0.5, 0.25 * len(names)), *HEIGHTS[2:])
-    between = 0.3
-    height = sum(heights) + between * (len(heights) - 1) + 0.95
+    names, bands = analysis.motion.contact_names, _bands(analysis)
+    rows = ROW * max(len(names), 1)
+    height = rows + sum(GAP + BAND for _ in bands)
     figure, grid = new_grid(
-        WIDTH, height, analysis.name, len(heights), 1, left=1.05, between=between, height_ratios=heights
+        WIDTH,
+        STRIP + height + 1.2,
+        analysis.name,
+        2,
+        1,
+        left=0.95,
+        between=0.25,
+        height_ratios=(STRIP, height),
     )
     figure.set_dpi(80)
-    panels = [figure.add_subplot(grid[row, 0]) for row in range(len(heights))]
-    _postures(panels[0], analysis)
-    _supports(panels[1], analysis)
-    _forces(panels[2], analysis)
-    _margins(panels[3], analysis)
-    _heights(panels[4], analysis)
-    _scores(panels[5], analysis)
-    for axes in panels[1:]:
-        axes.set_xlim(float(analysis.time[0]), float(analysis.time[-1]))
-    for axes in panels[1:-1]:
-        axes.xaxis.set_visible(False)  # ticks are what takes most of the drawing time
-    for axes in panels[2:]:
-        axes.locator_params(axis="y", nbins=4)
-    panels[-1].set_xlabel("time [s]", fontsize=9)
+    _postures(figure.add_subplot(grid[0, 0]), analysis)
+    axes = figure.add_subplot(grid[1, 0])
+    axes.set_xlim(float(analysis.time[0]), float(analysis.time[-1]))
+    axes.set_ylim(0.0, height)
+    axes.yaxis.set_visible(False)
+    for side in ("top", "left", "right"):
+        axes.spines[side].set_visible(False)
+    axes.tick_params(labelsize=8)
+    axes.set_xlabel("time [s]", fontsize=9)
+    _supports(axes, analysis, height)
+    for number, band in enumerate(bands):
+        _draw(axes, analysis.time, band, height - rows - number * (GAP + BAND) - GAP - BAND)
     return figure
+
+
+def _bands(analysis: "Analysis") -> list[_Band]:
+    ink, ours, soft = COLOURS["ink"], COLOURS["recorded"], COLOURS["soft"]
+    forces = {"from motion": (analysis.vertical_force / analysis.weight, ours)}
+    if analysis.plates is not None:
+        measured = np.where(analysis.plates.compared, analysis.plates.vertical_force, np.nan)
+        forces["force plates"] = (measured / analysis.weight, ink)
+    margins = {"whole body": (analysis.motion.margin, ours), "point mass": (analysis.point_mass_margin, soft)}
+    bands = [
+        _scaled("vertical force [body weight]", forces, 0.0),
+        _scaled("margin [N.m]", margins, 0.0, 0.01),
+        _scaled("height of the centre of mass [m]", {"": (analysis.com_height, ours)}),
+    ]
+    posture = analysis.ergonomics.posture
+    if posture is not None:
+        scores = {
+            one.method: (one.score.astype(np.float64), COLOURS[colour])
+            for one, colour in ((posture.rula, "planned"), (posture.reba, "executed"))
+        }
+        bands.append(_Band("scores", scores, 0.0, 15.0))
+    return bands
+
+
+def _scaled(title: str, curves: Curves, least: float | None = None, cut: float = 0.0) -> _Band:
+    """A band that shows all values but the share ``cut`` that is lowest, and the value ``least``."""
+    known = np.concatenate([values[np.isfinite(values)] for values, _ in curves.values()])
+    low, high = (float(np.quantile(known, cut)), float(known.max())) if known.size else (0.0, 1.0)
+    low = low if least is None else min(low, least)
+    room = 0.05 * max(high - low, 0.05)
+    return _Band(title, curves, low - room, high + room)
+
+
+def _draw(axes: Axes, time: FloatArray, band: _Band, bottom: float) -> None:
+    def placed(values: FloatArray) -> FloatArray:
+        shares = (values - band.low) / (band.high - band.low)
+        return bottom + BAND * np.where(np.abs(shares - 0.5) <= 0.5, shares, np.nan)
+
+    ticks = MaxNLocator(nbins=4).tick_values(band.low, band.high)
+    ticks = ticks[(ticks >= band.low) & (ticks <= band.high)]
+    beside = axes.get_yaxis_transform()
+    for tick, level in zip(ticks, placed(ticks), strict=True):
+        axes.text(-0.008, level, f"{tick:g}", transform=beside, ha="right", va="center", fontsize=8)
+    axes.hlines(placed(ticks), time[0], time[-1], color="#E3E3E3", linewidth=0.6, zorder=0.5)
+    axes.text(0.0, bottom + BAND + 0.06, band.title, transform=beside, fontsize=9, color=COLOURS["ink"])
+    right = 1.0
+    for name, (values, colour) in reversed(band.curves.items()):
+        axes.plot(time, placed(values), color=colour, linewidth=1.2)
+        axes.text(right, bottom + BAND + 0.06, name, transform=beside, ha="right", fontsize=8.5, color=colour)
+        right -= 0.009 * len(name) + 0.015
 
 
 def _postures(axes: Axes, analysis: "Analysis") -> None:
@@ -65,13 +146,12 @@ def _postures(axes: Axes, analysis: "Analysis") -> None:
     drawn = list(np.concatenate(lines))
     bones = LineCollection(drawn, colors=colours * len(lines), linewidths=3.5, capstyle="round")
     axes.add_collection(bones, autolim=False)
-    for number in range(len(turned)):
-        axes.text(STEP * number, -0.16, f"{analysis.time[frames[number]]:.2f} s", ha="center", fontsize=7.5)
+    for number, frame in enumerate(frames):
+        axes.text(STEP * number, -0.16, f"{analysis.time[frame]:.2f} s", ha="center", fontsize=7.5)
     axes.axhline(0.0, color=COLOURS["soft"], linewidth=0.8)
     axes.set_aspect("equal")
     axes.set_xlim(-0.7, STEP * (len(frames) - 1) + 0.7)
-    top = float(np.max(turned[:, 2])) - floor + 0.55 * (analysis.body.stature or 1.75)
-    axes.set_ylim(-0.25, top)
+    axes.set_ylim(-0.25, float(np.max(turned[:, 2])) - floor + 0.55 * (analysis.body.stature or 1.75))
     axes.axis("off")
 
 
@@ -101,63 +181,14 @@ def _turned(q: FloatArray, angle: float) -> FloatArray:
     return turned
 
 
-def _supports(axes: Axes, analysis: "Analysis") -> None:
+def _supports(axes: Axes, analysis: "Analysis", top: float) -> None:
+    """A row of bars for each effector, from the top."""
     names = analysis.motion.contact_names
-    colours = colours_of(names)
+    colours, beside = colours_of(names), axes.get_yaxis_transform()
     for row, name in enumerate(names):
+        bottom = top - ROW * (row + 1)
         spans = [(one.start, one.duration) for one in analysis.supports.of(name)]
-        axes.broken_barh(spans, (-row - 0.4, 0.8), color=colours[name])
-    dress(axes)
-    axes.set_yticks([-row for row in range(len(names))], [readable(name) for name in names], fontsize=8)
-    axes.set_ylim(-max(len(names), 1) + 0.4, 0.6)
-    axes.grid(False)
-
-
-def _forces(axes: Axes, analysis: "Analysis") -> None:
-    weight = analysis.weight
-    axes.plot(analysis.time, analysis.vertical_force / weight, color=COLOURS["recorded"], label="from motion")
-    if analysis.plates is not None:
-        measured = np.where(analysis.plates.compared, analysis.plates.vertical_force, np.nan)
-        axes.plot(analysis.time, measured / weight, color=COLOURS["ink"], linewidth=1.0, label="force plates")
-    dress(axes, "vertical force\n[body weight]")
-    _name_curves(axes)
-
-
-def _margins(axes: Axes, analysis: "Analysis") -> None:
-    axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.8)
-    axes.plot(
-        analysis.time, analysis.point_mass_margin, color=COLOURS["soft"], linewidth=1.0, label="point mass"
-    )
-    axes.plot(analysis.time, analysis.motion.margin, color=COLOURS["recorded"], label="whole body")
-    known = analysis.motion.margin[np.isfinite(analysis.motion.margin)]
-    if known.size:
-        low, high = min(0.0, float(np.quantile(known, 0.01))), float(known.max())
-        axes.set_ylim(low - 0.1 * (high - low) - 1.0, high + 0.1 * (high - low) + 1.0)
-    dress(axes, "margin\n[N.m]")
-    _name_curves(axes)
-
-
-def _heights(axes: Axes, analysis: "Analysis") -> None:
-    axes.plot(analysis.time, analysis.com_height, color=COLOURS["recorded"])
-    dress(axes, "centre of mass\n[m]")
-
-
-def _scores(axes: Axes, analysis: "Analysis") -> None:
-    posture = analysis.ergonomics.posture
-    if posture is not None:
-        for one, colour in ((posture.rula, COLOURS["planned"]), (posture.reba, COLOURS["executed"])):
-            axes.step(analysis.time, one.score, where="post", color=colour, label=one.method)
-        _name_curves(axes)
-    axes.set_ylim(0.0, 15.5)
-    dress(axes, "score")
-
-
-def _name_curves(axes: Axes) -> None:
-    """Names of the curves in their colours above the right end, which takes a tenth of a legend's time."""
-    right = 1.0
-    for line in reversed([one for one in axes.lines if not str(one.get_label()).startswith("_")]):
-        name = str(line.get_label())
+        axes.broken_barh(spans, (bottom + 0.1 * ROW, 0.8 * ROW), color=colours[name])
         axes.text(
-            right, 1.03, name, transform=axes.transAxes, ha="right", fontsize=8.5, color=line.get_color()
+            -0.008, bottom + 0.5 * ROW, readable(name), transform=beside, ha="right", va="center", fontsize=8
         )
-        right -= 0.009 * len(name) + 0.015
