@@ -3,7 +3,7 @@
 import time as clock
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,6 +20,9 @@ from manikin.commands.console import (
 )
 from manikin.errors import InputError
 from manikin.interruption import Interruption
+
+if TYPE_CHECKING:
+    from manikin.replan import Method
 
 
 def analyze(
@@ -82,16 +85,15 @@ def _one(
         from manikin.analysis import analyze_file
         from manikin.analysis_directory import check_directory, summary_of, write_analysis
 
-        if method is not None:
-            _check_method(method)
+        chosen = None if method is None else _method(method)
         if directory is not None:
             check_directory(directory)
         found, planned = analyze_file(path, options), None
-        if method is not None:
+        if chosen is not None:
             from manikin.replan import replan
 
             planned = replan(
-                found.found, found.supports, method=method, execute=execute, friction=options.friction
+                found.found, found.supports, method=chosen, execute=execute, friction=options.friction
             )
         if directory is not None:
             write_analysis(found, directory, draw=draw, plan=planned)
@@ -109,11 +111,13 @@ def _one(
     return FAILED if failure else DONE
 
 
-def _check_method(method: str) -> None:
+def _method(name: str) -> "Method":
     from manikin.replan import METHODS
 
-    if method not in METHODS:
-        raise InputError(f"--plan is {method!r}; valid: {', '.join(METHODS)}")
+    for method in METHODS:
+        if name == method:
+            return method
+    raise InputError(f"--plan is {name!r}; valid: {', '.join(METHODS)}")
 
 
 def _shown(summary: dict[str, Any]) -> dict[str, Any]:

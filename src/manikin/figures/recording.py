@@ -120,7 +120,7 @@ def _draw(axes: Axes, time: FloatArray, band: _Band, bottom: float) -> None:
         shares = (values - band.low) / (band.high - band.low)
         return bottom + BAND * np.where(np.abs(shares - 0.5) <= 0.5, shares, np.nan)
 
-    ticks = MaxNLocator(nbins=4).tick_values(band.low, band.high)
+    ticks = np.asarray(MaxNLocator(nbins=4).tick_values(band.low, band.high))
     ticks = ticks[(ticks >= band.low) & (ticks <= band.high)]
     beside = axes.get_yaxis_transform()
     for tick, level in zip(ticks, placed(ticks), strict=True):
@@ -128,7 +128,7 @@ def _draw(axes: Axes, time: FloatArray, band: _Band, bottom: float) -> None:
     axes.hlines(placed(ticks), time[0], time[-1], color="#E3E3E3", linewidth=0.6, zorder=0.5)
     axes.text(0.0, bottom + BAND + 0.06, band.title, transform=beside, fontsize=9, color=COLOURS["ink"])
     right = 1.0
-    for name, (values, colour) in reversed(band.curves.items()):
+    for name, (values, colour) in reversed(list(band.curves.items())):
         axes.plot(time, placed(values), color=colour, linewidth=1.2)
         axes.text(right, bottom + BAND + 0.06, name, transform=beside, ha="right", fontsize=8.5, color=colour)
         right -= 0.009 * len(name) + 0.015
