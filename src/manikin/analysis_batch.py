@@ -15,6 +15,9 @@ from manikin.analysis_directory import write_analysis
 from manikin.errors import InputError, ManikinError
 from manikin.worker import prepare_worker
 
+METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
+"""Fresh processes: copies of this one would share the threads and locks of its libraries."""
+
 
 def analyze_files(
     jobs: Sequence[AnalysisJob], options: AnalysisOptions, *, workers: int = 1
@@ -42,9 +45,7 @@ def analyze_files(
                 entry = analyze_one(job, options)
             yield entry
         return
-    # Fresh processes: copies of this one would share the threads and locks of its libraries.
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(workers, len(jobs)), context, _prepare)
+    pool = ProcessPoolExecutor(min(workers, len(jobs)), multiprocessing.get_context(METHOD), _prepare)
     try:
         for future in as_completed([pool.submit(analyze_one, job, options) for job in jobs]):
             yield future.result()

@@ -18,6 +18,7 @@ from manikin.commands.console import (
     refuse,
     stdout_kept_clean,
 )
+from manikin.commands.forkserver import preload
 from manikin.errors import InputError
 from manikin.interruption import Interruption
 
@@ -61,18 +62,21 @@ def analyze(
     json: JsonOption = False,
 ) -> int:
     """Measure recorded people: supports, timing, balance, forces, effort; one report for each file."""
+    single = len(sources) == 1 and not sources[0].is_dir()
+    if not single:
+        refuse(plan is not None or execute, "--plan", "there are several files")
+        refuse(frames is not None, "--frames", "there are several files")
+        if jobs != 1:
+            preload("manikin.analysis_batch")
     from manikin.analysis import AnalysisOptions, recordings_in
 
     options = AnalysisOptions(frames=frames, mass=mass, sex=sex, friction=friction, load=load)
-    single = len(sources) == 1 and not sources[0].is_dir()
     paths = recordings_in(sources)
     if single:
         refuse(jobs is not None, "--jobs", "there is one file")
         directory = out if out is not None else None if json else Path("runs/analysis") / paths[0].stem
         refuse(execute and plan is None, "--execute", "it needs --plan")
         return _one(paths[0], directory, options, (plan, execute), draw=figures, json=json)
-    refuse(plan is not None or execute, "--plan", "there are several files")
-    refuse(frames is not None, "--frames", "there are several files")
     directory = out if out is not None else None if json else Path("runs/analysis")
     return _several(paths, directory, options, context.obj, jobs, draw=figures, json=json)
 

@@ -23,10 +23,10 @@ from manikin.spatial import FloatArray
 if TYPE_CHECKING:
     from manikin.analysis import Analysis
 
-POSTURES = 9
+POSTURES = 7
 """Postures drawn, at even times."""
 
-STEP = 1.0
+STEP = 1.3
 """From one posture to the next on the sheet [m]."""
 
 WIDTH = 11.0
@@ -68,7 +68,7 @@ def recording_figure(analysis: "Analysis") -> Figure:
         between=0.25,
         height_ratios=(STRIP, height),
     )
-    figure.set_dpi(80)
+    figure.set_dpi(75)
     _postures(figure.add_subplot(grid[0, 0]), analysis)
     axes = figure.add_subplot(grid[1, 0])
     axes.set_xlim(float(analysis.time[0]), float(analysis.time[-1]))
@@ -120,7 +120,7 @@ def _draw(axes: Axes, time: FloatArray, band: _Band, bottom: float) -> None:
         shares = (values - band.low) / (band.high - band.low)
         return bottom + BAND * np.where(np.abs(shares - 0.5) <= 0.5, shares, np.nan)
 
-    ticks = np.asarray(MaxNLocator(nbins=4).tick_values(band.low, band.high))
+    ticks = np.asarray(MaxNLocator(nbins=3).tick_values(band.low, band.high))
     ticks = ticks[(ticks >= band.low) & (ticks <= band.high)]
     beside = axes.get_yaxis_transform()
     for tick, level in zip(ticks, placed(ticks), strict=True):
