@@ -12,6 +12,7 @@ from manikin.balance import contact_limits, stability_margins, wrench_polytope
 from manikin.balance.friction import contact_to_world, edge_wrenches
 from manikin.body import human
 from manikin.body.configuration import Configuration
+from manikin.body.further_contacts import with_knees_and_elbows
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, grasp, sole
 from manikin.errors import BodyError
 from manikin.mocap import (
@@ -118,6 +119,8 @@ def test_mass_scales_forces_and_nothing_else(swinging, dynamics):
     np.testing.assert_allclose(lighter.wrench / 60.0, dynamics.wrench / dynamics.body.mass, atol=1e-7)
     with pytest.raises(BodyError):
         with_mass(swinging, 10.0)
+    kneeling = replace(swinging, body=with_knees_and_elbows(swinging.body))
+    assert with_mass(kneeling, 60.0).body.effectors.keys() == kneeling.body.effectors.keys()
 
 
 def test_contacts_leave_nothing_for_the_pelvis_to_hold(swinging, dynamics):

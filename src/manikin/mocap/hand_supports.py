@@ -33,12 +33,6 @@ STAYS = 0.45
 BESIDE = 0.30
 """Distance of a palm from the nearest hip or knee up to which it rests on the own body, or hangs [m]."""
 
-SHORTEST_GRIP = 0.20
-"""Speed below which a hand may hold something [m/s]."""
-
-HOLD = 0.25
-"""A hand that swings back stays for less while the body runs past it [s]."""
-
 SHORTEST_HOLD = 0.25
 """A hand that swings back stays for less while the body runs past it [s]."""
 

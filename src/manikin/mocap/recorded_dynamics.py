@@ -15,7 +15,9 @@ from scipy.spatial.transform import Rotation
 from manikin.balance import pseudo_wrench, zero_moment_point
 from manikin.balance.friction import cross
 from manikin.body import BodyModel
+from manikin.body.further_contacts import with_knees_and_elbows
 from manikin.body.human import body_from_signature
+from manikin.mocap.effector_places import JOINTS
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_motion import rates_of, smoothed_postures
 from manikin.spatial import GRAVITY_VECTOR, FloatArray, frozen_array
@@ -109,9 +111,12 @@ def dynamics_of(found: Reconstruction, cutoff: float = CUTOFF) -> RecordedDynami
 
 
 def with_mass(found: Reconstruction, mass: float) -> Reconstruction:
-    """The same postures of a body of another mass [kg], its shares of segments kept.
+    """The same postures of a body of another mass [kg], its shares of segments and its effectors kept.
 
     Raises:
         BodyError: If it is not the mass of an adult.
     """
-    return replace(found, body=body_from_signature(found.body.signature() | {"mass": mass}))
+    body = body_from_signature(found.body.signature() | {"mass": mass})
+    if set(JOINTS) <= set(found.body.effectors):
+        body = with_knees_and_elbows(body)
+    return replace(found, body=body)
