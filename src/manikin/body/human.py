@@ -18,7 +18,8 @@ from manikin.body.anthropometry import (
     TOES_MASS_SHARE,
     Anthropometry,
 )
-from manikin.body.model import BodyModel
+from manikin.body.model import OFF_AXIS, BodyModel
+from manikin.body.off_axis import off_axis
 from manikin.body.parts import (
     ALONG_X,
     across,
@@ -65,6 +66,7 @@ def human(
     sole_length: float | None = None,
     sole_width: float | None = None,
     lengths: Mapping[str, float] | None = None,
+    off_axis_masses: bool = False,
 ) -> BodyModel:
     """Make a human body of 19 segments and 45 degrees of freedom ([Qiu2012]_ Table 2.1, B.1).
 
@@ -100,6 +102,8 @@ def human(
         lengths: Measured lengths [m] instead of scaled ones, by the names of
             :data:`manikin.body.anthropometry.MEASURED_LENGTHS`; the stature scales the others, the foot,
             the head and the flesh.
+        off_axis_masses: Whether centres of mass lie off the lines between joints, as
+            :mod:`manikin.body.off_axis` says, instead of on them.
 
     Raises:
         BodyError: If a value is out of its range.
@@ -107,7 +111,7 @@ def human(
     size = Anthropometry(
         stature, mass, sex, sole_length=sole_length, sole_width=sole_width, lengths=lengths
     )  # fmt: skip
-    builder = _HumanBuilder(size)
+    builder = _HumanBuilder(size, off_axis_masses)
     return BodyModel(
         name="human",
         segments=builder.segments(),
@@ -121,6 +125,7 @@ def human(
         nominal_mass=size.mass,
         limbs=_limbs(),
         lengths=size.lengths,
+        off_axis_masses=off_axis_masses,
     )
 
 
@@ -141,7 +146,7 @@ def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
     measured: dict[str, Any] = {
         name: signature[f"{name}_length"] for name in MEASURED_LENGTHS if f"{name}_length" in signature
     }
-    return human(**values, lengths=measured)
+    return human(**values, lengths=measured, off_axis_masses=signature.get("masses") == OFF_AXIS)
 
 
 def standing_angles() -> dict[str, float]:
@@ -203,8 +208,9 @@ class _Inertia:
 class _HumanBuilder:
     """Turns dimensions into segments; the only state is the dimensions."""
 
-    def __init__(self, size: Anthropometry) -> None:
+    def __init__(self, size: Anthropometry, off_axis_masses: bool) -> None:
         self.size = size
+        self.off_axis_masses = off_axis_masses
         self.stature = size.stature
         self.girth = size.girth
 
@@ -279,7 +285,7 @@ class _HumanBuilder:
     ) -> Segment:
         """Trunk part whose origin is its lower border; the table measures from the upper one."""
         size = self.size
-        com = np.array([0.0, 0.0, size.length(row) - size.com_from_start(row)])
+        com = self._com(row, size.length(row) - size.com_from_start(row))
         hinges = human_hinges(name, "", size.mass * size.stature) if parent else ()
         origin = np.array([0.0, 0.0, height])
         return Segment(
@@ -291,12 +297,12 @@ class _HumanBuilder:
         neck_length = NECK_LENGTH_SHARE * length
         both = _Inertia(
             size.segment_mass("head_and_neck"),
-            np.array([0.0, 0.0, length - size.com_from_start("head_and_neck")]),
+            self._com("head_and_neck", length - size.com_from_start("head_and_neck")),
             np.diag(size.moments("head_and_neck")),
         )
         neck_mass = NECK_MASS_SHARE * both.mass
         neck_moments = cylinder_inertia(neck_mass, NECK_RADIUS * self.stature, neck_length)
-        neck = _Inertia(neck_mass, np.array([0.0, 0.0, 0.5 * neck_length]), neck_moments)
+        neck = _Inertia(neck_mass, self._com("head_and_neck", 0.5 * neck_length), neck_moments)
         head = both.without(neck)
         hinges = human_hinges("neck", "", size.mass * size.stature)
         base = np.array([0.0, 0.0, size.length("upper_trunk")])
@@ -429,6 +435,11 @@ class _HumanBuilder:
         x, y = (transverse, sagittal) if sideways else (sagittal, transverse)
         return Segment(
             f"{side}_{name}", parent, np.array(origin), human_hinges(name, side, size.mass * size.stature),
-            size.segment_mass(row), np.array([0.0, 0.0, -size.com_from_start(row)]),
+            size.segment_mass(row), self._com(row, -size.com_from_start(row), side),
             np.diag([x, y, longitudinal]), shapes,
         )  # fmt: skip
+
+    def _com(self, row: str, height: float, side: str = "") -> FloatArray:
+        """(3,) centre of mass of a part at a height above its joint [m]."""
+        aside = off_axis(self.size, row, side) if self.off_axis_masses else np.zeros(3)
+        return np.array([0.0, 0.0, height]) + aside

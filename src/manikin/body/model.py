@@ -27,6 +27,9 @@ from manikin.body.segments import (
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, frozen_array
 
+OFF_AXIS = "off axis"
+"""Value of ``masses`` in a signature of :attr:`BodyModel.off_axis_masses`."""
+
 
 @dataclass(frozen=True, eq=False)
 class BodyModel:
@@ -51,6 +54,7 @@ class BodyModel:
         nominal_mass: The mass that was asked for [kg]; the segments must add up to it.
         limbs: The limbs with which it makes contacts, see :mod:`manikin.body.limbs`.
         lengths: Lengths of a human that were measured instead of scaled [m].
+        off_axis_masses: Whether a human's centres of mass lie off the lines between joints.
     """
 
     name: str
@@ -65,6 +69,7 @@ class BodyModel:
     nominal_mass: float | None = None
     limbs: tuple[Limb, ...] = ()
     lengths: Mapping[str, float] = field(default_factory=dict)
+    off_axis_masses: bool = False
 
     def __post_init__(self) -> None:
         index = segments_by_name(self.segments)
@@ -286,6 +291,8 @@ class BodyModel:
             "sole_length": self.sole_length, "sole_width": self.sole_width,
         }  # fmt: skip
         values |= {f"{name}_length": value for name, value in self.lengths.items()}
+        if self.off_axis_masses:
+            values["masses"] = OFF_AXIS
         return {key: value for key, value in values.items() if value is not None}
 
 

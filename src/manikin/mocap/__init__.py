@@ -13,6 +13,7 @@ from manikin.mocap.bvh import read_bvh
 from manikin.mocap.c3d import read_c3d
 from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.gaps import Gap
+from manikin.mocap.least_shift import LeastShift, least_shift
 from manikin.mocap.markers import Event, MarkerRecording
 from manikin.mocap.mot import read_mot
 from manikin.mocap.passages import Overhead, Passage, passages, whole_passage
@@ -37,7 +38,7 @@ from manikin.mocap.read import read_recording
 from manikin.mocap.reconstruct import person_of, reconstruct
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_clip import RecordedClip, clip_of
-from manikin.mocap.recorded_dynamics import RecordedDynamics, dynamics_of, with_mass
+from manikin.mocap.recorded_dynamics import RecordedDynamics, dynamics_of, touch_downs_of, with_mass
 from manikin.mocap.recorded_forces import motion_on_contacts
 from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
 from manikin.mocap.recorded_motion import motion_of, smoothed
@@ -73,6 +74,7 @@ __all__ = [
     "ForcePlate",
     "Gap",
     "GroupStatistics",
+    "LeastShift",
     "Loss",
     "MarkerRecording",
     "Origin",
@@ -109,6 +111,7 @@ __all__ = [
     "first_stance",
     "group_statistics",
     "largest_distances",
+    "least_shift",
     "mass_on_plates",
     "motion_of",
     "motion_on_contacts",
@@ -142,6 +145,7 @@ __all__ = [
     "support_placements",
     "supports_of",
     "timing_errors",
+    "touch_downs_of",
     "whole_passage",
     "with_mass",
 ]

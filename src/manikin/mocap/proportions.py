@@ -92,7 +92,7 @@ def human_of(
     mass: float | None = None,
     stature: float | None = None,
 ) -> BodyModel:
-    """Our human with the lengths of a recorded person.
+    """Our human with the lengths of a recorded person, its masses off the lines between joints.
 
     Args:
         centres: (n, 3) joint centres [m]; what is missing is scaled with the stature.
@@ -116,4 +116,4 @@ def human_of(
         stature = REFERENCE_STATURE * share
     if mass is None:
         mass = REFERENCE_MASS * (stature / REFERENCE_STATURE) ** 2
-    return human(stature, mass, sex, lengths=lengths)
+    return human(stature, mass, sex, lengths=lengths, off_axis_masses=True)

@@ -5,6 +5,7 @@ Newton-Euler equations gives the torques that a body without contacts would need
 components, those of the free pelvis, are the wrench that the ground has to supply.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,6 +21,7 @@ from manikin.body.human import body_from_signature
 from manikin.mocap.effector_places import JOINTS
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_motion import rates_of, smoothed_postures
+from manikin.mocap.recorded_supports import RecordedSupports
 from manikin.spatial import GRAVITY_VECTOR, FloatArray, frozen_array
 
 CUTOFF = 5.0
@@ -84,17 +86,36 @@ class RecordedDynamics:
         return zero_moment_point(self.wrench, height)
 
 
-def dynamics_of(found: Reconstruction, cutoff: float = CUTOFF) -> RecordedDynamics:
+def dynamics_of(
+    found: Reconstruction, cutoff: float = CUTOFF, touch_downs: Sequence[float] = ()
+) -> RecordedDynamics:
     """Smooth a reconstruction, differentiate it twice and find the wrench that it needs.
 
     Args:
         found: At least four instants at an even rate, not yet smoothed.
         cutoff: Of the low-pass of the postures [Hz].
+        touch_downs: Instants at which it rises for a moment, on the clock of ``found`` [s], see
+            :func:`touch_downs_of`.
 
     Raises:
         InputError: If there are too few instants, or the cutoff is not below half their rate.
     """
-    q = smoothed_postures(found, cutoff, limits=False)
+    return dynamics_of_postures(
+        found, smoothed_postures(found, cutoff, limits=False, touch_downs=touch_downs)
+    )
+
+
+def touch_downs_of(supports: RecordedSupports) -> tuple[float, ...]:
+    """Instants at which a support begins, on the clock of the reconstruction [s]."""
+    return tuple(one.start - supports.start for one in supports.supports if one.start_seen)
+
+
+def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynamics:
+    """The wrench that (n, nq) smooth postures at the instants of a reconstruction need.
+
+    Raises:
+        InputError: If there are too few instants.
+    """
     v, a = rates_of(found, q)
     model, data, n = found.body.pinocchio, found.body.pinocchio.createData(), len(q)
     com, spin = np.empty((n, 3)), np.empty((n, 3))

@@ -1,5 +1,6 @@
 """A reconstruction without the noise of its recording, and with velocities and accelerations."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pinocchio as pin
 from scipy.signal import butter, sosfiltfilt
 
 from manikin.errors import InputError
+from manikin.mocap.local_cutoff import local_cutoff, smooth
 from manikin.mocap.posture_cost import PostureCost
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.motion.motion import Motion
@@ -16,6 +18,9 @@ CUTOFF = 6.0
 """Frequency above which a walk has little but noise [Hz] (Winter, Biomechanics and Motor Control, 2.2.4)."""
 
 FEWEST_FRAMES = 4
+
+HIGHEST_SHARE = 0.45
+"""Highest cutoff at a touch-down, per rate of the recording: what is faster cannot be told from slower."""
 
 
 def smoothed(found: Reconstruction, cutoff: float = CUTOFF) -> Reconstruction:
@@ -36,7 +41,9 @@ def smoothed(found: Reconstruction, cutoff: float = CUTOFF) -> Reconstruction:
     return replace(found, q=q, residual=residual)
 
 
-def smoothed_postures(found: Reconstruction, cutoff: float = CUTOFF, limits: bool = True) -> FloatArray:
+def smoothed_postures(
+    found: Reconstruction, cutoff: float = CUTOFF, limits: bool = True, touch_downs: Sequence[float] = ()
+) -> FloatArray:
     """(n, nq) postures of :func:`smoothed`, without their residuals.
 
     Args:
@@ -44,6 +51,8 @@ def smoothed_postures(found: Reconstruction, cutoff: float = CUTOFF, limits: boo
         cutoff: As there [Hz].
         limits: Whether hinges are kept to their limits afterwards. Where a smooth angle meets its limit it
             gets a kink, so what is differentiated twice had better overshoot a little.
+        touch_downs: Instants at which the cutoff rises for a moment, on the clock of ``found`` [s], see
+            :mod:`manikin.mocap.local_cutoff`; none for the Butterworth filter.
 
     Raises:
         InputError: As there.
@@ -52,12 +61,15 @@ def smoothed_postures(found: Reconstruction, cutoff: float = CUTOFF, limits: boo
     finite_number(cutoff, "cutoff [Hz]", above=0.0)
     if cutoff >= 0.5 * rate:
         raise InputError(f"cutoff is {cutoff:g} Hz; valid: below half the rate, {0.5 * rate:g} Hz")
-    sections = butter(2, cutoff, fs=rate, output="sos")
     q = np.array(found.q)
     flips = np.cumprod(np.where(np.sum(q[1:, 3:7] * q[:-1, 3:7], axis=1) < 0.0, -1.0, 1.0))
     q[1:, 3:7] *= flips[:, None]
-    padding = min(len(q) - 1, int(np.ceil(2.0 * rate / cutoff)))
-    q = sosfiltfilt(sections, q, axis=0, padlen=padding)
+    if len(touch_downs):
+        ceiling = np.minimum(local_cutoff(found.time, touch_downs, cutoff), HIGHEST_SHARE * rate)
+        q = smooth(q, rate, ceiling)
+    else:
+        padding = min(len(q) - 1, int(np.ceil(2.0 * rate / cutoff)))
+        q = sosfiltfilt(butter(2, cutoff, fs=rate, output="sos"), q, axis=0, padlen=padding)
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     if limits:
         q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
