@@ -85,13 +85,14 @@ Stances, forces, torques and margins of recorded people (Qiu 2012, 4.4), beside 
 friction {FRICTION:g}; postures are low-passed at {CUTOFF:g} Hz (second order, no delay), rising to
 {TOUCH_DOWN_CUTOFF:g} Hz within {1e3 * TOUCH_DOWN_WIDTH:.0f} ms of a touch-down, the same for all files, and
 differentiated twice. Segment masses lie off the lines between joints (Dumas, Chèze and Verriest, 2007), a
-trunk without markers tilts so that its upper end has a third of what is fast in the pelvis' motion. Nothing is
-fitted to the plates but the mass of the person; the cutoff at touch-downs was chosen with them.
+trunk without markers tilts so that its upper end has a third of what is fast in the pelvis' motion. Nothing
+is fitted to the plates but the mass of the person; the cutoff at touch-downs was chosen with them.
 
 *Shifted* is the motion of the whole body shifted by the smooth path that is least and leaves the
 centre of pressure {1e2 * INSIDE:.0f} cm inside of the edges of the soles, if none longer than
 {1e2 * LARGEST_SHIFT:.0f} cm along an axis is needed (`manikin.mocap.least_shift`). Markers tell the place of
-a body to a centimetre; a millimetre at 4 Hz moves the centre of pressure by 6 cm. The plates have no part in it.
+a body to a centimetre; a millimetre at 4 Hz moves the centre of pressure by 6 cm. The plates have no part in
+it.
 """
 PLATES = f"""
 ## Beside force plates
@@ -120,8 +121,8 @@ SHARES = """
 ## Margins
 
 Share of the frames with a positive margin of the whole body (4.55), as recorded and shifted, and of a point
-mass as recorded (4.54); *median* of the whole body's as recorded; how far the body was shifted. Columns at the
-right: the frames whose margin is not positive although shifted, by what they are put down to.
+mass as recorded (4.54); *median* of the whole body's as recorded; how far the body was shifted. Columns at
+the right: the frames whose margin is not positive although shifted, by what they are put down to.
 
 * *Change*: the stance before or after a touch-down or lift-off within a quarter of the cutoff's period admits
   the wrench; the low-pass spreads the impact over that time.
@@ -381,9 +382,10 @@ def clip_text(found: list[tuple[Trial, np.ndarray]], walks: list[Trial], heads: 
         "\n### Without plates\n\nWindows of level walks by the CMU Graphics Lab and ACCAD, recorded as "
         "skeletons. In single support the centre of mass is "
         f"{100.0 * skeletons:.1f} cm inside of the axis of the sole (median), in the walks above, whose "
-        f"markers show the feet, {100.0 * marked:.1f} cm: the feet of skeletons stand too far inside, and they "
-        f"are not told where their masses are. {sum(share >= 0.97 for share in shares)} of {len(shares)} files reach "
-        f"97 % once shifted, by {1e3 * np.median(shifts):.1f} mm (median of the root mean squares).\n\n"
+        f"markers show the feet, {100.0 * marked:.1f} cm: the feet of skeletons stand too far inside, and "
+        "they are not told where their masses are. "
+        f"{sum(share >= 0.97 for share in shares)} of {len(shares)} files reach 97 % once shifted, by "
+        f"{1e3 * np.median(shifts):.1f} mm (median of the root mean squares).\n\n"
         + table(heads, [share_row(one, inside) for one, inside in found])
         + "\n### What is left\n\nEvery run of frames of the two tables whose margin is not positive although "
         "shifted:\n\n"
@@ -394,8 +396,8 @@ def clip_text(found: list[tuple[Trial, np.ndarray]], walks: list[Trial], heads: 
 CONTROL = """
 ### What a shift can tell
 
-The least shift is no cure for everything. With stances that begin and end too late, it grows, until it meets its
-bound and the margin stays negative. Median over the level walks of both tables:
+The least shift is no cure for everything. With stances that begin and end too late it grows, until it meets
+its bound and the margin stays negative. Median over the level walks of both tables:
 
 """
 DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3)

@@ -11,6 +11,7 @@ from manikin.balance.limiting import LimitingConstraint
 from manikin.body import BodyModel
 from manikin.ergonomics import Ergonomics
 from manikin.locomotion.segmentation import PathSegments
+from manikin.mocap.least_shift import LeastShift
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_supports import RecordedSupports, SupportPhase
 from manikin.motion import Motion
@@ -32,6 +33,7 @@ class Analysis:
         supports: Of feet, hands and seat.
         motion: Smoothed, with torques, forces and whole-body margin; its time is 0 at the first instant.
         point_mass_margin: (n,) margin without angular momentum [N.m].
+        shifted: The nearest motion that the contacts can carry.
         limiting: What limits the lowest margin; None if no margin is known.
         cop: (n, 3) centre of pressure that the motion needs [m]; NaN in flight.
         segments: Holonomic and nonholonomic stretches; None where nobody walks upright.
@@ -49,6 +51,7 @@ class Analysis:
     supports: RecordedSupports
     motion: Motion
     point_mass_margin: FloatArray
+    shifted: LeastShift
     limiting: LimitingConstraint | None
     cop: FloatArray
     segments: PathSegments | None
@@ -98,6 +101,8 @@ class Analysis:
         columns |= {
             "margin_Nm": self.motion.margin,
             "point_mass_margin_Nm": self.point_mass_margin,
+            "shift_m": self.shifted.size,
+            "shifted_margin_Nm": self.shifted.margins.whole_body,
             "vertical_force_N": self.vertical_force,
             "cop_x_m": self.cop[:, 0],
             "cop_y_m": self.cop[:, 1],
@@ -172,6 +177,12 @@ class Analysis:
             "limiting": None if self.limiting is None else self.limiting.description,
             "limiting_contact": None if self.limiting is None else self.limiting.effector,
             "share_known": float(np.mean(known)),
+            "shifted": {
+                "share_positive": float(np.mean(self.shifted.margins.whole_body > 0.0)),
+                "min": float(self.shifted.margins.whole_body.min()),
+                "rms_m": self.shifted.rms,
+                "max_m": float(self.shifted.size.max()),
+            },
             "point_mass_min": float(points.min()) if points.size else None,
             "point_mass_share_positive": float(np.mean(points > 0.0)) if points.size else None,
         }

@@ -13,10 +13,11 @@ from manikin.analysis.walking import walked_segments
 from manikin.body.further_contacts import with_knees_and_elbows
 from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, upright_neck
 from manikin.errors import InputError
+from manikin.mocap.least_shift import least_shift
 from manikin.mocap.markers import MarkerRecording
 from manikin.mocap.read import read_recording
 from manikin.mocap.reconstruct import reconstruct
-from manikin.mocap.recorded_dynamics import dynamics_of, with_mass
+from manikin.mocap.recorded_dynamics import dynamics_of, touch_downs_of, with_mass
 from manikin.mocap.recorded_forces import motion_on_contacts
 from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
 from manikin.mocap.recorded_stances import FRICTION, recorded_schedule
@@ -112,18 +113,20 @@ def analyze(
     if not {one.effector for one in supports.supports} <= set(found.body.effectors):
         found = replace(found, body=with_knees_and_elbows(found.body))
     schedule = recorded_schedule(found, supports, friction=given.friction)
-    dynamics = dynamics_of(found)
+    touch_downs = touch_downs_of(supports)
+    dynamics = dynamics_of(found, touch_downs=touch_downs)
     mass = None if given.mass is not None else measured_mass(recording, dynamics, schedule, supports.start)
     if mass is not None:
         found = with_mass(found, mass)
         schedule = recorded_schedule(found, supports, friction=given.friction)
-        dynamics = dynamics_of(found)
+        dynamics = dynamics_of(found, touch_downs=touch_downs)
     margins = recorded_margins(dynamics, schedule, supports.start)
     motion = motion_on_contacts(dynamics, schedule, supports.start, margins)
+    shifted = least_shift(found, dynamics, margins, schedule, supports.start)
     ground = min(supports.surfaces, default=0.0)
     report: PlateReport | None = None
     if plates:
-        report = plate_report(plates, supports, schedule, dynamics, margins)
+        report = plate_report(plates, supports, schedule, dynamics, margins, shifted)
     neck = upright_neck(found.body, motion.q)
     circumstances = Circumstances(
         load_kg=given.load, neck_upright_deg=0.0 if neck is None else float(np.degrees(neck))
@@ -133,7 +136,7 @@ def analyze(
     )
     analysis = Analysis(
         name=name or recording.name, source=recording.name, rate=recording.rate, sex=given.sex, found=found,
-        supports=supports, motion=motion, point_mass_margin=margins.point_mass,
+        supports=supports, motion=motion, point_mass_margin=margins.point_mass, shifted=shifted,
         limiting=margins.limiting(margins.lowest), cop=dynamics.zero_moment_point(ground),
         segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
     )  # fmt: skip

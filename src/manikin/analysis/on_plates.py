@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from manikin.balance import zero_moment_point
 from manikin.contact import ContactSchedule
 from manikin.mocap.force_plate import ForcePlate
+from manikin.mocap.least_shift import LeastShift
 from manikin.mocap.markers import MarkerRecording
 from manikin.mocap.plate_forces import PlateComparison, compare_with_plates, mass_on_plates, plate_forces
 from manikin.mocap.plate_supports import TimingError, timing_errors
@@ -30,6 +31,7 @@ class PlateReport:
         compared: (n,) whether every support is on a plate, so that the plates tell all there is.
         timing: Touch-downs and lift-offs beside those of the plates.
         forces: Errors of forces and centres of pressure; None where no foot alone was on a plate.
+        shifted: The same of the motion shifted onto its contacts.
     """
 
     vertical_force: FloatArray
@@ -37,6 +39,7 @@ class PlateReport:
     compared: NDArray[np.bool_]
     timing: tuple[TimingError, ...]
     forces: PlateComparison | None
+    shifted: PlateComparison | None
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready numbers (SI); None where there was nothing to compare."""
@@ -48,6 +51,7 @@ class PlateReport:
             "timing_max_s": float(np.max(errors)) if errors else None,
             "vertical_rms_body_weight": None if forces is None else forces.vertical_rms,
             "cop_rms_m": None if forces is None else forces.cop_rms,
+            "cop_rms_shifted_m": None if self.shifted is None else self.shifted.cop_rms,
             "frames": int(self.compared.sum()),
             "single_support_frames": None if forces is None else forces.single_frames,
             "margin_share_positive": None if forces is None else forces.margin_share,
@@ -73,7 +77,7 @@ def measured_mass(
 
 def plate_report(
     plates: Sequence[ForcePlate], supports: RecordedSupports, schedule: ContactSchedule,
-    dynamics: RecordedDynamics, margins: RecordedMargins,
+    dynamics: RecordedDynamics, margins: RecordedMargins, shifted: LeastShift,
 ) -> PlateReport:  # fmt: skip
     """Hold a motion against the plates under it.
 
@@ -83,6 +87,7 @@ def plate_report(
         schedule: Its stances.
         dynamics: Its forces, with the person's mass.
         margins: Its margins.
+        shifted: The motion nearest to it that its contacts can carry.
     """
     measured = plate_forces(plates, dynamics.time + supports.start, schedule)
     height = float(np.mean([plate.origin[2] for plate in plates]))
@@ -92,4 +97,5 @@ def plate_report(
     return PlateReport(
         measured.wrench[:, 2], np.where(loaded[:, None], cop, np.nan), measured.covered,
         timing_errors(supports, plates), compare_with_plates(dynamics, margins, measured, height),
+        compare_with_plates(shifted.dynamics, shifted.margins, measured, height),
     )  # fmt: skip

@@ -20,7 +20,7 @@ LONG_FLIGHT = 0.5
 """Nobody is without support for longer [s]."""
 
 FEW_POSITIVE = 0.9
-"""Share of frames with a positive margin below which contacts must be missing."""
+"""Share of frames with a positive margin, the body shifted, below which contacts must be missing."""
 
 
 def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> tuple[str, ...]:
@@ -56,11 +56,11 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         lines.append(
             f"nothing supports for {max(flights):.2f} s: the person may touch something that is not recorded"
         )
-    margin = analysis.motion.margin[np.isfinite(analysis.motion.margin)]
-    if margin.size and float(np.mean(margin > 0.0)) < FEW_POSITIVE:
-        share = 100.0 * float(np.mean(margin > 0.0))
+    balanced = float(np.mean(analysis.shifted.margins.whole_body > 0.0))
+    if balanced < FEW_POSITIVE:
         lines.append(
-            f"balanced in {share:.0f} % of the frames only: running, or supports that were not found"
+            f"balanced in {100.0 * balanced:.0f} % of the frames only, although shifted by up to "
+            f"{1e3 * analysis.shifted.size.max():.0f} mm: running, or supports that were not found"
         )
     if analysis.plates is not None and not analysis.plates.compared.any():
         lines.append("no instant has all supports on force plates: their forces are not compared")

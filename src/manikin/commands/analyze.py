@@ -140,6 +140,11 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
             f"{margin['min']:.1f} N.m at {margin['at_s']:.2f} s ({margin['limiting'] or 'in flight'}), "
             f"positive in {100.0 * margin['share_positive']:.1f} % of the frames"
         )
+        shifted = margin["shifted"]
+        shown["shifted"] = (
+            f"by {1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest): "
+            f"positive in {100.0 * shifted['share_positive']:.1f} %"
+        )
     for name in ("rula", "reba"):
         if effort[name] is not None:
             one = effort[name]

@@ -184,24 +184,27 @@ class _Facets:
 
 @dataclass(frozen=True, eq=False)
 class _Spline:
-    """Values (n, k) and second differences (n, k) of the splines of a basis at the frames."""
+    """Values (n, k) and second differences (n, k) of the k splines of a basis at the frames."""
 
     values: sparse.csr_array
     second: sparse.csr_array
+    count: int
 
     @classmethod
     def over(cls, time: FloatArray) -> "_Spline":
         """Basis with even knots over the instants, none closer than they are."""
         n, step = len(time), float(time[-1] - time[0]) / (len(time) - 1)
-        count = max(int((time[-1] - time[0]) / max(KNOTS, step)), 1)
-        inner = np.linspace(time[0], time[-1], count + 1)
+        spans = max(int((time[-1] - time[0]) / max(KNOTS, step)), 1)
+        inner = np.linspace(time[0], time[-1], spans + 1)
         knots = np.r_[[inner[0]] * _DEGREE, inner, [inner[-1]] * _DEGREE]
         values = sparse.csr_array(BSpline.design_matrix(time, knots, _DEGREE))
         # As velocities and accelerations of recorded postures, see recorded_motion.rates_of.
-        velocity = sparse.diags_array([-0.5, 0.5], offsets=[-1, 1], shape=(n, n), dtype=float).tolil()
-        velocity[[0], :3], velocity[[-1], -3:] = [-1.5, 2.0, -0.5], [0.5, -2.0, 1.5]
+        velocity = sparse.lil_array((n, n))
+        velocity.setdiag(-0.5, -1)
+        velocity.setdiag(0.5, 1)
+        velocity[0, :3], velocity[n - 1, n - 3 :] = [-1.5, 2.0, -0.5], [0.5, -2.0, 1.5]
         gradient = velocity.tocsr() / step
-        return cls(values, sparse.csr_array(gradient @ gradient @ values))
+        return cls(values, sparse.csr_array(gradient @ gradient @ values), spans + _DEGREE)
 
 
 def _solve(facets: _Facets, spline: _Spline) -> FloatArray | None:
@@ -209,7 +212,7 @@ def _solve(facets: _Facets, spline: _Spline) -> FloatArray | None:
 
     None where the solver finds none, as for postures that jump.
     """
-    count = spline.values.shape[1]
+    count = spline.count
     cost = spline.values.T @ spline.values / PLACE_ERROR**2
     cost = cost + spline.second.T @ spline.second / ACCELERATION_ERROR**2
     frames, owner = np.unique(facets.frame, return_inverse=True)
