@@ -169,7 +169,7 @@ class Trial:
     @cached_property
     def shifted(self) -> LeastShift:
         """The motion nearest to it that its stances can carry."""
-        return least_shift(self.found, self.dynamics, self.margins, self.schedule, self.supports.start)
+        return least_shift(self.found, self.dynamics, self.margins)
 
     @cached_property
     def losses(self) -> tuple[Loss, ...]:
@@ -411,7 +411,7 @@ def control_text(trials: list[Trial]) -> str:
         for one in trials:
             start = one.supports.start - delay
             margins = recorded_margins(one.dynamics, one.schedule, start)
-            moved = least_shift(one.found, one.dynamics, margins, one.schedule, start)
+            moved = least_shift(one.found, one.dynamics, margins)
             shares = [float(np.mean(each.whole_body > 0.0)) for each in (margins, moved.margins)]
             found.append((*shares, moved.rms, float(moved.size.max())))
         recorded, shifted, rms, largest = np.median(found, axis=0)

@@ -40,7 +40,7 @@ def on_one_foot(ahead):
 def shifted(found, schedule, **options):
     dynamics = dynamics_of(found)
     margins = recorded_margins(dynamics, schedule)
-    return margins, least_shift(found, dynamics, margins, schedule, **options)
+    return margins, least_shift(found, dynamics, margins, **options)
 
 
 def test_who_is_in_balance_is_left_alone():
@@ -91,7 +91,7 @@ def test_the_shifted_wrench_obeys_the_law_of_momentum():
     found = standing(1.2e-3 * np.sin(8.0 * np.pi * TIME))
     schedule = on_one_foot(0.035)
     dynamics = dynamics_of(found)
-    moved = least_shift(found, dynamics, recorded_margins(dynamics, schedule), schedule)
+    moved = least_shift(found, dynamics, recorded_margins(dynamics, schedule))
     bend = np.gradient(np.gradient(moved.shift, 1 / RATE, axis=0), 1 / RATE, axis=0)
     force = BODY.mass * bend
     change = moved.dynamics.wrench - dynamics.wrench

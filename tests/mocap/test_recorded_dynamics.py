@@ -328,7 +328,7 @@ def test_walks_agree_with_force_plates(recordings_folder, file, mass, cop, posit
     assert shown.vertical_rms < 0.10
     assert shown.margin_share > 0.99
     assert np.mean(margins.whole_body > 0.0) > positive
-    nearest = least_shift(found, dynamics, margins, schedule, supports.start)
+    nearest = least_shift(found, dynamics, margins)
     closer = compare_with_plates(nearest.dynamics, nearest.margins, measured)
     assert closer is not None
     assert closer.cop_rms < cop

@@ -122,7 +122,7 @@ def analyze(
         dynamics = dynamics_of(found, touch_downs=touch_downs)
     margins = recorded_margins(dynamics, schedule, supports.start)
     motion = motion_on_contacts(dynamics, schedule, supports.start, margins)
-    shifted = least_shift(found, dynamics, margins, schedule, supports.start)
+    shifted = least_shift(found, dynamics, margins)
     ground = min(supports.surfaces, default=0.0)
     report: PlateReport | None = None
     if plates:

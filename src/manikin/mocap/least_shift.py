@@ -25,11 +25,10 @@ from scipy import sparse
 from scipy.interpolate import BSpline
 
 from manikin.balance.friction import cross
-from manikin.contact import ContactSchedule
 from manikin.errors import InputError
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_dynamics import RecordedDynamics, dynamics_of_postures
-from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins, wrench_at
+from manikin.mocap.recorded_margins import RecordedMargins, margins_within, wrench_at
 from manikin.spatial import GRAVITY, FloatArray, frozen_array
 
 PLACE_ERROR = 0.005
@@ -91,8 +90,6 @@ def least_shift(
     found: Reconstruction,
     dynamics: RecordedDynamics,
     margins: RecordedMargins,
-    schedule: ContactSchedule,
-    start: float = 0.0,
     inside: float = INSIDE,
 ) -> LeastShift:
     """Shift a recorded motion as little as its contacts ask for.
@@ -100,9 +97,7 @@ def least_shift(
     Args:
         found: The reconstruction of the person.
         dynamics: Of its smooth postures.
-        margins: Of ``dynamics`` on ``schedule``.
-        schedule: Its stances.
-        start: The schedule's clock at the motion's first instant [s].
+        margins: Of ``dynamics`` on its stances.
         inside: Margin to keep, per body weight [m].
 
     Raises:
@@ -128,7 +123,9 @@ def least_shift(
     q = np.array(dynamics.q)
     q[:, :3] += shift
     moved = dynamics_of_postures(replace(found, body=dynamics.body), q)
-    return LeastShift(moved, recorded_margins(moved, schedule, start), frozen_array(shift, "shift"))
+    return LeastShift(
+        moved, margins_within(margins.polytopes, margins.phase, moved), frozen_array(shift, "shift")
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,9 +83,22 @@ def recorded_margins(
         polytope_of(phase.stance) if len(phase.stance) and np.any(phases == number) else None
         for number, phase in enumerate(schedule.sequence)
     )
+    return margins_within(polytopes, phases, dynamics)
+
+
+def margins_within(
+    polytopes: Sequence[WrenchPolytope | None], phases: NDArray[np.int64], dynamics: RecordedDynamics
+) -> RecordedMargins:
+    """Margins of a recorded motion in known polytopes.
+
+    Args:
+        polytopes: One for each phase; None for flight.
+        phases: (n,) index of the phase in each frame.
+        dynamics: The motion.
+    """
     body = margins_of_wrenches(polytopes, phases, dynamics.wrench, dynamics.com)
     mass = margins_of_wrenches(polytopes, phases, dynamics.point_mass_wrench, dynamics.com)
-    return RecordedMargins(body[0], mass[0], body[1], mass[1], phases, polytopes, dynamics.wrench)
+    return RecordedMargins(body[0], mass[0], body[1], mass[1], phases, tuple(polytopes), dynamics.wrench)
 
 
 def margins_of_wrenches(
