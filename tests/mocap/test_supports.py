@@ -12,6 +12,7 @@ from manikin.errors import InputError
 from manikin.mocap import ForcePlate, Reconstruction, Targets, read_recording, reconstruct
 from manikin.mocap.plate_supports import plate_loads, timing_errors
 from manikin.mocap.recorded_supports import RecordedSupports, Support, SupportPhase
+from manikin.mocap.support_levels import slowest_speed, track
 from manikin.mocap.supports import supports_of, supports_of_points
 from manikin.spatial import GRAVITY
 
@@ -190,6 +191,15 @@ def test_feet_of_a_run_that_the_filter_never_lets_rest_are_found():
     for name, instants in downs.items():
         starts = [one.start for one in found.of(name) if one.start_seen]
         assert starts[: len(instants)] == pytest.approx(instants, abs=0.06)
+
+
+@pytest.mark.parametrize(("share", "slowest"), [(0.3, 0.0), (1.0, 0.0), (2.0, 0.25)])
+def test_the_slowest_point_of_a_sole_is_nearest_to_what_it_turns_about(share, slowest):
+    # At 1 rad/s, about a point on the sole or one sole's length, 0.25 m, before its toes.
+    time = np.arange(200) / 100.0
+    along = np.stack([np.cos(time), np.zeros(200), -np.sin(time)], axis=1) * np.linalg.norm(TOES)
+    heel, toes = (track(way * along, 100.0) for way in (-share, 1.0 - share))
+    assert slowest_speed(heel, toes)[50:150] == pytest.approx(slowest, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -381,6 +391,18 @@ def test_feet_of_a_recorded_run_go_in_turn(recordings_folder):
     assert [one.effector for one in found.supports] == ["right_foot", "left_foot", "right_foot"]
     assert all(0.1 < one.duration < 0.3 for one in found.supports)
     assert all(before.end < after.start for before, after in pairwise(found.supports))
+
+
+def test_a_step_of_who_ducks_in_running_is_not_a_shift(recordings_folder):
+    path = recordings_folder / "cmu_asf_amc" / "127_32.amc"
+    if not path.exists():
+        pytest.skip("the clip of a run with a duck is not there")
+    found = supports_of(reconstruct(read_recording(path)))
+    # All of the left sole moves at 1.5 m/s at 1.83 s; the centre of mass falls at 0.6 g before.
+    assert not [one for one in found.of("left_foot") if one.start < 1.83 < one.end]
+    assert [one.effector for one in found.supports if one.start > 0.5 and one.start < 2.0] == [
+        "right_foot", "left_foot", "right_foot", "left_foot", "right_foot", "left_foot"
+    ]  # fmt: skip
 
 
 def test_a_jump_has_no_support_where_it_is_highest(recordings_folder):

@@ -201,6 +201,14 @@ def ball_of(heel: Track, toes: Track) -> Track:
     return Track(frozen_array(positions, "track positions"), frozen_array(speed, "track speed"), heel.rate)
 
 
+def slowest_speed(heel: Track, toes: Track) -> FloatArray:
+    """(n,) of that point of a sole, from its heel to its toes, that is slowest [m/s]."""
+    begin, end = (np.gradient(point.positions, 1.0 / heel.rate, axis=0) for point in (heel, toes))
+    way = end - begin
+    share = np.clip(-np.sum(begin * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-12), 0.0, 1.0)
+    return np.linalg.norm(begin + share[:, None] * way, axis=1)
+
+
 def sole_height(heel: Track, toes: Track, lying: NDArray[np.bool_] | None = None) -> FloatArray:
     """(n,) of the middle of a sole, of the ball of a steep one, or of the lower end of an upright one [m].
 

@@ -22,18 +22,20 @@ from manikin.mocap.ground_supports import ground_supports
 from manikin.mocap.hand_supports import hand_supports
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_supports import RecordedSupports, Support
-from manikin.mocap.runs import lasting, switch
+from manikin.mocap.runs import lasting, runs, switch
 from manikin.mocap.seat_supports import lying, seat_supports
 from manikin.mocap.support_levels import (
     BALL,
     CUTOFF,
     LEVELS_APART,
     RAISED,
+    SHIFT_SPEED,
     STEEP,
     Surface,
     Track,
     ball_of,
     heel_rise,
+    slowest_speed,
     sole_height,
     sole_rise,
     surfaces_under,
@@ -51,6 +53,9 @@ AWAY = 0.10
 
 NEAR_LYING, AWAY_LYING = 0.13, 0.18
 """The same where a person crawls or lies, whose feet lean on the ground with any side [m]."""
+
+MOVES = 0.25
+"""Speed of the slowest point of a sole above which the foot is on its way [m/s]."""
 
 SHORTEST = 0.08
 """Shorter supports, and shorter interruptions of one, are not told from noise [s]."""
@@ -123,7 +128,7 @@ def supports_of_points(
             _ball_above(both, (1.0 - BALL) * heel + BALL * toes, levels),
         )
         touching = [_touching(one, height, near, away) for one, height in zip(points, above, strict=True)]
-        supports += _supports(name, points, np.array(touching), surfaces, start)
+        supports += _supports(name, points, np.array(touching) & ~_steps(both, touching), surfaces, start)
     supports.sort(key=lambda support: (support.start, support.effector))
     heights = tuple(surface.height for surface in surfaces)
     return RecordedSupports(tuple(supports), start, start + (frames - 1) / rate, heights)
@@ -216,6 +221,19 @@ def _touching(one: Track, height: FloatArray, near: FloatArray, away: FloatArray
     """(n,) whether a point touches a surface that it is at a height (n,) above [m]."""
     slow, fast = one.slow_and_fast()
     return switch(slow & (height > -away) & (height < near), fast | (np.abs(height) > away))
+
+
+def _steps(points: tuple[Track, Track], touching: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """(n,) whether a foot that seems to touch steps: even the slowest point of its sole is too fast to shift.
+
+    A small step after a fast swing is slow beside that, if the foot was down for too short to come to rest.
+    """
+    down, speed = np.logical_or.reduce(touching), slowest_speed(*points)
+    steps = np.zeros(len(speed), dtype=bool)
+    for first, stop in runs(speed > MOVES):
+        if first > 0 and down[first - 1 : stop + 1].all() and speed[first:stop].max() > SHIFT_SPEED:
+            steps[first:stop] = stop < len(speed)
+    return steps
 
 
 def _supports(
