@@ -97,7 +97,6 @@ class Track:
         """
         peaks, last = np.full(len(self.speed), np.inf), len(self.speed)
         moves = runs(self.speed >= rest)
-        moves = runs(self.speed >= rest)
         swings = [(first, stop, float(self.speed[first:stop].max())) for first, stop in moves]
         swings = [one for one in swings if not self._shifts(*one, shift)]
         whole = [peak for first, stop, peak in swings if first > 0 and stop < last]

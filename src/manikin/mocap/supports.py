@@ -210,7 +210,7 @@ def _toes_above(
 
 
 def _ball_above(points: tuple[Track, Track], ball: FloatArray, levels: FloatArray) -> FloatArray:
-    """(n,) of the ball from the nearest level [m]; infinite while the heel is down, which tells itself then.
+    """(n,) of the ball from the nearest level [m]; infinite while the heel is down and tells by itself.
 
     A foot that turns on the spot moves both ends beside a ball that stays, though it is lifted.
     """
@@ -231,8 +231,9 @@ def _steps(points: tuple[Track, Track], touching: Sequence[NDArray[np.bool_]]) -
     down, speed = np.logical_or.reduce(touching), slowest_speed(*points)
     steps = np.zeros(len(speed), dtype=bool)
     for first, stop in runs(speed > MOVES):
-        if first > 0 and down[first - 1 : stop + 1].all() and speed[first:stop].max() > SHIFT_SPEED:
-            steps[first:stop] = stop < len(speed)
+        inside = first > 0 and stop < len(speed) and down[first - 1 : stop + 1].all()
+        if inside and speed[first:stop].max() > SHIFT_SPEED:
+            steps[first:stop] = True
     return steps
 
 
