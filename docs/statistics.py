@@ -169,13 +169,12 @@ does not move on, is not counted.
 
 """
 WEAK = """
-* Not every flight is one. In a true flight the centre of mass accelerates at -{gravity:g} m/s²; parabolas
+* Short flights may be none. In a true flight the centre of mass accelerates at -{gravity:g} m/s²; parabolas
   through the inner halves of flights of {felt:g} s and more have
 
 """
 WEAK_END = """
-  The jumps fall as they should. In the first one of `01_13` both feet move at 2 to 5 m/s and nothing falls:
-  hands carry the body, of which the feet say nothing.
+  The jumps fall as they should.
 * Who moves on while low for another reason, such as landing from a jump, is taken to pass a bar: its place is
   not known. A box has one.
 * Two touch-downs within {shortest:g} s make a phase that no one saw; it counts in durations and not in

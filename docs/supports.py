@@ -43,47 +43,47 @@ LONGEST = 4.2
 """Of a strip to be judged [s]."""
 
 ERRORS = {
-    "14_21": "left foot lifts off 0.15 s early at 8.4 s (last step down)",
+    "14_21": "none seen",
     "14_31_f1-1150": "none seen",
     "01_02_f400-1300": "none seen",
-    "01_05_f2000-3120": "left foot 0.2 to 0.3 s late at 1.9 and 8.0 s (on tiptoe under the bar); "
+    "01_05_f2000-3120": "left foot 0.2 s late at 1.9 s (tips of its toes slide under the bar); "
     "small steps on the spot from 2.7 to 6.4 s are taken for shifts",
-    "01_13_f140-760": "hands that slide along the bar are let go 0.2 s (0.96 s) and 0.3 s (3.9 s) early",
-    "01_09_f3900-4242": "right hand let go 0.3 s early at 1.3 s (slides)",
+    "01_13_f140-760": "none seen",
+    "01_09_f3900-4242": "none seen",
     "03_01": "none seen",
     "03_02": "none seen (the recording jumps before 0.4 s)",
-    "03_03_f1-1000": "right foot up to 0.1 s late at 3.2 s",
+    "03_03_f1-1000": "none seen",
     "127_29": "none seen",
-    "127_31": "lift-offs early and touch-downs late by 0.05 s or so: flights at 1.9 and 2.5 s are false",
-    "127_32": "short flight at 0.64 s is doubtful",
+    "127_31": "whether there are flights, of 0.03 and 0.06 s, at 1.9 and 2.5 s cannot be told",
+    "127_32": "whether there is a flight, of 0.04 s, at 0.64 s cannot be told",
     "127_37": "right hand on the floor from 1.9 to 2.05 s cannot be told from passing close",
     "127_38": "whether the hands touch the floor at 0.55 s cannot be told",
-    "127_25": "left foot 0.06 s late at 1.2 s (landing)",
+    "127_25": "none seen",
     "127_26": "none seen",
     "127_28": "none seen",
     "127_33": "none seen",
     "127_36": "none seen",
-    "127_18": "the support that begins in the last 0.1 s is missed",
-    "127_05": "contacts of 0.1 s in the sprint may be too short; order right",
+    "127_18": "none seen",
+    "127_05": "right foot missed at 0.77 s, a contact of 0.1 s in the sprint",
     "16_08": "none seen",
     "16_57": "none seen",
     "17_03": "the support that begins in the last 0.05 s is missed",
-    "Male1_A7_Crouch": "false gap of the left foot, 1.3 to 1.5 s, as it rises to its ball",
-    "Male1_A8_CrouchToLie": "knees 0.2 to 0.7 s late at 3.3 s (they slide)",
+    "Male1_A7_Crouch": "none seen",
+    "Male1_A8_CrouchToLie": "none seen",
     "Male1_A9_LieDown": "none seen",
-    "Male1_A10_LieToCrouch": "right elbow missed while lying; left hand let go 0.5 s early at 3.2 s",
-    "Male1_A11_CrawlForward": "hands and knees in the right order; feet and elbows broken into pieces, "
-    "some missed; toes that drag count as supports",
-    "Male1_A12_CrawlBackward": "hands in the right order; feet, knees and elbows broken into pieces, some "
-    "missed; the floor drifts by 0.1 m",
-    "Male1_B24_WalkToCrouch": "false gap of the left foot, 5.9 to 6.1 s, as it rises to its ball",
-    "Male1_B25_CrouchToWalk": "false gaps of both feet, 1.2 to 1.5 s, as they come down from their balls; "
-    "the floor drifts: one surface too many",
+    "Male1_A10_LieToCrouch": "whether the right elbow, 5 cm above the left one, lies on the floor until "
+    "1.7 s cannot be told",
+    "Male1_A11_CrawlForward": "hands, knees and elbows in the right order; pieces of the left hand, at 6.2 "
+    "and 8.3 s, before it swings; feet broken into pieces, toes that drag count as supports",
+    "Male1_A12_CrawlBackward": "hands and knees in the right order but for pieces of the right hand at 1.5 "
+    "and 2.1 s; feet and right elbow broken into pieces, some missed; the floor drifts by 0.1 m",
+    "Male1_B24_WalkToCrouch": "none seen",
+    "Male1_B25_CrouchToWalk": "none seen",
     "Male1_A5_PickUpBox": "none seen",
-    "Male1_B19_WalkToPickUpBox_Working": "the floor drifts: one surface too many",
+    "Male1_B19_WalkToPickUpBox_Working": "none seen",
     "Male1_B20_WalkWithBox": "none seen",
     "Male1_B21_PutDownBoxToWalk": "none seen",
-    "Male1_C26_RunToCrouch": "first right stance (0.1 s) missed; false gap of the right foot, 2.2 to 2.5 s",
+    "Male1_C26_RunToCrouch": "first right stance, of 0.1 s, missed",
     "Male1_B18_Walk2Leap2Walk": "left foot in the air from 4.3 to 4.8 s is doubtful (step after the landing)",
 }
 """What is wrong with the sequence of each clip, judged by eye on its strips."""
@@ -96,15 +96,21 @@ alone (`supports_of`). By `docs/supports.py`.
 * Positions of effectors of the reconstructed body, low-passed at 5 Hz (Butterworth, second order, forward
   and backward), and their speeds. A switch with hysteresis closes where a point is slow, below 8 % of the
   highest speed of its swing or 0.12 m/s, and opens above 24 %.
-* **Feet**: heel and toes, each on one of the *surfaces*: heights at which a sole rests while another foot
-  moves. A steep sole stands on its ball.
+* **Feet**: heel and toes, and the ball of a foot with a raised heel, each on one of the *surfaces*: heights
+  at which a sole rests while another foot moves, with a gap of 3 cm between two. A foot of which even the
+  slowest point gets faster than 0.6 m/s steps. A support lasts at least 0.08 s, or 0.04 s where the recording
+  cuts it.
 * **Seat**: who is still and low with the centre of mass beside the feet sits.
 * **Hands**: a palm that rests on the ground; on the seat while it is taken or left; or elsewhere, where
   the shoulder moves by more than 12 cm while the palm stays (less than 0.45 of that, for more than 0.25
   s) and is more than 30 cm away from the own hips and knees. Hands that hang, lie on a knee or carry a
   box are none. Where such a hand takes part of the weight or only touches is not told by positions.
+* **Sliding**: hands, knees and elbows slide without leaving by up to 15 cm between two times below 0.2 m/s,
+  at less than 0.6 m/s; half of the time a hand off the ground is slower than 0.4 m/s.
 * **Knees and elbows**: near the surface under the feet, with the body's thickness; **pelvis**, for the
   whole trunk, where it is low and the trunk is 60° or more from upright.
+* **None** while the centre of mass falls freely, at a median of 0.8 g or more: as at the top of a jump, where
+  feet are slow and may be as high as the box it began on.
 
 ## Beside force plates
 
@@ -126,18 +132,20 @@ more with a doubt that positions cannot settle, and in {others} something is wro
 
 """
 AFTER = """
-What is wrong has four causes:
+What is wrong has three causes:
 
-* **Rising to the balls of the feet.** Our sole is rigid to its end, so heel and toes both move while a
-  foot turns about its ball; the switch opens for 0.2 s.
-* **Sliding.** Hands along a bar and knees over the floor move while they carry. They count while slower
-  than 0.25 m/s.
-* **Fast and short.** The filter spreads events over a tenth of a second: contacts of 0.1 s in a sprint,
-  and the single supports of a crouched run, are found with the right order but roughly; at 30 Hz of ACCAD
-  a frame is 33 ms.
-* **Lying and crawling low.** Limbs of the model are thinner than flesh, toes are not recorded and the
-  recorded floor drifts by up to 0.1 m. Hands, which move most, come out right; feet and elbows that roll
-  and drag do not. Of the trunk only the pelvis is reported: chest and head are not told apart.
+* **Fast and short.** The filter spreads events over a tenth of a second: two contacts of 0.1 s in sprints are
+  missed, and whether there is a flight of less than 0.06 s in a crouched run is told neither by the feet nor
+  by the acceleration of the centre of mass; at 30 Hz of ACCAD a frame is 33 ms.
+* **Small steps.** A foot that turns on the spot has a point that hardly moves, loaded or not; the tips of
+  toes that slide at 0.4 m/s may carry.
+* **Crawling low.** Limbs of the model are thinner than flesh, toes are not recorded and the recorded floor
+  drifts by up to 0.1 m. Hands and knees come out right; feet, which drag, do not. Of the trunk only the
+  pelvis is reported: chest and head are not told apart.
+
+The thresholds were chosen on these clips. What guards against choosing too well: the plates above, the walks
+and runs below, and recordings cut at random, in which supports shorter than 0.08 s at the cut were compared
+with those of the whole recording: 240 of 240 were part of one.
 
 ## Strips
 
@@ -149,7 +157,8 @@ NO_HANDS = """
 ## Where there are none
 
 Hands, knees, elbows and trunk support nobody in the recordings of walks and runs on free ground, {walks}
-of them: found were {found}.
+of them: found were {found}; recordings without a support of a foot: {missing}. In {unseen} other recordings
+that the rules were not made on, of walks, runs, a jump and a box: {unseen_found}, and {unseen_missing}.
 """
 THANKS = """
 ## Acknowledgements
@@ -194,16 +203,31 @@ def on_plates(folder: Path) -> Iterator[tuple[str, list[TimingError]]]:
             yield path.stem, list(errors)
 
 
-def free_ground(folder: Path) -> tuple[int, list[str]]:
-    """How many recordings of ``clips_locomotion.csv`` there are, and other supports than feet in them."""
-    with (folder / "clips_locomotion.csv").open(newline="") as rows:
-        files = sorted({row["file"] for row in csv.DictReader(rows)})
-    others = []
-    for file in files:
+def listed(folder: Path, table: str) -> set[str]:
+    """Files of a table."""
+    with (folder / table).open(newline="") as rows:
+        return {row["file"] for row in csv.DictReader(rows)}
+
+
+def unlisted(folder: Path, files: set[str]) -> set[str]:
+    """Recordings of skeletons that are not among these files."""
+    paths = [
+        *(folder / "mocap" / "cmu_asf_amc").glob("*.amc"),
+        *(folder / "mocap" / "accad_male1_bvh").glob("*.bvh"),
+    ]
+    found = {str(path.relative_to(folder / "mocap")) for path in paths}
+    return found - files
+
+
+def free_ground(folder: Path, files: set[str]) -> tuple[str, int]:
+    """Other supports than feet in recordings, and in how many of them there is none of a foot."""
+    others, missing = [], 0
+    for file in sorted(files):
         found = supports_of(reconstruct(read_recording(folder / "mocap" / file)))
-        names = {one.effector for one in found.supports} - {"left_foot", "right_foot"}
-        others += [f"{name} in {Path(file).stem}" for name in sorted(names)]
-    return len(files), others
+        names = {one.effector for one in found.supports}
+        others += [f"{name} in {Path(file).stem}" for name in sorted(names - {"left_foot", "right_foot"})]
+        missing += not names
+    return ", ".join(others) or "none", missing
 
 
 def milliseconds(errors: Sequence[TimingError], event: str) -> list[float]:
@@ -285,11 +309,15 @@ def main() -> None:
     verdicts = [ERRORS[clip.name] for clip in found]
     right = sum(verdict.startswith("none seen") for verdict in verdicts)
     doubtful = sum("doubtful" in verdict or "cannot be told" in verdict for verdict in verdicts)
-    walks, others = free_ground(folder)
+    walks = listed(folder, "clips_locomotion.csv")
+    unseen = unlisted(folder, walks | listed(folder, "clips_cluttered.csv"))
+    others, missing = free_ground(folder, walks)
+    unseen_others, unseen_missing = free_ground(folder, unseen)
     numbers = {
         "named": ", ".join(f"`{name}`" for name in NAMED), "count": len(found), "right": right,
-        "doubtful": doubtful, "others": len(found) - right - doubtful, "walks": walks,
-        "found": ", ".join(others) or "none",
+        "doubtful": doubtful, "others": len(found) - right - doubtful, "walks": len(walks),
+        "found": others, "missing": missing, "unseen": len(unseen), "unseen_found": unseen_others,
+        "unseen_missing": unseen_missing,
         "down": median(milliseconds(named, "touch-down")), "up": median(milliseconds(named, "lift-off")),
         "all_down": median(milliseconds(every, "touch-down")),
         "all_up": median(milliseconds(every, "lift-off")),

@@ -29,10 +29,11 @@ def standing(seconds):
     return np.tile(BODY.standing_posture(), (round(seconds * RATE) + 1, 1))
 
 
-def passing(speed, begin, end):
+def passing(speed, begin, end, slide=0.0):
     """Who glides along x for three seconds, the left arm raised, and holds a rail between two instants.
 
-    Before and after, the hand goes along with the body, from a place ahead of it to one behind it.
+    Before and after, the hand goes along with the body, from a place ahead of it to one behind it. In the
+    middle of its hold it slides outward along the rail, within 0.4 s.
     """
     standing_q = standing(3.0)
     time = np.arange(len(standing_q)) / RATE
@@ -40,6 +41,8 @@ def passing(speed, begin, end):
     places = effector_places(BODY, standing_q, names).transpose(1, 0, 2).copy()
     places[:, 5, 2] += 0.35
     places[:, 5, 0] += 0.5 * speed * (end - begin) - speed * np.clip(time - begin, 0.0, end - begin) + 0.3
+    sliding = np.clip((time - 0.5 * (begin + end)) / 0.4 + 0.5, 0.0, 1.0)
+    places[:, 5, 1] += slide * (0.5 - 0.5 * np.cos(np.pi * sliding))
     places[:, :, 0] += speed * time[:, None]
     segments = (*names[:5], "left_hand")
     targets = Targets(names, segments, np.zeros((6, 3)), places, np.ones(6))
@@ -107,6 +110,12 @@ def test_a_hand_on_a_rail_supports_while_the_body_moves_past_it():
     assert np.linalg.norm(one.last_contact - one.first_contact) < 0.1
 
 
+def test_a_hand_that_slides_along_its_rail_holds_on_to_it():
+    (one,) = supports_of(passing(0.4, 0.8, 2.2, 0.1)).of("left_hand")
+    assert one.start == pytest.approx(0.8, abs=0.1)
+    assert one.end == pytest.approx(2.2, abs=0.1)
+
+
 def test_a_hand_that_is_carried_along_supports_nothing():
     assert supports_of(passing(0.4, 1.0, 1.0)).of("left_hand") == ()
 
@@ -142,6 +151,37 @@ def test_knees_of_who_crawls_carry_and_nobody_sits(crawl):
     for name in ("left_knee", "right_knee"):
         assert 4 <= len([one for one in crawl.of(name) if one.duration > 0.4]) <= 9
     assert all(phase.effectors or phase.duration < 0.2 for phase in crawl.phases)
+
+
+def test_knees_of_who_crawls_slide_without_being_lifted(crawl):
+    # From when the first knee is drawn up, at 1.3 s, until he lies down, each carries once a cycle.
+    knees = [one for name in ("left_knee", "right_knee") for one in crawl.of(name) if 1.5 < one.start < 8.3]
+    knees.sort(key=lambda one: one.start)
+    assert len(knees) == 7
+    assert all(one.effector != other.effector for one, other in pairwise(knees))
+    assert all(one.end > other.start - 0.05 for one, other in pairwise(knees))
+
+
+@pytest.mark.parametrize(
+    ("name", "held"),
+    [
+        ("01_09_f3900-4242.amc", {"left_hand": 1.4, "right_hand": 1.4}),
+        ("01_13_f140-760.amc", {"left_hand": 4.1, "right_hand": 1.1}),
+    ],
+)
+def test_hands_that_slide_along_a_bar_hold_it_until_the_body_is_below(recordings_folder, name, held):
+    # Until then the palms, side by side, are within 5 cm of the height of the bar.
+    found = clip(recordings_folder, name)
+    for hand, instant in held.items():
+        assert any(one.start < instant - 0.4 and one.end > instant for one in found.of(hand))
+
+
+def test_who_kneels_down_slides_on_the_knees(recordings_folder):
+    found = clip(recordings_folder, "Male1_A8_CrouchToLie.bvh")
+    for name in ("left_knee", "right_knee"):
+        (one,) = found.of(name)
+        assert 3.2 < one.start < 3.6
+        assert not one.end_seen
 
 
 def test_who_lies_lies_on_the_trunk_with_hands_and_knees_on_the_floor(recordings_folder):

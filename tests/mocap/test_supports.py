@@ -12,7 +12,9 @@ from manikin.errors import InputError
 from manikin.mocap import ForcePlate, Reconstruction, Targets, read_recording, reconstruct
 from manikin.mocap.plate_supports import plate_loads, timing_errors
 from manikin.mocap.recorded_supports import RecordedSupports, Support, SupportPhase
+from manikin.mocap.support_levels import slowest_speed, track
 from manikin.mocap.supports import supports_of, supports_of_points
+from manikin.spatial import GRAVITY
 
 STAND, SWING = 0.5, 0.45
 TOES = np.array([0.25, 0.0, 0.0])
@@ -138,6 +140,68 @@ def test_a_foot_held_still_in_the_air_supports_nothing():
     assert found.phases[-1].effectors == ("right_foot",)
 
 
+def turning(share, seconds=0.6, rate=100.0):
+    """A foot that rises by 60 degrees within a time, about the point at a share of its sole, and stays so."""
+    time = np.arange(round(2.5 * rate) + 1) / rate
+    angle = np.deg2rad(60.0) * (0.5 - 0.5 * np.cos(np.pi * np.clip((time - 0.8) / seconds, 0.0, 1.0)))
+    along = np.stack([np.cos(angle), np.zeros_like(angle), -np.sin(angle)], axis=1) * np.linalg.norm(TOES)
+    pivot = np.array([0.0, 0.1, 0.0]) + share * TOES
+    return pivot - share * along, pivot + (1.0 - share) * along
+
+
+def test_a_foot_that_rises_to_its_ball_has_not_left_the_ground():
+    # Our sole is rigid and not quite where the person's is: toes and heel move, up and down, by 12 cm.
+    feet = {"left_foot": turning(0.5), "right_foot": (np.zeros((251, 3)), np.tile(TOES, (251, 1)))}
+    (one,) = supports_of_points(feet, 100.0).of("left_foot")
+    assert not one.start_seen
+    assert not one.end_seen
+
+
+def test_a_floor_that_drifts_is_one_surface():
+    soles, events = walk(100.0, 0.6, 0.018)
+    found = supports_of_points(soles, 100.0)
+    assert len(found.surfaces) == 1
+    assert all(len(found.of(name)) == len(swings) + 1 for name, swings in events.items())
+
+
+def test_a_support_that_the_recording_cuts_may_be_shorter_than_a_whole_one():
+    rate = 100.0
+    soles, events = walk(rate, 0.6, 0.0)
+    frames = round((events["right_foot"][1][1] + 0.06) * rate)
+    found = supports_of_points({n: (h[:frames], t[:frames]) for n, (h, t) in soles.items()}, rate)
+    last = found.of("right_foot")[-1]
+    assert not last.end_seen
+    assert last.start == pytest.approx(events["right_foot"][1][1], abs=0.06)
+
+
+def test_feet_of_a_run_that_the_filter_never_lets_rest_are_found():
+    # Stances of 0.08 s between swings of 3.2 m within 0.5 s, in a sprint.
+    rate, period, stance = 120.0, 0.58, 0.08
+    time = np.arange(round(2.2 * rate)) / rate
+    feet, downs = {}, {}
+    for name, shift in (("left_foot", 0.0), ("right_foot", 0.5 * period)):
+        cycle, phase = np.divmod(time + shift, period)
+        share = np.clip((phase - stance) / (period - stance), 0.0, 1.0)
+        heel = np.zeros((len(time), 3))
+        heel[:, 0] = 3.2 * (cycle + 0.5 - 0.5 * np.cos(np.pi * share))
+        heel[:, 2] = 0.4 * np.sin(np.pi * share) ** 2
+        feet[name] = (heel, heel + TOES)
+        downs[name] = [down for down in np.arange(1, 5) * period - shift if down < time[-1] - stance]
+    found = supports_of_points(feet, rate)
+    for name, instants in downs.items():
+        starts = [one.start for one in found.of(name) if one.start_seen]
+        assert starts[: len(instants)] == pytest.approx(instants, abs=0.06)
+
+
+@pytest.mark.parametrize(("share", "slowest"), [(0.3, 0.0), (1.0, 0.0), (2.0, 0.25)])
+def test_the_slowest_point_of_a_sole_is_nearest_to_what_it_turns_about(share, slowest):
+    # At 1 rad/s, about a point on the sole or one sole's length, 0.25 m, before its toes.
+    time = np.arange(200) / 100.0
+    along = np.stack([np.cos(time), np.zeros(200), -np.sin(time)], axis=1) * np.linalg.norm(TOES)
+    heel, toes = (track(way * along, 100.0) for way in (-share, 1.0 - share))
+    assert slowest_speed(heel, toes)[50:150] == pytest.approx(slowest, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("count", "cutoff", "told"),
     [(3, 5.0, "valid: at least 4"), (50, 60.0, "valid: above 0, below half the rate")],
@@ -259,6 +323,28 @@ def test_who_stands_does_not_sit():
     assert [one.effector for one in supports_of(standing).supports] == ["left_foot", "right_foot"]
 
 
+def test_nothing_carries_who_is_in_the_air():
+    # From a box of 0.5 m down to the floor, and up to where the soles turn round at the height of the box.
+    body, rate, box = human(1.75, 75.0), 100.0, 0.5
+    fall = np.sqrt(2.0 * box / GRAVITY)
+    time = np.arange(round((0.5 + fall + 0.6 + 2.0 * fall + 0.5) * rate)) / rate
+    jump = 0.5 + fall + 0.6
+    since = np.clip(time - jump, 0.0, 2.0 * fall)
+    height = np.clip(box - 0.5 * GRAVITY * np.clip(time - 0.5, 0.0, None) ** 2, 0.0, None)
+    height += GRAVITY * fall * since - 0.5 * GRAVITY * since**2
+    q = np.tile(body.standing_posture(), (len(time), 1))
+    q[:, 2] += height
+    targets = Targets(("pelvis",), ("pelvis",), np.zeros((1, 3)), q[:, None, :3], np.ones(1))
+    found = supports_of(Reconstruction(body, time, q, targets, np.zeros((len(time), 1))))
+    assert len(found.surfaces) == 2
+    for name in ("left_foot", "right_foot"):
+        assert [(one.start_seen, one.end_seen) for one in found.of(name)] == [
+            (False, True), (True, True), (True, False)
+        ]  # fmt: skip
+    free = [phase for phase in found.phases if not phase.effectors]
+    assert [phase.duration for phase in free] == pytest.approx([fall, 2.0 * fall], abs=0.12)
+
+
 def test_recorded_seat_off_is_when_the_feet_carry_the_weight(recordings_folder):
     path = next(recordings_folder.rglob("STS1.trc"), None)
     if path is None:
@@ -285,3 +371,50 @@ def test_steps_of_a_recorded_stair_are_found(recordings_folder):
     assert np.diff(found.surfaces) == pytest.approx([0.21, 0.21, 0.21], abs=0.03)
     assert all(phase.effectors or phase.duration < 0.05 for phase in found.phases)
     assert all(one != other for one, other in pairwise(found.sequence))
+
+
+@pytest.mark.parametrize("name", ["Male1_A7_Crouch.bvh", "Male1_B25_CrouchToWalk.bvh"])
+def test_who_rises_to_the_balls_of_the_feet_stays_on_them(recordings_folder, name):
+    path = recordings_folder / "accad_male1_bvh" / name
+    if not path.exists():
+        pytest.skip("the clip of somebody who crouches is not there")
+    found = supports_of(reconstruct(read_recording(path).cut(0, 75)))
+    assert found.sequence == ()
+    assert len(found.surfaces) == 1
+
+
+def test_feet_of_a_recorded_run_go_in_turn(recordings_folder):
+    path = recordings_folder / "cmu_asf_amc" / "16_45.amc"
+    if not path.exists():
+        pytest.skip("the clip of a run is not there")
+    found = supports_of(reconstruct(read_recording(path)))
+    assert [one.effector for one in found.supports] == ["right_foot", "left_foot", "right_foot"]
+    assert all(0.1 < one.duration < 0.3 for one in found.supports)
+    assert all(before.end < after.start for before, after in pairwise(found.supports))
+
+
+def test_a_step_of_who_ducks_in_running_is_not_a_shift(recordings_folder):
+    path = recordings_folder / "cmu_asf_amc" / "127_32.amc"
+    if not path.exists():
+        pytest.skip("the clip of a run with a duck is not there")
+    found = supports_of(reconstruct(read_recording(path)))
+    # All of the left sole moves at 1.5 m/s at 1.83 s; the centre of mass falls at 0.6 g before.
+    assert not [one for one in found.of("left_foot") if one.start < 1.83 < one.end]
+    assert [one.effector for one in found.supports if one.start > 0.5 and one.start < 2.0] == [
+        "right_foot", "left_foot", "right_foot", "left_foot", "right_foot", "left_foot"
+    ]  # fmt: skip
+
+
+def test_a_jump_has_no_support_where_it_is_highest(recordings_folder):
+    path = next(recordings_folder.rglob("DJ1.trc"), None)
+    if path is None:
+        pytest.skip("the drop jump is not there")
+    recording = read_recording(path)
+    found = supports_of(reconstruct(recording), start=recording.start)
+    loads = [plate_loads(plate) for plate in recording.plates]
+    off = max(load.end for each in loads for load in each if load.end_seen)
+    carried = [np.interp(recording.time, plate.time, plate.force[:, 2]) for plate in recording.plates]
+    again = recording.time[(recording.time > off + 0.1) & (np.sum(carried, axis=0) > 20.0)][0]
+    assert again - off > 0.3
+    # Less what the low-pass spreads events over.
+    assert not [one for one in found.supports if off + 0.05 < one.start < again - 0.05]

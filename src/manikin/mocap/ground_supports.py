@@ -23,6 +23,9 @@ ROLLS = 0.20
 LEAVES = 0.25
 """Speed above which it may leave [m/s]."""
 
+SLIDE_WAY = 0.15
+"""Longest way along which they slide between two rests, in contrast to a swing [m]."""
+
 LOW = 0.13
 """Height above the ground within which a knee or an elbow comes to rest on it [m]."""
 
@@ -83,5 +86,5 @@ def stays(one: Track) -> list[tuple[int, int]]:
 
 def slow_and_leaving(one: Track) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(n,) whether a point is slow enough to stay, and fast enough to leave, other than a foot may roll."""
-    slow, fast = one.slow_and_fast()
+    slow, fast = one.slow_and_fast(ROLLS, SLIDE_WAY)
     return slow | (one.speed < ROLLS), fast & (one.speed > LEAVES)

@@ -30,6 +30,9 @@ PASSED = 0.12
 STAYS = 0.45
 """Share of the shoulder's way within which a hand that holds something stays."""
 
+SLIDES = 0.40
+"""Median speed up to which a hand holds on to something, sliding along it; else it swings [m/s]."""
+
 BESIDE = 0.30
 """Distance of a palm from the nearest hip or knee up to which it rests on the own body, or hangs [m]."""
 
@@ -78,7 +81,8 @@ def hand_supports(
             own, way = (float(np.linalg.norm(np.ptp(p.positions[during], axis=0))) for p in (hand, shoulder))
             on_ground = float(np.median(hand.positions[during, 2] - floor[during])) < AWAY
             apart = float(np.median(beside[during])) > BESIDE or _on_seat(one, seats)
-            held = one.duration > SHORTEST_HOLD and way > PASSED and own < STAYS * way and apart
+            slow = float(np.median(hand.speed[during])) < SLIDES
+            held = one.duration > SHORTEST_HOLD and way > PASSED and own < STAYS * way and slow and apart
             if on_ground or held:
                 supports.append(one)
     return tuple(supports)

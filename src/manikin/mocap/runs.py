@@ -28,15 +28,24 @@ def switch(closes: NDArray[np.bool_], opens: NDArray[np.bool_]) -> NDArray[np.bo
     return states
 
 
-def lasting(holds: NDArray[np.bool_], shortest: float) -> list[tuple[int, int]]:
+def lasting(
+    holds: NDArray[np.bool_], shortest: float, shortest_cut: float | None = None
+) -> list[tuple[int, int]]:
     """Runs of at least ``shortest`` frames, interruptions of less ignored.
 
     Args:
         holds: (n,) whether it holds in each frame.
         shortest: Frames; what is missing before the first frame and behind the last is no interruption.
+        shortest_cut: Frames of a run that begins with the first frame or ends with the last, of which a
+            part is missing; as many as of any other if None.
     """
     held, last = holds.copy(), len(holds)
     for first, stop in runs(~holds):
         if stop - first < shortest and first > 0 and stop < last:
             held[first:stop] = True
-    return [(first, stop) for first, stop in runs(held) if stop - first >= shortest]
+    cut = shortest if shortest_cut is None else shortest_cut
+    return [
+        (first, stop)
+        for first, stop in runs(held)
+        if stop - first >= (cut if first == 0 or stop == last else shortest)
+    ]

@@ -1,11 +1,12 @@
 """What supports a recorded person, when and at which height: here the feet, and all others with them.
 
-A foot supports while its heel or its toes do. Each of the two points is followed by a switch with
-hysteresis: it closes where the point is slow and near a surface, and opens where it is fast or away from
-it. Speeds are compared with the highest one of the swing, for the low-pass filter turns the stop of a
-fast foot into a slope that is as high as the foot was fast. Surfaces are found from the recording itself
-(:mod:`manikin.mocap.support_levels`), so stairs need no description. Others:
+A foot supports while its heel or its toes do, or, with the heel raised, the ball that it turns about. Each of
+these points is followed by a switch with hysteresis: it closes where the point is slow and near a surface,
+and opens where it is fast or away from it. Speeds are compared with the highest one of the swing, for the
+low-pass filter turns the stop of a fast foot into a slope that is as high as the foot was fast. Surfaces are
+found from the recording itself (:mod:`manikin.mocap.support_levels`), so stairs need no description. Others:
 :mod:`manikin.mocap.seat_supports`, :mod:`manikin.mocap.ground_supports`, :mod:`manikin.mocap.hand_supports`.
+Nobody is supported who falls freely (:mod:`manikin.mocap.free_fall`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,20 +17,28 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.errors import InputError
+from manikin.mocap.free_fall import while_carried
 from manikin.mocap.ground_supports import ground_supports
 from manikin.mocap.hand_supports import hand_supports
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_supports import RecordedSupports, Support
-from manikin.mocap.runs import lasting, switch
+from manikin.mocap.runs import lasting, runs, switch
 from manikin.mocap.seat_supports import lying, seat_supports
 from manikin.mocap.support_levels import (
+    BALL,
     CUTOFF,
     LEVELS_APART,
+    RAISED,
+    SHIFT_SPEED,
     STEEP,
+    Surface,
     Track,
+    ball_of,
+    heel_rise,
+    slowest_speed,
     sole_height,
     sole_rise,
-    surface_heights,
+    surfaces_under,
     track,
 )
 from manikin.spatial import FloatArray
@@ -45,8 +54,14 @@ AWAY = 0.10
 NEAR_LYING, AWAY_LYING = 0.13, 0.18
 """The same where a person crawls or lies, whose feet lean on the ground with any side [m]."""
 
+MOVES = 0.25
+"""Speed of the slowest point of a sole above which the foot is on its way [m/s]."""
+
 SHORTEST = 0.08
 """Shorter supports, and shorter interruptions of one, are not told from noise [s]."""
+
+SHORTEST_CUT = 0.04
+"""The same of a support that the recording cuts, of which a part is missing [s]."""
 
 
 def supports_of(found: Reconstruction, *, start: float = 0.0, cutoff: float = CUTOFF) -> RecordedSupports:
@@ -71,7 +86,7 @@ def supports_of(found: Reconstruction, *, start: float = 0.0, cutoff: float = CU
         *ground_supports(found, floor, rate, start=begin, cutoff=cutoff),
         *hand_supports(found, floor, seats, rate, start=begin, cutoff=cutoff),
     )
-    every = (*feet.supports, *others)
+    every = while_carried((*feet.supports, *others), found, rate, start=begin, cutoff=cutoff)
     return replace(feet, supports=tuple(sorted(every, key=lambda one: (one.start, one.effector))))
 
 
@@ -96,21 +111,27 @@ def supports_of_points(
     }
     frames = min(len(one.speed) for both in tracks.values() for one in both)
     flat = {name: heel.resting & toes.resting for name, (heel, toes) in tracks.items()}
-    surfaces = surface_heights(list(tracks.values()), lying)
-    levels = np.array(surfaces)
+    surfaces = surfaces_under(list(tracks.values()), lying)
+    levels = np.array([level for surface in surfaces for level in surface.levels])
     down = np.zeros(frames, dtype=bool) if lying is None else lying
     near, away = np.where(down, NEAR_LYING, NEAR), np.where(down, AWAY_LYING, AWAY)
     supports: list[Support] = []
     for name, both in tracks.items():
-        offsets = _offsets(both, flat[name] & ~_others(flat, name), levels)
+        offsets = _offsets(both, flat[name] & ~_others(flat, name), levels, down)
         if offsets is None:
-            offsets = _offsets(both, flat[name], levels) or (0.0, 0.0)
+            offsets = _offsets(both, flat[name], levels, down) or (0.0, 0.0)
         heel, toes = (one.positions[:, 2] - offset for one, offset in zip(both, offsets, strict=True))
-        above = [_height_above(heel, levels), _toes_above(both, toes, levels)]
-        touching = [_touching(one, height, near, away) for one, height in zip(both, above, strict=True)]
-        supports += _supports(name, both, np.array(touching), levels, start)
+        points = (*both, ball_of(*both))
+        above = (
+            _height_above(heel, levels),
+            _toes_above(both, toes, levels, down),
+            _ball_above(both, (1.0 - BALL) * heel + BALL * toes, levels),
+        )
+        touching = [_touching(one, height, near, away) for one, height in zip(points, above, strict=True)]
+        supports += _supports(name, points, np.array(touching) & ~_steps(both, touching), surfaces, start)
     supports.sort(key=lambda support: (support.start, support.effector))
-    return RecordedSupports(tuple(supports), start, start + (frames - 1) / rate, surfaces)
+    heights = tuple(surface.height for surface in surfaces)
+    return RecordedSupports(tuple(supports), start, start + (frames - 1) / rate, heights)
 
 
 def sole_points(found: Reconstruction) -> dict[str, tuple[FloatArray, FloatArray]]:
@@ -153,14 +174,14 @@ def _others(flat: Mapping[str, NDArray[np.bool_]], name: str) -> NDArray[np.bool
 
 
 def _offsets(
-    points: tuple[Track, Track], stands: NDArray[np.bool_], levels: FloatArray
+    points: tuple[Track, Track], stands: NDArray[np.bool_], levels: FloatArray, lying: NDArray[np.bool_]
 ) -> tuple[float, float] | None:
     """Heights of heel and toes above the surface where the foot stands: the errors of a model's sole [m].
 
     They are learnt best while the other foot moves: with both on the ground a person may be on the toes.
     None where the foot never stands so.
     """
-    height = sole_height(*points)
+    height = sole_height(*points, lying)
     above = _height_above(height, levels)
     stands = stands & (np.abs(above) < LEVELS_APART) & (sole_rise(*points) < STEEP)
     if not stands.any():
@@ -178,11 +199,22 @@ def _height_above(heights: FloatArray, levels: FloatArray) -> FloatArray:
     return np.take_along_axis(above, np.argmin(np.abs(above), axis=1)[:, None], axis=1)[:, 0]
 
 
-def _toes_above(points: tuple[Track, Track], toes: FloatArray, levels: FloatArray) -> FloatArray:
+def _toes_above(
+    points: tuple[Track, Track], toes: FloatArray, levels: FloatArray, lying: NDArray[np.bool_]
+) -> FloatArray:
     """(n,) of the toes from the nearest level, or of what a steep sole stands on where that is nearer [m]."""
     above = _height_above(toes, levels)
-    ball = np.where(sole_rise(*points) > STEEP, _height_above(sole_height(*points), levels), np.inf)
+    stands = _height_above(sole_height(*points, lying), levels)
+    ball = np.where(sole_rise(*points) > STEEP, stands, np.inf)
     return np.where(np.abs(ball) < np.abs(above), ball, above)
+
+
+def _ball_above(points: tuple[Track, Track], ball: FloatArray, levels: FloatArray) -> FloatArray:
+    """(n,) of the ball from the nearest level [m]; infinite while the heel is down and tells by itself.
+
+    A foot that turns on the spot moves both ends beside a ball that stays, though it is lifted.
+    """
+    return np.where(heel_rise(*points) > RAISED, _height_above(ball, levels), np.inf)
 
 
 def _touching(one: Track, height: FloatArray, near: FloatArray, away: FloatArray) -> NDArray[np.bool_]:
@@ -191,22 +223,37 @@ def _touching(one: Track, height: FloatArray, near: FloatArray, away: FloatArray
     return switch(slow & (height > -away) & (height < near), fast | (np.abs(height) > away))
 
 
+def _steps(points: tuple[Track, Track], touching: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """(n,) whether a foot that seems to touch steps: even the slowest point of its sole is too fast to shift.
+
+    A small step after a fast swing is slow beside that, if the foot was down for too short to come to rest.
+    """
+    down, speed = np.logical_or.reduce(touching), slowest_speed(*points)
+    steps = np.zeros(len(speed), dtype=bool)
+    for first, stop in runs(speed > MOVES):
+        inside = first > 0 and stop < len(speed) and down[first - 1 : stop + 1].all()
+        if inside and speed[first:stop].max() > SHIFT_SPEED:
+            steps[first:stop] = True
+    return steps
+
+
 def _supports(
-    name: str, points: tuple[Track, ...], touching: NDArray[np.bool_], levels: FloatArray, start: float
-) -> list[Support]:
+    name: str, points: tuple[Track, ...], touching: NDArray[np.bool_],
+    surfaces: Sequence[Surface], start: float,
+) -> list[Support]:  # fmt: skip
     """Runs in which any of the points touches, without those that are too short to tell.
 
     Args:
         name: The foot.
-        points: Heel and toes.
-        touching: (2, n) which of them touches.
-        levels: (k,) heights of the surfaces [m].
+        points: Heel, toes and ball.
+        touching: (3, n) which of them touches.
+        surfaces: Those found.
         start: Instant of the first frame [s].
     """
     rate, last, found = points[0].rate, touching.shape[1] - 1, []
-    for first, stop in lasting(np.logical_or(*touching), SHORTEST * rate):
-        place = np.median(np.mean([point.positions[first:stop] for point in points], axis=0), axis=0)
-        place[2] = levels[np.argmin(np.abs(levels - place[2]))]
+    for first, stop in lasting(np.logical_or.reduce(touching), SHORTEST * rate, SHORTEST_CUT * rate):
+        place = np.median(np.mean([point.positions[first:stop] for point in points[:2]], axis=0), axis=0)
+        place[2] = _surface_at(float(place[2]), surfaces).height
         begins, ends = (points[int(np.argmax(touching[:, frame]))] for frame in (first, stop - 1))
         found.append(
             Support(
@@ -215,3 +262,8 @@ def _supports(
             )
         )  # fmt: skip
     return found
+
+
+def _surface_at(height: float, surfaces: Sequence[Surface]) -> Surface:
+    """That one of them with the nearest level."""
+    return min(surfaces, key=lambda surface: min(abs(level - height) for level in surface.levels))
