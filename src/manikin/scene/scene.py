@@ -122,7 +122,7 @@ class Scene:
         """
         aligned = self._aligned(contact, _ALIGNED if max_angle is None else float(np.cos(max_angle)))
         points = contact.points_in_world
-        worst = [_misfit(surface, points) for surface in aligned]
+        worst = [_misfit(surface, points, tolerance) for surface in aligned]
         if worst and min(worst) <= tolerance:
             return aligned[int(np.argmin(worst))]
         raise ContactError(self._off_surface(contact, aligned, tolerance))
@@ -232,9 +232,13 @@ class Scene:
         )
 
 
-def _misfit(surface: Surface, points: FloatArray) -> float:
-    """Larger of the worst height and the worst overhang of the points [m]."""
-    return float(max(np.abs(surface.height(points)).max(), surface.outside(points).max()))
+def _misfit(surface: Surface, points: FloatArray, tolerance: float) -> float:
+    """Larger of the worst height and the worst overhang of the points [m].
+
+    The height alone where it already exceeds ``tolerance`` [m]: the overhang takes longer.
+    """
+    height = float(np.abs(surface.height(points)).max())
+    return height if height > tolerance else max(height, float(surface.outside(points).max()))
 
 
 def _shape_values(item: Obstacle) -> list[FloatArray]:
