@@ -220,7 +220,7 @@ class Scene:
             facing = np.round(contact.normal, 3).tolist()
             return f"{where} lies on no surface: none faces its normal {facing}; {remedy}"
         points = contact.points_in_world
-        nearest = min(aligned, key=lambda surface: _misfit(surface, points))
+        nearest = min(aligned, key=lambda surface: _misfit(surface, points, np.inf))
         height = nearest.height(points)
         over = float(nearest.outside(points).max())
         worst = float(height[np.argmax(np.abs(height))])
