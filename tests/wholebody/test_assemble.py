@@ -110,7 +110,7 @@ def test_the_same_seed_gives_the_same_bits(step_motion, person, flat_ground, ste
 
 def test_a_motion_that_breaks_its_requirement_is_a_failure_that_says_so(person, flat_ground, step_com):
     # Coarse, because what cannot be is tried in several ways.
-    coarse = WholeBodySettings(guide_spacing=0.3, knot_spacing=0.1)
+    coarse = WholeBodySettings(guide_spacing=0.3, knot_spacing=0.1, manner=CLOSE)
     strict = replace(coarse, requirements=WholeBodyRequirements(com_error=1e-9))
     result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0), settings=strict)
     assert not result.succeeded
