@@ -17,6 +17,24 @@ from manikin.motion.file import MotionFile
 FEET = ("left_foot", "right_foot")
 
 
+APART = frozenset({
+    "tests/centroidal/test_walls.py", "tests/pipeline/test_beam.py", "tests/pipeline/test_contact_search.py",
+    "tests/pipeline/test_key_postures.py", "tests/pipeline/test_limb_contacts.py",
+    "tests/pipeline/test_pushed_moving.py", "tests/pipeline/test_run.py", "tests/pipeline/test_walked.py",
+    "tests/simulation/test_push_map_holds.py",
+})  # fmt: skip
+"""Modules of long tests that share no results, but for those with the same parameters."""
+
+
+def unit_of(nodeid):
+    """What a test is done together with by one worker: its module, or the tests with its parameters."""
+    module, _, test = nodeid.partition("::")
+    if module not in APART:
+        return module
+    name, bracket, parameters = test.partition("[")
+    return f"{module}[{parameters}" if bracket else f"{module}::{name}"
+
+
 def pytest_collection_modifyitems(items):
     """Modules with slow tests come first, so that no worker is left alone with a long one at the end.
 
@@ -24,6 +42,21 @@ def pytest_collection_modifyitems(items):
     """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Workers get one unit after the other, in the order of the tests; none is done twice or waits long."""
+    if config.option.dist not in {"load", "worksteal"}:
+        return None
+    from xdist.scheduler import LoadScopeScheduling
+
+    class UnitScheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            return unit_of(nodeid)
+
+    config.option.loadscopereorder = False
+    return UnitScheduling(config, log)
 
 
 def carried(scenario, body, schedule, time, offset=0.0):

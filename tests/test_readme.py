@@ -23,7 +23,7 @@ def marked_command(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "last"), [("run", "manikin run platform"), ("test", "python -m pytest -n 2 --dist worksteal")]
+    ("name", "last"), [("run", "manikin run platform"), ("test", "python -m pytest -n 2")]
 )
 def test_each_fresh_machine_command_is_one_line(name, last):
     (line,) = marked_command(name)

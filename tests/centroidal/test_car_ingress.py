@@ -24,6 +24,11 @@ def problem():
     return load_scenario("car-ingress").build_centroidal_problem()
 
 
+@pytest.fixture(scope="module")
+def planned(problem):
+    return plan_com(problem)
+
+
 def test_the_smallest_intersection_has_the_published_radius(problem):
     """32.63 N.m (7.2.2), to the width of 9 cm that was derived from it."""
     found = assess_feasibility(problem, polytopes_of(problem))
@@ -49,16 +54,15 @@ def test_the_published_motion_is_balanced_with_the_inputs_that_fit_it(problem):
     assert 25.5 < least[0] < 30.7
 
 
-def test_the_plan_reaches_the_published_margin_in_the_published_time(problem):
-    result = plan_com(problem)
-    assert result.succeeded, result.failure
-    assert result.d_min >= 19.4
-    assert result.trajectory.duration <= 4.56
-    assert np.all(result.trajectory.schedule.durations >= [0.15, 0.4, 0.1, 0.5, 0.6, 0.6])
+def test_the_plan_reaches_the_published_margin_in_the_published_time(planned):
+    assert planned.succeeded, planned.failure
+    assert planned.d_min >= 19.4
+    assert planned.trajectory.duration <= 4.56
+    assert np.all(planned.trajectory.schedule.durations >= [0.15, 0.4, 0.1, 0.5, 0.6, 0.6])
 
 
-def test_a_joined_trajectory_is_both_of_its_parts(problem):
-    first = plan_com(problem).trajectory
+def test_a_joined_trajectory_is_both_of_its_parts(problem, planned):
+    first = planned.trajectory
     end = first.duration
     second = plan_com(_problem_onward(problem, first)).trajectory
     joined = first.followed_by(second)

@@ -24,15 +24,20 @@ def head_clearance(name, result):
     return min(proximity.minimum(q, others).distance for q in result.executed.q[::4])
 
 
+@pytest.fixture(scope="module", params=RECORDED)
+def passage(request, tmp_path_factory):
+    """Name of a passage and its run, which its tests share."""
+    return request.param, run(request.param, out=tmp_path_factory.mktemp("runs") / request.param)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("name", list(RECORDED))
-def test_a_person_passes_under_the_beam(name):
+def test_a_person_passes_under_the_beam(passage):
     """Planned, certified and executed without a fall or an unplanned touch; head 2 cm clear of the beam.
 
     The CoM comes as low as people's, within 7 cm: 3 cm for what "about" and half way between squat
     and stoop leave open, 4 cm for a smooth path that must stay below its bound.
     """
-    result = run(name)
+    name, result = passage
     assert result.succeeded, result.summary["failure"]
     execution = result.summary["execution"]
     clearance = head_clearance(name, result)
@@ -56,13 +61,29 @@ def test_a_person_passes_between_two_beams_with_a_hand_on_a_post(name):
 
 
 @pytest.mark.slow
-def test_the_passage_between_two_beams_ends_on_the_seat():
+@pytest.mark.parametrize("passage", ["beam-H2C3"], indirect=True)
+def test_the_passage_between_two_beams_ends_on_the_seat(passage):
     """At the end the seat carries most of the weight, and the person rests."""
-    result = run("beam-H2C3")
+    _, result = passage
     names, executed = list(result.executed.contact_names), result.executed
     assert executed.contact_force[-1, names.index("buttocks"), 2] > 0.5 * 79.0 * 9.81
     assert np.abs(executed.v[-1]).max() < 0.1
     assert result.execution.touches == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("passage", ["beam-H1C1@S2"], indirect=True)
+def test_the_passage_under_a_beam_runs_again_through_its_key_frames(passage, tmp_path):
+    """The example of [Qiu2012]_ 5.3.3, 9 key frames with a left-hand grasp, on our own recording."""
+    _, recorded = passage
+    file = tmp_path / "again.yaml"
+    recording = f"planning: {{method: keyframes, recording: {recorded.directory}}}"
+    file.write_text(f"extends: beam-H1C1@S2\nname: again\n{recording}\n")
+    result = run(file)
+    assert result.succeeded, result.summary["failure"]
+    assert len(result.centroidal.key_instants) == 9
+    assert result.summary["centroidal"]["min_margin"] > 15.0
+    assert result.summary["execution"]["min_margin"] > 0.0
 
 
 @pytest.mark.parametrize("name", ["beam-H1C1", "beam-H2C1", "beam-H3C1", "beam-H2C2", "beam-H2C3"])

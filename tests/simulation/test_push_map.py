@@ -172,7 +172,7 @@ def test_the_result_does_not_depend_on_the_number_of_jobs():
 
 def test_processes_end_when_nobody_waits_for_them():
     before = set(multiprocessing.active_children())
-    searches = [DirectionSearch(TRIALS, direction, 20.0) for direction in (0.0, 90.0, 180.0, 270.0)]
+    searches = [DirectionSearch(TRIALS, direction, 60.0) for direction in (0.0, 90.0, 180.0, 270.0)]
     with closing(search_directions(searches, jobs=2)) as found:
         next(found)
     # Not joined: the pool's own thread joins them, and one of two that join at a time misses the end.

@@ -354,7 +354,7 @@ def test_both_experiments_stand_with_the_delay_on_ankles_that_hold():
         arms = found.turned("arms")  # positive the way of the fall: backward arms in 1, forward and up in 2
         assert arms[np.argmax(np.abs(arms))] > 5.0
     assert np.degrees(angle(back, "waist_flexion")).max() > 30.0
-    leans = [trunk_lean(KUDOH, joint_groups(KUDOH), q) for q in back.trace.motion.q]
+    leans = [trunk_lean(Configuration(KUDOH, q), joint_groups(KUDOH)) for q in back.trace.motion.q]
     assert np.degrees(max(leans)) > 60.0
     assert np.degrees(angle(front, "left_shoulder_flexion")).max() > 60.0
 

@@ -21,6 +21,7 @@ from manikin.wholebody import (
 from manikin.wholebody.failure import WholeBodyFailure
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.knots import CLOSEST_KNOTS, phase_knots, refined, sample_times
+from manikin.wholebody.manner import CLOSE
 from manikin.wholebody.reweigh import reweighed
 
 
@@ -108,7 +109,9 @@ def test_the_same_seed_gives_the_same_bits(step_motion, person, flat_ground, ste
 
 
 def test_a_motion_that_breaks_its_requirement_is_a_failure_that_says_so(person, flat_ground, step_com):
-    strict = replace(WholeBodySettings(), requirements=WholeBodyRequirements(com_error=1e-9))
+    # Coarse, because what cannot be is tried in several ways.
+    coarse = WholeBodySettings(guide_spacing=0.3, knot_spacing=0.1, manner=CLOSE)
+    strict = replace(coarse, requirements=WholeBodyRequirements(com_error=1e-9))
     result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0), settings=strict)
     assert not result.succeeded
     assert "centre-of-mass error" in result.failure.reason
@@ -207,7 +210,9 @@ def test_a_step_found_by_the_bi_rrt_is_followed_like_any_other(person, flat_grou
 def test_a_ceiling_below_the_head_is_reported_with_its_pair(person, step_com):
     """No person of 1.75 m keeps the centre of mass at 0.93 m below a ceiling at 1.1 m."""
     scene = Scene([Obstacle("ceiling", Box((4.0, 4.0, 0.1)), translation=(0.0, 0.0, 1.15))])
-    result = plan_whole_body(person, scene, step_com, rng=np.random.default_rng(0))
+    # Coarse: what is impossible is tried in every way there is.
+    coarse = WholeBodySettings(guide_spacing=0.5, knot_spacing=0.15, manner=CLOSE)
+    result = plan_whole_body(person, scene, step_com, rng=np.random.default_rng(0), settings=coarse)
     assert not result.succeeded
     assert result.certificate.min_clearance_m < 0.01
     assert "ceiling" in str(result.certificate.closest_pair) or "error" in result.failure.reason

@@ -272,11 +272,11 @@ def test_clearance_of_a_flight_rises_and_falls(person):
 
 
 @pytest.mark.slow
-def test_a_long_climb_and_a_long_crouch(cases):
+@pytest.mark.parametrize(("name", "length"), [("climb", 8), ("crouch", 5)])
+def test_a_long_climb_and_a_long_crouch(cases, name, length):
     """The acceptance cases in full: eight moves on the wall, six steps under the slab."""
-    for case in (cases.climb(8), cases.crouch(5)):
-        result = refine_motion(*case)
-        assert result.succeeded, result.failure
-        assert result.after.squared_accelerations <= result.before.squared_accelerations / 5.0
-        assert result.after.physics_violation <= result.before.physics_violation / 10.0
-        assert result.after.min_margin > 0.0
+    result = refine_motion(*getattr(cases, name)(length))
+    assert result.succeeded, result.failure
+    assert result.after.squared_accelerations <= result.before.squared_accelerations / 5.0
+    assert result.after.physics_violation <= result.before.physics_violation / 10.0
+    assert result.after.min_margin > 0.0

@@ -1,6 +1,7 @@
 """One configuration of a body and what follows from it: frames, Jacobians, dynamics."""
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -25,10 +26,7 @@ class Configuration:
     def __init__(self, body: BodyModel, q: ArrayLike | None = None, v: ArrayLike | None = None) -> None:
         self.body = body
         model = body.pinocchio
-        # Separate data: Pinocchio's algorithms overwrite each other's intermediate results.
         self._frames = model.createData()
-        self._dynamics = model.createData()
-        self._second_order = model.createData()
         self._results: dict[Any, Any] = {}
         self._zero = np.zeros(body.nv)
         self.update(body.standing_posture() if q is None else q, v)
@@ -48,6 +46,16 @@ class Configuration:
         self._results.clear()
         pin.framesForwardKinematics(self.body.pinocchio, self._frames, self.q)
         return self
+
+    # Separate data, because Pinocchio's algorithms overwrite each other's intermediate results; made only
+    # when needed, because making them takes longer than placing the frames.
+    @cached_property
+    def _dynamics(self) -> pin.Data:
+        return self.body.pinocchio.createData()
+
+    @cached_property
+    def _second_order(self) -> pin.Data:
+        return self.body.pinocchio.createData()
 
     def _once(self, key: Any, compute: Callable[[], Any]) -> Any:
         try:

@@ -129,9 +129,12 @@ class _Builder:
         self.groups.append((group, column.numel()))
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=8)
 def transcribe(structure: Structure) -> Programme:
-    """Write and compile the programme of [Qiu2012]_ 5.4.1-5.4.2; cached by structure."""
+    """Write and compile the programme of [Qiu2012]_ 5.4.1-5.4.2.
+
+    Cached by structure; only the last few, because each keeps 20 to 40 MB.
+    """
     builder = _Builder(structure)
     mass = builder.parameter("mass", 1)
     for phase in range(structure.phases):

@@ -122,7 +122,7 @@ class Scene:
         """
         aligned = self._aligned(contact, _ALIGNED if max_angle is None else float(np.cos(max_angle)))
         points = contact.points_in_world
-        worst = [_misfit(surface, points) for surface in aligned]
+        worst = [_misfit(surface, points, tolerance) for surface in aligned]
         if worst and min(worst) <= tolerance:
             return aligned[int(np.argmin(worst))]
         raise ContactError(self._off_surface(contact, aligned, tolerance))
@@ -220,7 +220,7 @@ class Scene:
             facing = np.round(contact.normal, 3).tolist()
             return f"{where} lies on no surface: none faces its normal {facing}; {remedy}"
         points = contact.points_in_world
-        nearest = min(aligned, key=lambda surface: _misfit(surface, points))
+        nearest = min(aligned, key=lambda surface: _misfit(surface, points, np.inf))
         height = nearest.height(points)
         over = float(nearest.outside(points).max())
         worst = float(height[np.argmax(np.abs(height))])
@@ -232,9 +232,13 @@ class Scene:
         )
 
 
-def _misfit(surface: Surface, points: FloatArray) -> float:
-    """Larger of the worst height and the worst overhang of the points [m]."""
-    return float(max(np.abs(surface.height(points)).max(), surface.outside(points).max()))
+def _misfit(surface: Surface, points: FloatArray, tolerance: float) -> float:
+    """Larger of the worst height and the worst overhang of the points [m].
+
+    The height alone where it already exceeds ``tolerance`` [m]: the overhang takes longer.
+    """
+    height = float(np.abs(surface.height(points)).max())
+    return height if height > tolerance else max(height, float(surface.outside(points).max()))
 
 
 def _shape_values(item: Obstacle) -> list[FloatArray]:

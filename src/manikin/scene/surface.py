@@ -1,6 +1,7 @@
 """Planar faces of the scene that an effector can be put on."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import trimesh
@@ -31,12 +32,14 @@ class Surface:
     polygon: FloatArray
     normal: FloatArray
 
-    @property
+    @cached_property
     def rotation(self) -> FloatArray:
         """(3, 3) surface-to-world rotation with z along the normal."""
         across = np.cross(np.eye(3)[int(np.argmin(np.abs(self.normal)))], self.normal)
         across /= np.linalg.norm(across)
-        return np.column_stack([across, np.cross(self.normal, across), self.normal])
+        rotation = np.column_stack([across, np.cross(self.normal, across), self.normal])
+        rotation.setflags(write=False)
+        return rotation
 
     @property
     def area(self) -> float:

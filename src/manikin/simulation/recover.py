@@ -191,6 +191,7 @@ class _Run:
         self.world.plan_touches([(feet, obstacle.name) for obstacle in ground])
         self.recorder = RecoveryRecorder(body, self.controller)
         self.grounds = tuple(ground.names)
+        self.placed = Configuration(body)
         self.stepping = SteppingRecovery(
             body, self.controller, ground, replace(StepSettings(), most=task.steps)
         )  # fmt: skip
@@ -250,7 +251,7 @@ class _Run:
         felt = FeltPush.none(self.body.nv)
         if not acting:
             return felt
-        state = Configuration(self.body, q)
+        state = self.placed.update(q)
         wrench, generalised = np.zeros(6), np.zeros(self.body.nv)
         for push in acting:
             offset = self.body.segment(push.segment).com if push.point is None else push.point
@@ -264,7 +265,8 @@ class _Run:
         wanted = self.task.until_at_rest
         if wanted is None or time < self.disturbed_until:
             return False
-        if not at_rest(self.body, self.controller, state.q, state.com, state.momentum[:3] / state.mass):
+        velocity = state.momentum[:3] / state.mass
+        if not at_rest(self.placed, self.controller, state.q, state.com, velocity):
             self.rest_from = time + self.substeps * self.world.model.options.timestep
         return time - self.rest_from >= wanted - 1e-9
 
@@ -284,7 +286,7 @@ def _check_standing(controller: BalanceRecovery, q: FloatArray) -> None:
             f"the body does not stand: its centre of mass is over {np.round(place, 3).tolist()}, "
             "outside its soles; valid: a posture that stands on both feet"
         )
-    lean = trunk_lean(controller.body, controller.groups, q)
+    lean = trunk_lean(Configuration(controller.body, q), controller.groups)
     if lean > UPRIGHT:
         raise InputError(
             f"the body does not stand upright: its trunk leans by {math.degrees(lean):.0f} deg; "

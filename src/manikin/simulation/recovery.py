@@ -180,21 +180,20 @@ def judge(
     )
 
 
-def trunk_lean(body: BodyModel, groups: JointGroups, q: FloatArray) -> float:
+def trunk_lean(state: Configuration, groups: JointGroups) -> float:
     """Largest angle of a segment of the trunk, but the head, to the vertical [rad]."""
-    state = Configuration(body, q)
     names = [name for name in groups.segments["trunk"] if name not in ("head", "neck")]
     upright = min(float(state.segment_placement(name)[0][2, 2]) for name in names)
     return float(np.arccos(np.clip(upright, -1.0, 1.0)))
 
 
 def at_rest(
-    body: BodyModel, controller: BalanceRecovery, q: FloatArray, com: FloatArray, velocity: FloatArray
+    state: Configuration, controller: BalanceRecovery, q: FloatArray, com: FloatArray, velocity: FloatArray
 ) -> bool:
     """Whether a body stands at rest: high, upright and slow, its centre of mass over its soles.
 
     Args:
-        body: The body.
+        state: Of the body; it is moved to ``q`` where the trunk has to be looked at.
         controller: What keeps it.
         q: (nq,) configuration.
         com: (3,) centre of mass [m].
@@ -205,16 +204,16 @@ def at_rest(
         com[2] - height >= STANDS_HEIGHT * (controller.com[2] - height)
         and np.linalg.norm(velocity) <= STANDS_SPEED
         and controller.area.inside(com[:2]) > 0.0
-        and trunk_lean(body, controller.groups, q) <= STANDS_LEAN
+        and trunk_lean(state.update(q), controller.groups) <= STANDS_LEAN
     )
 
 
 def _rests_from(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -> float | None:
     """Time from which the body stands at rest to the end [s]; None if it does not."""
     samples = zip(trace.motion.time, trace.motion.q, trace.motion.com, trace.com_velocity, strict=True)
-    since = None
+    state, since = Configuration(body), None
     for time, *sample in reversed(list(samples)):
-        if not at_rest(body, controller, *sample):
+        if not at_rest(state, controller, *sample):
             break
         since = float(time)
     return since

@@ -203,6 +203,7 @@ class _Planner:
         self.known: Guide | None = None
         self.straight_toes = True
         self.waypoints: Guide | None = None
+        self._guides: dict[tuple[tuple[PlannedSwing, ...], Manner, Guide | None], Guide] = {}
         self._progress = progress
 
     def run(self, began: float) -> WholeBodyResult:
@@ -287,7 +288,7 @@ class _Planner:
 
     def _fitted(self, swings: tuple[PlannedSwing, ...], began: float) -> "_Fitted":
         """Guide postures and the first fit near them."""
-        guide = self._guide(swings)
+        guide = self._guide_once(swings)
         self._report(0.4)
         fit, start = self._prepare(swings, guide, self._knots(), self._scales())
         found = fit.solve(start)
@@ -324,6 +325,13 @@ class _Planner:
     def _scales(self) -> FitScales:
         share = self.settings.manner.moment_factor * self.settings.fit.moment_share
         return replace(self.settings.fit, moment_share=share)
+
+    def _guide_once(self, swings: tuple[PlannedSwing, ...]) -> Guide:
+        """The guide to the swings, found once for each manner and set of known postures."""
+        key = swings, self.settings.manner, self.known
+        if key not in self._guides:
+            self._guides[key] = self._guide(swings)
+        return self._guides[key]
 
     def _guide(self, swings: tuple[PlannedSwing, ...]) -> Guide:
         schedule = self.trajectory.schedule

@@ -1,0 +1,148 @@
+"""The main job, end to end on the real scenario, whose run the tests share."""
+
+import json
+
+import numpy as np
+import pytest
+
+from manikin.ergonomics import lowest_margin
+from manikin.motion.file import read_motions
+from manikin.pipeline import run
+from manikin.stages import ExecutionRequirements
+
+KEYS = {
+    "centroidal": {
+        "method", "duration_s", "phase_durations_s", "min_margin", "margin_unit", "limiting_phase",
+        "limiting_contact", "feasibility_radius", "wall_s",
+    },
+    "wholebody": {
+        "max_support_error_m", "max_meeting_error_m", "max_com_error_m", "min_clearance_m", "max_scuff_m",
+        "closest_pair",
+        "max_joint_limit_violation_rad", "seed_matters", "lowest_com_m", "head_clearance_m", "wall_s",
+    },
+    "execution": {
+        "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m", "min_margin",
+        "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm", "realtime_factor",
+        "lowest_com_m", "head_clearance_m", "push", "wall_s",
+    },
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def platform(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("runs") / "platform"
+    return run("platform", out=directory, seed=0)
+
+
+@pytest.mark.slow
+def test_the_platform_is_planned_and_stood_on(platform):
+    """Every threshold is a requirement of the scenario (metres, newton metres, seconds)."""
+    summary = platform.summary
+    assert summary["succeeded"], summary["failure"]
+    assert (summary["stature_m"], summary["mass_kg"], summary["seed"]) == (1.75, 79.0, 0)
+    com, body, executed = summary["centroidal"], summary["wholebody"], summary["execution"]
+    assert com["min_margin"] >= 20.0
+    assert com["duration_s"] <= 5.0
+    assert body["max_support_error_m"] <= 1e-3
+    assert body["max_com_error_m"] <= 2e-3
+    assert body["min_clearance_m"] >= 0.01
+    assert body["max_joint_limit_violation_rad"] <= 1e-9
+    assert not executed["fell"]
+    assert executed["com_rms_error_m"] <= 0.015
+    assert executed["max_foot_error_m"] <= 0.02
+    assert executed["min_margin"] > 0.0
+    assert executed["max_penetration_m"] <= 0.005
+
+
+@pytest.mark.slow
+def test_the_body_stands_for_a_second_after_the_end(platform):
+    executed, planned = platform.executed, platform.planned
+    assert executed.time[-1] >= planned.time[-1] + 0.99
+    rest = executed.time > planned.time[-1] + 0.5
+    np.testing.assert_allclose(executed.com[rest], planned.com[-1] * np.ones((rest.sum(), 1)), atol=5e-3)
+    assert np.all(executed.support[rest])
+
+
+@pytest.mark.slow
+def test_executed_forces_carry_the_weight_at_the_end(platform):
+    """Standing still, the measured contact forces sum to the weight (within 1 %)."""
+    vertical = platform.executed.contact_force[-1, :, 2].sum()
+    assert vertical == pytest.approx(79.0 * 9.81, rel=0.01)
+
+
+@pytest.mark.slow
+def test_the_summary_has_the_documented_keys_and_is_on_disk(platform):
+    for stage, keys in KEYS.items():
+        assert keys <= set(platform.summary[stage])
+    on_disk = json.loads((platform.directory / "summary.json").read_text())
+    assert on_disk["succeeded"] is True
+    assert on_disk["centroidal"] == json.loads(json.dumps(platform.summary["centroidal"]))
+
+
+@pytest.mark.slow
+def test_the_motion_file_holds_both_motions(platform):
+    content = read_motions(platform.directory / "motion.h5")
+    assert np.array_equal(content.planned.q, platform.planned.q)
+    assert np.array_equal(content.executed.margin, platform.executed.margin)
+    assert content.body.mass == pytest.approx(79.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("which", ["planned", "executed"])
+def test_the_lowest_margin_is_explained_as_in_the_summary(platform, which):
+    """Found again from the file, by the planned contacts and from the effectors alone (within 0.5 N.m)."""
+    content = read_motions(platform.directory / "motion.h5")
+    motion = content.motions[which]
+    stage = "wholebody" if which == "planned" else "execution"
+    for schedule in (content.schedule, None):
+        found = lowest_margin(content.body, motion, schedule)
+        assert found.value == pytest.approx(platform.summary[stage]["min_margin"], abs=1e-9)
+        assert found.reproduced
+        assert found.limiting.description == platform.summary["centroidal"]["limiting_contact"]
+
+
+@pytest.mark.slow
+def test_the_resolved_scenario_runs_again_to_the_same_bits(platform):
+    again = run(platform.directory / "scenario.yaml")
+    assert np.array_equal(again.planned.q, platform.planned.q)
+    assert np.array_equal(again.executed.q, platform.executed.q)
+    assert np.array_equal(again.executed.contact_force, platform.executed.contact_force)
+
+
+@pytest.mark.slow
+def test_an_executed_run_is_a_recording_for_the_keyframe_method(platform, tmp_path):
+    """Same timing to half a control step, same CoM at the key frames, executed without falling."""
+    file = tmp_path / "again.yaml"
+    file.write_text(
+        f"extends: platform\nname: again\nplanning: {{method: keyframes, recording: {platform.directory}}}\n"
+    )
+    result = run(file, out=tmp_path / "again")
+    assert result.succeeded, result.summary["failure"]
+    instants = result.centroidal.key_instants
+    np.testing.assert_allclose(instants, platform.centroidal.key_instants, atol=2.5e-3)
+    samples = np.searchsorted(platform.executed.time, instants - 1e-9)
+    np.testing.assert_allclose(
+        result.centroidal.trajectory.position(instants), platform.executed.com[samples], rtol=0, atol=1e-9
+    )
+    assert result.summary["centroidal"]["method"] == "keyframes"
+    assert result.summary["centroidal"]["min_margin"] >= 20.0
+    assert result.summary["execution"]["min_margin"] > 0.0
+
+
+@pytest.mark.slow
+def test_a_run_that_draws_no_numbers_has_the_same_bits_for_every_seed(platform):
+    other = run("platform", seed=7)
+    assert not platform.summary["wholebody"]["seed_matters"]
+    assert np.array_equal(other.planned.q, platform.planned.q)
+    assert np.array_equal(other.executed.q, platform.executed.q)
+
+
+@pytest.mark.slow
+def test_an_execution_that_misses_its_requirement_is_a_failure(platform):
+    requirements = ExecutionRequirements(margin=1e6)
+    reason, time = requirements.violation(platform.execution)
+    assert "executed margin" in reason
+    assert time == platform.execution.motion.time[np.argmin(platform.execution.motion.margin)]
+    reason, time = ExecutionRequirements(foot_error=1e-9).violation(platform.execution)
+    assert f"error of {platform.execution.worst_effector} is" in reason
+    assert time == platform.execution.worst_effector_time_s
