@@ -29,18 +29,15 @@ AT_REST = 0.2
 PUSHES, CHUNK = 200, 25
 CHUNKS = pytest.mark.parametrize("first", range(0, PUSHES, CHUNK))
 """Parts of the pushes, for several processes of the tests."""
-FAR = 5
-"""Of the pushes in the half of their range that is farther from the border, one in so many is tried."""
 
 
 def random_pushes(first, shares, border, seed):
     """Direction, impulse and outcome of a chunk of pushes; impulses are shares of those at the border."""
     rng = np.random.default_rng([seed, first])
-    for number in range(CHUNK):
-        direction, share = rng.uniform(0.0, 360.0), rng.uniform(*shares)
-        if abs(share - 1.0) <= abs(np.mean(shares) - 1.0) or number % FAR == 0:
-            impulse = share * border(direction)
-            yield direction, impulse, TRIALS.push(direction, impulse, until_at_rest=AT_REST)
+    for _ in range(CHUNK):
+        direction = rng.uniform(0.0, 360.0)
+        impulse = rng.uniform(*shares) * border(direction)
+        yield direction, impulse, TRIALS.push(direction, impulse, until_at_rest=AT_REST)
 
 
 def test_the_stored_map_is_complete_and_of_the_body_of_kudoh():
