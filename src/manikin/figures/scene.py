@@ -11,10 +11,11 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
-from manikin.figures.style import COLOURS, colours_of, need, new_figure, white_edge
+from manikin.figures.style import need, new_figure, white_edge
 from manikin.figures.views import distinct_contacts
 from manikin.motion import Motion
 from manikin.motion.derived import phases_of, segment_positions
+from manikin.palette import COLOURS, colours_of
 from manikin.record import ComTrack, RunRecord
 from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
 from manikin.spatial import FloatArray

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
-from scipy.signal import butter, sosfiltfilt
 
 from manikin.errors import InputError
+from manikin.low_pass import low_passed
 from manikin.mocap.posture_cost import PostureCost
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.motion.motion import Motion
@@ -52,12 +52,10 @@ def smoothed_postures(found: Reconstruction, cutoff: float = CUTOFF, limits: boo
     finite_number(cutoff, "cutoff [Hz]", above=0.0)
     if cutoff >= 0.5 * rate:
         raise InputError(f"cutoff is {cutoff:g} Hz; valid: below half the rate, {0.5 * rate:g} Hz")
-    sections = butter(2, cutoff, fs=rate, output="sos")
     q = np.array(found.q)
     flips = np.cumprod(np.where(np.sum(q[1:, 3:7] * q[:-1, 3:7], axis=1) < 0.0, -1.0, 1.0))
     q[1:, 3:7] *= flips[:, None]
-    padding = min(len(q) - 1, int(np.ceil(2.0 * rate / cutoff)))
-    q = sosfiltfilt(sections, q, axis=0, padlen=padding)
+    q = low_passed(q, cutoff, rate)
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     if limits:
         q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
