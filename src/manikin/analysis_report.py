@@ -142,9 +142,7 @@ def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
         "sequence of touch-downs": ", ".join(map(readable, summary["sequence"])) or "none",
         "lowest centre of mass [m]": summary["com_height_min_m"],
         "lowest margin [N.m]": margin["min"],
-        "frames with a positive margin": None
-        if margin["share_positive"] is None
-        else f"{100.0 * margin['share_positive']:.1f} %",
+        "frames with a positive margin": _share(margin["share_positive"]),
         "limited by": None if margin["limiting"] is None else readable(margin["limiting"]),
     }
 
@@ -172,8 +170,8 @@ def _plan(page: ReportPage, plan: Mapping[str, Any]) -> None:
     page.numbers({
         "recorded duration [s]": plan["recorded_duration_s"],
         "planned duration [s]": plan["duration_s"],
-        "centre of mass from the recorded one, RMS [m]": plan["com_rms_m"],
-        "largest [m]": plan["com_max_m"],
+        "centre of mass from the recorded one [mm]": f"{_millimetres(plan['com_rms_m'])} (RMS), "
+        f"{_millimetres(plan['com_max_m'])} (largest)",
         f"least margin [{plan['margin_unit']}]": plan["min_margin"],
     })  # fmt: skip
     if plan["phase_durations_s"] is not None:
@@ -191,11 +189,32 @@ def _plan(page: ReportPage, plan: Mapping[str, Any]) -> None:
             decimals=(None, 3, 3),
         )  # fmt: skip
     if plan["execution"] is not None:
-        page.numbers({
-            f"executed: {name.replace('_', ' ')}": value
-            for name, value in plan["execution"].items()
-            if not isinstance(value, Mapping | list)
-        })  # fmt: skip
+        _execution(page, plan["execution"], plan["margin_unit"])
+
+
+def _execution(page: ReportPage, found: Mapping[str, Any], unit: str) -> None:
+    page.heading("The plan executed by the whole body in the physics engine")
+    page.remarks([readable(found["failure"])] if found["failure"] else [])
+    page.numbers({
+        "executed [s]": found["executed_s"],
+        "fell": "yes" if found["fell"] else "no",
+        "frames with a positive margin": _share(found["share_positive_margin"]),
+        f"lowest margin [{unit}]": found["min_margin"],
+        "centre of mass from the planned one [mm]": f"{_millimetres(found['com_rms_error_m'])} (RMS), "
+        f"{_millimetres(found['com_max_error_m'])} (largest), "
+        f"{_millimetres(found['final_com_error_m'])} (in the end)",
+        "feet from where they were planned, largest [mm]": _millimetres(found["max_foot_error_m"]),
+        "deepest penetration of a contact [mm]": _millimetres(found["max_penetration_m"]),
+        "speed, per real time": found["realtime_factor"],
+    })  # fmt: skip
+
+
+def _share(value: float | None) -> str | None:
+    return None if value is None else f"{100.0 * value:.1f} %"
+
+
+def _millimetres(value: float | None) -> str:
+    return "-" if value is None else f"{1e3 * value:.1f}"
 
 
 def _time(instant: float, seen: bool) -> str:

@@ -18,7 +18,7 @@ body.wide th { position: sticky; top: 0; background: #fff; vertical-align: botto
 body.wide { font-size: 13px; line-height: 1.3 } body.wide td, body.wide th { padding-right: .6rem }
 ul.remarks { background: #fff6e5; border-left: 4px solid #e69f00; padding: .5rem .5rem .5rem 1.8rem }
 td:first-child { white-space: nowrap }
-img, svg { max-width: 100%; display: block; margin: .8rem 0 }
+img, svg { max-width: 100%; height: auto; display: block; margin: .8rem 0 }
 a { color: #0072b2 }
 """.strip()
 
@@ -87,8 +87,10 @@ class ReportPage:
             png: Content of a PNG file.
             words: What it shows, for who does not see it.
         """
-        data = base64.b64encode(png).decode("ascii")
-        self._parts.append(f'<img alt="{escape(words)}" src="data:image/png;base64,{data}">')
+        data, size = base64.b64encode(png).decode("ascii"), ""
+        if png[12:16] == b"IHDR":  # at half its pixels, so that letters of all pictures are equally large
+            size = f' width="{int.from_bytes(png[16:20], "big") // 2}"'
+        self._parts.append(f'<img alt="{escape(words)}"{size} src="data:image/png;base64,{data}">')
 
     def drawing(self, svg: str) -> None:
         """An SVG element, as :meth:`manikin.svg.Drawing.svg` gives it."""

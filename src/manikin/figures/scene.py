@@ -195,7 +195,8 @@ def frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
         high = np.maximum(high, np.minimum(corners.max(axis=0), high + 1.0))
     low[2] = min(low[2] + 0.1, 0.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    zoom: Any = 1.16  # the annotation says int, the function takes any number
+    longest = float(np.max(high - low) / np.linalg.norm(high - low))
+    zoom: Any = 1.16 * min(1.0, 0.85 / longest)  # the annotation says int, the function takes any number
     axes.set_box_aspect(high - low, zoom=zoom)
     spans = zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", (high - low) / (high - low).max(), strict=True)
     for axis, name, share in spans:
