@@ -201,6 +201,7 @@ def frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
     spans = zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", (high - low) / (high - low).max(), strict=True)
     for axis, name, share in spans:
         axis.set_label_text(f"{name} [m]", fontsize=9)
+        axis.labelpad = 4.0 if longest < 0.85 else 12.0  # numbers along a long axis hang lower
         axis.set_major_locator(MaxNLocator(max(round(MOST_TICKS * float(share)), 1)))
         axis.set_tick_params(labelsize=7)
         axis.pane.set_facecolor("#FAFBFC")
