@@ -6,8 +6,7 @@ import pytest
 
 from manikin.analysis import analyze, analyze_file
 from manikin.analysis_directory import write_analysis
-from manikin.figures.recording import recording_figure
-from manikin.figures.write import png_of
+from manikin.analysis_sheet import recording_sheet
 from manikin.mocap import read_recording
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
@@ -26,7 +25,7 @@ def test_numbers(benchmark, name):
 @pytest.mark.parametrize("name", FILES)
 def test_sheet(benchmark, name):
     found = analyze_file(FOLDER / name)
-    benchmark.pedantic(lambda: png_of(recording_figure(found), 1), rounds=5, warmup_rounds=1)
+    benchmark.pedantic(recording_sheet, (found, "the recording"), rounds=5, warmup_rounds=1)
 
 
 @pytest.mark.parametrize("name", FILES)

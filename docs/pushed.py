@@ -23,10 +23,11 @@ from manikin.balance.impulse import predict_impulse
 from manikin.body import BodyModel, Configuration
 from manikin.contact import ContactSchedule
 from manikin.control import ControlSettings, ReturnSettings
-from manikin.figures.style import COLOURS, CYCLE, dress, new_figure
+from manikin.figures.style import dress, new_figure
 from manikin.figures.write import save_figure
 from manikin.motion import Motion
 from manikin.motion.file import read_motions
+from manikin.palette import COLOURS, CYCLE
 from manikin.pipeline import run
 from manikin.scene import Scene
 from manikin.simulation import Push, execute, push_on_the_way

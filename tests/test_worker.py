@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from manikin.errors import ManikinError
+from manikin.worker import SERVED, side_by_side
+
 SCRIPT = """
 import os, time
 from concurrent.futures import ProcessPoolExecutor
@@ -52,3 +55,24 @@ def alive(process: int) -> bool:
     except ProcessLookupError:
         return False
     return True
+
+
+def halved(value):
+    if value < 0:
+        raise ValueError("below 0")
+    if value == 13:
+        os._exit(1)
+    return value / 2
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_work_side_by_side_is_that_of_one_after_the_other(workers):
+    found = dict(side_by_side(halved, [3, 1, 2, 4], workers, "halves"))
+    assert found == {0: 1.5, 1: 0.5, 2: 1.0, 3: 2.0}
+    with pytest.raises(ValueError, match="below 0"):
+        list(side_by_side(halved, [1, -1], workers, "halves"))
+
+
+def test_a_process_that_ends_is_told_of():
+    with pytest.raises(ManikinError, match="a process of the halves ended before its time"):
+        list(side_by_side(halved, [13, 13], 2, "halves", method=SERVED))

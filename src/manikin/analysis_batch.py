@@ -1,22 +1,15 @@
 """Recordings measured side by side in processes beside this one; a bad file stops none of the others."""
 
 import gc
-import multiprocessing
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from os.path import commonpath
 from pathlib import Path
 
-from threadpoolctl import threadpool_limits
-
 from manikin.analysis import AnalysisEntry, AnalysisJob, AnalysisOptions, analyze_file
 from manikin.analysis_directory import write_analysis
-from manikin.errors import InputError, ManikinError
-from manikin.worker import prepare_worker
-
-METHOD = "forkserver" if "forkserver" in multiprocessing.get_all_start_methods() else "spawn"
-"""Fresh processes: copies of this one would share the threads and locks of its libraries."""
+from manikin.errors import InputError
+from manikin.worker import SERVED, prepare_worker, side_by_side
 
 
 def analyze_files(
@@ -27,8 +20,7 @@ def analyze_files(
     Args:
         jobs: The files.
         options: The same for all.
-        workers: Processes; with 1 all is done here. With more a script must keep its own work under
-            ``if __name__ == "__main__":``.
+        workers: Processes, see :func:`manikin.worker.side_by_side`.
 
     Yields:
         Entries in the order in which they are done.
@@ -39,20 +31,11 @@ def analyze_files(
     """
     if workers < 1:
         raise InputError(f"workers is {workers}; valid: at least 1")
-    if workers == 1 or len(jobs) < 2:
-        for job in jobs:
-            with threadpool_limits(1):
-                entry = analyze_one(job, options)
-            yield entry
-        return
-    pool = ProcessPoolExecutor(min(workers, len(jobs)), multiprocessing.get_context(METHOD), _prepare)
-    try:
-        for future in as_completed([pool.submit(analyze_one, job, options) for job in jobs]):
-            yield future.result()
-    except BrokenProcessPool:
-        raise ManikinError("a process of the analysis ended before its time, for want of memory?") from None
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+    # Longest first, so that all processes end together.
+    ordered = sorted(jobs, key=lambda job: -job.path.stat().st_size)
+    one = partial(analyze_one, options=options)
+    for _, entry in side_by_side(one, ordered, workers, "analysis", prepare=_prepare, method=SERVED):
+        yield entry
 
 
 def _prepare() -> None:

@@ -23,10 +23,9 @@ import numpy as np
 
 from manikin.analysis import Analysis, AnalysisEntry
 from manikin.analysis_report import overview_page, report_page
+from manikin.analysis_sheet import recording_sheet
 from manikin.atomic import write_text
 from manikin.errors import MotionFileError
-from manikin.figures.recording import recording_figure
-from manikin.figures.write import comparison_pictures, png_of
 from manikin.motion.file import MotionFile, write_motions
 from manikin.output import MOTION, SUMMARY, make_directory, to_json
 
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
     from manikin.replan import Replan
 
 SHEET = "Postures, supports, forces, margins, height and scores over time"
-"""What the first picture of a report shows."""
+"""What the drawing of a report shows."""
 REPORT = "report.html"
 SERIES = "series.csv"
 OVERVIEW = "index.html"
@@ -82,20 +81,25 @@ def write_analysis(
     """
     make_directory(directory)
     summary = summary_of(found, plan)
-    pictures: dict[str, bytes] = {}
-    if draw:
-        pictures[SHEET] = png_of(recording_figure(found), 1)
-        if plan is not None and plan.com.trajectory is not None:
-            from manikin.replan import against_recording
-
-            pictures |= comparison_pictures(against_recording(plan))
+    sheet = recording_sheet(found, SHEET) if draw else ""
+    pictures = _plan_pictures(plan) if draw and plan is not None else {}
     content = MotionFile(recorded=found.motion, body=found.body)
     if plan is not None:
         content = replace(plan.content, recorded=found.motion)
     write_motions(directory / MOTION, content)
     _write(directory / SERIES, _series_text(found))
-    _write(directory / REPORT, report_page(found, summary, pictures))
+    _write(directory / REPORT, report_page(found, summary, sheet, pictures))
     _write(directory / SUMMARY, to_json(summary) + "\n")
+
+
+def _plan_pictures(plan: "Replan") -> dict[str, bytes]:
+    """Contents of PNG files that compare a plan with its recording, by what they show."""
+    if plan.com.trajectory is None:
+        return {}
+    from manikin.figures.write import comparison_pictures
+    from manikin.replan import against_recording
+
+    return comparison_pictures(against_recording(plan))
 
 
 def write_overview(entries: Sequence[AnalysisEntry], overview: dict[str, Any], directory: Path) -> None:

@@ -1,10 +1,12 @@
 """The report of a measured recording, and the overview of several, as pages for people."""
 
 from collections.abc import Mapping, Sequence
+from os.path import commonpath
+from pathlib import Path
 from typing import Any
 
 from manikin.analysis import Analysis
-from manikin.figures.style import readable
+from manikin.palette import readable
 from manikin.report_page import ReportPage
 from manikin.version import __version__
 
@@ -15,24 +17,47 @@ WORDS = (
     "give it. Recordings tell places to a centimetre and so leave accelerations open: the shift onto the "
     "contacts is the least one of the whole body after which the contacts could."
 )
+COLUMNS: dict[str, tuple[str, float, int]] = {
+    "duration_s": ("duration [s]", 1.0, 2),
+    "frames": ("frames", 1, 0),
+    "stature_m": ("stature [m]", 1.0, 2),
+    "mass_kg": ("mass [kg]", 1.0, 1),
+    "residual_median_m": ("residual, median [mm]", 1e3, 1),
+    "supports": ("supports", 1, 0),
+    "phases": ("phases", 1, 0),
+    "com_height_min_m": ("lowest CoM [m]", 1.0, 3),
+    "margin_min_Nm": ("lowest margin [N.m]", 1.0, 1),
+    "margin_share_positive": ("positive margin [% of frames]", 100.0, 1),
+    "shifted_share_positive": ("positive once shifted [%]", 100.0, 1),
+    "shift_rms_m": ("shift, RMS [mm]", 1e3, 1),
+    "timing_median_s": ("instants against plates [ms]", 1e3, 0),
+    "vertical_rms_body_weight": ("force against plates [% of weight]", 100.0, 1),
+    "cop_rms_m": ("CoP against plates [mm]", 1e3, 0),
+    "rula_max": ("highest RULA", 1, 0),
+    "reba_max": ("highest REBA", 1, 0),
+}
+"""Columns of the overview for people, by those of the table: heading, factor, decimals."""
+
 STRONGEST_SHOWN = 8
 """Joints in the table of torques, those first that come nearest to their strength."""
 
 
-def report_page(found: Analysis, summary: Mapping[str, Any], pictures: Mapping[str, bytes]) -> str:
+def report_page(
+    found: Analysis, summary: Mapping[str, Any], sheet: str, pictures: Mapping[str, bytes]
+) -> str:
     """HTML of one recording.
 
     Args:
         found: What was measured.
         summary: Its numbers.
-        pictures: Contents of PNG files by what they show: the sheet of the recording, then those of a plan.
+        sheet: SVG of :func:`manikin.analysis_sheet.recording_sheet`; empty for none.
+        pictures: Contents of PNG files of the plan by what they show.
     """
     page = ReportPage(found.name, f"{summary['file']}, measured by manikin {__version__}")
     page.remarks(summary["remarks"])
     page.numbers(_headline(summary))
-    sheet, *others = [*pictures.items(), ("", b"")]
-    if sheet[1]:
-        page.picture(sheet[1], sheet[0])
+    if sheet:
+        page.drawing(sheet)
     page.text(WORDS)
     page.heading("Supports")
     page.table(
@@ -42,7 +67,9 @@ def report_page(found: Analysis, summary: Mapping[str, Any], pictures: Mapping[s
              _time(one["end_s"], one["end_seen"]), one["end_s"] - one["start_s"], tuple(one["place_m"]))
             for one in summary["supports"]
         ],
+        decimals=(None, None, None, 3, 3),
     )  # fmt: skip
+    page.text("In brackets: the support began before the recording, or went on after it.")
     page.heading("Phases")
     page.table(
         ("phase", "from [s]", "to [s]", "duration [s]", "lowest margin [N.m]", "supports"),
@@ -51,23 +78,23 @@ def report_page(found: Analysis, summary: Mapping[str, Any], pictures: Mapping[s
              ", ".join(map(readable, one["effectors"])) or "flight")
             for number, one in enumerate(summary["phases"])
         ],
+        decimals=(None, 3, 3, 3, 1),
     )  # fmt: skip
     if summary["segments"]:
         page.heading("Walking: where people look is where they go (nonholonomic), or not (holonomic)")
         page.table(
             ("kind", "from [s]", "to [s]"),
             [(one["kind"], one["start_s"], one["end_s"]) for one in summary["segments"]],
+            decimals=(None, 3, 3),
         )
     _torques(page, summary)
     _ergonomics(page, summary)
     if summary["force_plates"] is not None:
-        page.heading("Against force plates")
-        page.numbers(summary["force_plates"])
+        _plates(page, summary["force_plates"])
     if summary["plan"] is not None:
         _plan(page, summary["plan"])
-        for words, picture in others:
-            if picture:
-                page.picture(picture, words)
+        for words, picture in pictures.items():
+            page.picture(picture, words)
     return page.html()
 
 
@@ -83,11 +110,27 @@ def overview_page(
     """
     page = ReportPage(
         "Recordings",
-        f"{len(overview['files'])} measured, {len(overview['refused'])} refused, manikin {__version__}",
+        f"{len(overview['files'])} recordings of {overview['duration_s']:.0f} s measured, "
+        f"{len(overview['refused'])} refused, manikin {__version__}",
+        wide=True,
     )
     page.remarks(one["reason"] for one in overview["refused"])
-    columns = [name for name in rows[0] if name != "refused"]
-    page.table(columns, [[row[name] for name in columns] for row in rows], links=links)
+    shared = commonpath([Path(row["file"]).parent for row in rows])
+    page.text(f"Files in {shared}:")
+    names = {row["file"]: Path(row["file"]).relative_to(shared).as_posix() for row in rows}
+    shown = {key: COLUMNS[key] for key in COLUMNS if any(row[key] is not None for row in rows)}
+    page.table(
+        ("file", *(heading for heading, _, _ in shown.values())),
+        [
+            (
+                names[row["file"]],
+                *(None if row[key] is None else factor * row[key] for key, (_, factor, _) in shown.items()),
+            )
+            for row in rows
+        ],
+        decimals=(None, *(decimals for _, _, decimals in shown.values())),
+        links={names[file]: address for file, address in links.items()},
+    )
     return page.html()
 
 
@@ -103,13 +146,29 @@ def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
         "sequence of touch-downs": ", ".join(map(readable, summary["sequence"])) or "none",
         "lowest centre of mass [m]": summary["com_height_min_m"],
         "lowest margin [N.m]": margin["min"],
-        "frames with a positive margin": None
-        if margin["share_positive"] is None
-        else f"{100.0 * margin['share_positive']:.1f} %",
-        "limited by": margin["limiting"],
+        "frames with a positive margin": _share(margin["share_positive"]),
+        "limited by": None if margin["limiting"] is None else readable(margin["limiting"]),
         "shift onto the contacts [mm]": f"{1e3 * shifted['rms_m']:.1f} (RMS), {1e3 * shifted['max_m']:.1f} "
-        f"(largest); positive then in {100.0 * shifted['share_positive']:.1f} % of the frames",
+        f"(largest); positive then in {_share(shifted['share_positive'])} of the frames",
     }
+
+
+def _plates(page: ReportPage, plates: Mapping[str, Any]) -> None:
+    def of(key: str, factor: float, unit: str) -> str | None:
+        return None if plates[key] is None else f"{factor * plates[key]:.1f} {unit}"
+
+    page.heading("Against force plates")
+    page.numbers({
+        "touch-downs and lift-offs compared": plates["events"],
+        "their distance in time": None if plates["timing_median_s"] is None
+        else f"{of('timing_median_s', 1e3, 'ms')} (median), {of('timing_max_s', 1e3, 'ms')} (largest)",
+        "frames with all supports on plates": plates["frames"],
+        "error of the vertical force, RMS": of("vertical_rms_body_weight", 100.0, "% of body weight"),
+        "positive margin of the measured forces": of("margin_share_positive", 100.0, "% of these frames"),
+        "frames with one foot on a plate": plates["single_support_frames"],
+        "error of the centre of pressure, RMS": of("cop_rms_m", 1e3, "mm"),
+        "the same, shifted onto the contacts": of("cop_rms_shifted_m", 1e3, "mm"),
+    })  # fmt: skip
 
 
 def _plan(page: ReportPage, plan: Mapping[str, Any]) -> None:
@@ -118,8 +177,8 @@ def _plan(page: ReportPage, plan: Mapping[str, Any]) -> None:
     page.numbers({
         "recorded duration [s]": plan["recorded_duration_s"],
         "planned duration [s]": plan["duration_s"],
-        "centre of mass from the recorded one, RMS [m]": plan["com_rms_m"],
-        "largest [m]": plan["com_max_m"],
+        "centre of mass from the recorded one [mm]": f"{_millimetres(plan['com_rms_m'])} (RMS), "
+        f"{_millimetres(plan['com_max_m'])} (largest)",
         f"least margin [{plan['margin_unit']}]": plan["min_margin"],
     })  # fmt: skip
     if plan["phase_durations_s"] is not None:
@@ -134,13 +193,35 @@ def _plan(page: ReportPage, plan: Mapping[str, Any]) -> None:
                     )
                 )
             ],
+            decimals=(None, 3, 3),
         )  # fmt: skip
     if plan["execution"] is not None:
-        page.numbers({
-            f"executed: {name.replace('_', ' ')}": value
-            for name, value in plan["execution"].items()
-            if not isinstance(value, Mapping | list)
-        })  # fmt: skip
+        _execution(page, plan["execution"], plan["margin_unit"])
+
+
+def _execution(page: ReportPage, found: Mapping[str, Any], unit: str) -> None:
+    page.heading("The plan executed by the whole body in the physics engine")
+    page.remarks([readable(found["failure"])] if found["failure"] else [])
+    page.numbers({
+        "executed [s]": found["executed_s"],
+        "fell": "yes" if found["fell"] else "no",
+        "frames with a positive margin": _share(found["share_positive_margin"]),
+        f"lowest margin [{unit}]": found["min_margin"],
+        "centre of mass from the planned one [mm]": f"{_millimetres(found['com_rms_error_m'])} (RMS), "
+        f"{_millimetres(found['com_max_error_m'])} (largest), "
+        f"{_millimetres(found['final_com_error_m'])} (in the end)",
+        "feet from where they were planned, largest [mm]": _millimetres(found["max_foot_error_m"]),
+        "deepest penetration of a contact [mm]": _millimetres(found["max_penetration_m"]),
+        "speed, per real time": found["realtime_factor"],
+    })  # fmt: skip
+
+
+def _share(value: float | None) -> str | None:
+    return None if value is None else f"{100.0 * value:.1f} %"
+
+
+def _millimetres(value: float | None) -> str:
+    return "-" if value is None else f"{1e3 * value:.1f}"
 
 
 def _time(instant: float, seen: bool) -> str:
@@ -159,6 +240,7 @@ def _torques(page: ReportPage, summary: Mapping[str, Any]) -> None:
             (readable(name), one["limit_Nm"], one["max_share"], one["max_at_s"], one["share_of_time_above"])
             for name, one in joints
         ],
+        decimals=(None, 1, 2, 3, 3),
     )
 
 
@@ -172,6 +254,7 @@ def _ergonomics(page: ReportPage, summary: Mapping[str, Any]) -> None:
             (name.upper(), one["max"], one["max_at_s"], one["max_side"], one["mean"], one["action"])
             for name, one in scores.items()
         ],
+        decimals=(None, None, 3, None, 2),
     )
     if found["effort"] is not None:
         page.numbers({

@@ -22,10 +22,10 @@ from manikin.figures import (
     write_comparison,
     write_figures,
 )
-from manikin.figures.style import readable
 from manikin.figures.write import save_figure
 from manikin.locomotion.words import WordSlice, equal_paths
 from manikin.output import FIGURES, to_json
+from manikin.palette import readable
 from manikin.record import read_run
 from manikin.scene import Scene
 from manikin.simulation import PushMap, PushTrials

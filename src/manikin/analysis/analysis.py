@@ -37,7 +37,7 @@ class Analysis:
         limiting: What limits the lowest margin; None if no margin is known.
         cop: (n, 3) centre of pressure that the motion needs [m]; NaN in flight.
         segments: Holonomic and nonholonomic stretches; None where nobody walks upright.
-        ergonomics: Scores, torques against strength, effort.
+        ergonomics: Scores, torques against strength, effort; its time is that of the motion.
         plates: Comparison with force plates; None without plates.
         remarks: What a reader must know, a line each.
         wall: Time that it took [s].
@@ -157,7 +157,7 @@ class Analysis:
             ],
             "margin": self._margin(),
             "force_plates": None if self.plates is None else self.plates.as_dict(),
-            "ergonomics": self.ergonomics.as_dict(),
+            "ergonomics": _later(self.ergonomics.as_dict(), self.supports.start),
             "remarks": list(self.remarks),
             "wall_s": self.wall,
         }  # fmt: skip
@@ -186,3 +186,13 @@ class Analysis:
             "point_mass_min": float(points.min()) if points.size else None,
             "point_mass_share_positive": float(np.mean(points > 0.0)) if points.size else None,
         }
+
+
+def _later(numbers: Any, start: float) -> Any:
+    """The same with instants, by keys that end in ``at_s``, on a clock that shows ``start`` at their zero."""
+    if not isinstance(numbers, dict):
+        return numbers
+    return {
+        key: value + start if key.endswith("at_s") and value is not None else _later(value, start)
+        for key, value in numbers.items()
+    }

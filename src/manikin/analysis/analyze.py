@@ -23,7 +23,6 @@ from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
 from manikin.mocap.recorded_stances import FRICTION, recorded_schedule
 from manikin.mocap.recording import Recording
 from manikin.mocap.supports import supports_of
-from manikin.mocap.untold_segments import untold_upright
 from manikin.motion import Motion
 from manikin.spatial import finite_number
 
@@ -103,7 +102,7 @@ def analyze(
     start, plates = 0.0, ()
     if isinstance(recording, MarkerRecording):
         start, plates = recording.start, recording.plates
-    found = untold_upright(reconstruct(recording, sex=given.sex, mass=given.mass))
+    found = reconstruct(recording, sex=given.sex, mass=given.mass)
     if len(found.time) < FEWEST_FRAMES:
         raise InputError(
             f"recording {recording.name!r} shows the person in {len(found.time)} frame(s); "

@@ -23,14 +23,14 @@ from manikin.body.off_axis import off_axis
 from manikin.body.parts import (
     ALONG_X,
     across,
+    arms_and_legs,
     cuboid_inertia,
     cylinder_inertia,
     palm_rotation,
     upright_capsule,
 )
 from manikin.body.range_of_motion import HUMAN_HINGES, human_hinges
-from manikin.body.segments import Effector, Limb, Segment, Shape, ShapeKind
-from manikin.contact import ContactKind
+from manikin.body.segments import Effector, Segment, Shape, ShapeKind
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, skew
 
@@ -123,7 +123,7 @@ def human(
         sole_length=size.sole_length,
         sole_width=size.sole_width,
         nominal_mass=size.mass,
-        limbs=_limbs(),
+        limbs=arms_and_legs(("upper_arm", "forearm", "hand"), ("thigh", "leg", "foot")),
         lengths=size.lengths,
         off_axis_masses=off_axis_masses,
     )
@@ -158,22 +158,6 @@ def standing_angles() -> dict[str, float]:
     angles["shoulder_flexion"] = float(np.arctan2(arm @ spread, -arm[2]))
     angles["shoulder_abduction"] = float(np.arcsin(arm @ -lift))
     return {f"{side}_{name}": angle for side in ("left", "right") for name, angle in angles.items()}
-
-
-def _limbs() -> tuple[Limb, ...]:
-    """Arms and legs; a hand presses with its palm, unless a grasp is asked for."""
-    chains = (
-        ("arm", "hand", ("upper_arm", "forearm", "hand"), ContactKind.POINT),
-        ("leg", "foot", ("thigh", "leg", "foot"), ContactKind.SOLE),
-    )
-    return tuple(
-        Limb(
-            f"{side}_{name}", f"{side}_{effector}", tuple(f"{side}_{part}" for part in parts), kind,
-            f"{other}_{name}",
-        )
-        for name, effector, parts, kind in chains
-        for side, other in (("left", "right"), ("right", "left"))
-    )  # fmt: skip
 
 
 def _soft_pairs() -> frozenset[frozenset[str]]:

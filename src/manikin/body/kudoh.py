@@ -17,10 +17,16 @@ import numpy as np
 from manikin.body.anthropometry import ANKLE_FROM_HEEL
 from manikin.body.human import standing_angles
 from manikin.body.model import BodyModel
-from manikin.body.parts import ALONG_X, across, cylinder_inertia, palm_rotation, upright_capsule
+from manikin.body.parts import (
+    ALONG_X,
+    across,
+    arms_and_legs,
+    cylinder_inertia,
+    palm_rotation,
+    upright_capsule,
+)
 from manikin.body.range_of_motion import human_hinges
-from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKind
-from manikin.contact import ContactKind
+from manikin.body.segments import Effector, Hinge, Segment, Shape, ShapeKind
 from manikin.spatial import FloatArray
 
 
@@ -98,7 +104,7 @@ def kudoh() -> BodyModel:
         sole_length=PARTS["foot"].length,
         sole_width=SOLE_WIDTH,
         nominal_mass=MASS,
-        limbs=_limbs(),
+        limbs=arms_and_legs(_ARMS, _LEGS),
     )
 
 
@@ -231,15 +237,3 @@ def _effectors() -> list[Effector]:
         found.append(Effector(f"{side}_foot", f"{side}_foot", sole))
         found.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
     return found
-
-
-def _limbs() -> tuple[Limb, ...]:
-    chains = (("arm", "hand", _ARMS, ContactKind.POINT), ("leg", "foot", _LEGS, ContactKind.SOLE))
-    return tuple(
-        Limb(
-            f"{side}_{name}", f"{side}_{effector}", tuple(f"{side}_{part}" for part in parts), kind,
-            f"{other}_{name}",
-        )
-        for name, effector, parts, kind in chains
-        for side, other in (("left", "right"), ("right", "left"))
-    )  # fmt: skip

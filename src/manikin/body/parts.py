@@ -1,9 +1,12 @@
-"""Shapes, inertias and axes that the parts of human bodies have in common."""
+"""Shapes, inertias, axes and limbs that the parts of human bodies have in common."""
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.body.segments import Shape, ShapeKind
+from manikin.body.segments import Limb, Shape, ShapeKind
+from manikin.contact import ContactKind
 from manikin.spatial import FloatArray
 
 ALONG_Y = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -40,3 +43,21 @@ def cuboid_inertia(mass: float, extents: FloatArray) -> FloatArray:
     """Inertia of a solid cuboid about its centre."""
     squares = extents**2
     return np.diag(mass / 12.0 * (squares.sum() - squares))
+
+
+def arms_and_legs(arm: Sequence[str], leg: Sequence[str]) -> tuple[Limb, ...]:
+    """Limbs of both sides; a hand presses with its palm, unless a grasp is asked for.
+
+    Args:
+        arm: Segments of an arm from the trunk outward, without their side.
+        leg: Of a leg.
+    """
+    chains = (("arm", "hand", arm, ContactKind.POINT), ("leg", "foot", leg, ContactKind.SOLE))
+    return tuple(
+        Limb(
+            f"{side}_{name}", f"{side}_{effector}", tuple(f"{side}_{part}" for part in parts), kind,
+            f"{other}_{name}",
+        )
+        for name, effector, parts, kind in chains
+        for side, other in (("left", "right"), ("right", "left"))
+    )  # fmt: skip

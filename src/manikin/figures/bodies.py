@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.body import BodyModel
 from manikin.body.triangles import segment_triangles
-from manikin.figures.style import COLOURS
+from manikin.palette import COLOURS
 from manikin.scene import HalfSpace, Plane, Scene
 from manikin.spatial import FloatArray
 

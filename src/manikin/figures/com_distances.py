@@ -6,10 +6,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from manikin.figures.groups import group_colours, legend_below_title, name_groups
-from manikin.figures.style import COLOURS, dress, need, new_grid, readable
+from manikin.figures.style import dress, need, new_grid
 from manikin.mocap.recorded_clip import RecordedClip
 from manikin.mocap.spread import Spread
 from manikin.mocap.support_distances import LIMIT, support_distances
+from manikin.palette import COLOURS, readable
 
 
 def com_distances_figure(

@@ -7,9 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from manikin.figures.groups import group_colours, name_groups
-from manikin.figures.style import COLOURS, dress, need, new_grid
+from manikin.figures.style import dress, need, new_grid
 from manikin.mocap.published_phases import published_heights
 from manikin.mocap.statistics import GroupStatistics
+from manikin.palette import COLOURS
 
 
 @dataclass(frozen=True)

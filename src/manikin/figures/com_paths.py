@@ -9,9 +9,10 @@ from matplotlib.lines import Line2D
 
 from manikin.errors import FigureError
 from manikin.figures.groups import group_colours, legend_below_title
-from manikin.figures.style import COLOURS, colours_of, dress, need, new_grid
+from manikin.figures.style import dress, need, new_grid
 from manikin.mocap.recorded_clip import RecordedClip
 from manikin.mocap.support_placements import Origin
+from manikin.palette import COLOURS, colours_of
 from manikin.spatial import FloatArray
 
 

@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 from manikin.comparison import RunComparison, TimingRow
 from manikin.comparison.compare import STAGES, tracks_of
 from manikin.figures.compare_timing import RUN_COLOURS
-from manikin.figures.style import COLOURS, dress, legend_in_title, named_below, need, new_grid
+from manikin.figures.style import dress, legend_in_title, named_below, need, new_grid
+from manikin.palette import COLOURS
 from manikin.record import ComTrack
 
 

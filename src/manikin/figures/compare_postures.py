@@ -6,8 +6,9 @@ from matplotlib.figure import Figure
 from manikin.comparison import RunComparison
 from manikin.figures.compare_timing import RUN_COLOURS
 from manikin.figures.postures import GAP, chosen_instants, draw_moment, frame_panels
-from manikin.figures.style import COLOURS, dress, need, new_grid, readable
+from manikin.figures.style import dress, need, new_grid
 from manikin.figures.views import ALONG_X, ALONG_Y
+from manikin.palette import COLOURS, readable
 
 REACH = np.array([0.65, 0.65, 1.0])
 """Drawn around the centres of mass [m]."""

@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from manikin.comparison import RunComparison, TimingRow
-from manikin.figures.style import COLOURS, dress, named_below, need, new_grid, support_colour, support_keys
+from manikin.figures.style import dress, named_below, need, new_grid, support_colour, support_keys
+from manikin.palette import COLOURS
 
 RUN_COLOURS = (COLOURS["first run"], COLOURS["second run"])
 

@@ -11,7 +11,8 @@ from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
 from manikin.errors import FigureError
 from manikin.figures.bodies import body_solids, draw_arrow, draw_floor, draw_solids, scene_solids
-from manikin.figures.style import COLOURS, new_figure
+from manikin.figures.style import new_figure
+from manikin.palette import COLOURS
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 

@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from manikin.contact import Contact, ContactSchedule
-from manikin.figures.style import COLOURS, colours_of, dress, need, new_grid, readable
+from manikin.figures.style import dress, need, new_grid
 from manikin.figures.views import (
     View,
     best_view,
@@ -16,6 +16,7 @@ from manikin.figures.views import (
     draw_obstacles,
     panel_ticks,
 )
+from manikin.palette import COLOURS, colours_of, readable
 from manikin.record import ComTrack, RunRecord
 
 COLUMNS = 6

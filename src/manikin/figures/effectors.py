@@ -3,9 +3,10 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.figures.style import STYLES, legend_in_title, need, readable, span_at_least
+from manikin.figures.style import STYLES, legend_in_title, need, span_at_least
 from manikin.figures.timeline import timeline
 from manikin.figures.tracking import interpolated
+from manikin.palette import readable
 from manikin.record import RunRecord
 
 LEAST_SPAN = 0.02

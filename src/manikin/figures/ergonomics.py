@@ -9,7 +9,8 @@ from matplotlib.patches import Patch
 
 from manikin.ergonomics import Assessment, Ergonomics, JointStrength
 from manikin.errors import FigureError
-from manikin.figures.style import COLOURS, CYCLE, dress, legend_above, new_grid, readable
+from manikin.figures.style import dress, legend_above, new_grid
+from manikin.palette import COLOURS, CYCLE, readable
 
 LEVEL_COLOURS = ("#DDEBDD", "#EFF3D2", "#FBEBC3", "#F6D2BB", "#EDB4B1")
 """From nothing to do to change at once; RULA's four action levels begin at the second."""

@@ -9,7 +9,8 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from manikin.contact import ContactSchedule, Swing
 from manikin.figures.scene import draw_scene, draw_soles, frame
-from manikin.figures.style import STYLES, colours_of, dress, need, new_figure, readable
+from manikin.figures.style import STYLES, dress, need, new_figure
+from manikin.palette import colours_of, readable
 from manikin.record import RunRecord
 from manikin.spatial import FloatArray
 

@@ -8,17 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from manikin.contact import Contact, ContactKind
-from manikin.figures.style import (
-    COLOURS,
-    STYLES,
-    colours_of,
-    dress,
-    need,
-    new_figure,
-    readable,
-    white_edge,
-)
+from manikin.figures.style import STYLES, dress, need, new_figure, white_edge
 from manikin.figures.views import ABOVE, distinct_contacts, draw_contact
+from manikin.palette import COLOURS, colours_of, readable
 from manikin.record import RunRecord
 from manikin.scene import HalfSpace, Plane, Scene
 

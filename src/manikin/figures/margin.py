@@ -5,9 +5,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from manikin.figures.labels import Labels
-from manikin.figures.style import COLOURS, STYLES, legend_in_title, need
+from manikin.figures.style import STYLES, legend_in_title, need
 from manikin.figures.timeline import timeline
 from manikin.motion.derived import PhaseTable
+from manikin.palette import COLOURS
 from manikin.record import ComTrack, RunRecord
 
 POINT_MASS = "planned point mass"

@@ -8,9 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from manikin.figures.groups import group_colours, group_keys
-from manikin.figures.style import COLOURS, dress, label_room, need, new_grid, support_colour
+from manikin.figures.style import dress, label_room, need, new_grid, support_colour
 from manikin.mocap.phase_durations import By, by_group, phase_durations
 from manikin.mocap.phase_sequence import FLIGHT, PhaseSequence
+from manikin.palette import COLOURS
 
 WIDTH = 0.8
 """Of all bars of one phase, of the distance between two."""

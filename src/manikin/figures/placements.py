@@ -9,8 +9,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 
 from manikin.figures.labels import Labels
-from manikin.figures.style import COLOURS, colours_of, dress, need, new_grid, readable
+from manikin.figures.style import dress, need, new_grid
 from manikin.mocap.support_placements import Placement
+from manikin.palette import COLOURS, colours_of, readable
 
 SHARE = 0.5
 """Of the places in an ellipse, were they normal."""

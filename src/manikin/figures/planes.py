@@ -9,17 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
 from manikin.figures.labels import Labels
-from manikin.figures.style import (
-    COLOURS,
-    STYLES,
-    colours_of,
-    dress,
-    legend_in_title,
-    need,
-    new_grid,
-    readable,
-)
+from manikin.figures.style import STYLES, dress, legend_in_title, need, new_grid
 from manikin.figures.views import VIEWS, View, distinct_contacts, draw_contact, draw_obstacles
+from manikin.palette import COLOURS, colours_of, readable
 from manikin.record import ComTrack, RunRecord
 from manikin.spatial import FloatArray
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from manikin.figures.style import COLOURS, dress, need, new_grid
+from manikin.figures.style import dress, need, new_grid
 from manikin.figures.views import (
     ALONG_X,
     ALONG_Y,
@@ -15,9 +15,9 @@ from manikin.figures.views import (
     draw_contact,
     draw_obstacles,
     panel_ticks,
-    side_colour,
 )
 from manikin.motion import Motion
+from manikin.palette import COLOURS, side_colour
 from manikin.record import RunRecord
 from manikin.spatial import FloatArray
 

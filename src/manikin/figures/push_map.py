@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from manikin.errors import FigureError
-from manikin.figures.style import COLOURS, CYCLE, colours_of, new_figure
+from manikin.figures.style import new_figure
+from manikin.palette import COLOURS, CYCLE, colours_of
 from manikin.simulation import PushMap
 from manikin.simulation.push_conditions import told_apart
 from manikin.spatial import FloatArray

@@ -11,10 +11,11 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
-from manikin.figures.style import COLOURS, colours_of, need, new_figure, white_edge
+from manikin.figures.style import need, new_figure, white_edge
 from manikin.figures.views import distinct_contacts
 from manikin.motion import Motion
 from manikin.motion.derived import phases_of, segment_positions
+from manikin.palette import COLOURS, colours_of
 from manikin.record import ComTrack, RunRecord
 from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
 from manikin.spatial import FloatArray
@@ -194,11 +195,13 @@ def frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
         high = np.maximum(high, np.minimum(corners.max(axis=0), high + 1.0))
     low[2] = min(low[2] + 0.1, 0.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    zoom: Any = 1.16  # the annotation says int, the function takes any number
+    longest = float(np.max(high - low) / np.linalg.norm(high - low))
+    zoom: Any = 1.16 * min(1.0, 0.85 / longest)  # the annotation says int, the function takes any number
     axes.set_box_aspect(high - low, zoom=zoom)
     spans = zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", (high - low) / (high - low).max(), strict=True)
     for axis, name, share in spans:
         axis.set_label_text(f"{name} [m]", fontsize=9)
+        axis.labelpad = 4.0 if longest < 0.85 else 12.0  # numbers along a long axis hang lower
         axis.set_major_locator(MaxNLocator(max(round(MOST_TICKS * float(share)), 1)))
         axis.set_tick_params(labelsize=7)
         axis.pane.set_facecolor("#FAFBFC")

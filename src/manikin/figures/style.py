@@ -11,34 +11,8 @@ from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
 from manikin.errors import FigureError
+from manikin.palette import COLOURS, readable
 from manikin.record import RunRecord
-
-COLOURS = {
-    "recorded": "#6A51A3",
-    "planned": "#0072B2",
-    "executed": "#D55E00",
-    "left_foot": "#009E73",
-    "right_foot": "#CC79A7",
-    "left_hand": "#56B4E9",
-    "right_hand": "#E69F00",
-    "left_knee": "#005F45",
-    "right_knee": "#8E4770",
-    "left_elbow": "#1F6FA3",
-    "right_elbow": "#9A6700",
-    "pelvis": "#6A51A3",
-    "buttocks": "#6A51A3",
-    "ink": "#222222",
-    "soft": "#8A8A8A",
-    "shade": "#EEF1F5",
-    "obstacle": "#C9CED6",
-    "trunk": "#6F7784",
-    "one support": "#0072B2",
-    "two supports": "#C0392B",
-    "more supports": "#4D4D4D",
-    "first run": "#0072B2",
-    "second run": "#D55E00",
-}
-"""Okabe and Ito's palette, which colour-blind readers can tell apart."""
 
 STYLES: dict[str, dict[str, Any]] = {
     "recorded": {"color": COLOURS["recorded"], "linewidth": 1.6, "zorder": 2.8},
@@ -47,9 +21,6 @@ STYLES: dict[str, dict[str, Any]] = {
     "executed": {"color": COLOURS["executed"], "linewidth": 0.9, "zorder": 4},
 }
 DPI = 150
-
-CYCLE = ("#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#6A51A3", "#8C564B")
-"""For effectors without a colour of their own."""
 
 T = TypeVar("T")
 
@@ -124,20 +95,6 @@ def dress(axes: Axes, ylabel: str = "", xlabel: str = "", title: str = "") -> No
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
         axes.spines[side].set_color(COLOURS["soft"])
-
-
-def readable(effector: str) -> str:
-    """Name of an effector for people."""
-    return effector.replace("_", " ")
-
-
-def colours_of(effectors: Iterable[str]) -> dict[str, str]:
-    """A colour for each effector: its own, or else the next free one."""
-    names = list(dict.fromkeys(effectors))
-    free = [colour for colour in CYCLE if colour not in {COLOURS.get(name) for name in names}]
-    unknown = [name for name in names if name not in COLOURS]
-    chosen = dict(zip(unknown, free * (len(unknown) // max(len(free), 1) + 1), strict=False))
-    return {name: COLOURS.get(name) or chosen[name] for name in names}
 
 
 def support_colour(count: int) -> str:

@@ -10,10 +10,11 @@ from matplotlib.patches import ConnectionPatch
 
 from manikin.body import BodyModel
 from manikin.errors import FigureError
-from manikin.figures.style import COLOURS, colours_of, dress, label_room, new_grid, readable
+from manikin.figures.style import dress, label_room, new_grid
 from manikin.figures.views import ALONG_Y, View, draw_body
 from manikin.mocap import Reconstruction, RecordedSupports
 from manikin.mocap.effector_places import effector_places
+from manikin.palette import COLOURS, colours_of, readable
 from manikin.spatial import FloatArray
 
 MOST = 14

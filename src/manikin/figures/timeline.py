@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
 from manikin.figures.labels import Labels
-from manikin.figures.style import COLOURS, colours_of, dress, end_of, label_room, need, new_grid, readable
+from manikin.figures.style import dress, end_of, label_room, need, new_grid
 from manikin.motion.derived import PhaseTable
+from manikin.palette import COLOURS, colours_of, readable
 from manikin.record import RunRecord
 
 

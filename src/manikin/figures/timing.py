@@ -8,20 +8,18 @@ from matplotlib.patches import Patch
 
 from manikin.contact import ContactSchedule
 from manikin.figures.style import (
-    COLOURS,
-    colours_of,
     dress,
     end_of,
     label_room,
     named_below,
     need,
     new_grid,
-    readable,
     support_colour,
     support_keys,
 )
 from manikin.figures.timeline import draw_phases
 from manikin.motion import Motion
+from manikin.palette import COLOURS, colours_of, readable
 from manikin.record import RunRecord
 
 AT_LIMIT = 1e-3

@@ -3,8 +3,9 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.figures.style import COLOURS, colours_of, legend_above, need, readable
+from manikin.figures.style import legend_above, need
 from manikin.figures.timeline import timeline
+from manikin.palette import COLOURS, colours_of, readable
 from manikin.record import RunRecord
 from manikin.spatial import FloatArray
 

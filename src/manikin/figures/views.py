@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 from manikin.balance import convex_polygon
 from manikin.body import BodyModel, Shape, ShapeKind
 from manikin.contact import Contact, ContactSchedule, SolePart
-from manikin.figures.style import COLOURS
+from manikin.palette import COLOURS, side_colour
 from manikin.scene import Box, HalfSpace, Mesh, Plane, Scene
 from manikin.spatial import FloatArray
 
@@ -191,14 +191,6 @@ def draw_body(axes: Axes, body: BodyModel, q: FloatArray, view: View) -> None:
     )  # fmt: skip
     drawn.set_zorder(3)
     axes.add_collection(drawn, autolim=False)
-
-
-def side_colour(name: str) -> str:
-    """Colour of the body's side that a segment or effector belongs to."""
-    for side in ("left", "right"):
-        if name.startswith(side):
-            return COLOURS[f"{side}_foot"]
-    return COLOURS["trunk"]
 
 
 def panel_ticks(low: float, high: float, offsets: Sequence[float]) -> tuple[list[float], list[str]]:

@@ -5,9 +5,10 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from manikin.figures.style import COLOURS, dress, need, new_figure
+from manikin.figures.style import dress, need, new_figure
 from manikin.figures.walking import KINDS, draw_obstacle
 from manikin.locomotion import HOLONOMIC, NONHOLONOMIC, ShoulderPaths, Walker, floor_plan, segment_path
+from manikin.palette import COLOURS
 from manikin.record import RunRecord
 from manikin.spatial import FloatArray
 

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from manikin.errors import FigureError
-from manikin.figures.style import COLOURS, dress, new_grid
+from manikin.figures.style import dress, new_grid
 from manikin.locomotion import WalkingPath, WalkObstacle
+from manikin.palette import COLOURS
 
 KINDS = {"holonomic": COLOURS["executed"], "nonholonomic": COLOURS["planned"]}
 

@@ -11,8 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from manikin.errors import FigureError
-from manikin.figures.style import COLOURS, dress, new_grid
+from manikin.figures.style import dress, new_grid
 from manikin.locomotion.words import STRAIGHT, THESIS_WORDS, EqualPaths, WordPath, WordSlice
+from manikin.palette import COLOURS
 from manikin.spatial import FloatArray
 
 WORD_COLOURS = {

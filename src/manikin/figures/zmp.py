@@ -8,18 +8,10 @@ from matplotlib.lines import Line2D
 from manikin.balance.zmp_path import ZmpPath
 from manikin.contact import ContactSchedule
 from manikin.figures.labels import Labels
-from manikin.figures.style import (
-    COLOURS,
-    STYLES,
-    colours_of,
-    dress,
-    label_room,
-    need,
-    support_colour,
-    support_words,
-)
+from manikin.figures.style import STYLES, dress, label_room, need, support_colour, support_words
 from manikin.figures.timeline import timeline
 from manikin.figures.views import ABOVE, distinct_contacts, draw_contact, sections
+from manikin.palette import COLOURS, colours_of
 from manikin.record import RunRecord
 from manikin.spatial import FloatArray
 

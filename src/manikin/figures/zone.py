@@ -6,10 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from manikin.errors import FigureError
-from manikin.figures.style import COLOURS, dress, legend_in_title, new_figure, new_grid
+from manikin.figures.style import dress, legend_in_title, new_figure, new_grid
 from manikin.figures.walking import KINDS
 from manikin.locomotion import CategoryStatistics, HolonomicZone
 from manikin.locomotion.zone import THESIS_RADIUS
+from manikin.palette import COLOURS
 
 _BARS = {"mean": "#4D4D4D", "average deviation": "#56B4E9", "largest deviation": "#E69F00"}
 

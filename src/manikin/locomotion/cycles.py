@@ -6,13 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.locomotion.foot_placement import Sole
 from manikin.locomotion.leg_kinematics import LegKinematics
 from manikin.locomotion.stance_foot import borders
+from manikin.low_pass import SHARES, low_passed
 from manikin.mocap.anatomy import SIDES
 from manikin.spatial import FloatArray
 
@@ -157,8 +157,7 @@ def _cut(
 
 
 def _stands(point: FloatArray, rate: float) -> NDArray[np.bool_]:
-    low_pass = butter(2, min(CUTOFF / (0.5 * rate), 0.95), output="sos")
-    smooth = sosfiltfilt(low_pass, point, axis=0, padlen=min(9, len(point) - 1))
+    smooth = low_passed(point, min(CUTOFF / (0.5 * rate), 0.95), SHARES, padding=9)
     speed = np.linalg.norm(np.gradient(smooth, 1.0 / rate, axis=0), axis=1)
     slow = speed < max(SLOW, SLOW_SHARE * float(np.percentile(speed, 95)))
     return slow & (smooth[:, 2] < np.percentile(smooth[:, 2], 5) + LOW)

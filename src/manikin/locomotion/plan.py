@@ -1,8 +1,6 @@
 """Finding walking paths: the criterion minimised from several guesses, around obstacles as well."""
 
-import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -18,6 +16,7 @@ from manikin.locomotion.path import WalkingPath, WalkingTask
 from manikin.locomotion.solve import Guess, bent, cheapest, lacking, programme_of, sharpened, solve
 from manikin.locomotion.ways import Grid
 from manikin.spatial import FloatArray, finite_number, frozen_array
+from manikin.worker import side_by_side
 
 NEAREST, FARTHEST = 0.01, 100.0
 """Distances from start to goal that can be asked [m]; at none, the direction of the goal has no value."""
@@ -104,12 +103,8 @@ def walking_paths(
         raise InputError(f"workers is {workers!r}; valid: an integer >= 1")
     wanted = [frozen_array(goal, f"walking goal {i} [m, m, rad]", (3,)) for i, goal in enumerate(goals)]
     one = partial(_one, start, objective, options)
-    if workers == 1 or len(wanted) < 2:
-        return [one(goal) for goal in wanted]
-    # Fresh processes: copies of this one would share the threads and locks of its libraries.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(wanted)), context) as pool:
-        return list(pool.map(one, wanted, chunksize=max(1, len(wanted) // (4 * workers))))
+    found = dict(side_by_side(one, wanted, workers, "walking paths"))
+    return [found[number] for number in range(len(wanted))]
 
 
 def _check(task: WalkingTask) -> None:

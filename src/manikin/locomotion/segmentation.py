@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from manikin.errors import InputError
 from manikin.locomotion.shoulders import LEAST_DISTANCE, ShoulderPaths, deviations
+from manikin.low_pass import SHARES, low_passed
 from manikin.spatial import FloatArray, finite_number, frozen_array
 
 HOLONOMIC = "holonomic"
@@ -245,11 +245,7 @@ def _smoothed(angles: FloatArray, cutoff: float) -> FloatArray:
     """(n, 2) angles, low-passed as directions so that whole turns do not matter; NaN counts for nothing."""
     known = np.isfinite(angles)
     pointers = np.where(known, np.exp(1j * np.where(known, angles, 0.0)), 0.0)
-    sections = butter(2, cutoff, output="sos")
-    padding = min(9, len(angles) - 1)
-    real, imaginary = (
-        sosfiltfilt(sections, part, axis=0, padlen=padding) for part in (pointers.real, pointers.imag)
-    )
+    real, imaginary = (low_passed(part, cutoff, SHARES, padding=9) for part in (pointers.real, pointers.imag))
     return np.where(np.any(known, axis=0), np.arctan2(imaginary, real), np.nan)
 
 

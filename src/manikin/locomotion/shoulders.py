@@ -6,10 +6,10 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import butter, sosfiltfilt
 
 from manikin.errors import InputError
 from manikin.locomotion.path import WalkingPath
+from manikin.low_pass import SHARES, low_passed
 from manikin.mocap.anatomy import SIDES, segment_joint
 from manikin.mocap.recording import Recording
 from manikin.spatial import FloatArray, finite_number, frozen_array
@@ -141,9 +141,8 @@ class ShoulderPaths:
         Args:
             cutoff: As a share of half the rate, between 0 and 1 [-].
         """
-        sections = butter(2, cutoff, output="sos")
-        padding = min(max(9, int(np.ceil(2.0 / cutoff))), len(self) - 1)
-        left, right = (sosfiltfilt(sections, p, axis=0, padlen=padding) for p in (self.left, self.right))
+        padding = max(9, int(np.ceil(2.0 / cutoff)))
+        left, right = (low_passed(path, cutoff, SHARES, padding) for path in (self.left, self.right))
         return ShoulderPaths(left, right, self.rate)
 
 

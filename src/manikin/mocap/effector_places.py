@@ -30,8 +30,10 @@ def effector_places(body: BodyModel, q: FloatArray, names: Sequence[str]) -> Flo
     frames = [
         body.effector_frame(name) if name in body.effectors else body.segment_frame(name) for name in names
     ]
-    places = np.empty((len(names), len(q), 3))
+    # Views of Pinocchio's memory: they follow whatever is computed in these data.
+    views = [data.oMf[frame].translation for frame in frames]
+    places = np.empty((len(q), len(names), 3))
     for number, posture in enumerate(q):
         pin.framesForwardKinematics(model, data, posture)
-        places[:, number] = [data.oMf[frame].translation for frame in frames]
-    return places
+        places[number] = views
+    return np.ascontiguousarray(places.transpose(1, 0, 2))

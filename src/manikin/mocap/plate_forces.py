@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from manikin.balance import zero_moment_point
 from manikin.contact import Contact, ContactKind, ContactSchedule
+from manikin.low_pass import low_passed
 from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.recorded_dynamics import RecordedDynamics
 from manikin.mocap.recorded_margins import RecordedMargins, margins_of_wrenches
@@ -155,9 +155,7 @@ def _sampled(plate: ForcePlate, times: FloatArray, cutoff: float) -> FloatArray:
     if free.sum() >= LEAST_UNLOADED * plate.rate:
         wrenches = wrenches - wrenches[free].mean(axis=0)
     if 2.0 * cutoff < plate.rate and len(plate) > 4:
-        sections = butter(2, cutoff, fs=plate.rate, output="sos")
-        padding = min(len(plate) - 1, int(np.ceil(2.0 * plate.rate / cutoff)))
-        wrenches = sosfiltfilt(sections, wrenches, axis=0, padlen=padding)
+        wrenches = low_passed(wrenches, cutoff, plate.rate)
     loaded = np.interp(times, plate.time, plate.pressed) > 0.5
     found = np.stack([np.interp(times, plate.time, column) for column in wrenches.T], axis=1)
     return np.where(loaded[:, None], found, 0.0)

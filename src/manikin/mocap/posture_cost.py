@@ -119,9 +119,11 @@ class PostureCost:
 
     def room(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Smallest and largest steps (n, d) that leave the hinges of (n, nq) postures in their ranges."""
-        free = np.full((len(q), 6), np.inf)
+        lower = np.full((len(q), len(self.slots)), -np.inf)
+        upper = np.full((len(q), len(self.slots)), np.inf)
         angles = q[:, self._angles]
-        return np.hstack([-free, self._lower - angles]), np.hstack([free, self._upper - angles])
+        lower[:, 6:], upper[:, 6:] = self._lower - angles, self._upper - angles
+        return lower, upper
 
     def moved(self, q: FloatArray, steps: FloatArray) -> FloatArray:
         """Postures after steps (n, d), hinges within their ranges; no step turns by more than 1 rad."""

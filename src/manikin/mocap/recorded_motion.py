@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
-from scipy.signal import butter, sosfiltfilt
 
 from manikin.errors import InputError
+from manikin.low_pass import low_passed
 from manikin.mocap.local_cutoff import local_cutoff, smooth
 from manikin.mocap.posture_cost import PostureCost
 from manikin.mocap.reconstruction import Reconstruction
@@ -68,8 +68,7 @@ def smoothed_postures(
         ceiling = np.minimum(local_cutoff(found.time, touch_downs, cutoff), HIGHEST_SHARE * rate)
         q = smooth(q, rate, ceiling)
     else:
-        padding = min(len(q) - 1, int(np.ceil(2.0 * rate / cutoff)))
-        q = sosfiltfilt(butter(2, cutoff, fs=rate, output="sos"), q, axis=0, padlen=padding)
+        q = low_passed(q, cutoff, rate)
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     if limits:
         q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)

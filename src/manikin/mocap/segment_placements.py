@@ -55,5 +55,9 @@ class SegmentPlacements:
             caused: Any = pin.computeJointJacobians(model, data, posture)
             pin.updateFramePlacements(model, data)
             turns[frame], shifts[frame], columns[frame] = self._turns, self._shifts, caused.T
-        last = (np.ascontiguousarray(np.moveaxis(values, 0, -1)) for values in (turns, shifts, columns))
-        return Placements(q[:, :3].T, *last)
+        return Placements(
+            q[:, :3].T,
+            np.ascontiguousarray(turns.transpose(1, 2, 3, 0)),
+            np.ascontiguousarray(shifts.transpose(1, 2, 0)),
+            np.ascontiguousarray(columns.transpose(1, 2, 0)),
+        )

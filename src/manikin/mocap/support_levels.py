@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from manikin.errors import InputError
+from manikin.low_pass import low_passed
 from manikin.mocap.runs import runs
 from manikin.spatial import FloatArray, frozen_array
 
@@ -140,17 +139,9 @@ def track(positions: FloatArray, rate: float, cutoff: float = CUTOFF) -> Track:
         raise InputError(f"{len(positions)} positions of an effector; valid: at least 4")
     if not 0.0 < cutoff < 0.5 * rate:
         raise InputError(f"cutoff is {cutoff:g} Hz; valid: above 0, below half the rate, {0.5 * rate:g} Hz")
-    sections = _low_pass(cutoff, rate)
-    padding = min(len(positions) - 1, int(np.ceil(2.0 * rate / cutoff)))
-    smooth = sosfiltfilt(sections, positions, axis=0, padlen=padding)
+    smooth = low_passed(positions, cutoff, rate)
     speed = np.linalg.norm(np.gradient(smooth, 1.0 / rate, axis=0), axis=1)
     return Track(frozen_array(smooth, "track positions"), frozen_array(speed, "track speed"), rate)
-
-
-@lru_cache(maxsize=16)
-def _low_pass(cutoff: float, rate: float) -> FloatArray:
-    """Second-order sections of the low-pass: the same for every point of a recording."""
-    return np.asarray(butter(2, cutoff, fs=rate, output="sos"), dtype=np.float64)
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,12 @@
 
 import multiprocessing
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from multiprocessing.synchronize import Event
-
-from threadpoolctl import threadpool_limits
 
 from manikin.errors import InputError, ManikinError
 from manikin.simulation.push_search import DirectionSearch, HeldImpulse
-from manikin.worker import prepare_worker
+from manikin.worker import FRESH, prepare_worker, side_by_side
 
 
 def search_directions(
@@ -22,8 +19,7 @@ def search_directions(
 
     Args:
         searches: What to search.
-        jobs: Processes; 1 searches here. With more a script must keep its own work under
-            ``if __name__ == "__main__":``.
+        jobs: Processes, see :func:`manikin.worker.side_by_side`.
 
     Yields:
         Index of a search that is done, and what it found, in the order in which they end.
@@ -34,29 +30,11 @@ def search_directions(
     """
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; valid: at least 1")
-    if jobs > 1 and len(searches) > 1:
-        yield from _side_by_side(searches, min(jobs, len(searches)))
-        return
-    for number, search in enumerate(searches):
-        with threadpool_limits(1):
-            found = search.run()
-        yield number, found
-
-
-def _side_by_side(searches: Sequence[DirectionSearch], jobs: int) -> Iterator[tuple[int, HeldImpulse]]:
-    # Fresh processes: copies of this one would share the threads and locks of its libraries.
-    context = multiprocessing.get_context("spawn")
-    given_up = context.Event()
-    pool = ProcessPoolExecutor(jobs, context, _prepare, (given_up,))
+    given_up = multiprocessing.get_context(FRESH).Event()
     try:
-        futures = {pool.submit(_run, search): number for number, search in enumerate(searches)}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    except BrokenProcessPool:
-        raise ManikinError("a process of the search ended before its time, for want of memory?") from None
+        yield from side_by_side(_run, searches, jobs, "search", prepare=partial(_prepare, given_up))
     finally:
         given_up.set()
-        pool.shutdown(wait=False, cancel_futures=True)
 
 
 _given_up: Event | None = None

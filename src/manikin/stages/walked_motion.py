@@ -5,12 +5,12 @@ import math
 
 import numpy as np
 import pinocchio as pin
-from scipy.signal import butter, sosfiltfilt
 
 from manikin.balance import wrench_polytope
 from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import BodyError
 from manikin.locomotion import Walk
+from manikin.low_pass import low_passed
 from manikin.mocap.recorded_motion import CUTOFF
 from manikin.motion import Motion
 from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
@@ -35,7 +35,7 @@ def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
     schedule, motion = walked_schedule(walk, height), walk.motion
     polytopes = [wrench_polytope(phase.stance) for phase in schedule.sequence]
     rate = (len(motion.time) - 1) / motion.duration
-    v = sosfiltfilt(butter(2, CUTOFF, fs=rate, output="sos"), motion.v, axis=0)
+    v = low_passed(motion.v, CUTOFF, rate, padding=9)
     a = np.gradient(v, 1.0 / rate, axis=0)
     full, _ = full_motion(walk.body, schedule, polytopes, motion.time, motion.q, v, a)
     return schedule, full

@@ -74,7 +74,7 @@ class ViewerSession(Page):
         self._build_body()
         self._build_others(others or {})
         self._build_controls()
-        self.show(self.time)
+        self.put_beside(self.beside)
 
     @property
     def motion(self) -> Motion:
@@ -121,6 +121,8 @@ class ViewerSession(Page):
             raise InputError(f"motion is {name!r}; valid here: {NOTHING}, {', '.join(self.content.motions)}")
         with self._lock:
             self.beside = name
+            if name != NOTHING:
+                self._second.paint(COLOURS[name])
             self.show(self.time)
 
     def play(self) -> None:
@@ -158,7 +160,8 @@ class ViewerSession(Page):
                 f"/com/{name}", segments, np.array(COLOURS[name]), thickness=3.0, thickness_units="screen"
             )
         self._draw_contacts()
-        look_at(self.server, self.motion.com.mean(axis=0))
+        path = self.motion.com
+        look_at(self.server, path.mean(axis=0), float(np.linalg.norm(np.ptp(path, axis=0))))
 
     def _draw_contacts(self) -> None:
         """Outline of every sole of the schedule."""
@@ -185,6 +188,9 @@ class ViewerSession(Page):
         self._shapes = BodyShapes(self.server, self._body)  # the centre of mass and its path are inside
         self._second = BodyShapes(self.server, self._body, 0.45, "/beside")
         self._aside = BESIDE * _across(self.motion.com)
+        self._names = [
+            scene.add_label(f"/names/{which}", which, anchor="bottom-center") for which in ("shown", "beside")
+        ]
         self._com = scene.add_icosphere("/com/now", radius=0.03, color=(34, 34, 34))
         names = dict.fromkeys(
             name for motion in self.content.motions.values() for name in motion.contact_names
@@ -214,13 +220,20 @@ class ViewerSession(Page):
             shapes.place(motion.q[int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))])
 
     def _place_beside(self) -> None:
-        self._second.show(self.beside != NOTHING)
-        if self.beside == NOTHING:
+        together = self.beside != NOTHING
+        self._second.show(together)
+        for label in self._names:
+            label.visible = together
+        if not together:
             return
         motion = self.content.motions[self.beside]
         q = np.array(motion.q[int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))])
         q[:2] += self._aside
         self._second.place(q)
+        for label, name, shapes in zip(
+            self._names, (self.chosen, self.beside), (self._shapes, self._second), strict=True
+        ):
+            label.text, label.position = name, shapes.top()
 
     def _place_forces(self, motion: Motion, index: int) -> None:
         for number, name in enumerate(motion.contact_names):

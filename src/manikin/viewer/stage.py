@@ -33,6 +33,13 @@ COLOURS = {
 VIEW = np.array([-1.7, -1.9, 0.5])
 """Where new visitors look from, seen from what they look at [m]."""
 
+WHOLE = 2.0
+"""Size of what is seen whole from there, a body aside [m]."""
+
+
+ABOVE = 0.35
+"""From the origin of the head to a name above it [m]."""
+
 
 def start_server(port: int) -> viser.ViserServer:
     """Start a server on this computer.
@@ -84,10 +91,16 @@ def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: 
         )
 
 
-def look_at(server: viser.ViserServer, middle: FloatArray) -> None:
-    """Let new visitors look at a point (3,) from the front of its left, from a person's height [m]."""
+def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) -> None:
+    """Let new visitors look at a point from behind its right, from a person's height or above.
+
+    Args:
+        server: Of the page.
+        middle: (3,) the point [m].
+        size: Of what is to be seen, a body aside: from farther away the larger it is [m].
+    """
     server.initial_camera.look_at = middle
-    server.initial_camera.position = middle + VIEW
+    server.initial_camera.position = middle + max(1.0, size / WHOLE) * VIEW
     server.initial_camera.up = (0.0, 0.0, 1.0)
 
 
@@ -113,14 +126,21 @@ class BodyShapes:
         self._body = body
         self.data = body.pinocchio.createData()
         self.frames: dict[str, viser.FrameHandle] = {}
+        self._meshes: list[viser.MeshHandle] = []
         for segment in body.segments:
             triangles = segment_triangles(segment)
             if triangles is None:
                 continue
             self.frames[segment.name] = server.scene.add_frame(f"{root}/{segment.name}", show_axes=False)
-            server.scene.add_mesh_simple(
+            mesh = server.scene.add_mesh_simple(
                 f"{root}/{segment.name}/shape", *triangles, color=side_colour(segment.name), opacity=opacity
             )
+            self._meshes.append(mesh)
+
+    def paint(self, colour: tuple[int, int, int]) -> None:
+        """Give all shapes one colour, other than those of the sides of a body."""
+        for mesh in self._meshes:
+            mesh.color = colour
 
     def place(self, q: FloatArray) -> None:
         """Show the configuration (nq,)."""
@@ -129,6 +149,11 @@ class BodyShapes:
             placement = self.data.oMf[self._body.segment_frame(name)]
             x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
             frame.wxyz, frame.position = (w, x, y, z), placement.translation
+
+    def top(self) -> FloatArray:
+        """(3,) above the highest origin of a segment as the body is placed [m]."""
+        places = [self.data.oMf[self._body.segment_frame(name)].translation for name in self.frames]
+        return max(places, key=lambda place: place[2]) + np.array([0.0, 0.0, ABOVE])
 
     def show(self, visible: bool) -> None:
         """Draw the body, or hide it."""

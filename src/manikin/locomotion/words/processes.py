@@ -1,16 +1,12 @@
 """Slices of the partition, several at once, each in a process beside this one."""
 
-import multiprocessing
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 
-from threadpoolctl import threadpool_limits
-
-from manikin.errors import InputError, ManikinError
+from manikin.errors import InputError
 from manikin.locomotion.words.grid import THESIS_GRID, WordGrid
 from manikin.locomotion.words.partition import WordSlice, solve_slice
-from manikin.worker import prepare_worker
+from manikin.worker import side_by_side
 
 
 def solve_slices(
@@ -21,8 +17,7 @@ def solve_slices(
     Args:
         headings_deg: Final heading of each [deg].
         grid: Of the places.
-        jobs: Processes; 1 works here. With more a script must keep its own work under
-            ``if __name__ == "__main__":``.
+        jobs: Processes, see :func:`manikin.worker.side_by_side`.
 
     Yields:
         The slices in the order in which they are done.
@@ -33,20 +28,5 @@ def solve_slices(
     """
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; valid: at least 1")
-    if jobs == 1 or len(headings_deg) < 2:
-        for heading in headings_deg:
-            with threadpool_limits(1):
-                found = solve_slice(heading, grid)
-            yield found
-        return
-    # Fresh processes: copies of this one would share the threads and locks of its libraries.
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(jobs, len(headings_deg)), context, prepare_worker)
-    try:
-        futures = [pool.submit(solve_slice, heading, grid) for heading in headings_deg]
-        for future in as_completed(futures):
-            yield future.result()
-    except BrokenProcessPool:
-        raise ManikinError("a process of the words ended before its time, for want of memory?") from None
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+    for _, found in side_by_side(partial(solve_slice, grid=grid), headings_deg, jobs, "words"):
+        yield found
