@@ -13,9 +13,13 @@ from matplotlib.figure import Figure
 from manikin.centroidal import KeyframeProblem, plan_com_through_key_frames
 from manikin.figures.compare_com import compare_planes_figure, compare_scene_figure
 from manikin.figures.compare_timing import compare_timing_figure
+from manikin.figures.postures import draw_moment
 from manikin.figures.style import dress, new_grid
+from manikin.figures.views import ALONG_X, ALONG_Y
 from manikin.figures.write import save_figure
 from manikin.mocap import Reconstruction, RecordedSupports, read_recording, reconstruct, supports_of
+from manikin.motion.file import MotionFile
+from manikin.record import RunRecord
 from manikin.replan import Replan, against_recording, replan, window
 
 PAGE = Path(__file__).with_suffix(".md")
@@ -220,6 +224,36 @@ def key_frame_figure(plan: Replan) -> Figure:
     return figure
 
 
+def posture_figure(plan: Replan, count: int = 9) -> Figure:
+    """Recorded, planned and executed postures at the same instants, seen from the side."""
+    kinds = {"recorded": plan.recorded, "planned": plan.planned, "executed": plan.executed}
+    motions = {name: motion for name, motion in kinds.items() if motion is not None}
+    record = RunRecord(
+        "postures", MotionFile(body=plan.body, scene=plan.scene, schedule=plan.schedule),
+        {"succeeded": True}, plan.body.mass, None,
+    )  # fmt: skip
+    view = ALONG_Y if np.ptp(plan.recorded.com[:, 1]) < np.ptp(plan.recorded.com[:, 0]) else ALONG_X
+    reach = np.array([0.65, 0.65, 1.0])
+    figure, grid = new_grid(
+        14.0, 9.2, "A recorded walk, its plan and its execution", len(motions), 1, between=0.15
+    )
+    for row, (name, motion) in enumerate(motions.items()):
+        axes = figure.add_subplot(grid[row, 0])
+        for column, time in enumerate(np.linspace(0.0, 0.999, count) * plan.recorded.time[-1]):
+            sample = int(np.argmin(np.abs(motion.time - time)))
+            centre = motion.com[sample]
+            across = view(centre[None])[0][0]
+            draw_moment(
+                axes, record, motion, sample, view.moved(1.15 * column - across, 0.0),
+                (centre - reach, centre + reach),
+            )  # fmt: skip
+            axes.text(1.15 * column, 1.86, f"{time:.2f} s", ha="center", fontsize=8)
+        dress(axes, ylabel=name)
+        axes.set(xlim=(-0.6, 1.15 * count - 0.5), ylim=(-0.05, 1.95), xticks=[])
+        axes.set_aspect("equal")
+    return figure
+
+
 def main(folder: Path) -> None:
     """Measure everything and write page and figures."""
     near, ran, against, shown = [], [], [], {}
@@ -237,11 +271,12 @@ def main(folder: Path) -> None:
         free = replan(found, supports, method="timing-free", rolling=False)
         against.append(against_row(name, free))
         if path == SHOWN:
-            shown = {"near": whole, "free": free}
+            shown = {"near": whole, "free": free, "ran": rolling}
     for name, figure in (
         ("keyframes", key_frame_figure(shown["near"])),
         ("planes", compare_planes_figure(against_recording(shown["free"]))),
         ("scene", compare_scene_figure(against_recording(shown["free"]))),
+        ("postures", posture_figure(shown["ran"])),
         ("timing", compare_timing_figure(against_recording(shown["free"]))),
     ):
         save_figure(figure, IMAGES / f"replanning-{name}.png")
@@ -252,7 +287,7 @@ def main(folder: Path) -> None:
         + "".join(near) + "\n![Key frames](images/replanning-keyframes.png)\n" + EXECUTED
         + head("recording", "outcome", "executed [s]", "posture [°]", "torque", "CoM RMS [mm]",
                "CoM largest [mm]", "feet largest [mm]", "balanced [%]", "least margin [N.m]")
-        + "".join(ran) + NOTES + AGAINST.lstrip("\n")
+        + "".join(ran) + "\n![Postures](images/replanning-postures.png)\n" + NOTES + AGAINST.lstrip("\n")
         + head("walk", "recorded [s]", "planned [s]", "single, recorded [s]", "single, planned [s]",
                "double, recorded [s]", "double, planned [s]", "CoM RMS [cm]", "least margin, recorded [N.m]",
                "least margin, planned [N.m]")
