@@ -76,3 +76,14 @@ def test_a_phase_without_support_is_refused():
     flight = StanceSequence([Phase(Stance(c, 1500.0)) for c in ([LEFT, RIGHT], [], [LEFT, RIGHT])])
     with pytest.raises(InputError, match="no support in phase 1"):
         Recording(TIME, COM, flight, KEYS)
+
+
+def test_the_rate_of_the_angular_momentum_is_cut_like_the_samples():
+    rate = np.column_stack([TIME, -TIME, 0.0 * TIME])
+    recording = Recording(TIME, COM, SEQUENCE, KEYS, rate)
+    np.testing.assert_allclose(recording.angular_momentum_rate[:, 0], recording.time + 2.1, atol=1e-9)
+    assert Recording(TIME, COM, SEQUENCE, KEYS).angular_momentum_rate is None
+    again = recording.with_angular_momentum_rate(recording.angular_momentum_rate)
+    np.testing.assert_array_equal(again.com, recording.com)
+    with pytest.raises(InputError, match="angular momentum rate"):
+        Recording(TIME, COM, SEQUENCE, KEYS, rate[:-1])

@@ -1,6 +1,7 @@
 """The CoM trajectory: published splines, time scaling, dictionaries."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -100,3 +101,29 @@ def test_motion_must_start_at_zero(table_5_4: CentroidalTrajectory):
     schedule = ContactSchedule(table_5_4.schedule.sequence, table_5_4.schedule.instants + 1.0)
     with pytest.raises(InputError, match="starts at 1 s"):
         CentroidalTrajectory(79.0, table_5_4.spline, schedule)
+
+
+def turning(table_5_4: CentroidalTrajectory) -> CentroidalTrajectory:
+    """The published CoM of a body that turns, too."""
+    spline, rng = table_5_4.spline, np.random.default_rng(0)
+    rate = BSpline(spline.degree, spline.knots, 20.0 * rng.normal(size=spline.control_points.shape))
+    return replace(table_5_4, turning=rate)
+
+
+def test_a_body_that_turns_needs_its_rate_of_angular_momentum_as_a_moment(table_5_4: CentroidalTrajectory):
+    """[Qiu2012]_ 4.51 less 4.6 is the rate of the angular momentum, at any time."""
+    time, found = np.linspace(0.0, table_5_4.duration, 7), turning(table_5_4)
+    more = found.pseudo_wrench(time) - table_5_4.pseudo_wrench(time)
+    np.testing.assert_allclose(more[:, :3], 0.0, atol=1e-9)
+    np.testing.assert_allclose(more[:, 3:], found.angular_momentum_rate(time), atol=1e-9)
+    assert not np.any(table_5_4.angular_momentum_rate(time))
+
+
+def test_turning_survives_the_dictionary_and_forbids_joining(table_5_4: CentroidalTrajectory):
+    found = turning(table_5_4)
+    again = CentroidalTrajectory.from_dict(found.to_dict(), found.schedule.sequence)
+    assert again.to_dict() == found.to_dict()
+    with pytest.raises(SplineError, match="valid: those of point masses"):
+        found.followed_by(table_5_4)
+    with pytest.raises(SplineError, match="turning"):
+        replace(found, turning=BSpline(1, [0.0, 0.0, 2.0, 2.0], np.zeros((2, 3))))

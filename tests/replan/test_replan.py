@@ -1,6 +1,7 @@
 """Recorded motions planned anew: their stances, their centre of mass, and what becomes of them."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,16 @@ from manikin.errors import InputError
 from manikin.mocap import recorded_schedule, smoothed
 from manikin.motion.file import read_motions, write_motions
 from manikin.replan import against_recording, replan, window
-from manikin.replan.contacts import landing_flat, on_one_seat, scene_under
+from manikin.replan.contacts import (
+    landing_flat,
+    leaving_with_the_hinge,
+    on_one_seat,
+    scene_under,
+    within_toe_strength,
+)
 from manikin.replan.effectors import effector_paths
+from manikin.replan.placements import effector_placements, toe_hinge
+from manikin.spatial import GRAVITY
 
 
 def test_who_stands_and_nods_is_planned_and_executed(nod):
@@ -133,6 +142,83 @@ def test_the_walk_is_executed_at_its_own_speed(walked):
     assert ran.motion.duration == pytest.approx(walked.recording.time[-1], abs=0.01)
     assert ran.com_max_error_m < 0.02
     assert np.mean(ran.motion.margin > 0.0) > 0.9
+
+
+def test_plan_and_execution_keep_to_the_recorded_postures(walked):
+    """Below 8 degrees, with nothing in touch and no joint beyond its strength.
+
+    Arms that have to make up for what a point mass leaves out, and soles that tilt half as far as they were
+    recorded to, come to 15 degrees.
+    """
+    told = walked.as_dict()
+    assert np.degrees(told["wholebody"]["posture_rms_rad"]) < 8.0
+    assert told["wholebody"]["max_torque_share"] <= 1.0
+    assert told["wholebody"]["min_clearance_m"] >= 0.01
+    assert walked.execution.failure == ""
+    assert len(walked.execution.touches) == 0
+
+
+def test_the_plan_is_in_balance_as_a_point_mass_and_with_its_angular_momentum(walked):
+    """Both every millisecond; the rate is no small one: walkers turn with some 30 N.m and more."""
+    trajectory = walked.com.trajectory
+    times = np.linspace(0.0, trajectory.duration, round(1000 * trajectory.duration) + 1)
+    polytopes = [wrench_polytope(phase.stance) for phase in walked.schedule.sequence]
+    phases = walked.schedule.phase_at(times)
+    for way in (trajectory, replace(trajectory, turning=None)):
+        wrench = way.pseudo_wrench(times)
+        assert min(polytopes[p].margin(w) for p, w in zip(phases, wrench, strict=True)) >= 0.0
+    assert np.abs(trajectory.angular_momentum_rate(times)).max() > 20.0
+
+
+def test_feet_leave_while_their_toes_still_lie(walk):
+    """At most a tenth of a second sooner than recorded, and with their hinge within 3 cm of its place."""
+    found, supports = walk
+    even, clock = smoothed(found), supports.start + found.time
+    before = landing_flat(recorded_schedule(even, supports, rolling=True), found.body)
+    after = leaving_with_the_hinge(before, found.body, clock, even.q)
+    earlier = before.instants - after.instants
+    assert earlier.max() > 0.02
+    assert np.all((earlier >= 0.0) & (earlier < 0.1))
+    for name in ("left_foot", "right_foot"):
+        position, rotation = effector_placements(found.body, even.q, name)
+        hinge = toe_hinge(found.body, name)
+        path = position + rotation @ hinge
+        for index, end in enumerate(after.instants[1:-1]):
+            stance = after.sequence[index].stance
+            if name not in stance or name in after.sequence[index + 1].stance:
+                continue
+            contact = stance[name]
+            place = contact.position + contact.rotation_contact_to_world @ hinge
+            assert np.linalg.norm(path[np.argmin(np.abs(clock - end))] - place) < 0.03
+
+
+def test_a_foot_tilts_on_its_toes_as_far_as_it_was_recorded_to(walk):
+    """Beyond 35 degrees, up to which it once counted; its toes bend by the same angle and lie flat."""
+    found, supports = walk
+    even, clock = smoothed(found), supports.start + found.time
+    schedule = landing_flat(recorded_schedule(even, supports, rolling=True), found.body)
+    schedule = leaving_with_the_hinge(schedule, found.body, clock, even.q)
+    paths = effector_paths(found.body, schedule, clock, even.q)
+    tilts = []
+    for name, target in paths.targets.items():
+        pitch = np.arcsin(-target.rotation[:, 2, 0])
+        held = target.weight >= 1.0
+        toes = paths.toes[found.body.joint_index(name.replace("foot", "toe_extension"))]
+        np.testing.assert_allclose(np.maximum(pitch, 0.0)[held], toes[held], atol=1e-6)
+        tilts.append(np.degrees(pitch[held].max()))
+    assert min(tilts) > 35.0
+
+
+def test_toes_carry_only_what_they_are_strong_enough_for(walk):
+    """A load of 1.4 body weights at the tip of a shortened sole asks for the toes' strength."""
+    found, supports = walk
+    body = found.body
+    schedule = landing_flat(recorded_schedule(smoothed(found), supports, rolling=True), body)
+    lever = body.torque_limit[body.joint_index("left_toe_extension")] / (1.4 * body.mass * GRAVITY)
+    for phase in within_toe_strength(schedule, body).sequence:
+        for contact in phase.stance:
+            ahead = contact.points[:, 0].max() - toe_hinge(body, contact.effector)[0]
+            assert ahead == pytest.approx(lever, abs=1e-9)
 
 
 def test_planned_timing_free_double_supports_last_longer(walk):

@@ -4,7 +4,8 @@
 [Qiu2012]_ 5.3 does. Where a walk's supports last a tenth of a second, a centimetre of error asks for
 accelerations that no foot can give, and further key frames make it worse. Here the key frames pull, balance
 is imposed all along, and the motion is measured every millisecond. Where it strays from the recording,
-the sample that is farthest off becomes one more key frame.
+the sample that is farthest off becomes one more key frame. With the recorded rate of the angular momentum the
+plan keeps its balance twice: as a point mass, as in the thesis, and with a rate near the recorded one.
 """
 
 import time as clock
@@ -97,7 +98,7 @@ class _Search:
         asked, recording = problem.requirements, problem.recording
         self.problem, self.recording, self.iterations, self.rounds = problem, recording, 0, 0
         self.polytopes: tuple[WrenchPolytope, ...] = polytopes_of(asked)
-        self.programme = NearProgramme.of(asked.mass, self.polytopes, recording.schedule, asked.weights)
+        self.programme = NearProgramme.of(asked.mass, self.polytopes, recording, asked.weights)
 
     def run(self) -> NearKeyFramesResult:
         began = clock.perf_counter()
@@ -167,12 +168,19 @@ class _Search:
 
     def _measured(self, frames: tuple[int, ...], points: FloatArray) -> _Attempt:
         asked = self.problem.requirements
-        trajectory = CentroidalTrajectory(asked.mass, self.programme.spline(points), self.recording.schedule)
-        problem = replace(asked, start_com=points[0], goal_com=points[-1])
-        return _Attempt(frames, points, trajectory, problem, measure(problem, trajectory, self.polytopes))
+        trajectory = CentroidalTrajectory(
+            asked.mass, self.programme.spline(points), self.recording.schedule,
+            turning=self.programme.turning_spline(points),
+        )  # fmt: skip
+        problem = replace(asked, start_com=points[0, :3], goal_com=points[-1, :3])
+        measured = [measure(problem, way, self.polytopes) for way in _ways(trajectory)]
+        worst = min(measured, key=lambda certificate: certificate.min_margin)
+        return _Attempt(frames, points, trajectory, problem, worst)
 
     def _margins(self, attempt: _Attempt) -> list[FloatArray]:
-        return phase_margins(attempt.problem, attempt.trajectory, self.polytopes)
+        """Of each phase, the lesser ones of the point mass and of the body that turns."""
+        found = [phase_margins(attempt.problem, way, self.polytopes) for way in _ways(attempt.trajectory)]
+        return [np.minimum.reduce(margins) for margins in zip(*found, strict=True)]
 
     def _distance(self, attempt: _Attempt) -> FloatArray:
         offset = attempt.trajectory.position(self.recording.time) - self.recording.com
@@ -197,6 +205,11 @@ class _Search:
             return None
         worst = best.certificate.largest
         return Failure(worst.requirement, f"{worst} near the key frames", worst.phase, worst.time)
+
+
+def _ways(trajectory: CentroidalTrajectory) -> tuple[CentroidalTrajectory, ...]:
+    """The trajectory, and without its turning."""
+    return (trajectory,) if trajectory.turning is None else (trajectory, replace(trajectory, turning=None))
 
 
 def _hopeless(feasibility: Feasibility) -> Failure | None:

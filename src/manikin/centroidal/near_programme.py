@@ -3,10 +3,12 @@
 A recorded position is not exact, so that the one CoM that passes all of them may be out of balance where a
 person was not. Here the key frames pull instead, and balance is imposed every ten milliseconds: the
 pseudo-wrench ``m [a - g; p x (a - g)]`` ([Qiu2012]_ 4.6), bilinear in position and acceleration, is
-linearised about the last solution. Both our own.
+linearised about the last solution. Where the recorded rate of the angular momentum is known, the plan has
+one too, near it, and both wrenches keep their balance: that of the point mass and that of the body which
+turns ([Qiu2012]_ 4.51). All this is our own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +18,7 @@ from scipy import sparse
 
 from manikin.balance import WrenchPolytope
 from manikin.centroidal.problem import Weights
+from manikin.centroidal.recording import Recording
 from manikin.contact import ContactSchedule
 from manikin.spatial import GRAVITY, FloatArray, skew
 from manikin.spline import BSpline, basis_matrix, clamped_knots
@@ -35,6 +38,20 @@ FACETS = 16
 PULL = 1e4
 """Cost of a mean squared distance from the key frames, against that of a speed of 1 m/s [1/m^2]."""
 
+TURN = 100.0
+"""Unit of the rate of the angular momentum among the unknowns [N.m]."""
+
+TURN_PULL = 2.0
+"""Cost of its mean squared distance from the recorded one, in that unit: 10 N.m cost as much as the
+key frames missed by a little more than a millimetre."""
+
+RESERVE = 8.0
+"""Margin of the body that turns beyond that of the point mass: arms and legs meet the rate of its angular
+momentum only nearly [N.m]."""
+
+TURN_BEND = 1e-7
+"""Cost of its mean squared second derivative, in that unit [s^4]."""
+
 _NO_BOUND = 1e30
 
 
@@ -47,6 +64,8 @@ class NearProgramme:
         polytopes: W_i of the phases about the world origin.
         knots: On [0, 1].
         smoothness: (n, n) matrix of the objective of one axis, without the pull.
+        turning: (n, n) and (n, 3) objective of the rate of the angular momentum, in :data:`TURN`; None for a
+            point mass.
         phases: (m,) phase of each instant at which balance is imposed; key instants count twice.
         position: (m, n) CoM there by control points.
         acceleration: (m, n) its acceleration.
@@ -56,45 +75,52 @@ class NearProgramme:
     polytopes: tuple[WrenchPolytope, ...]
     knots: FloatArray
     smoothness: FloatArray
+    turning: tuple[FloatArray, FloatArray] | None
     phases: np.ndarray
     position: FloatArray
     acceleration: FloatArray
 
     @classmethod
     def of(
-        cls, mass: float, polytopes: Sequence[WrenchPolytope], schedule: ContactSchedule, weights: Weights
+        cls, mass: float, polytopes: Sequence[WrenchPolytope], recording: Recording, weights: Weights
     ) -> "NearProgramme":
         """Lay out knots and instants.
 
         Args:
             mass: [kg].
             polytopes: W_i of the phases about the world origin.
-            schedule: Stances with their instants, from 0 on.
+            recording: Stances with their instants, from 0 on, and the rate of the angular momentum.
             weights: Of velocity, acceleration and jerk; the first entry of each counts for all three axes.
         """
+        schedule = recording.schedule
         duration = float(schedule.instants[-1])
         spans = max(1, round(duration / KNOT_SPACING))
         knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, spans + 1))
         times, phases = _instants(schedule)
         shares = np.minimum(times / duration, 1.0)
         return cls(
-            mass, tuple(polytopes), knots, _smoothness(knots, duration, weights), phases,
+            mass, tuple(polytopes), knots, _smoothness(knots, duration, weights),
+            _turning(knots, duration, recording), phases,
             basis_matrix(DEGREE, knots, shares), basis_matrix(DEGREE, knots, shares, 2) / duration**2,
         )  # fmt: skip
 
     def spline(self, points: FloatArray) -> BSpline:
-        """Spline over [0, 1] of (n, 3) control points."""
-        return BSpline(DEGREE, self.knots, points)
+        """CoM over [0, 1] of control points (n, 3 or 6)."""
+        return BSpline(DEGREE, self.knots, points[:, :3])
+
+    def turning_spline(self, points: FloatArray) -> BSpline | None:
+        """Rate of the angular momentum over [0, 1] of control points (n, 3 or 6) [N.m]."""
+        return None if self.turning is None else BSpline(DEGREE, self.knots, TURN * points[:, 3:])
 
     def free(self, shares: FloatArray, wanted: FloatArray) -> FloatArray:
-        """(n, 3) control points without regard to balance.
+        """(n, 3 or 6) control points without regard to balance; the last three of the turning.
 
         Args:
             shares: (f,) key frames on [0, 1].
             wanted: (f, 3) CoM there [m].
         """
-        quadratic, linear = self._objective(shares, wanted)
-        return np.asarray(np.linalg.solve(quadratic, -linear), dtype=np.float64)
+        solved = [np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)]
+        return np.asarray(np.hstack(solved), dtype=np.float64)
 
     def solve(
         self, shares: FloatArray, wanted: FloatArray, margin: FloatArray, near: FloatArray
@@ -105,25 +131,29 @@ class NearProgramme:
             shares: (f,) key frames on [0, 1].
             wanted: (f, 3) CoM there [m].
             margin: (phases,) to keep [N.m].
-            near: (n, 3) control points about which the wrench is linearised.
+            near: (n, 3 or 6) control points about which the wrench is linearised.
         """
-        quadratic, linear = self._objective(shares, wanted)
+        parts = self._objectives(shares, wanted)
+        linear = np.hstack([line for _, line in parts])
         rows, bounds = self._balance(margin, near)
         solver = piqp.SparseSolver()
         solver.settings.verbose = False
-        cost = sparse.csc_matrix(np.kron(2.0 * quadratic, np.eye(3)))
+        axes = [np.diag(np.repeat(np.arange(len(parts)) == number, 3)) for number in range(len(parts))]
+        whole = sum(np.kron(2.0 * quadratic, axis) for (quadratic, _), axis in zip(parts, axes, strict=True))
+        cost = sparse.csc_matrix(whole)
         solver.setup(
             cost, 2.0 * linear.ravel(), None, None, rows, np.full(len(bounds), -_NO_BOUND), bounds
         )  # fmt: skip
         if solver.solve() != piqp.PIQP_SOLVED:
             return None
-        return solver.result.x.reshape(-1, 3), int(solver.result.info.iter)
+        return solver.result.x.reshape(linear.shape), int(solver.result.info.iter)
 
-    def _objective(self, shares: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n, n) and (n, 3): the objective is ``C' Q C + 2 l' C`` of each axis."""
+    def _objectives(self, shares: FloatArray, wanted: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """(n, n) and (n, 3) of CoM and turning: the objective is ``C' Q C + 2 l' C`` of each axis."""
         basis = basis_matrix(DEGREE, self.knots, shares)
         pull = PULL / len(shares) * basis.T
-        return self.smoothness + pull @ basis, -pull @ wanted
+        com = self.smoothness + pull @ basis, -pull @ wanted
+        return [com] if self.turning is None else [com, self.turning]
 
     def _balance(self, margin: FloatArray, near: FloatArray) -> tuple[Any, FloatArray]:
         """Rows and bounds of unit length; ``p x b`` is ``p0 x b + p x b0 - p0 x b0`` with ``b = a - g``."""
@@ -132,19 +162,30 @@ class NearProgramme:
         for row, phase in enumerate(self.phases):
             polytope = self.polytopes[phase]
             force, moment = self.mass * polytope.H[:, :3], self.mass * polytope.H[:, 3:]
-            p, b = self.position[row] @ near, self.acceleration[row] @ near - gravity
+            p, b = self.position[row] @ near[:, :3], self.acceleration[row] @ near[:, :3] - gravity
             by_acceleration, by_position = force + moment @ skew(p), -moment @ skew(b)
             bound = polytope.h - margin[phase] + by_acceleration @ gravity + moment @ np.cross(p, b)
-            room = bound - by_acceleration @ (b + gravity) - by_position @ p
-            chosen = np.argsort(room, kind="stable")[:FACETS]
-            block = (
-                self.acceleration[row][:, None] * by_acceleration[chosen, None]
-                + self.position[row][:, None] * by_position[chosen, None]
-            ).reshape(len(chosen), -1)
-            length = np.linalg.norm(block, axis=1)
-            blocks.append(sparse.csr_matrix(block / length[:, None]))
-            bounds.append(bound[chosen] / length)
+            still = bound - by_acceleration @ (b + gravity) - by_position @ p
+            for turn in self._turns(polytope):
+                room = still - (0.0 if turn is None else turn @ (self.position[row] @ near[:, 3:]))
+                chosen = np.argsort(room, kind="stable")[:FACETS]
+                block = (
+                    self.acceleration[row][:, None] * by_acceleration[chosen, None]
+                    + self.position[row][:, None] * by_position[chosen, None]
+                )
+                if self.turning is not None:
+                    by_turn = np.zeros((len(chosen), 3)) if turn is None else turn[chosen]
+                    turned = self.position[row][:, None] * by_turn[:, None]
+                    block = np.concatenate([block, turned], axis=2)
+                block = block.reshape(len(chosen), -1)
+                length = np.linalg.norm(block, axis=1)
+                blocks.append(sparse.csr_matrix(block / length[:, None]))
+                bounds.append((bound[chosen] - (0.0 if turn is None else RESERVE)) / length)
         return sparse.vstack(blocks).tocsc(), np.concatenate(bounds)
+
+    def _turns(self, polytope: WrenchPolytope) -> list[FloatArray | None]:
+        """Derivatives (facets, 3) by the turning: None of the point mass, those of the body that turns."""
+        return [None] if self.turning is None else [None, TURN * polytope.H[:, 3:]]
 
 
 def _instants(schedule: ContactSchedule) -> tuple[FloatArray, np.ndarray]:
@@ -156,14 +197,32 @@ def _instants(schedule: ContactSchedule) -> tuple[FloatArray, np.ndarray]:
     return np.concatenate(times), np.concatenate(phases)
 
 
+def _turning(
+    knots: FloatArray, duration: float, recording: Recording
+) -> tuple[FloatArray, FloatArray] | None:
+    """(n, n) and (n, 3) objective of the rate of the angular momentum, near the recorded one."""
+    if recording.angular_momentum_rate is None:
+        return None
+    basis = basis_matrix(DEGREE, knots, np.minimum(recording.time / duration, 1.0))
+    pull = TURN_PULL / len(basis) * basis.T
+    bend = _squared(knots, duration, {2: TURN_BEND})
+    return pull @ basis + bend, -pull @ recording.angular_momentum_rate / TURN
+
+
 def _smoothness(knots: FloatArray, duration: float, weights: Weights) -> FloatArray:
-    """(n, n) mean over time of the weighted squared derivatives, exact for the polynomials."""
+    """(n, n) objective of the CoM's derivatives, the first entry of each weight."""
+    kinds = (weights.velocity, weights.acceleration, weights.jerk)
+    return _squared(knots, duration, {order: kind[0] for order, kind in enumerate(kinds, start=1)})
+
+
+def _squared(knots: FloatArray, duration: float, costs: Mapping[int, float]) -> FloatArray:
+    """(n, n) mean over time of the weighted squared derivatives by order, exact for the polynomials."""
     nodes, shares = np.polynomial.legendre.leggauss(DEGREE)
     breaks = np.unique(knots)
     half = 0.5 * np.diff(breaks)[:, None]
     times, share = (breaks[:-1, None] + half * (1.0 + nodes)).ravel(), (half * shares).ravel()
     total = np.zeros((len(knots) - DEGREE - 1,) * 2)
-    for order, diagonal in enumerate((weights.velocity, weights.acceleration, weights.jerk), start=1):
+    for order, cost in costs.items():
         basis = basis_matrix(DEGREE, knots, times, order) / duration**order
-        total += diagonal[0] * basis.T @ (share[:, None] * basis)
+        total += cost * basis.T @ (share[:, None] * basis)
     return total

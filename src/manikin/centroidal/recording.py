@@ -22,15 +22,22 @@ class Recording:
         com: (n, 3) [m].
         key_frames: (phases + 1,) indices of the key frames among the samples.
         sequence: Stances, one per phase, whose duration bounds are both the recorded duration.
+        angular_momentum_rate: (n, 3) about the CoM [N.m] ([Qiu2012]_ 4.51); None where it is not known.
     """
 
     time: FloatArray
     com: FloatArray
     key_frames: NDArray[np.int64]
     sequence: StanceSequence
+    angular_momentum_rate: FloatArray | None
 
     def __init__(
-        self, time: ArrayLike, com: ArrayLike, sequence: StanceSequence, key_times: ArrayLike
+        self,
+        time: ArrayLike,
+        com: ArrayLike,
+        sequence: StanceSequence,
+        key_times: ArrayLike,
+        angular_momentum_rate: ArrayLike | None = None,
     ) -> None:
         """Take over the samples from the first to the last key frame.
 
@@ -40,6 +47,7 @@ class Recording:
             sequence: Stances, one per phase, each with at least one contact.
             key_times: (phases + 1,) [s], where the support changes, with both ends; each is
                 moved to the nearest sample.
+            angular_momentum_rate: (n, 3) about the CoM [N.m]; None where it is not known.
 
         Raises:
             InputError: If a number is not finite, times do not increase, or a phase has no
@@ -60,14 +68,23 @@ class Recording:
             )
         kept = slice(frames[0], frames[-1] + 1)
         instants = times[frames] - times[frames[0]]
+        turning = angular_momentum_rate
+        if turning is not None:
+            turning = frozen_array(turning, "recording angular momentum rate [N.m]", (len(times), 3))
+            turning = frozen_array(turning[kept], "recording angular momentum rate [N.m]")
         values = {
             "time": frozen_array(times[kept] - times[frames[0]], "recording time [s]"),
             "com": frozen_array(positions[kept], "recording com [m]"),
             "key_frames": _frozen_indices(frames - frames[0]),
             "sequence": _with_durations(sequence, np.diff(instants)),
+            "angular_momentum_rate": turning,
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def with_angular_momentum_rate(self, rate: ArrayLike) -> "Recording":
+        """The same with a rate of the angular momentum (n, 3) about the CoM at its samples [N.m]."""
+        return Recording(self.time, self.com, self.sequence, self.key_times, rate)
 
     @property
     def key_times(self) -> FloatArray:

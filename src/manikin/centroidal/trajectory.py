@@ -28,18 +28,28 @@ class CentroidalTrajectory:
         schedule: Stances with their key instants [s]; the motion starts at 0.
         binding_until: A whole body must keep its CoM on the trajectory until then [s]; after
             that, safe on a seat, the trajectory only shows the way. None for the whole motion.
+        turning: Rate of the angular momentum about the CoM, a B-spline on [0, 1] in three dimensions
+            [N.m] ([Qiu2012]_ 4.51); None for that of a point mass, zero.
     """
 
     mass: float
     spline: BSpline
     schedule: ContactSchedule
     binding_until: float | None = None
+    turning: BSpline | None = None
 
     def __post_init__(self) -> None:
         finite_number(self.mass, "centroidal trajectory mass [kg]", above=0.0)
         if self.spline.domain != (0.0, 1.0) or self.spline.control_points.shape[1] != 3:
             raise SplineError(
                 "centroidal trajectory needs a spline over [0, 1]; valid: with (n, 3) control points"
+            )
+        if self.turning is not None and (
+            self.turning.domain != (0.0, 1.0) or self.turning.control_points.shape[1] != 3
+        ):
+            raise SplineError(
+                "centroidal trajectory has turning of another domain or dimension; valid: a spline over "
+                "[0, 1] with (n, 3) control points"
             )
         if self.schedule.instants[0] != 0.0:
             raise InputError(f"centroidal trajectory starts at {self.schedule.instants[0]:g} s; valid: 0")
@@ -58,8 +68,10 @@ class CentroidalTrajectory:
         """Join a trajectory that starts where this one ends, at the same velocity and acceleration.
 
         Raises:
-            SplineError: If end and start, or the degrees, differ.
+            SplineError: If end and start, or the degrees, differ, or one of them turns.
         """
+        if self.turning is not None or other.turning is not None:
+            raise SplineError("trajectories that turn cannot be joined; valid: those of point masses")
         k, here, there = self.spline.degree, self.spline, other.spline
         gaps = [
             float(np.abs(self._derivative(self.duration, d) - other._derivative(0.0, d)).max())
@@ -111,17 +123,31 @@ class CentroidalTrajectory:
         return self._derivative(time, 3)
 
     def pseudo_wrench(self, time: ArrayLike) -> FloatArray:
-        """(..., 6) ``[m (a - g); p x m (a - g)]`` about the world origin [N, N.m] ([Qiu2012]_ 4.6)."""
-        return pseudo_wrench(self.mass, self.position(time), self.acceleration(time))
+        """(..., 6) ``[m (a - g); p x m (a - g) + Ldot]`` about the world origin [N, N.m].
+
+        [Qiu2012]_ 4.6 for a point mass, 4.51 with the rate of its angular momentum.
+        """
+        rate = None if self.turning is None else self.angular_momentum_rate(time)
+        return pseudo_wrench(self.mass, self.position(time), self.acceleration(time), rate)
+
+    def angular_momentum_rate(self, time: ArrayLike) -> FloatArray:
+        """(..., 3) rate of the angular momentum about the CoM at each time [N.m]; zero for a point mass."""
+        t = np.asarray(time, dtype=np.float64)
+        if self.turning is None:
+            return np.zeros((*t.shape, 3))
+        inside = ((t >= 0.0) & (t <= self.duration))[..., None]
+        return np.where(inside, self.turning(np.clip(t / self.duration, 0.0, 1.0)), 0.0)
 
     def to_dict(self) -> dict[str, Any]:
         """Mass, degree, normalised knots, control points and key instants as plain lists and numbers."""
+        turning = self.turning
         return {
             "mass_kg": float(self.mass),
             "degree": int(self.spline.degree),
             "knots": self.spline.knots.tolist(),
             "control_points_m": self.spline.control_points.tolist(),
             "key_instants_s": self.schedule.instants.tolist(),
+            **({} if turning is None else {"turning": _spline_dict(turning)}),
         }
 
     @classmethod
@@ -141,7 +167,10 @@ class CentroidalTrajectory:
         if missing:
             raise InputError(f"centroidal trajectory lacks {missing[0]!r}; valid keys: {', '.join(wanted)}")
         spline = BSpline(data["degree"], data["knots"], data["control_points_m"])
-        return cls(float(data["mass_kg"]), spline, ContactSchedule(sequence, data["key_instants_s"]))
+        schedule = ContactSchedule(sequence, data["key_instants_s"])
+        told = data.get("turning")
+        turning = None if told is None else BSpline(told["degree"], told["knots"], told["control_points_Nm"])
+        return cls(float(data["mass_kg"]), spline, schedule, turning=turning)
 
     def _derivative(self, time: ArrayLike, order: int) -> FloatArray:
         t = np.asarray(time, dtype=np.float64)
@@ -149,3 +178,11 @@ class CentroidalTrajectory:
         if order > 0:
             values = np.where(((t >= 0.0) & (t <= self.duration))[..., None], values, 0.0)
         return values
+
+
+def _spline_dict(spline: BSpline) -> dict[str, Any]:
+    return {
+        "degree": int(spline.degree),
+        "knots": spline.knots.tolist(),
+        "control_points_Nm": spline.control_points.tolist(),
+    }

@@ -1,5 +1,7 @@
 """A plan against the recording on whose stances it was made ([Qiu2012]_ Table 7.7, Fig. 7.16 to 7.18)."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from manikin.balance import pseudo_wrench
@@ -50,6 +52,7 @@ def _planned_track(found: Replan) -> ComTrack | None:
     trajectory = found.com.trajectory
     if trajectory is None:
         return None
+    trajectory = replace(trajectory, turning=None)
     time = np.concatenate(phase_times(trajectory))
     margin = np.concatenate(phase_margins(found.com.problem, trajectory, found.com.polytopes))
     derivatives = trajectory.position, trajectory.velocity, trajectory.acceleration

@@ -1,21 +1,33 @@
 """Stances and surfaces of a recorded person as a planned body can use them."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from manikin.body import BodyModel
+from manikin.body.limb import hanging_segment, hinge_line
 from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance, StanceSequence
 from manikin.contact.contact import sole
 from manikin.mocap.seat_supports import SEAT
+from manikin.replan.placements import effector_placements, toe_hinge
 from manikin.scene import Box, Obstacle, Scene
-from manikin.spatial import frozen_array
+from manikin.spatial import GRAVITY, FloatArray, frozen_array
 
 RAISED = 0.02
 """A contact this far above the floor has a block under it [m]."""
 
 SAME_SEAT = 0.15
 """Seats nearer to each other are one [m]."""
+
+ROLLED = 0.02
+"""Way of the hinge of the toes from which a foot counts as rolling over their tips [m]."""
+
+SHORTEST = 0.04
+"""What is left at least of a phase whose foot leaves earlier [s]."""
+
+TOE_LOAD = 1.4
+"""Load of a foot on its toes: above the second peak of a brisk walk's vertical force [body weights]."""
 
 ROOM = 0.03
 """How far a block reaches beyond its contact [m]."""
@@ -41,6 +53,56 @@ def landing_flat(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
         phases.append(Phase(stance, duration, duration))
         instants.append(float(end))
     return ContactSchedule(StanceSequence(phases), instants)
+
+
+def leaving_with_the_hinge(
+    schedule: ContactSchedule, body: BodyModel, time: FloatArray, q: FloatArray
+) -> ContactSchedule:
+    """The same with every foot that leaves from its toes off as soon as their hinge has moved away.
+
+    A recorded foot rolls over the tips of its toes in the last hundredths of a second, hardly loaded; a stiff
+    toe segment lies flat up to the end, and would hold the leg back.
+
+    Args:
+        schedule: Contacts in time.
+        body: Whose.
+        time: (n,) [s], on the schedule's clock.
+        q: (n, nq) recorded postures then.
+    """
+    instants = np.array(schedule.instants)
+    phases = list(schedule.sequence)
+    for name in schedule.sequence.effectors:
+        hinge = toe_hinge(body, name)
+        if hinge is None:
+            continue
+        position, rotation = effector_placements(body, q, name)
+        path = position + rotation @ hinge
+        for index in range(len(phases) - 1):
+            stance = phases[index].stance
+            if name not in stance or name in phases[index + 1].stance:
+                continue
+            contact = stance[name]
+            place = contact.position + contact.rotation_contact_to_world @ hinge
+            rows = np.flatnonzero((time > instants[index]) & (time < instants[index + 1]))
+            near = rows[np.linalg.norm(path[rows] - place, axis=1) <= ROLLED]
+            left = instants[index] if len(near) == 0 else time[near[-1]]
+            if contact.part is SolePart.TOES and left < instants[index + 1]:
+                shortest = min(SHORTEST, instants[index + 1] - instants[index])
+                instants[index + 1] = max(left, instants[index] + shortest)
+    timed = [
+        replace(phase, min_duration=float(duration), max_duration=float(duration))
+        for phase, duration in zip(phases, np.diff(instants), strict=True)
+    ]
+    return ContactSchedule(StanceSequence(timed), instants)
+
+
+def within_toe_strength(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
+    """The same with toes that carry no farther from their hinge than their strength allows.
+
+    Whoever stands on the toes of one foot has the centre of pressure at most the toes' torque limit over the
+    load ahead of the hinge; the rest of their length is no support.
+    """
+    return _with_contacts(schedule, lambda contact: _strong_part(contact, body))
 
 
 def on_one_seat(schedule: ContactSchedule) -> ContactSchedule:
@@ -86,6 +148,26 @@ def scene_under(schedule: ContactSchedule, floor: float) -> Scene:
             known.add(place)
             blocks.append(_block(contact, f"{contact.effector} {len(blocks) + 1}"))
     return Scene(blocks, floor_height=floor)
+
+
+def _with_contacts(schedule: ContactSchedule, change: Callable[[Contact], Contact]) -> ContactSchedule:
+    phases = [
+        replace(phase, stance=Stance(list(map(change, phase.stance)), phase.stance.normal_force_cap))
+        for phase in schedule.sequence
+    ]
+    return ContactSchedule(StanceSequence(phases), schedule.instants)
+
+
+def _strong_part(contact: Contact, body: BodyModel) -> Contact:
+    toes = hanging_segment(body, body.effector(contact.effector).segment)
+    line = hinge_line(body, contact.effector)
+    if contact.kind is not ContactKind.SOLE or contact.part is SolePart.HEEL or toes is None or line is None:
+        return contact
+    strength = float(body.torque_limit[body.joint_index(toes.hinges[0].name)])
+    reach = line + strength / (TOE_LOAD * body.mass * GRAVITY)
+    points = np.array(contact.points)
+    points[:, 0] = np.minimum(points[:, 0], reach)
+    return replace(contact, points=frozen_array(points, "toe points", (None, 3)))
 
 
 def _whole(contact: Contact, body: BodyModel) -> Contact:

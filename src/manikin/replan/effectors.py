@@ -1,8 +1,7 @@
 """Where each effector goes: on its contact while it holds one, and as recorded in between.
 
-A foot that only stands on its toes tilts about their hinge. What it was recorded to tilt
-counts up to some thirty degrees: a recorded foot leaves on the tips of its toes at several hundred degrees
-per second. In flight each effector goes smoothly from its contact to the recorded path and from there
+A foot that only stands on its toes tilts about their hinge, as far as it was recorded to, within what
+toes can bend. In flight each effector goes smoothly from its contact to the recorded path and from there
 to its next contact, the tips of a foot kept off the surface. All this is our own.
 """
 
@@ -11,26 +10,35 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
-from manikin.body.segments import Segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.locomotion.stance_foot import smooth_step
 from manikin.mocap.runs import runs
+from manikin.replan.placements import effector_placements, toe_hinge
 from manikin.spatial import FloatArray
 from manikin.wholebody.targets import GRASP_ROTATION_WEIGHT, EffectorTarget, flight_weight
 
-LARGEST_TILT = float(np.deg2rad(35.0))
-"""Tilt of a foot that stands on its toes, approached but not reached [rad]."""
+LARGEST_TILT = float(np.deg2rad(64.0))
+"""Tilt of a foot that stands on its toes, approached but not reached: they bend up to 70 degrees [rad]."""
+
+TILT_BEND = float(np.deg2rad(3.0))
+"""Width of the bend of the tilt below it [rad]."""
 
 TILTING = 0.08
 """Longest time over which the recorded tilt sets in [s]."""
 
 JOINING = 0.45
 """Share of a flight at either end in which it leaves, or joins, the recorded path."""
+
+SIDEWAYS = 0.15
+"""Importance of a flying foot's place to the side, as a share of that ahead and upward: a recorded foot may
+pass nearer to the other leg than the body's soles and shanks can."""
+
+SHORTEST_JOINING = 0.2
+"""Time in which a foot in flight at a clip's end does so at least, as long as there is so much [s]."""
 
 SWING_HEIGHT = 0.03
 """Least height of a foot's lowest point in the middle of its flight [m]."""
@@ -87,13 +95,14 @@ class _Path:
     ) -> None:
         self.body, self.schedule, self.time, self.name = body, schedule, time, name
         self.phases = schedule.phase_at(time)
-        self.recorded = _placements(body, q, name)
+        self.recorded = effector_placements(body, q, name)
         self.position, self.rotation = (np.array(part) for part in self.recorded)
         n = len(time)
         self.weight, self.rotation_weight, self.toes = np.zeros(n), np.ones(n), np.zeros(n)
+        self.along = np.tile(np.eye(3), (n, 1, 1))
         hanging = hanging_segment(body, body.effector(name).segment)
         self.toe_joint = None if hanging is None else body.joint_index(hanging.hinges[0].name)
-        self.hinge = None if hanging is None else _hinge(body, name, hanging)
+        self.hinge = toe_hinge(body, name)
 
     def target(self) -> EffectorTarget:
         held = np.array([self.name in phase.stance for phase in self.schedule.sequence])
@@ -101,7 +110,7 @@ class _Path:
             self._hold(first, stop)
         for first, stop in runs(self.weight == 0.0):
             self._fly(first, stop)
-        return EffectorTarget(self.position, self.rotation, self.weight, self.rotation_weight)
+        return EffectorTarget(self.position, self.rotation, self.weight, self.rotation_weight, self.along)
 
     def _hold(self, first: int, stop: int) -> None:
         """Place it on one of its contacts, which lasts from a phase up to another."""
@@ -117,7 +126,7 @@ class _Path:
             if part is SolePart.TOES and self.hinge is not None:
                 start, over = self.schedule.instants[[first + begin, first + end]]
                 share = (self.time[rows] - start) / min(TILTING, over - start)
-                angle = LARGEST_TILT * np.tanh(np.maximum(tilt[rows] - rest, 0.0) / LARGEST_TILT)
+                angle = _up_to(LARGEST_TILT, np.maximum(tilt[rows] - rest, 0.0))
                 angle *= smooth_step(share) if begin > 0 else 1.0
                 turn = turn @ Rotation.from_rotvec(np.outer(angle, [0.0, 1.0, 0.0])).as_matrix()
                 place = place + contact.rotation_contact_to_world @ self.hinge - turn @ self.hinge
@@ -132,26 +141,46 @@ class _Path:
         leaves, lands = first > 0, stop < len(self.time)
         start, end = self.time[max(first - 1, 0)], self.time[min(stop, len(self.time) - 1)]
         share = (self.time[rows] - start) / max(end - start, 1e-9)
-        position, rotation = self.position[rows].copy(), self.rotation[rows].copy()
-        turn = np.zeros((stop - first, 3))
+        joining = (
+            JOINING if leaves and lands else min(max(JOINING, SHORTEST_JOINING / max(end - start, 1e-9)), 1.0)
+        )
+        # The hinge of the toes starts from rest, and the foot keeps turning about it.
+        arm = np.zeros(3) if self.hinge is None else self.hinge
+        points = self.position + self.rotation @ arm
+        place, turn = points[rows].copy(), np.zeros((stop - first, 3))
         for there, at, along in ((leaves, first - 1, share), (lands, stop, 1.0 - share)):
             if there:
-                rest = 1.0 - smooth_step(along / JOINING)
-                position += rest[:, None] * (self.position[at] - self.position[rows])
-                away = self.rotation[at] @ self.rotation[rows].transpose(0, 2, 1)
+                rest = 1.0 - smooth_step(along / joining)
+                place += rest[:, None] * (points[at] - points[rows])
+                known = self.recorded[1][at] if at < first else self.rotation[rows]
+                away = self.rotation[at] @ np.swapaxes(known, -1, -2)
                 turn += rest[:, None] * Rotation.from_matrix(away).as_rotvec()
-        self.position[rows] = position
-        self.rotation[rows] = Rotation.from_rotvec(turn).as_matrix() @ rotation
+        self.rotation[rows] = Rotation.from_rotvec(turn).as_matrix() @ self.rotation[rows]
+        self.position[rows] = place - self.rotation[rows] @ arm
         if leaves:
-            self.toes[rows] = self.toes[first - 1] * (1.0 - smooth_step(share / TOES_BACK))
+            self.toes[rows] = self._straightening(first, share, TOES_BACK * (end - start))
         near = np.maximum(share, 0.5 if not leaves else 0.0)
         near = np.clip(np.minimum(near, 0.5 if not lands else 1.0), 1e-6, 1.0 - 1e-6)
         if self.hinge is not None:
             self._lift(rows, np.minimum(near, 1.0 - near))
         self.weight[rows] = flight_weight(near, FLIGHT_POSITION, FLIGHT_END, FLIGHT_END)
         self.rotation_weight[rows] = flight_weight(near, FLIGHT_ROTATION, FLIGHT_END, FLIGHT_END)
+        if self.hinge is not None:
+            side = self.rotation[rows, :, 1] * [1.0, 1.0, 0.0]
+            side /= np.linalg.norm(side, axis=1, keepdims=True)
+            less = (1.0 - SIDEWAYS) * (1.0 - self.weight[rows]) / (1.0 - FLIGHT_POSITION)
+            self.along[rows] -= less[:, None, None] * side[:, :, None] * side[:, None, :]
         if self._grasps():
             self.rotation_weight[rows] = GRASP_ROTATION_WEIGHT
+
+    def _straightening(self, first: int, share: FloatArray, lasting: float) -> FloatArray:
+        """Angle of the toes after a lift-off: it goes on as it came, and then back to straight [rad]."""
+        before = max(first - 2, 0)
+        angle, since = self.toes[first - 1], max(self.time[first - 1] - self.time[before], 1e-9)
+        rate = (angle - self.toes[before]) / since
+        gone = np.clip(share / TOES_BACK, 0.0, 1.0)
+        found = angle * (1.0 - smooth_step(gone)) + rate * lasting * gone * (1.0 - gone) ** 2
+        return _up_to(LARGEST_TILT, np.maximum(found, 0.0))
 
     def _lift(self, rows: slice, share: FloatArray) -> None:
         """Keep heel, hinge and tips of a foot off the surface in flight."""
@@ -174,25 +203,14 @@ class _Path:
         return all(contact.kind is ContactKind.GRASP for contact in self._contacts())
 
 
-def _placements(body: BodyModel, q: FloatArray, name: str) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) positions and (n, 3, 3) rotations of an effector in the world."""
-    data, frame = body.pinocchio.createData(), body.effector_frame(name)
-    position, rotation = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
-    for row, one in enumerate(q):
-        pin.framesForwardKinematics(body.pinocchio, data, one)
-        position[row], rotation[row] = data.oMf[frame].translation, data.oMf[frame].rotation
-    return position, rotation
-
-
-def _hinge(body: BodyModel, name: str, toes: Segment) -> FloatArray:
-    """(3,) middle of the hinge of a foot's toes in the frame of its sole [m]."""
-    frame = body.effector(name)
-    return frame.rotation.T @ (toes.origin - frame.translation)
-
-
 def _pitch(rotation: FloatArray) -> FloatArray:
     """(n,) of soles, heel up when positive [rad]."""
     return np.arcsin(np.clip(-rotation[:, 2, 0], -1.0, 1.0))
+
+
+def _up_to(limit: float, angle: FloatArray) -> FloatArray:
+    """Angles (n,) >= 0 with a smooth bend below a limit [rad]."""
+    return np.maximum(limit - TILT_BEND * np.logaddexp(0.0, (limit - angle) / TILT_BEND), 0.0)
 
 
 def _parts(contacts: list[Contact]) -> Iterator[tuple[SolePart, int, int]]:

@@ -9,17 +9,28 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.centroidal import CentroidalResult, NearKeyFramesResult, Recording
 from manikin.contact import ContactSchedule
+from manikin.control import ControlSettings, TaskWeights
 from manikin.errors import InputError
 from manikin.mocap import Reconstruction, RecordedSupports, motion_of, recorded_schedule, smoothed
 from manikin.mocap.recorded_stances import FRICTION
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
 from manikin.replan.com import METHODS, Method, plan_recorded_com
-from manikin.replan.contacts import landing_flat, on_one_seat, scene_under
-from manikin.replan.whole_body import AdaptedMotion, adapt_postures
+from manikin.replan.contacts import (
+    landing_flat,
+    leaving_with_the_hinge,
+    on_one_seat,
+    scene_under,
+    within_toe_strength,
+)
+from manikin.replan.whole_body import AdaptedMotion, adapt_postures, rate_on_contacts
 from manikin.scene import Scene
 from manikin.simulation import Execution, execute
 from manikin.spatial import FloatArray
+
+SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0))
+"""Of the execution. A recorded posture is worth more than one that was only preferred: six times the usual
+weight keeps arms off the trunk while they make up for what the contacts do not give."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,10 +164,16 @@ def replan(
     even, recorded = smoothed(found), motion_of(found)
     stances = recorded_schedule(even, supports, friction=friction, rolling=rolling)
     stances = on_one_seat(landing_flat(stances, found.body))
-    recording = Recording(supports.start + found.time, recorded.com, stances.sequence, stances.instants)
+    stances = leaving_with_the_hinge(stances, found.body, supports.start + found.time, even.q)
+    stances = within_toe_strength(stances, found.body)
+    time = supports.start + found.time
+    recording = Recording(time, recorded.com, stances.sequence, stances.instants)
     velocity = np.gradient(recorded.com, recorded.time, axis=0, edge_order=2)[[0, -1]]
-    com = plan_recorded_com(found.body.mass, recording, velocity, method, required_margin)
     scene = scene_under(stances, supports.surfaces[0] if supports.surfaces else 0.0)
+    if method == "keyframes":
+        rate = rate_on_contacts(found.body, scene, recording, (even.time, even.q))
+        recording = recording.with_angular_momentum_rate(rate)
+    com = plan_recorded_com(found.body.mass, recording, velocity, method, required_margin)
     result = Replan(method, found.body, scene, recording, recorded, com)
     return _executed(result, even) if execute and com.trajectory is not None else result
 
@@ -168,7 +185,7 @@ def _executed(result: Replan, even: Reconstruction) -> Replan:
     schedule = trajectory.schedule
     clock = schedule.instants, result.recording.key_times
     adapted = adapt_postures(body, scene, trajectory, result.com.polytopes, (even.time, even.q), clock)
-    execution = execute(body, scene, adapted.motion, schedule, hold=0.0)
+    execution = execute(body, scene, adapted.motion, schedule, settings=SETTINGS, hold=0.0)
     return Replan(
         result.method, body, scene, result.recording, result.recorded, result.com, adapted, execution
     )  # fmt: skip

@@ -266,8 +266,9 @@ class MotionObjective:
             weight[end], residual[end] = 1.0 / scales.rest, rate[end] / scales.rest
         out.add_diagonal(1, weight, residual)
 
-    @staticmethod
-    def _add_accelerations(out: Linearised, second: FloatArray, scales: MotionScales) -> None:
+    def _add_accelerations(self, out: Linearised, second: FloatArray, scales: MotionScales) -> None:
+        if self._targets.reference_second is not None:
+            second = second - self._targets.reference_second
         weight = np.full_like(second, 1.0 / scales.acceleration)
         weight[:, :7] = 1.0 / scales.pelvis_acceleration
         out.add_diagonal(2, weight, weight * second)
@@ -281,6 +282,8 @@ class MotionObjective:
         scale[:, 3:] = scales.moment_share * np.maximum(targets.margin, LEAST_MARGIN)[:, None]
         residual = momentum.value.copy()
         residual[:, :3] -= self._body.mass * targets.com_acceleration
+        if targets.turning is not None:
+            residual[:, 3:] -= targets.turning
         first, second, third = (jacobian / scale[:, :, None] for jacobian in momentum.jacobians)
         out.momentum = MomentumRate(residual / scale, (first, second, third))
         out.sample_cost += 0.5 * np.sum(out.momentum.value**2, axis=1)

@@ -51,6 +51,10 @@ class FitTargets:
             much as one unit of every other residual; infinite entries are free.
         ignored: Pairs whose distance does not count, per sample.
         meeting: What is met at speed, per sample, or None without.
+        turning: (n, 3) rate of the angular momentum about the centre of mass [N.m]; None for that of a point
+            mass, zero.
+        reference_second: (n, nq) second derivatives of the reference, from which accelerations count; None
+            where any acceleration costs.
     """
 
     time: FloatArray
@@ -63,6 +67,8 @@ class FitTargets:
     reference_scale: FloatArray
     ignored: tuple[Ignored, ...]
     meeting: Meeting | None = None
+    turning: FloatArray | None = None
+    reference_second: FloatArray | None = None
 
 
 def effector_targets(
