@@ -5,10 +5,13 @@ from typing import Literal, get_args
 import numpy as np
 
 from manikin.centroidal import (
+    BentSurface,
     CentroidalProblem,
     CentroidalResult,
+    GeometricConstraint,
     KeyframeProblem,
     Recording,
+    height_band,
     plan_com,
     plan_com_near_key_frames,
 )
@@ -24,6 +27,9 @@ METHODS: tuple[Method, ...] = get_args(Method)
 SHORTEST, LONGEST = 0.5, 2.0
 """Bounds of a phase that is planned timing-free, as shares of its recorded duration: nobody swings a leg in
 no time, and phases of a walk are no places to stay."""
+
+HEIGHT_ROOM = 0.1
+"""Beyond the recorded heights of the centre of mass, for a plan that is timing-free [m]."""
 
 
 def plan_recorded_com(
@@ -48,7 +54,7 @@ def plan_recorded_com(
         CentroidalProblem(
             mass, _free_durations(recording), recording.com[0], recording.com[-1],
             start_velocity=velocity[0], goal_velocity=velocity[1], required_margin=required_margin,
-            support_distance=farthest_support(recording),
+            support_distance=farthest_support(recording), geometric=_recorded_heights(recording),
         )
     )  # fmt: skip
 
@@ -63,6 +69,16 @@ def farthest_support(recording: Recording) -> float:
         for contact in phase.stance:
             farthest = max(farthest, float(np.linalg.norm(com - contact.position, axis=1).max()))
     return farthest
+
+
+def _recorded_heights(recording: Recording) -> tuple[GeometricConstraint, ...]:
+    """No lower and no higher than it was recorded, but for some room: feet admit a way through the floor."""
+    heights = recording.com[:, 2]
+    lower, upper = (
+        BentSurface(float(height), 0.0, 0.0, 0.0)
+        for height in (heights.min() - HEIGHT_ROOM, heights.max() + HEIGHT_ROOM)
+    )
+    return height_band(lower, upper)
 
 
 def _free_durations(recording: Recording) -> StanceSequence:
