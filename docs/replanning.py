@@ -115,8 +115,9 @@ AGAINST = """
 ## Plan against recording (7.3)
 
 The same stances on whole soles, timing-free: durations between half and twice the recorded ones, position
-and velocity of both ends as recorded, the CoM no farther from a foot than it was recorded, and within 10 cm of
-the recorded heights. CoM: root mean square distance at equal shares of each phase. *Recorded* margin: that of a point mass with the recorded
+and velocity of both ends as recorded, the CoM no farther from a foot than it was recorded, and within 10 cm
+of the recorded heights. CoM: root mean square distance at equal shares of each phase. *Recorded* margin:
+that of a point mass with the recorded
 acceleration, which a recording with noise need not keep.
 
 """
