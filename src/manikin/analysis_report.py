@@ -159,6 +159,7 @@ def _plates(page: ReportPage, plates: Mapping[str, Any]) -> None:
 
     page.heading("Against force plates")
     page.numbers({
+        "mass": of("mass_kg", 1.0, "kg"),
         "touch-downs and lift-offs compared": plates["events"],
         "their distance in time": None if plates["timing_median_s"] is None
         else f"{of('timing_median_s', 1e3, 'ms')} (median), {of('timing_max_s', 1e3, 'ms')} (largest)",

@@ -103,7 +103,11 @@ def _bands(analysis: Analysis) -> list[_Band]:
     if analysis.plates is not None and analysis.plates.compared.any():
         measured = np.where(analysis.plates.compared, analysis.plates.vertical_force, np.nan)
         forces["force plates"] = (measured / analysis.weight, ink)
-    margins = {"whole body": (analysis.motion.margin, ours), "point mass": (analysis.point_mass_margin, soft)}
+    margins = {
+        "whole body": (analysis.motion.margin, ours),
+        "shifted onto the contacts": (analysis.shifted.margins.whole_body, ink),
+        "point mass": (analysis.point_mass_margin, soft),
+    }
     bands = [
         _scaled("vertical force [body weight]", forces, 0.0),
         _scaled("margin [N.m]", margins, 0.0, 0.01),

@@ -125,3 +125,14 @@ def test_who_crawls_is_held_by_points_on_the_ground(recordings_folder):
     assert names & {"left_knee", "right_knee"}
     assert names <= set(found.body.effectors)
     assert np.median(found.vertical_force) == pytest.approx(found.weight, rel=0.1)
+
+
+def test_plates_that_carry_another_mass_than_the_file_tells_are_remarked(recordings_folder):
+    """Of this person the file says 66.5 kg, and the plates 61.3 kg, 8 % less."""
+    path = recordings_folder / "grf/btkdata/PiG_Motion-FlatFoot-One.c3d"
+    found = analyze_file(path)
+    assert found.body.mass == pytest.approx(66.5)
+    assert found.as_dict()["force_plates"]["mass_kg"] == pytest.approx(61.3, abs=0.3)
+    assert any("carry 61.3 kg, not 66.5 kg" in line for line in found.remarks)
+    lighter = analyze_file(path, AnalysisOptions(mass=61.3))
+    assert not any("carry" in line for line in lighter.remarks)

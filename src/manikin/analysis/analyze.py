@@ -114,8 +114,9 @@ def analyze(
     schedule = recorded_schedule(found, supports, friction=given.friction)
     touch_downs = touch_downs_of(supports)
     dynamics = dynamics_of(found, touch_downs=touch_downs)
-    mass = None if given.mass is not None else measured_mass(recording, dynamics, schedule, supports.start)
-    if mass is not None:
+    mass = measured_mass(plates, dynamics, schedule, supports.start)
+    told = given.mass is not None or (isinstance(recording, MarkerRecording) and recording.subject.mass)
+    if mass is not None and not told:
         found = with_mass(found, mass)
         schedule = recorded_schedule(found, supports, friction=given.friction)
         dynamics = dynamics_of(found, touch_downs=touch_downs)
@@ -125,7 +126,7 @@ def analyze(
     ground = min(supports.surfaces, default=0.0)
     report: PlateReport | None = None
     if plates:
-        report = plate_report(plates, supports, schedule, dynamics, margins, shifted)
+        report = plate_report(plates, supports, schedule, dynamics, margins, shifted, mass)
     neck = upright_neck(found.body, motion.q)
     circumstances = Circumstances(
         load_kg=given.load, neck_upright_deg=0.0 if neck is None else float(np.degrees(neck))

@@ -11,13 +11,11 @@ from manikin.balance import zero_moment_point
 from manikin.contact import ContactSchedule
 from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.least_shift import LeastShift
-from manikin.mocap.markers import MarkerRecording
 from manikin.mocap.plate_forces import PlateComparison, compare_with_plates, mass_on_plates, plate_forces
 from manikin.mocap.plate_supports import TimingError, timing_errors
 from manikin.mocap.recorded_dynamics import RecordedDynamics
 from manikin.mocap.recorded_margins import RecordedMargins
 from manikin.mocap.recorded_supports import RecordedSupports
-from manikin.mocap.recording import Recording
 from manikin.spatial import FloatArray
 
 
@@ -29,6 +27,7 @@ class PlateReport:
         vertical_force: (n,) of all plates together [N].
         cop: (n, 2) their centre of pressure [m]; NaN while they are not loaded.
         compared: (n,) whether every support is on a plate, so that the plates tell all there is.
+        mass: Of the person, by them [kg]; None where they cannot tell.
         timing: Touch-downs and lift-offs beside those of the plates.
         forces: Errors of forces and centres of pressure; None where no foot alone was on a plate.
         shifted: The same of the motion shifted onto its contacts.
@@ -37,6 +36,7 @@ class PlateReport:
     vertical_force: FloatArray
     cop: FloatArray
     compared: NDArray[np.bool_]
+    mass: float | None
     timing: tuple[TimingError, ...]
     forces: PlateComparison | None
     shifted: PlateComparison | None
@@ -46,6 +46,7 @@ class PlateReport:
         forces = self.forces
         errors = [abs(one.error) for one in self.timing]
         return {
+            "mass_kg": self.mass,
             "events": len(errors),
             "timing_median_s": float(np.median(errors)) if errors else None,
             "timing_max_s": float(np.max(errors)) if errors else None,
@@ -59,25 +60,24 @@ class PlateReport:
 
 
 def measured_mass(
-    recording: Recording | MarkerRecording, dynamics: RecordedDynamics, schedule: ContactSchedule,
-    start: float,
-) -> float | None:  # fmt: skip
-    """Mass by the plates of a recording whose file says none [kg]; None where they cannot tell.
+    plates: Sequence[ForcePlate], dynamics: RecordedDynamics, schedule: ContactSchedule, start: float
+) -> float | None:
+    """Mass by the plates [kg]; None where there are none, or they cannot tell.
 
     Args:
-        recording: The recording.
+        plates: On the clock of the schedule.
         dynamics: Its motion, of any mass.
         schedule: Its stances.
         start: The schedule's clock at the motion's first instant [s].
     """
-    if not isinstance(recording, MarkerRecording) or not recording.plates or recording.subject.mass:
+    if not plates:
         return None
-    return mass_on_plates(dynamics, plate_forces(recording.plates, dynamics.time + start, schedule))
+    return mass_on_plates(dynamics, plate_forces(plates, dynamics.time + start, schedule))
 
 
 def plate_report(
     plates: Sequence[ForcePlate], supports: RecordedSupports, schedule: ContactSchedule,
-    dynamics: RecordedDynamics, margins: RecordedMargins, shifted: LeastShift,
+    dynamics: RecordedDynamics, margins: RecordedMargins, shifted: LeastShift, mass: float | None,
 ) -> PlateReport:  # fmt: skip
     """Hold a motion against the plates under it.
 
@@ -88,6 +88,7 @@ def plate_report(
         dynamics: Its forces, with the person's mass.
         margins: Its margins.
         shifted: The motion nearest to it that its contacts can carry.
+        mass: Of the person, by the plates [kg].
     """
     measured = plate_forces(plates, dynamics.time + supports.start, schedule)
     height = float(np.mean([plate.origin[2] for plate in plates]))
@@ -95,7 +96,7 @@ def plate_report(
         cop = zero_moment_point(measured.wrench, height)
     loaded = measured.wrench[:, 2] > 20.0
     return PlateReport(
-        measured.wrench[:, 2], np.where(loaded[:, None], cop, np.nan), measured.covered,
+        measured.wrench[:, 2], np.where(loaded[:, None], cop, np.nan), measured.covered, mass,
         timing_errors(supports, plates), compare_with_plates(dynamics, margins, measured, height),
         compare_with_plates(shifted.dynamics, shifted.margins, measured, height),
     )  # fmt: skip

@@ -19,6 +19,9 @@ SLOW_RATE = 50.0
 LONG_FLIGHT = 0.5
 """Nobody is without support for longer [s]."""
 
+OTHER_MASS = 0.03
+"""Share by which the mass of a person is not that on the plates."""
+
 FEW_POSITIVE = 0.9
 """Share of frames with a positive margin, the body shifted, below which contacts must be missing."""
 
@@ -61,6 +64,12 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         lines.append(
             f"balanced in {100.0 * balanced:.0f} % of the frames only, although shifted by up to "
             f"{1e3 * analysis.shifted.size.max():.0f} mm: running, or supports that were not found"
+        )
+    mass = None if analysis.plates is None else analysis.plates.mass
+    if mass is not None and abs(mass / analysis.body.mass - 1.0) > OTHER_MASS:
+        lines.append(
+            f"the force plates carry {mass:.1f} kg, not {analysis.body.mass:.1f} kg: forces, torques and "
+            f"margins are in proportion to the mass (--mass {mass:.1f} for the plates')"
         )
     if analysis.plates is not None and not analysis.plates.compared.any():
         lines.append("no instant has all supports on force plates: their forces are not compared")
