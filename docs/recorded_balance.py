@@ -50,12 +50,12 @@ from manikin.mocap import (
     touch_downs_of,
     with_mass,
 )
-from manikin.mocap.least_shift import INSIDE, LARGEST_SHIFT
 from manikin.mocap.local_cutoff import TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH
 from manikin.mocap.plate_forces import UNSURE
 from manikin.mocap.recorded_dynamics import CUTOFF
 from manikin.mocap.recorded_margins import margins_of_wrenches
 from manikin.mocap.recorded_stances import FRICTION
+from manikin.mocap.shifted_motion import INSIDE, LARGEST_SHIFT
 from manikin.motion import Motion
 from manikin.spatial import GRAVITY, FloatArray
 
@@ -227,6 +227,7 @@ def trial(path: Path) -> Trial:
     measured = plate_forces(plates, dynamics.time + supports.start, schedule) if plates else None
     mass = mass_on_plates(dynamics, measured) if measured else None
     if mass is not None:
+        schedule = recorded_schedule(with_mass(found, mass), supports)
         dynamics = dynamics_of(with_mass(found, mass), touch_downs=touch_downs)
     lab = None
     if isinstance(recording, MarkerRecording) and LAB_COM in recording.marker_names:

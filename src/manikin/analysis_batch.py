@@ -6,9 +6,11 @@ from functools import partial
 from os.path import commonpath
 from pathlib import Path
 
+import numpy as np
+
 from manikin.analysis import AnalysisEntry, AnalysisJob, AnalysisOptions, analyze_file
 from manikin.analysis_directory import write_analysis
-from manikin.errors import InputError
+from manikin.errors import InputError, ManikinError
 from manikin.worker import SERVED, prepare_worker, side_by_side
 
 
@@ -47,7 +49,7 @@ def analyze_one(job: AnalysisJob, options: AnalysisOptions) -> AnalysisEntry:
     """Measure one file and write its directory."""
     try:
         found = analyze_file(job.path, options)
-    except InputError as error:
+    except (ManikinError, np.linalg.LinAlgError) as error:
         return AnalysisEntry(job, None, " ".join(str(error).split()))
     if job.directory is not None:
         write_analysis(found, job.directory, draw=job.draw)

@@ -11,7 +11,7 @@ from manikin.report_page import ReportPage
 from manikin.version import __version__
 
 WORDS = (
-    "Times are seconds from the first frame of the recording's clock. The margin is the distance of the "
+    "Times are seconds on the recording's clock. The margin is the distance of the "
     "wrench that the motion needs to the faces of what the contacts can give (Qiu 2012, 4.2.9), moments "
     "about the middle of the contacts, alpha = 1 m: below 0 the contacts, as they were found, could not "
     "give it. Recordings tell places to a centimetre and so leave accelerations open: the shift onto the "
@@ -115,9 +115,10 @@ def overview_page(
         wide=True,
     )
     page.remarks(one["reason"] for one in overview["refused"])
-    shared = commonpath([Path(row["file"]).parent for row in rows])
+    whole = {row["file"]: Path(row["file"]).resolve() for row in rows}
+    shared = commonpath([path.parent for path in whole.values()])
     page.text(f"Files in {shared}:")
-    names = {row["file"]: Path(row["file"]).relative_to(shared).as_posix() for row in rows}
+    names = {file: path.relative_to(shared).as_posix() for file, path in whole.items()}
     shown = {key: COLUMNS[key] for key in COLUMNS if any(row[key] is not None for row in rows)}
     page.table(
         ("file", *(heading for heading, _, _ in shown.values())),

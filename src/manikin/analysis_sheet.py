@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from manikin.analysis import Analysis
 from manikin.body import BodyModel
+from manikin.body.segments import end_of
 from manikin.palette import COLOURS, colours_of, readable, side_colour
 from manikin.spatial import FloatArray
 from manikin.svg import Drawing, round_values
@@ -222,7 +223,7 @@ def _bones(body: BodyModel, q: FloatArray) -> FloatArray:
     places = {name: frame.translation for name, frame in frames.items()}
     lines = [[places[one.parent or ""], places[one.name]] for one in body.segments[1:]]
     for name in _drawn(body)[len(lines) :]:
-        end = 2.0 * next(one.com for one in body.segments if one.name == name)
+        end = end_of(body.segment(name))
         lines.append([places[name], frames[name].act(end)])
     return np.array(lines)[..., [0, 2]]
 

@@ -10,6 +10,7 @@ from manikin.body import human
 from manikin.body.anthropometry import Anthropometry
 from manikin.body.human import body_from_signature
 from manikin.body.off_axis import off_axis
+from manikin.errors import BodyError
 
 
 def com(body):
@@ -45,6 +46,8 @@ def test_a_body_is_made_again_with_its_masses():
     for again in (body_from_signature(body.signature()), pickle.loads(pickle.dumps(body))):
         assert again.off_axis_masses
         np.testing.assert_allclose(com(again), com(body), atol=1e-12)
+    with pytest.raises(BodyError, match="valid: off axis, or none"):
+        body_from_signature(body.signature() | {"masses": "anywhere"})
     plain = human()
     assert "masses" not in plain.signature()
     assert not body_from_signature(plain.signature()).off_axis_masses

@@ -11,7 +11,7 @@ from manikin.body.configuration import Configuration
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import InputError
 from manikin.mocap import Reconstruction, Targets, dynamics_of, least_shift, recorded_margins
-from manikin.mocap.least_shift import ACCELERATION_ERROR, INSIDE, LARGEST_SHIFT, PLACE_ERROR
+from manikin.mocap.shifted_motion import ACCELERATION_ERROR, INSIDE, LARGEST_SHIFT, PLACE_ERROR
 from manikin.spatial import GRAVITY
 
 RATE, FRAMES = 100.0, 201

@@ -11,9 +11,9 @@ from manikin.balance.limiting import LimitingConstraint
 from manikin.body import BodyModel
 from manikin.ergonomics import Ergonomics
 from manikin.locomotion.segmentation import PathSegments
-from manikin.mocap.least_shift import LeastShift
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_supports import RecordedSupports, SupportPhase
+from manikin.mocap.shifted_motion import LeastShift
 from manikin.motion import Motion
 from manikin.spatial import GRAVITY, FloatArray
 
@@ -35,7 +35,7 @@ class Analysis:
         point_mass_margin: (n,) margin without angular momentum [N.m].
         shifted: The nearest motion that the contacts can carry.
         limiting: What limits the lowest margin; None if no margin is known.
-        cop: (n, 3) centre of pressure that the motion needs [m]; NaN in flight.
+        cop: (n, 2) centre of pressure that the motion needs [m]; NaN in flight, and below 20 N.
         segments: Holonomic and nonholonomic stretches; None where nobody walks upright.
         ergonomics: Scores, torques against strength, effort; its time is that of the motion.
         plates: Comparison with force plates; None without plates.
@@ -77,7 +77,7 @@ class Analysis:
 
     @cached_property
     def vertical_force(self) -> FloatArray:
-        """(n,) of the scene on the body, as the motion needs it [N]."""
+        """(n,) of the scene on the body, as the motion needs it [N]; 0 where nothing supports."""
         return self.motion.contact_force[:, :, 2].sum(axis=1)
 
     @cached_property

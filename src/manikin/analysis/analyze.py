@@ -10,21 +10,29 @@ from manikin.analysis.analysis import Analysis
 from manikin.analysis.on_plates import PlateReport, measured_mass, plate_report
 from manikin.analysis.remarks import remarks_on
 from manikin.analysis.walking import walked_segments
+from manikin.balance.zmp_path import LEAST_LOAD
 from manikin.body.further_contacts import with_knees_and_elbows
 from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, upright_neck
-from manikin.errors import InputError
-from manikin.mocap.least_shift import least_shift
+from manikin.errors import BodyError, InputError
 from manikin.mocap.markers import MarkerRecording
 from manikin.mocap.read import read_recording
 from manikin.mocap.reconstruct import reconstruct
-from manikin.mocap.recorded_dynamics import dynamics_of, touch_downs_of, with_mass
+from manikin.mocap.reconstruction import Reconstruction
+from manikin.mocap.recorded_dynamics import (
+    CUTOFF,
+    RecordedDynamics,
+    dynamics_of,
+    touch_downs_of,
+    with_mass,
+)
 from manikin.mocap.recorded_forces import motion_on_contacts
 from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
 from manikin.mocap.recorded_stances import FRICTION, recorded_schedule
 from manikin.mocap.recording import Recording
+from manikin.mocap.shifted_motion import least_shift
 from manikin.mocap.supports import supports_of
 from manikin.motion import Motion
-from manikin.spatial import finite_number
+from manikin.spatial import FloatArray, finite_number
 
 SEXES = ("male", "female")
 
@@ -99,6 +107,11 @@ def analyze(
         raise InputError(
             f"recording {recording.name!r} has {len(recording)} frame(s); valid: at least {FEWEST_FRAMES}"
         )
+    if recording.rate <= 2.0 * CUTOFF:
+        raise InputError(
+            f"recording {recording.name!r} has {recording.rate:g} frames per second; "
+            f"valid: more than {2.0 * CUTOFF:g}"
+        )
     start, plates = 0.0, ()
     if isinstance(recording, MarkerRecording):
         start, plates = recording.start, recording.plates
@@ -116,8 +129,8 @@ def analyze(
     dynamics = dynamics_of(found, touch_downs=touch_downs)
     mass = measured_mass(plates, dynamics, schedule, supports.start)
     told = given.mass is not None or (isinstance(recording, MarkerRecording) and recording.subject.mass)
-    if mass is not None and not told:
-        found = with_mass(found, mass)
+    if mass is not None and not told and (weighed := _weighed(found, mass)) is not None:
+        found = weighed
         schedule = recorded_schedule(found, supports, friction=given.friction)
         dynamics = dynamics_of(found, touch_downs=touch_downs)
     margins = recorded_margins(dynamics, schedule, supports.start)
@@ -137,10 +150,25 @@ def analyze(
     analysis = Analysis(
         name=name or recording.name, source=recording.name, rate=recording.rate, sex=given.sex, found=found,
         supports=supports, motion=motion, point_mass_margin=margins.point_mass, shifted=shifted,
-        limiting=margins.limiting(margins.lowest), cop=dynamics.zero_moment_point(ground),
+        limiting=margins.limiting(margins.lowest), cop=_centre_of_pressure(dynamics, motion, ground),
         segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
     )  # fmt: skip
     return replace(analysis, remarks=remarks_on(analysis, recording), wall=clock.perf_counter() - began)
+
+
+def _weighed(found: Reconstruction, mass: float) -> Reconstruction | None:
+    """With the mass by the plates; None where that is nobody's, as where a foot stands beside them."""
+    try:
+        return with_mass(found, mass)
+    except BodyError:
+        return None
+
+
+def _centre_of_pressure(dynamics: RecordedDynamics, motion: Motion, height: float) -> FloatArray:
+    """(n, 2) on the ground [m]; NaN where nothing supports."""
+    loaded = motion.support.any(axis=1) & (dynamics.vertical_force > LEAST_LOAD)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(loaded[:, None], dynamics.zero_moment_point(height), np.nan)
 
 
 def _lowest(motion: Motion, margins: RecordedMargins) -> LowestMargin:

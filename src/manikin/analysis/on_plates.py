@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from manikin.balance import zero_moment_point
 from manikin.contact import ContactSchedule
 from manikin.mocap.force_plate import ForcePlate
-from manikin.mocap.least_shift import LeastShift
 from manikin.mocap.plate_forces import PlateComparison, compare_with_plates, mass_on_plates, plate_forces
 from manikin.mocap.plate_supports import TimingError, timing_errors
 from manikin.mocap.recorded_dynamics import RecordedDynamics
 from manikin.mocap.recorded_margins import RecordedMargins
 from manikin.mocap.recorded_supports import RecordedSupports
+from manikin.mocap.shifted_motion import LeastShift
 from manikin.spatial import FloatArray
 
 

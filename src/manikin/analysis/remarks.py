@@ -59,12 +59,15 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         lines.append(
             f"nothing supports for {max(flights):.2f} s: the person may touch something that is not recorded"
         )
-    balanced = float(np.mean(analysis.shifted.margins.whole_body > 0.0))
-    if balanced < FEW_POSITIVE:
+    shifted = analysis.shifted
+    balanced = float(np.mean(shifted.margins.whole_body > 0.0))
+    if supports.supports and balanced < FEW_POSITIVE:
         lines.append(
             f"balanced in {100.0 * balanced:.0f} % of the frames only, although shifted by up to "
-            f"{1e3 * analysis.shifted.size.max():.0f} mm: running, or supports that were not found"
+            f"{1e3 * shifted.size.max():.0f} mm: running, or supports that were not found"
         )
+    if not shifted.solved:
+        lines.append("no shift onto the contacts was found: the postures jump")
     mass = None if analysis.plates is None else analysis.plates.mass
     if mass is not None and abs(mass / analysis.body.mass - 1.0) > OTHER_MASS:
         lines.append(

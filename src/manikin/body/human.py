@@ -146,7 +146,10 @@ def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
     measured: dict[str, Any] = {
         name: signature[f"{name}_length"] for name in MEASURED_LENGTHS if f"{name}_length" in signature
     }
-    return human(**values, lengths=measured, off_axis_masses=signature.get("masses") == OFF_AXIS)
+    masses = signature.get("masses")
+    if masses not in (None, OFF_AXIS):
+        raise BodyError(f"body masses are {masses!r}; valid: {OFF_AXIS}, or none")
+    return human(**values, lengths=measured, off_axis_masses=masses == OFF_AXIS)
 
 
 def standing_angles() -> dict[str, float]:

@@ -9,7 +9,7 @@ Source: Dumas, Chèze and Verriest, "Adjustments to McConville et al. and Young 
 parameters", J. Biomech. 40(3), 2007, Table 2, the anterior and lateral parts only; along the segments de
 Leva's places are kept. Arms, hands and feet are left as they are: their offsets move the body by less than a
 millimetre. The reference lines of the trunk end at the lumbosacral joint and at C7/T1, ours at the hips and
-at C7.
+at C7; the pelvis, whose offset is told from the lumbosacral joint alone, keeps its mass on the line.
 """
 
 from collections.abc import Mapping

@@ -253,6 +253,15 @@ def _check_chain(limb: Limb, segments: Mapping[str, Segment]) -> None:
         raise BodyError(f"limb {limb.name!r} has no hinge; valid: at least one")
 
 
+def end_of(segment: Segment) -> FloatArray:
+    """(3,) end of a segment that carries no other, in its frame [m]: twice as far as its centre of mass.
+
+    A head ends straight above its joint, wherever its mass is.
+    """
+    end = 2.0 * segment.com
+    return end * [0.0, 0.0, 1.0] if segment.name == "head" else end
+
+
 def hinges_of(segments: tuple[Segment, ...]) -> tuple[Hinge, ...]:
     """Every hinge of the segments, in the order of the configuration vector."""
     return tuple(hinge for segment in segments for hinge in segment.hinges)

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manikin.body import BodyModel, Segment
+from manikin.body.segments import end_of
 from manikin.errors import MotionFileError
 from manikin.motion import Motion
 from manikin.spatial import FloatArray
@@ -127,7 +128,7 @@ def _write_joint(text: StringIO, segment: Segment, joints: dict[str, _Joint], de
     for child in children:
         _write_joint(text, child, joints, depth + 1)
     if not children:
-        end = CENTIMETRES * (TO_BVH @ (2.0 * segment.com))
+        end = CENTIMETRES * (TO_BVH @ end_of(segment))
         text.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_numbers(end)}\n{inner}}}\n")
     text.write(f"{indent}}}\n")
 

@@ -13,7 +13,6 @@ from manikin.mocap.bvh import read_bvh
 from manikin.mocap.c3d import read_c3d
 from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.gaps import Gap
-from manikin.mocap.least_shift import LeastShift, least_shift
 from manikin.mocap.markers import Event, MarkerRecording
 from manikin.mocap.mot import read_mot
 from manikin.mocap.passages import Overhead, Passage, passages, whole_passage
@@ -47,6 +46,7 @@ from manikin.mocap.recorded_supports import RecordedSupports, Support, SupportPh
 from manikin.mocap.recording import Recording
 from manikin.mocap.seat_loads import SeatChange, seat_changes
 from manikin.mocap.sequence_consistency import SequenceConsistency, sequence_consistency
+from manikin.mocap.shifted_motion import LeastShift, least_shift
 from manikin.mocap.spread import Spread
 from manikin.mocap.statistics import (
     GroupStatistics,

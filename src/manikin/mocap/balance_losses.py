@@ -73,10 +73,10 @@ def balance_losses(
         wrench = dynamics.wrench[frame]
         if any(one is not None and one.margin(wrench_at(wrench, one.reference)) > 0.0 for one in others):
             cause = Cause.CHANGE
-        elif min(times[frame] - times[0], times[-1] - times[frame]) <= 2.0 * near:
-            cause = Cause.END
         elif margins.polytopes[int(margins.phase[frame])] is None:
             cause = Cause.FLIGHT
+        elif min(times[frame] - times[0], times[-1] - times[frame]) <= 2.0 * near:
+            cause = Cause.END
         else:
             cause = Cause.UNTOLD if untold else Cause.MODEL
         found.append(Loss(frame, float(times[frame]), float(margins.whole_body[frame]), cause))

@@ -27,7 +27,8 @@ class RecordedMargins:
     """Margins of each frame, alpha = 1 m; negative where the wrench is not admissible.
 
     In flight there is nothing to push against: the only admissible wrench is 0, and the margin is minus the
-    largest component of the one that the motion needs, which a ballistic flight would not.
+    largest component of the one that the motion needs about its centre of mass: a ballistic flight needs
+    none.
 
     Attributes:
         whole_body: (n,) about the middle of the contacts [N.m].
@@ -116,7 +117,7 @@ def margins_of_wrenches(
     for number in np.unique(phases):
         polytope, frames = polytopes[number], np.flatnonzero(phases == number)
         if polytope is None:
-            ours[frames] = abouts[frames] = -np.abs(wrench[frames]).max(axis=1)
+            ours[frames] = abouts[frames] = -np.abs(wrench_at(wrench[frames], com[frames])).max(axis=1)
             continue
         arms = com[frames] - polytope.reference
         ours[frames], abouts[frames] = _margins(polytope, wrench_at(wrench[frames], polytope.reference), arms)

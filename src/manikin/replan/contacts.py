@@ -79,7 +79,9 @@ def leaving_with_the_hinge(
         path = position + rotation @ hinge
         for index in range(len(phases) - 1):
             stance = phases[index].stance
-            if name not in stance or name in phases[index + 1].stance:
+            following = set(phases[index + 1].stance.effectors)
+            # Nothing that lands at the same instant shall land earlier.
+            if name not in stance or not following <= set(stance.effectors) - {name}:
                 continue
             contact = stance[name]
             place = contact.position + contact.rotation_contact_to_world @ hinge
@@ -87,7 +89,7 @@ def leaving_with_the_hinge(
             near = rows[np.linalg.norm(path[rows] - place, axis=1) <= ROLLED]
             left = instants[index] if len(near) == 0 else time[near[-1]]
             if contact.part is SolePart.TOES and left < instants[index + 1]:
-                shortest = min(SHORTEST, instants[index + 1] - instants[index])
+                shortest = min(max(SHORTEST, time[1] - time[0]), instants[index + 1] - instants[index])
                 instants[index + 1] = max(left, instants[index] + shortest)
     timed = [
         replace(phase, min_duration=float(duration), max_duration=float(duration))

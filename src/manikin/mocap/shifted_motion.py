@@ -11,8 +11,9 @@ with ``e`` and ``f`` the errors of place and of acceleration. The wrench of the 
     ``w(s) = w + [m s'', s x f + c x m s'']``,
 
 linear in ``s`` but for its product with itself, so that this is a quadratic program; ``s`` is a spline of
-fifth degree and its derivatives are the differences with which the motion itself is differentiated. Only
-facets that a solution violates enter it, a few at a time. What no shift up to a bound repairs stays as it is,
+fifth degree, differentiated by the differences with which the motion is, but for the turning of the pelvis.
+The margins that are told are measured on the shifted motion. Only facets that a solution violates enter the
+program, a few at a time. What no shift up to a bound repairs stays as it is,
 as far as it must: the largest violation of each frame is paid for at a price.
 """
 
@@ -44,13 +45,10 @@ INSIDE = 0.01
 """Margin that is kept, per body weight [m]: so far from the edge of a sole is the centre of pressure."""
 
 KNOTS = 0.04
-"""Time between the knots of the spline [s]: a shift up to 6 Hz."""
+"""Time between the knots of the spline [s]: a shift up to some 10 Hz."""
 
 PRICE = 1e4
-"""Of a violation, per metre: more than what a shift within the bound costs."""
-
-REACH = 0.2
-"""Farther from a facet no shift brings the wrench, per body weight [m]."""
+"""Of a violation, per metre, for which a shift is not made longer."""
 
 TOLERANCE = 1e-4
 """Violations that are let pass, per body weight [m]."""
@@ -69,11 +67,13 @@ class LeastShift:
         dynamics: Of the shifted motion.
         margins: Of the shifted motion.
         shift: (n, 3) of the whole body in each frame, world frame [m].
+        solved: Whether one was found; if not, the motion is as recorded, or shifted too little.
     """
 
     dynamics: RecordedDynamics
     margins: RecordedMargins
     shift: FloatArray
+    solved: bool
 
     @property
     def size(self) -> FloatArray:
@@ -105,35 +105,58 @@ def least_shift(
     """
     if not inside >= 0.0:
         raise InputError(f"inside is {inside!r}; valid: at least 0 m")
-    facets = _Facets.near(dynamics, margins, inside)
-    spline = _Spline.over(dynamics.time)
+    weight = GRAVITY * dynamics.body.mass
+    kept, spline = inside * weight, _Spline.over(dynamics.time)
     shift, bend = np.zeros((len(dynamics), 3)), np.zeros((len(dynamics), 3))
-    used = np.zeros(len(facets.frame), dtype=bool)
+    used, solved = np.zeros((0, 2), dtype=np.int64), True
     for _ in range(ROUNDS):
-        new = ~used & (facets.distances(shift, bend) < -TOLERANCE)
-        if not new.any():
+        wrench = _shifted_wrench(dynamics, shift, bend)
+        known = np.unique(np.vstack([used, _violated(margins, wrench, kept, weight)]), axis=0)
+        if len(known) == len(used):
             break
-        used |= new
-        coefficients = _solve(facets.part(used), spline)
+        used = known
+        coefficients = _solve(_Facets.of(dynamics, margins, used, kept), spline)
         if coefficients is None:
+            solved = False
             break
         shift, bend = spline.values @ coefficients, spline.second @ coefficients
     if not shift.any():
-        return LeastShift(dynamics, margins, frozen_array(shift, "shift"))
+        return LeastShift(dynamics, margins, frozen_array(shift, "shift"), solved)
     q = np.array(dynamics.q)
     q[:, :3] += shift
     moved = dynamics_of_postures(replace(found, body=dynamics.body), q)
     return LeastShift(
-        moved, margins_within(margins.polytopes, margins.phase, moved), frozen_array(shift, "shift")
+        moved, margins_within(margins.polytopes, margins.phase, moved), frozen_array(shift, "shift"), solved
     )
+
+
+def _shifted_wrench(dynamics: RecordedDynamics, shift: FloatArray, bend: FloatArray) -> FloatArray:
+    """(n, 6) about the world's origin, the product of the shift with itself left out [N, N.m]."""
+    force = dynamics.body.mass * bend
+    moment = cross(shift, dynamics.wrench[:, :3]) + cross(dynamics.com, force)
+    return dynamics.wrench + np.hstack([force, moment])
+
+
+def _violated(margins: RecordedMargins, wrench: FloatArray, kept: float, weight: float) -> NDArray[np.int64]:
+    """(v, 2) frame and facet of its polytope, of all that are nearer than ``kept`` or beyond."""
+    found = [np.zeros((0, 2), dtype=np.int64)]
+    for number in np.unique(margins.phase):
+        polytope = margins.polytopes[number]
+        if polytope is None:
+            continue
+        frames = np.flatnonzero(margins.phase == number)
+        distance = polytope.distances(wrench_at(wrench[frames], polytope.reference))
+        where, row = np.nonzero(distance < kept - TOLERANCE * weight)
+        found.append(np.column_stack([frames[where], row]))
+    return np.vstack(found)
 
 
 @dataclass(frozen=True, eq=False)
 class _Facets:
-    """Facets near the wrench of a frame; distances are per body weight [m], ``base - on . (s, s'')``.
+    """Facets that bound the shift; distances are per body weight [m], ``base - on . (s, s'')``.
 
     Attributes:
-        frame: (v,) which frame.
+        frame: (v,) which frame, in order.
         base: (v,) distance to the facet, less what is kept.
         on_shift: (v, 3) what a shift takes from it.
         on_bend: (v, 3) what its second derivative takes.
@@ -145,38 +168,25 @@ class _Facets:
     on_bend: FloatArray
 
     @classmethod
-    def near(cls, dynamics: RecordedDynamics, margins: RecordedMargins, inside: float) -> "_Facets":
-        """Those within reach of a shift, of all frames with contacts."""
-        mass = dynamics.body.mass
-        parts = []
-        for number in np.unique(margins.phase):
+    def of(
+        cls, dynamics: RecordedDynamics, margins: RecordedMargins, used: NDArray[np.int64], kept: float
+    ) -> "_Facets":
+        """Of (v, 2) frames and facets, by their frames."""
+        mass, parts = dynamics.body.mass, []
+        for number in np.unique(margins.phase[used[:, 0]]):
             polytope = margins.polytopes[number]
-            if polytope is None:
-                continue
-            frames = np.flatnonzero(margins.phase == number)
-            distance = polytope.distances(wrench_at(dynamics.wrench[frames], polytope.reference))
-            distance /= GRAVITY * mass
-            where, row = np.nonzero(distance < inside + REACH)
-            frame = frames[where]
+            assert polytope is not None  # none is violated in flight
+            frame, row = used[margins.phase[used[:, 0]] == number].T
             force, moment = polytope.H[row, :3], polytope.H[row, 3:]
+            local = wrench_at(dynamics.wrench[frame], polytope.reference)
+            distance = polytope.h[row] - np.sum(polytope.H[row] * local, axis=1)
             # H_m . (s x f) = s . (f x H_m), and H_m . (c x s'') = s'' . (H_m x c)
             parts.append((
-                frame, distance[where, row] - inside,
+                frame, (distance - kept) / (GRAVITY * mass),
                 cross(dynamics.wrench[frame, :3], moment) / (GRAVITY * mass),
                 (force + cross(moment, dynamics.com[frame] - polytope.reference)) / GRAVITY,
             ))  # fmt: skip
-        if not parts:
-            return cls(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
         return cls(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-    def part(self, chosen: NDArray[np.bool_]) -> "_Facets":
-        """Some of them."""
-        return _Facets(self.frame[chosen], self.base[chosen], self.on_shift[chosen], self.on_bend[chosen])
-
-    def distances(self, shift: FloatArray, bend: FloatArray) -> FloatArray:
-        """(v,) for (n, 3) shifts and their second derivatives; negative beyond what is kept [m]."""
-        taken = self.on_shift * shift[self.frame] + self.on_bend * bend[self.frame]
-        return self.base - taken.sum(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
