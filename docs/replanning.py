@@ -98,17 +98,16 @@ side. What is left: ankles and knees while a sole lands flat where the recorded 
 ms, knees after the lift-off, and arms, by up to some 50° at instants, in `walking2` and `walking5` beside
 recorded arms that no marker told and that just hang. Toes were the joints beyond their strength (up to
 1.9), with the centre of pressure at their tips. Left are toe, ankle and a shoulder of `FunctionalWalk` at
-instants (up to 1.16), and hip (1.85) and shoulders (1.3) of `PiG_Motion-FlatFoot-One` in the first and last
-tenth of a second, where a foot is landing as the clip begins and ends. `STS1` is its first five seconds:
-rise, sit down, rise; a seat is rigid and at one place.
+instants, and hip and shoulders of `PiG_Motion-FlatFoot-One` in the first and last tenth of a second, where a
+foot is landing as the clip begins and ends. `STS1` is its first five seconds: rise, sit down, rise; a seat
+is rigid and at one place.
 
-Not solved: the planned posture's whole-body margin is negative for 4 to 16 % of the time, by up to 19 N.m,
-as the fit meets the rate of angular momentum only nearly; support errors reach 3 to 5 mm for some ms at a
-lift-off, where 1 mm is the rule elsewhere. `17_03`, a stealthy walk, came to the end with an earlier plan
-of a point mass, 6.7° off, and now brushes an arm and nearly falls; `STS1` needs more strength than it did.
-Without double support between two single ones, as in the leap of `SideStepLeft`, there is no plan.
-Timing-free plans have no angular momentum of their own: a walk on whole soles (`walking1`) falls at 1.0 s,
-with a fit that misses soles by 2.2 cm and the CoM by 1.6 cm.
+Not solved: the planned posture's whole-body margin is negative for a part of the time, as the fit meets the
+rate of angular momentum only nearly; support errors reach some millimetres at a lift-off, where one is the
+rule elsewhere. `17_03`, a stealthy walk, came to the end with an earlier plan of a point mass and now
+brushes an arm and nearly falls; `STS1` needs more strength than it did. Without double support between two
+single ones, as in the leap of `SideStepLeft`, there is no plan. Timing-free plans have no angular momentum
+of their own: a walk on whole soles (`walking1`) falls after about a second.
 
 """
 AGAINST = """
