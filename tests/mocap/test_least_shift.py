@@ -11,7 +11,7 @@ from manikin.body.configuration import Configuration
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import InputError
 from manikin.mocap import Reconstruction, Targets, dynamics_of, least_shift, recorded_margins
-from manikin.mocap.shifted_motion import ACCELERATION_ERROR, INSIDE, LARGEST_SHIFT, PLACE_ERROR
+from manikin.mocap.shifted_motion import ACCELERATION_ERROR, ASIDE, INSIDE, LARGEST_SHIFT, PLACE_ERROR
 from manikin.spatial import GRAVITY
 
 RATE, FRAMES = 100.0, 201
@@ -29,10 +29,10 @@ def standing(sway):
     return Reconstruction(BODY, TIME, q, targets, np.zeros((FRAMES, 1)), neutral=())
 
 
-def on_one_foot(ahead):
-    """A right sole below the centre of mass of standing, its front edge ``ahead`` of it."""
+def on_one_foot(ahead, right=0.0):
+    """A right sole below the centre of mass of standing, its front edge ``ahead``, its axis to the right."""
     com = Configuration(BODY, BODY.standing_posture()).com
-    place = (com[0] + ahead - 0.5 * LENGTH, com[1], 0.0)
+    place = (com[0] + ahead - 0.5 * LENGTH, com[1] - right, 0.0)
     foot = sole("right_foot", place, 0.0, length=LENGTH, width=WIDTH, friction=0.8)
     return ContactSchedule(StanceSequence([Phase(Stance([foot], 4.0 * WEIGHT), 2.0)]), [0.0, 2.0])
 
@@ -44,15 +44,37 @@ def shifted(found, schedule, **options):
 
 
 def test_who_is_in_balance_is_left_alone():
-    margins, moved = shifted(standing(0.01 * np.sin(TIME)), on_one_foot(0.1))
+    margins, moved = shifted(standing(0.01 * np.sin(TIME)), on_one_foot(0.1), aside=None)
     assert (margins.whole_body > INSIDE * WEIGHT).all()
     assert not moved.shift.any()
     assert moved.margins is margins
+    # Nor does a foot alone draw whom it carries on its axis.
+    _, moved = shifted(standing(0.01 * np.sin(TIME)), on_one_foot(0.1))
+    np.testing.assert_allclose(moved.shift, 0.0, atol=1e-6)
+
+
+def test_a_foot_alone_is_rather_loaded_along_its_axis():
+    # At rest 3 cm beside the axis, within the sole.
+    schedule = on_one_foot(0.1, right=0.03)
+    margins, moved = shifted(standing(np.zeros(FRAMES)), schedule)
+    assert (margins.whole_body > INSIDE * WEIGHT).all()
+    axis = schedule.sequence[0].stance.contacts[0].position[1]
+    motions = (dynamics_of(standing(np.zeros(FRAMES))), moved.dynamics)
+    aside = [one.zero_moment_point(0.0)[:, 1] - axis for one in motions]
+    np.testing.assert_allclose(aside[0], 0.03, atol=1e-4)
+    assert np.sqrt(np.mean(aside[1] ** 2)) < 0.9 * 0.03
+    np.testing.assert_allclose(moved.shift[:, 0], 0.0, atol=1e-3)
+    # No other shift is cheaper: neither none, nor half or twice as much.
+    costs = [
+        cost(share * moved.shift) + np.sum((aside[0] + share * (aside[1] - aside[0])) ** 2) / ASIDE**2
+        for share in (1.0, 0.0, 0.5, 2.0)
+    ]
+    assert np.argmin(costs) == 0
 
 
 def test_who_stands_beyond_the_edge_is_put_back_by_what_is_missing():
     # At rest 1 cm before the front edge, the centre of mass has to go back by that and by what is kept.
-    margins, moved = shifted(standing(np.zeros(FRAMES)), on_one_foot(-0.01))
+    margins, moved = shifted(standing(np.zeros(FRAMES)), on_one_foot(-0.01), aside=None)
     assert (margins.whole_body < 0.0).all()
     # A margin in N.m is the distance to the edge times the force, but for the facet's part in the forces.
     assert moved.margins.whole_body.min() > 0.95 * INSIDE * WEIGHT
@@ -111,3 +133,5 @@ def test_in_flight_nothing_is_shifted_and_nonsense_is_refused():
         shifted(found, flight, inside=-1.0)
     with pytest.raises(InputError, match="valid: at least 0 m"):
         shifted(replace(found, neutral=("neck",)), flight, inside=float("nan"))
+    with pytest.raises(InputError, match="aside"):
+        shifted(found, flight, aside=0.0)
