@@ -290,11 +290,11 @@ def test_maps_with_and_without_a_step_and_stiff_ankles(capfd, tmp_path):
 @pytest.mark.slow
 def test_a_real_map_of_four_directions(capfd, tmp_path):
     """Each border was tried: what is held stands again when pushed once more, what is beyond falls."""
-    arguments = ["push", "--map", "--directions", "4", "--tolerance", "10", "--feet", "free", "--json"]
+    arguments = ["push", "--map", "--directions", "4", "--tolerance", "20", "--feet", "free", "--json"]
     assert main([*arguments, "--out", str(tmp_path / "map")]) == DONE
     found = json.loads(capfd.readouterr().out)
     held, beyond = np.array(found["impulse_Ns"]), np.array(found["beyond_Ns"])
-    assert np.all((held > 10.0) & (beyond - held <= 10.0) & (beyond > held))
+    assert np.all((held > 10.0) & (beyond - held <= 20.0) & (beyond > held))
     assert np.all(held <= found["bound_Ns"])
     for impulse, status in ((held[0], DONE), (beyond[0], FAILED)):
         force = ["--force", str(impulse / 0.1), "--direction", "0", "--feet", "free"]

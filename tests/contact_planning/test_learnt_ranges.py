@@ -31,9 +31,10 @@ def test_steps_under_a_slab_stay_within_the_learnt_ranges_where_that_is_asked_fo
     assert kept.min() >= -SLACK
 
 
-@pytest.mark.slow
 def test_a_climb_with_hands_stays_within_the_learnt_ranges_where_that_is_asked_for():
-    _, kept = found_with("learnt", "climb-wall")
+    _, freely = found_with("limits", "climb")
+    assert freely.min() < -np.deg2rad(10.0)
+    _, kept = found_with("learnt", "climb")
     assert kept.min() >= -SLACK
 
 
