@@ -18,8 +18,8 @@ wrench of the shifted body is
 linear in ``s`` but for its product with itself, so that this is a quadratic program; ``s`` is a spline of
 fifth degree, differentiated by the differences with which the motion is, but for the turning of the pelvis.
 The margins that are told are measured on the shifted motion. Only facets that a solution violates enter the
-program, a few at a time. What no shift up to a bound repairs stays as far as it must: the largest violation of
-each frame is paid for at a price.
+program, a few at a time. What no shift up to a bound repairs stays as far as it must: the largest violation
+of each frame is paid for at a price.
 """
 
 from collections.abc import Sequence
