@@ -37,7 +37,8 @@ from manikin.mocap import (
     touch_downs_of,
     with_mass,
 )
-from manikin.mocap.recorded_forces import shared_wrenches, torques_of
+from manikin.mocap.force_sharing import shared_wrenches
+from manikin.mocap.recorded_forces import torques_of
 from manikin.mocap.recorded_margins import wrench_at
 from manikin.mocap.recorded_supports import Support
 from manikin.mocap.untold_segments import untold_upright

@@ -1,0 +1,243 @@
+"""Which contact supplies how much of the wrench that a recorded motion needs.
+
+One contact has to supply all of it. Several can share it in many ways. People load a foot bit by bit, from
+nothing at its touch-down on, and unload it until its lift-off; of all shares that add up to the wrench in
+every frame, those are wanted whose wrenches ``f_i`` at the contacts change least:
+
+    ``sum_i integral |f_i'|^2 + |f_i|^2 / T^2 dt``,
+
+with ``f_i = 0`` before the contact is made and after it is left. What one foot has to supply alone before
+and after continues into a double support that way, so that the foot behind keeps pushing ahead while the one
+in front brakes, as under people who walk; the least forces, which the second term asks for where little
+changes, would not have the feet push against each other at all. It is the thought of Ren, Jones and Howard
+("Whole body inverse dynamics over a complete gait cycle based only on measured kinematics", J. Biomech. 41,
+2008) for contacts of any number and kind.
+
+Contacts push within their friction pyramids. With ``G`` the wrenches of unit pushes at the corners, one a
+column, and ``l`` pushes that supply the smooth shares, the pushes nearest to ``l`` are ``max(0, l + G^T y)``
+for the six multipliers ``y`` that solve ``G max(0, l + G^T y) + e y = w``, found by Newton's method for all
+frames of a phase at once. What they cannot supply, because the wrench is outside what the contacts admit, is
+added as the smallest wrenches at the contacts: the sum is always the whole wrench, so that the pelvis needs
+no hand from heaven, and a centre of pressure outside its sole is seen as such.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from manikin.balance.friction import contact_to_world, cross, edge_wrenches
+from manikin.contact import Contact, ContactKind, Stance
+from manikin.mocap.recorded_margins import wrench_at
+from manikin.mocap.runs import runs
+from manikin.spatial import FloatArray
+
+SOFTNESS = 1e-6
+"""``e``, per mean eigenvalue of ``G G^T``: so small that little of an admissible wrench is left."""
+
+ROUNDS = 30
+"""Most steps of Newton's method."""
+
+LEVER = 0.1
+"""Length by which a moment counts as much as a force [m]: about half a sole."""
+
+SLOW = 0.5
+"""``T`` [s]: a double support of walking is short beside it, standing is long."""
+
+
+def smooth_shares(
+    wrench: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float
+) -> FloatArray:
+    """Share wrenches among contacts so that each is loaded smoothly, without regard to friction.
+
+    Args:
+        wrench: (n, 6) to be supplied, about the world's origin [N, N.m].
+        held: (n, c) which contacts are made.
+        points: (n, c, 3) where they are [m]; any value where they are not made.
+        step: Time between frames [s].
+
+    Returns:
+        (n, c, 6) of each contact, about the world's origin; their sum over the contacts is ``wrench`` where
+        any is made, and 0 elsewhere.
+    """
+    found = np.where(held[..., None], wrench[:, None], 0.0)
+    for first, end in runs(held.sum(axis=1) > 1):
+        found[first:end] = _smooth_run(found, held, points, step, first, end)
+    return found
+
+
+def shared_wrenches(
+    stance: Stance, wrench: FloatArray, weight: float, near: FloatArray | None = None
+) -> FloatArray:
+    """Share wrenches among the contacts of a stance within their friction pyramids.
+
+    Args:
+        stance: At least one contact.
+        wrench: (n, 6) to be supplied, about the world's origin [N, N.m].
+        weight: Of the body [N], the scale of forces.
+        near: (n, c, 6) shares about the world's origin to stay near to, as of :func:`smooth_shares`; None
+            for the least forces.
+
+    Returns:
+        (n, c, 6) of each contact, about the world's origin; their sum over the contacts is ``wrench``.
+    """
+    middle = np.mean([contact.position for contact in stance], axis=0)
+    wanted = _scaled(wrench, middle, weight)
+    if len(stance) == 1:
+        shares = wanted[:, None]
+    else:
+        generators = [_generators(contact, middle, weight) for contact in stance]
+        columns = np.vstack(generators).T
+        known = np.zeros((len(wanted), columns.shape[1]))
+        if near is not None:
+            told = _scaled(near, middle, weight).swapaxes(0, 1)
+            known = np.hstack([_pushes(one.T, part) for one, part in zip(generators, told, strict=True)])
+        pushes = _pushes(columns, wanted, known)
+        ends = np.cumsum([0, *map(len, generators)])
+        shares = np.stack(
+            [pushes[:, a:b] @ part for a, b, part in zip(ends[:-1], ends[1:], generators, strict=True)],
+            axis=1,
+        )
+        shares += _smallest([contact.position - middle for contact in stance], wanted - shares.sum(axis=1))
+    shares = shares * weight
+    shares[..., 3:] *= LEVER
+    return wrench_at(shares, -middle)
+
+
+def _smooth_run(
+    found: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float, first: int, end: int
+) -> FloatArray:
+    """(k, c, 6) smooth shares in the frames from ``first`` up to ``end``, all with several contacts.
+
+    The wrenches about their own points, moments per lever, are the unknowns: their changes and sizes are
+    least squares, with one linear equation for the sum in every frame.
+    """
+    made, places = held[first:end], points[first:end]
+    count = int(made.sum())
+    index = np.full((end - first + 2, made.shape[1]), -1)
+    index[1:-1][made] = np.arange(count)
+    before, after = index[:-1], index[1:]
+    # A change from one frame to the next; none is asked for across an end of the recording.
+    inside = np.zeros((len(before), 1), dtype=bool)
+    inside[1 if first == 0 else 0 : len(before) - 1 if end == len(held) else len(before)] = True
+    changing = inside & ((before >= 0) | (after >= 0))
+    frames, who = np.nonzero(changing)
+    rows = np.arange(len(frames))
+    ours, theirs = after[frames, who], before[frames, who]
+    change = sparse.csr_array(
+        (np.r_[np.ones((ours >= 0).sum()), -np.ones((theirs >= 0).sum())],
+         (np.r_[rows[ours >= 0], rows[theirs >= 0]], np.r_[ours[ours >= 0], theirs[theirs >= 0]])),
+        shape=(len(rows), count),
+    )  # fmt: skip
+    known = np.zeros((len(rows), 6))
+    if first > 0:
+        start = frames == 0
+        known[start] = _about(found[first - 1, who[start]], places[0, who[start]])
+    if end < len(held):
+        last = frames == len(before) - 1
+        known[last] = -_about(found[end, who[last]], places[-1, who[last]])
+    cost = change.T @ change + (step / SLOW) ** 2 * sparse.eye_array(count)
+    frame, contact = np.nonzero(made)
+    middle = (places * made[..., None]).sum(axis=1) / made.sum(axis=1)[:, None]
+    total = _about(found[first:end][frame, contact], middle[frame])  # the whole wrench, once per contact
+    one = np.searchsorted(frame, np.arange(end - first))
+    sums = _sums(frame, places[frame, contact] - middle[frame], end - first)
+    system = sparse.block_array([[sparse.kron(cost, np.eye(6)), sums.T], [sums, None]])
+    right = np.concatenate([(change.T @ known).ravel(), total[one].ravel()])
+    solved = splu(sparse.csc_matrix(system)).solve(right)[: 6 * count].reshape(count, 6)
+    solved[:, 3:] *= LEVER
+    shares = np.zeros((end - first, made.shape[1], 6))
+    shares[frame, contact] = wrench_at(solved, -places[frame, contact])
+    return shares
+
+
+def _sums(frame: NDArray[np.int64], arm: FloatArray, frames: int) -> sparse.csr_array:
+    """(6 f, 6 k) sums over each frame's contacts of wrenches about points ``arm`` (k, 3) off its middle."""
+    carried = _carried(arm)
+    rows = 6 * frame[:, None, None] + np.arange(6)[:, None] + np.zeros(6, dtype=np.int64)
+    columns = 6 * np.arange(len(frame))[:, None, None] + np.zeros((6, 1), dtype=np.int64) + np.arange(6)
+    return sparse.csr_array((carried.ravel(), (rows.ravel(), columns.ravel())), (6 * frames, 6 * len(frame)))
+
+
+def _carried(arm: FloatArray) -> FloatArray:
+    """(k, 6, 6) which carry wrenches, moments per lever, from points (k, 3) away."""
+    x, y, z = (arm / LEVER).T
+    carried = np.tile(np.eye(6), (len(arm), 1, 1))
+    zero = np.zeros_like(x)
+    carried[:, 3:, :3] = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
+    return carried
+
+
+def _about(wrench: FloatArray, point: FloatArray) -> FloatArray:
+    """(k, 6) about points (k, 3), moments per lever."""
+    moved = wrench_at(wrench, point)
+    moved[:, 3:] /= LEVER
+    return moved
+
+
+def _scaled(wrench: FloatArray, middle: FloatArray, weight: float) -> FloatArray:
+    """(..., 6) about a point, per body weight and lever."""
+    wanted = wrench_at(wrench, middle) / weight
+    wanted[..., 3:] /= LEVER
+    return wanted
+
+
+def _generators(contact: Contact, middle: FloatArray, weight: float) -> FloatArray:
+    """(k, 6) wrenches of unit pushes about the middle, moments per lever."""
+    if contact.kind is ContactKind.GRASP:
+        axes = np.vstack([np.eye(3), -np.eye(3)]) * contact.max_force / weight
+        wrenches = np.hstack([axes, cross(contact.position - middle, axes)])
+    else:
+        wrenches = contact_to_world(contact, edge_wrenches(contact, "pyramid"), middle)
+    wrenches = np.array(wrenches)
+    wrenches[:, 3:] /= LEVER
+    return wrenches
+
+
+def _pushes(columns: FloatArray, wanted: FloatArray, known: FloatArray | float = 0.0) -> FloatArray:
+    """(n, k) pushes nearest to known ones that supply (n, 6) wrenches, as far as pushes can.
+
+    They are ``max(0, known + G^T y)`` at the zeros ``y`` of the slope of a convex function, by Newton's
+    method. A step that does not make the slope smaller is halved.
+    """
+    soft = SOFTNESS * float(np.trace(columns @ columns.T)) / 6.0
+    told = np.broadcast_to(known, (len(wanted), columns.shape[1]))
+    least = columns @ columns.T + soft * np.eye(6)
+    y = np.asarray(np.linalg.solve(least, (wanted - told @ columns.T).T).T, dtype=np.float64)
+    active = np.arange(len(y))
+    slope = _slope(columns, soft, y, wanted, told)
+    for _ in range(ROUNDS):
+        active = active[np.linalg.norm(slope[active], axis=1) > 1e-10]
+        if not len(active):
+            break
+        pushed = told[active] + y[active] @ columns > 0.0
+        bend = np.einsum("ik,nk,jk->nij", columns, pushed, columns, optimize=True) + soft * np.eye(6)
+        step = -np.linalg.solve(bend, slope[active][..., None])[..., 0]
+        size = np.linalg.norm(slope[active], axis=1)
+        length = np.ones(len(active))
+        for _ in range(8):
+            there = y[active] + length[:, None] * step
+            found = _slope(columns, soft, there, wanted[active], told[active])
+            worse = np.linalg.norm(found, axis=1) > (1.0 - 1e-4 * length) * size
+            if not worse.any():
+                break
+            length[worse] *= 0.5
+        y[active], slope[active] = there, found
+    return np.maximum(told + y @ columns, 0.0)
+
+
+def _slope(
+    columns: FloatArray, soft: float, y: FloatArray, wanted: FloatArray, known: FloatArray
+) -> FloatArray:
+    return np.maximum(known + y @ columns, 0.0) @ columns.T + soft * y - wanted
+
+
+def _smallest(arms: Sequence[FloatArray], missing: FloatArray) -> FloatArray:
+    """(n, c, 6) smallest wrenches at points ``arms`` away that add up to (n, 6) missing ones."""
+    maps = _carried(np.array(arms))
+    each = missing @ np.linalg.pinv(np.hstack(list(maps))).T
+    return np.stack(
+        [part @ one.T for part, one in zip(np.split(each, len(arms), axis=1), maps, strict=True)], axis=1
+    )
