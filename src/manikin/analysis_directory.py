@@ -132,7 +132,7 @@ def _row(entry: AnalysisEntry) -> dict[str, Any]:
     """A recording in one line; empty where it was refused."""
     found = entry.summary or {}
     margin, residual = found.get("margin") or {}, found.get("reconstruction_residual_m") or {}
-    shifted = margin.get("shifted") or {}
+    recorded, shifted = margin.get("recorded") or {}, margin.get("shifted") or {}
     plates, effort = found.get("force_plates") or {}, found.get("ergonomics") or {}
     return {
         "file": str(entry.job.path),
@@ -146,7 +146,7 @@ def _row(entry: AnalysisEntry) -> dict[str, Any]:
         "com_height_min_m": found.get("com_height_min_m"),
         "margin_min_Nm": margin.get("min"),
         "margin_share_positive": margin.get("share_positive"),
-        "shifted_share_positive": shifted.get("share_positive"),
+        "recorded_share_positive": recorded.get("share_positive"),
         "shift_rms_m": shifted.get("rms_m"),
         "timing_median_s": plates.get("timing_median_s"),
         "vertical_rms_body_weight": plates.get("vertical_rms_body_weight"),

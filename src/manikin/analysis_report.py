@@ -14,8 +14,9 @@ WORDS = (
     "Times are seconds on the recording's clock. The margin is the distance of the "
     "wrench that the motion needs to the faces of what the contacts can give (Qiu 2012, 4.2.9), moments "
     "about the middle of the contacts, alpha = 1 m: below 0 the contacts, as they were found, could not "
-    "give it. Recordings tell places to a centimetre and so leave accelerations open: the shift onto the "
-    "contacts is the least one of the whole body after which the contacts could."
+    "give it. Recordings tell places to a centimetre and so leave accelerations open: measured is the motion "
+    "after the least shift of the whole body with which the contacts can give it, if there is one, else as "
+    "it was recorded."
 )
 COLUMNS: dict[str, tuple[str, float, int]] = {
     "duration_s": ("duration [s]", 1.0, 2),
@@ -28,7 +29,7 @@ COLUMNS: dict[str, tuple[str, float, int]] = {
     "com_height_min_m": ("lowest CoM [m]", 1.0, 3),
     "margin_min_Nm": ("lowest margin [N.m]", 1.0, 1),
     "margin_share_positive": ("positive margin [% of frames]", 100.0, 1),
-    "shifted_share_positive": ("positive once shifted [%]", 100.0, 1),
+    "recorded_share_positive": ("positive as recorded [%]", 100.0, 1),
     "shift_rms_m": ("shift, RMS [mm]", 1e3, 1),
     "timing_median_s": ("instants against plates [ms]", 1e3, 0),
     "vertical_rms_body_weight": ("force against plates [% of weight]", 100.0, 1),
@@ -137,7 +138,8 @@ def overview_page(
 
 def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
     margin, residual = summary["margin"], summary["reconstruction_residual_m"]
-    shifted = margin["shifted"]
+    recorded, shifted = margin["recorded"], margin["shifted"]
+    used = "applied" if margin["motion"] == "shifted" else "not applied"
     return {
         "duration [s]": summary["duration_s"],
         "frames": summary["frames"],
@@ -150,7 +152,8 @@ def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
         "frames with a positive margin": _share(margin["share_positive"]),
         "limited by": None if margin["limiting"] is None else readable(margin["limiting"]),
         "shift onto the contacts [mm]": f"{1e3 * shifted['rms_m']:.1f} (RMS), {1e3 * shifted['max_m']:.1f} "
-        f"(largest); positive then in {_share(shifted['share_positive'])} of the frames",
+        f"(largest), {used}; positive then in {_share(shifted['share_positive'])} of the frames, "
+        f"as recorded in {_share(recorded['share_positive'])}",
     }
 
 
@@ -169,8 +172,19 @@ def _plates(page: ReportPage, plates: Mapping[str, Any]) -> None:
         "positive margin of the measured forces": of("margin_share_positive", 100.0, "% of these frames"),
         "frames with one foot on a plate": plates["single_support_frames"],
         "error of the centre of pressure, RMS": of("cop_rms_m", 1e3, "mm"),
-        "the same, shifted onto the contacts": of("cop_rms_shifted_m", 1e3, "mm"),
+        "the same of the motion as recorded": of("cop_rms_recorded_m", 1e3, "mm"),
     })  # fmt: skip
+    if plates["torques"]:
+        page.table(
+            ("torque", "frames", "difference, RMS [N.m]", "mean [N.m]", "largest [N.m]", "by plates [N.m]"),
+            [
+                (readable(joint), one["frames"], one["rms_Nm"], one["mean_Nm"], one["peak_Nm"],
+                 one["peak_by_plates_Nm"])
+                for joint, one in plates["torques"].items()
+            ],
+            decimals=(None, 0, 1, 1, 1, 1),
+        )  # fmt: skip
+        page.text("Of both legs, while the foot is on a plate of its own.")
 
 
 def _plan(page: ReportPage, plan: Mapping[str, Any]) -> None:

@@ -106,9 +106,10 @@ def _bands(analysis: Analysis) -> list[_Band]:
         forces["force plates"] = (measured / analysis.weight, ink)
     margins = {
         "whole body": (analysis.motion.margin, ours),
-        "shifted onto the contacts": (analysis.shifted.margins.whole_body, ink),
-        "point mass": (analysis.point_mass_margin, soft),
+        "point mass": (analysis.point_mass_margin, ink),
     }
+    if analysis.measured.believed:
+        margins["as recorded"] = (analysis.measured.recorded_margins.whole_body, soft)
     bands = [
         _scaled("vertical force [body weight]", forces, 0.0),
         _scaled("margin [N.m]", margins, 0.0, 0.01),

@@ -108,10 +108,12 @@ def test_a_recorded_walk_beside_its_plates(recordings_folder):
     assert plates["timing_median_s"] < 0.030
     assert plates["vertical_rms_body_weight"] < 0.10
     # And 97 % of the frames in balance, the body shifted by less than its markers tell.
-    shifted = found.as_dict()["margin"]["shifted"]
-    assert shifted["share_positive"] > 0.97
-    assert shifted["rms_m"] < 0.002
-    assert plates["cop_rms_shifted_m"] < plates["cop_rms_m"]
+    margin = found.as_dict()["margin"]
+    assert margin["motion"] == "shifted"
+    assert margin["share_positive"] == margin["shifted"]["share_positive"] > 0.97
+    assert margin["recorded"]["share_positive"] < margin["share_positive"]
+    assert margin["shifted"]["rms_m"] < 0.002
+    assert plates["cop_rms_m"] == plates["cop_rms_shifted_m"] < plates["cop_rms_recorded_m"]
     assert found.plates is not None
     both = found.plates.compared
     assert np.median(found.plates.vertical_force[both]) == pytest.approx(found.weight, rel=0.1)

@@ -38,7 +38,7 @@ from manikin.mocap import (
     with_mass,
 )
 from manikin.mocap.force_sharing import shared_wrenches
-from manikin.mocap.recorded_forces import torques_of
+from manikin.mocap.recorded_forces import contact_wrenches, torques_of
 from manikin.mocap.recorded_margins import wrench_at
 from manikin.mocap.recorded_supports import Support
 from manikin.mocap.untold_segments import untold_upright
@@ -129,7 +129,7 @@ def test_mass_scales_forces_and_nothing_else(swinging, dynamics):
 def test_contacts_leave_nothing_for_the_pelvis_to_hold(swinging, dynamics):
     schedule = on_feet(swinging)
     stance = schedule.sequence[0].stance
-    shares = shared_wrenches(stance, dynamics.wrench, GRAVITY * dynamics.body.mass)
+    shares = contact_wrenches(dynamics, schedule)
     torques = torques_of(dynamics, stance.effectors, shares)
     assert np.abs(torques[:, :6]).max() < 1e-7
     motion = motion_on_contacts(dynamics, schedule)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from manikin.analysis.measured_motion import MeasuredMotion
 from manikin.analysis.on_plates import PlateReport
 from manikin.balance.limiting import LimitingConstraint
 from manikin.body import BodyModel
@@ -13,7 +14,6 @@ from manikin.ergonomics import Ergonomics
 from manikin.locomotion.segmentation import PathSegments
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_supports import RecordedSupports, SupportPhase
-from manikin.mocap.shifted_motion import LeastShift
 from manikin.motion import Motion
 from manikin.spatial import GRAVITY, FloatArray
 
@@ -31,9 +31,10 @@ class Analysis:
         sex: Table of segment masses that was used.
         found: Reconstruction, not smoothed.
         supports: Of feet, hands and seat.
-        motion: Smoothed, with torques, forces and whole-body margin; its time is 0 at the first instant.
-        point_mass_margin: (n,) margin without angular momentum [N.m].
-        shifted: The nearest motion that the contacts can carry.
+        motion: Smoothed and, where that is to be believed, shifted onto its contacts, with torques, forces
+            and whole-body margin; its time is 0 at the first instant.
+        point_mass_margin: (n,) its margin without angular momentum [N.m].
+        measured: The motion as recorded, and shifted.
         limiting: What limits the lowest margin; None if no margin is known.
         cop: (n, 2) centre of pressure that the motion needs [m]; NaN in flight, and below 20 N.
         segments: Holonomic and nonholonomic stretches; None where nobody walks upright.
@@ -51,7 +52,7 @@ class Analysis:
     supports: RecordedSupports
     motion: Motion
     point_mass_margin: FloatArray
-    shifted: LeastShift
+    measured: MeasuredMotion
     limiting: LimitingConstraint | None
     cop: FloatArray
     segments: PathSegments | None
@@ -101,8 +102,9 @@ class Analysis:
         columns |= {
             "margin_Nm": self.motion.margin,
             "point_mass_margin_Nm": self.point_mass_margin,
-            "shift_m": self.shifted.size,
-            "shifted_margin_Nm": self.shifted.margins.whole_body,
+            "recorded_margin_Nm": self.measured.recorded_margins.whole_body,
+            "shifted_margin_Nm": self.measured.shifted.margins.whole_body,
+            "shift_m": self.measured.shifted.size,
             "vertical_force_N": self.vertical_force,
             "cop_x_m": self.cop[:, 0],
             "cop_y_m": self.cop[:, 1],
@@ -170,6 +172,7 @@ class Analysis:
         points = self.point_mass_margin[np.isfinite(self.point_mass_margin)]
         return {
             "form": WHOLE_BODY,
+            "motion": "shifted" if self.measured.believed else "recorded",
             "unit": self.motion.margin_unit,
             "min": None if lowest is None else float(margin[lowest]),
             "at_s": None if lowest is None else float(self.time[lowest]),
@@ -177,11 +180,15 @@ class Analysis:
             "limiting": None if self.limiting is None else self.limiting.description,
             "limiting_contact": None if self.limiting is None else self.limiting.effector,
             "share_known": float(np.mean(known)),
+            "recorded": {
+                "share_positive": float(np.mean(self.measured.recorded_margins.whole_body > 0.0)),
+                "min": float(self.measured.recorded_margins.whole_body.min()),
+            },
             "shifted": {
-                "share_positive": float(np.mean(self.shifted.margins.whole_body > 0.0)),
-                "min": float(self.shifted.margins.whole_body.min()),
-                "rms_m": self.shifted.rms,
-                "max_m": float(self.shifted.size.max()),
+                "share_positive": self.measured.shifted.balanced,
+                "min": float(self.measured.shifted.margins.whole_body.min()),
+                "rms_m": self.measured.shifted.rms,
+                "max_m": float(self.measured.shifted.size.max()),
             },
             "point_mass_min": float(points.min()) if points.size else None,
             "point_mass_share_positive": float(np.mean(points > 0.0)) if points.size else None,

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from manikin.analysis.analysis import Analysis
+from manikin.analysis.measured_motion import MeasuredMotion
 from manikin.analysis.on_plates import PlateReport, measured_mass, plate_report
 from manikin.analysis.remarks import remarks_on
 from manikin.analysis.walking import walked_segments
@@ -50,6 +51,7 @@ class AnalysisOptions:
         sex: Table of segment masses, ``"male"`` or ``"female"``.
         friction: Of soles on the ground.
         load: Carried in the hands [kg], for RULA and REBA.
+        as_recorded: Whether the motion is left as it was recorded, and not shifted onto its contacts.
     """
 
     frames: tuple[int, int] | None = None
@@ -57,6 +59,7 @@ class AnalysisOptions:
     sex: str = "male"
     friction: float = FRICTION
     load: float = 0.0
+    as_recorded: bool = False
 
     def __post_init__(self) -> None:
         if self.mass is not None:
@@ -133,13 +136,15 @@ def analyze(
         found = weighed
         schedule = recorded_schedule(found, supports, friction=given.friction)
         dynamics = dynamics_of(found, touch_downs=touch_downs)
-    margins = recorded_margins(dynamics, schedule, supports.start)
-    motion = motion_on_contacts(dynamics, schedule, supports.start, margins)
-    shifted = least_shift(found, dynamics, margins)
+    recorded = recorded_margins(dynamics, schedule, supports.start)
+    shifted = least_shift(found, dynamics, recorded)
+    measured = MeasuredMotion(dynamics, recorded, shifted, not given.as_recorded and shifted.believable)
+    margins = measured.margins
+    motion = motion_on_contacts(measured.dynamics, schedule, supports.start, margins)
     ground = min(supports.surfaces, default=0.0)
     report: PlateReport | None = None
     if plates:
-        report = plate_report(plates, supports, schedule, dynamics, margins, shifted, mass)
+        report = plate_report(plates, supports, schedule, measured, motion, mass)
     neck = upright_neck(found.body, motion.q)
     circumstances = Circumstances(
         load_kg=given.load, neck_upright_deg=0.0 if neck is None else float(np.degrees(neck))
@@ -149,8 +154,8 @@ def analyze(
     )
     analysis = Analysis(
         name=name or recording.name, source=recording.name, rate=recording.rate, sex=given.sex, found=found,
-        supports=supports, motion=motion, point_mass_margin=margins.point_mass, shifted=shifted,
-        limiting=margins.limiting(margins.lowest), cop=_centre_of_pressure(dynamics, motion, ground),
+        supports=supports, motion=motion, point_mass_margin=margins.point_mass, measured=measured,
+        limiting=margins.limiting(margins.lowest), cop=_centre_of_pressure(measured.dynamics, motion, ground),
         segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
     )  # fmt: skip
     return replace(analysis, remarks=remarks_on(analysis, recording), wall=clock.perf_counter() - began)

@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.analysis.measured_motion import MeasuredMotion
 from manikin.balance import zero_moment_point
 from manikin.contact import ContactSchedule
 from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.plate_forces import PlateComparison, compare_with_plates, mass_on_plates, plate_forces
 from manikin.mocap.plate_supports import TimingError, timing_errors
+from manikin.mocap.plate_torques import TorqueComparison, compare_torques
 from manikin.mocap.recorded_dynamics import RecordedDynamics
-from manikin.mocap.recorded_margins import RecordedMargins
 from manikin.mocap.recorded_supports import RecordedSupports
-from manikin.mocap.shifted_motion import LeastShift
+from manikin.motion import Motion
 from manikin.spatial import FloatArray
 
 
@@ -29,8 +30,11 @@ class PlateReport:
         compared: (n,) whether every support is on a plate, so that the plates tell all there is.
         mass: Of the person, by them [kg]; None where they cannot tell.
         timing: Touch-downs and lift-offs beside those of the plates.
-        forces: Errors of forces and centres of pressure; None where no foot alone was on a plate.
-        shifted: The same of the motion shifted onto its contacts.
+        forces: Errors of forces and centres of pressure of the motion; None where no foot alone was on a
+            plate.
+        recorded: The same of the motion as it was recorded.
+        shifted: The same of it shifted onto its contacts.
+        torques: Of the legs; empty where no foot was on a plate of its own.
     """
 
     vertical_force: FloatArray
@@ -39,7 +43,9 @@ class PlateReport:
     mass: float | None
     timing: tuple[TimingError, ...]
     forces: PlateComparison | None
+    recorded: PlateComparison | None
     shifted: PlateComparison | None
+    torques: tuple[TorqueComparison, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready numbers (SI); None where there was nothing to compare."""
@@ -52,10 +58,21 @@ class PlateReport:
             "timing_max_s": float(np.max(errors)) if errors else None,
             "vertical_rms_body_weight": None if forces is None else forces.vertical_rms,
             "cop_rms_m": None if forces is None else forces.cop_rms,
+            "cop_rms_recorded_m": None if self.recorded is None else self.recorded.cop_rms,
             "cop_rms_shifted_m": None if self.shifted is None else self.shifted.cop_rms,
             "frames": int(self.compared.sum()),
             "single_support_frames": None if forces is None else forces.single_frames,
             "margin_share_positive": None if forces is None else forces.margin_share,
+            "torques": {
+                one.joint: {
+                    "frames": one.frames,
+                    "rms_Nm": one.rms,
+                    "mean_Nm": one.mean,
+                    "peak_Nm": one.peak,
+                    "peak_by_plates_Nm": one.peak_by_plates,
+                }
+                for one in self.torques
+            },
         }
 
 
@@ -77,7 +94,7 @@ def measured_mass(
 
 def plate_report(
     plates: Sequence[ForcePlate], supports: RecordedSupports, schedule: ContactSchedule,
-    dynamics: RecordedDynamics, margins: RecordedMargins, shifted: LeastShift, mass: float | None,
+    measured: MeasuredMotion, motion: Motion, mass: float | None,
 ) -> PlateReport:  # fmt: skip
     """Hold a motion against the plates under it.
 
@@ -85,18 +102,24 @@ def plate_report(
         plates: At least one, on the clock of the supports.
         supports: Of the motion.
         schedule: Its stances.
-        dynamics: Its forces, with the person's mass.
-        margins: Its margins.
-        shifted: The motion nearest to it that its contacts can carry.
+        measured: The motion, with the person's mass.
+        motion: The same with forces and torques.
         mass: Of the person, by the plates [kg].
     """
-    measured = plate_forces(plates, dynamics.time + supports.start, schedule)
+    forces = plate_forces(plates, measured.recorded.time + supports.start, schedule)
     height = float(np.mean([plate.origin[2] for plate in plates]))
     with np.errstate(divide="ignore", invalid="ignore"):
-        cop = zero_moment_point(measured.wrench, height)
-    loaded = measured.wrench[:, 2] > 20.0
+        cop = zero_moment_point(forces.wrench, height)
+    loaded = forces.wrench[:, 2] > 20.0
+    shifted = measured.shifted
+    recorded, moved = (
+        compare_with_plates(dynamics, margins, forces, height)
+        for dynamics, margins in (
+            (measured.recorded, measured.recorded_margins), (shifted.dynamics, shifted.margins)
+        )
+    )  # fmt: skip
     return PlateReport(
-        measured.wrench[:, 2], np.where(loaded[:, None], cop, np.nan), measured.covered, mass,
-        timing_errors(supports, plates), compare_with_plates(dynamics, margins, measured, height),
-        compare_with_plates(shifted.dynamics, shifted.margins, measured, height),
+        forces.wrench[:, 2], np.where(loaded[:, None], cop, np.nan), forces.covered, mass,
+        timing_errors(supports, plates), moved if measured.believed else recorded, recorded, moved,
+        compare_torques(measured.dynamics, motion, forces),
     )  # fmt: skip

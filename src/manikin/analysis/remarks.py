@@ -2,8 +2,6 @@
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from manikin.mocap.markers import MarkerRecording
 from manikin.mocap.recording import Recording
 
@@ -21,9 +19,6 @@ LONG_FLIGHT = 0.5
 
 OTHER_MASS = 0.03
 """Share by which the mass of a person is not that on the plates."""
-
-FEW_POSITIVE = 0.9
-"""Share of frames with a positive margin, the body shifted, below which contacts must be missing."""
 
 
 def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> tuple[str, ...]:
@@ -59,12 +54,12 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
         lines.append(
             f"nothing supports for {max(flights):.2f} s: the person may touch something that is not recorded"
         )
-    shifted = analysis.shifted
-    balanced = float(np.mean(shifted.margins.whole_body > 0.0))
-    if supports.supports and balanced < FEW_POSITIVE:
+    shifted = analysis.measured.shifted
+    if supports.supports and shifted.solved and not shifted.believable:
         lines.append(
-            f"balanced in {100.0 * balanced:.0f} % of the frames only, although shifted by up to "
-            f"{1e3 * shifted.size.max():.0f} mm: running, or supports that were not found"
+            f"balanced in {100.0 * shifted.balanced:.0f} % of the frames only, even if shifted by up to "
+            f"{1e3 * shifted.size.max():.0f} mm: running, or supports that were not found; "
+            "measured is the motion as recorded"
         )
     if not shifted.solved:
         lines.append("no shift onto the contacts was found: the postures jump")

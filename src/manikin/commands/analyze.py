@@ -47,6 +47,10 @@ def analyze(
     sex: Annotated[str, typer.Option(metavar="male|female", help="Table of segment masses.")] = "male",
     friction: Annotated[float, typer.Option(metavar="MU", help="Of soles on the ground.")] = 0.8,
     load: Annotated[float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands.")] = 0.0,
+    as_recorded: Annotated[
+        bool,
+        typer.Option("--as-recorded", help="Measure the motion as it is, not shifted onto its contacts."),
+    ] = False,
     plan: Annotated[
         str | None,
         typer.Option(metavar="keyframes|timing-free", help="Plan the recording anew on its own stances."),
@@ -70,7 +74,9 @@ def analyze(
             preload("manikin.analysis_batch")
     from manikin.analysis import AnalysisOptions, recordings_in
 
-    options = AnalysisOptions(frames=frames, mass=mass, sex=sex, friction=friction, load=load)
+    options = AnalysisOptions(
+        frames=frames, mass=mass, sex=sex, friction=friction, load=load, as_recorded=as_recorded
+    )
     paths = recordings_in(sources)
     if single:
         refuse(jobs is not None, "--jobs", "there is one file")
@@ -140,10 +146,13 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
             f"{margin['min']:.1f} N.m at {margin['at_s']:.2f} s ({margin['limiting'] or 'in flight'}), "
             f"positive in {100.0 * margin['share_positive']:.1f} % of the frames"
         )
-        shifted = margin["shifted"]
+        recorded, shifted = margin["recorded"], margin["shifted"]
+        share = 100.0 * recorded["share_positive"]
+        size = f"{1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest)"
         shown["shifted"] = (
-            f"by {1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest): "
-            f"positive in {100.0 * shifted['share_positive']:.1f} %"
+            f"by {size}; as recorded positive in {share:.1f} %"
+            if margin["motion"] == "shifted"
+            else f"not; by {size} positive in {100.0 * shifted['share_positive']:.1f} %"
         )
     for name in ("rula", "reba"):
         if effort[name] is not None:
@@ -168,6 +177,11 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
             f"vertical {100.0 * plates['vertical_rms_body_weight']:.1f} % of body weight, "
             f"CoP {1e3 * plates['cop_rms_m']:.0f} mm (RMS)"
         )
+    if plates is not None and plates["torques"]:
+        apart = ", ".join(
+            f"{joint.replace('_', ' ')} {one['rms_Nm']:.0f}" for joint, one in plates["torques"].items()
+        )
+        shown["plates: torques"] = f"{apart} N.m (RMS)"
     return shown
 
 

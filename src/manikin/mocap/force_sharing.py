@@ -47,9 +47,7 @@ SLOW = 0.5
 """``T`` [s]: a double support of walking is short beside it, standing is long."""
 
 
-def smooth_shares(
-    wrench: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float
-) -> FloatArray:
+def smooth_shares(wrench: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float) -> FloatArray:
     """Share wrenches among contacts so that each is loaded smoothly, without regard to friction.
 
     Args:

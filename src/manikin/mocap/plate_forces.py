@@ -5,7 +5,7 @@ loaded tells its own offset, which is taken off.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,11 +45,17 @@ class PlateForces:
         wrench: (n, 6) of all plates about the world's origin, without their offsets [N, N.m].
         covered: (n,) whether every support is on a plate, so that the wrench is all there is.
         single: (n,) whether one foot alone supports.
+        effectors: The c effectors of the schedule.
+        of_effector: (n, c, 6) the part of the wrench on each of them; 0 where no plate carries it.
+        apart: (n,) whether it is told what is on each: all is covered, and no plate carries two of them.
     """
 
     wrench: FloatArray
     covered: NDArray[np.bool_]
     single: NDArray[np.bool_]
+    effectors: tuple[str, ...]
+    of_effector: FloatArray
+    apart: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -91,22 +97,32 @@ def plate_forces(
         schedule: Stances on the same clock.
         cutoff: Of the low-pass [Hz].
     """
-    wrench = sum((_sampled(plate, times, cutoff) for plate in plates), np.zeros((len(times), 6)))
+    wrenches = np.array([_sampled(plate, times, cutoff) for plate in plates])
     phases = schedule.phase_at(times)
     covered, single = np.ones(len(times), dtype=bool), np.zeros(len(times), dtype=bool)
-    known: dict[tuple[str, bytes], bool] = {}
+    held = _held(schedule)
+    carried = [[one for one in held if _carries(plate, one.contact, schedule)] for plate in plates]
+    on_plates = {id(one.contact) for ones in carried for one in ones}
     for number, phase in enumerate(schedule.sequence):
         begin, end = schedule.instants[number : number + 2]
         single[phases == number] = len(phase.stance) == 1
-        on_plates = bool(len(phase.stance))
-        for contact in phase.stance:
-            key = contact.effector, contact.position.tobytes()
-            if key not in known:
-                known[key] = any(_carries(plate, contact, schedule) for plate in plates)
-            on_plates &= known[key]
-        if not on_plates:
+        known = [one for one in held if one.begin <= begin and one.end >= end]
+        if not len(phase.stance) or not all(id(one.contact) in on_plates for one in known):
             covered[(times > begin - UNSURE) & (times < end + UNSURE)] = False
-    return PlateForces(frozen_array(wrench, "wrench"), covered, single)
+    names = schedule.sequence.effectors
+    parts, apart = np.zeros((len(times), len(names), 6)), covered.copy()
+    for ones, each in zip(carried, wrenches, strict=True):
+        if not ones:
+            continue
+        # A plate may be loaded a moment before its foot is found on it, and after.
+        away = np.array([np.maximum(np.maximum(one.begin - times, times - one.end), 0.0) for one in ones])
+        apart &= ~((np.sum(away == 0.0, axis=0) > 1) & each.any(axis=1))
+        owner = np.array([names.index(one.contact.effector) for one in ones])[np.argmin(away, axis=0)]
+        parts[np.arange(len(times)), owner] += each
+    return PlateForces(
+        frozen_array(wrenches.sum(axis=0), "wrench"), covered, single, names,
+        frozen_array(parts, "wrenches of the effectors"), apart,
+    )  # fmt: skip
 
 
 def mass_on_plates(dynamics: RecordedDynamics, measured: PlateForces) -> float | None:
@@ -147,6 +163,36 @@ def compare_with_plates(
         float(np.mean(theirs[measured.covered] > 0.0)),
         float(np.median(np.abs(theirs - margins.whole_body)[measured.covered])),
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A contact and the time for which it is made [s]."""
+
+    contact: Contact
+    begin: float
+    end: float
+
+
+def _held(schedule: ContactSchedule) -> list[_Held]:
+    """Contacts in the order of their beginnings; one that lasts for several phases is one."""
+    found: list[_Held] = []
+    for phase, begin, end in zip(
+        schedule.sequence, schedule.instants[:-1], schedule.instants[1:], strict=True
+    ):
+        for contact in phase.stance:
+            same = [
+                number
+                for number, one in enumerate(found)
+                if one.end == begin
+                and one.contact.effector == contact.effector
+                and one.contact.same_place(contact)
+            ]
+            if same:
+                found[same[0]] = replace(found[same[0]], end=float(end))
+            else:
+                found.append(_Held(contact, float(begin), float(end)))
+    return found
 
 
 def _sampled(plate: ForcePlate, times: FloatArray, cutoff: float) -> FloatArray:
