@@ -100,9 +100,9 @@ differentiated twice. Segment masses lie off the lines between joints (Dumas, Ch
 trunk without markers tilts so that its upper end has a third of what is fast in the pelvis' motion. Nothing
 is fitted to the plates but the mass of the person; the cutoff at touch-downs was chosen with them.
 
-*Shifted*, and what `manikin analyze` measures, is the motion of the whole body shifted by the smooth path that is least and leaves the
-centre of pressure {1e2 * INSIDE:.0f} cm inside of the edges of the soles, if none longer than
-{1e2 * LARGEST_SHIFT:.0f} cm along an axis is needed, and rather near the axis of a foot that carries alone
+*Shifted*, and what `manikin analyze` measures, is the motion of the whole body shifted by the smooth path that
+is least and leaves the centre of pressure {1e2 * INSIDE:.0f} cm inside of the edges of the soles, if none longer
+than {1e2 * LARGEST_SHIFT:.0f} cm along an axis is needed, and rather near the axis of a foot that carries alone
 (`manikin.mocap.least_shift`). Markers tell the place of a body to a centimetre; a millimetre at 4 Hz moves
 the centre of pressure by 6 cm. The plates have no part in a shift, but the weight of a foot's axis
 ({1e2 * ASIDE:.0f} cm count as much as {1e3 * PLACE_ERROR:.0f} mm of shift) was chosen with them.

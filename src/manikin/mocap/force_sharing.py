@@ -29,6 +29,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from manikin.balance.friction import contact_to_world, cross, edge_wrenches
+from manikin.balance.limits import contact_limits
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.mocap.recorded_margins import wrench_at
 from manikin.mocap.runs import runs
@@ -81,24 +82,45 @@ def shared_wrenches(
     Returns:
         (n, c, 6) of each contact, about the world's origin; their sum over the contacts is ``wrench``.
     """
+    if len(stance) == 1:
+        return np.array(wrench[:, None])
+    if near is None:
+        return _nearest(stance, wrench, weight, None)
+    shares = np.array(near)
+    wrong = np.flatnonzero(~_admissible(stance, near, weight))
+    if len(wrong):
+        shares[wrong] = _nearest(stance, wrench[wrong], weight, near[wrong])
+    return shares
+
+
+def _admissible(stance: Stance, shares: FloatArray, weight: float) -> NDArray[np.bool_]:
+    """(n,) whether every contact can give its share."""
+    fine = np.ones(len(shares), dtype=bool)
+    for contact, share in zip(stance, shares.swapaxes(0, 1), strict=True):
+        limits, turn = contact_limits(contact), contact.rotation_contact_to_world
+        there = wrench_at(share, contact.position)
+        local = np.hstack([there[:, :3] @ turn, there[:, 3:] @ turn])
+        fine &= (local @ limits.A.T - limits.b).max(axis=1) <= SOFTNESS * weight
+    return fine
+
+
+def _nearest(stance: Stance, wrench: FloatArray, weight: float, near: FloatArray | None) -> FloatArray:
+    """(n, c, 6) admissible shares of several contacts, nearest to given ones, or the least."""
     middle = np.mean([contact.position for contact in stance], axis=0)
     wanted = _scaled(wrench, middle, weight)
-    if len(stance) == 1:
-        shares = wanted[:, None]
-    else:
-        generators = [_generators(contact, middle, weight) for contact in stance]
-        columns = np.vstack(generators).T
-        known = np.zeros((len(wanted), columns.shape[1]))
-        if near is not None:
-            told = _scaled(near, middle, weight).swapaxes(0, 1)
-            known = np.hstack([_pushes(one.T, part) for one, part in zip(generators, told, strict=True)])
-        pushes = _pushes(columns, wanted, known)
-        ends = np.cumsum([0, *map(len, generators)])
-        shares = np.stack(
-            [pushes[:, a:b] @ part for a, b, part in zip(ends[:-1], ends[1:], generators, strict=True)],
-            axis=1,
-        )
-        shares += _smallest([contact.position - middle for contact in stance], wanted - shares.sum(axis=1))
+    generators = [_generators(contact, middle, weight) for contact in stance]
+    columns = np.vstack(generators).T
+    known = np.zeros((len(wanted), columns.shape[1]))
+    if near is not None:
+        told = _scaled(near, middle, weight).swapaxes(0, 1)
+        known = np.hstack([_pushes(one.T, part) for one, part in zip(generators, told, strict=True)])
+    pushes = _pushes(columns, wanted, known)
+    ends = np.cumsum([0, *map(len, generators)])
+    shares = np.stack(
+        [pushes[:, a:b] @ part for a, b, part in zip(ends[:-1], ends[1:], generators, strict=True)],
+        axis=1,
+    )
+    shares += _smallest([contact.position - middle for contact in stance], wanted - shares.sum(axis=1))
     shares = shares * weight
     shares[..., 3:] *= LEVER
     return wrench_at(shares, -middle)
