@@ -324,9 +324,9 @@ def standing_text(one: Trial) -> str:
     return (
         f"\nIn `{one.name}` the plates place the pressure under feet that stand still for seconds at "
         f"{', '.join(places)} from the middle of our soles, ahead positive, with the markers of heels and "
-        "toes at the same places of the soles each time. Hardly anybody stands so differently at both ends "
-        "of one walk: plates and markers of this file seem to agree to several centimetres only, which is most of "
-        "its error.\n"
+        "toes at the same places of the soles each time. Hardly anybody stands so differently at both "
+        "ends of one walk: plates and markers of this file seem to agree to several centimetres only, "
+        "which is most of its error.\n"
     )
 
 

@@ -28,8 +28,8 @@ COLUMNS: dict[str, tuple[str, float, int]] = {
     "phases": ("phases", 1, 0),
     "com_height_min_m": ("lowest CoM [m]", 1.0, 3),
     "margin_min_Nm": ("lowest margin [N.m]", 1.0, 1),
-    "margin_share_positive": ("positive margin [% of frames]", 100.0, 1),
-    "recorded_share_positive": ("positive as recorded [%]", 100.0, 1),
+    "share_positive_in_contact": ("positive margin [% of frames in contact]", 100.0, 1),
+    "recorded_share_positive_in_contact": ("positive as recorded [%]", 100.0, 1),
     "shift_rms_m": ("shift, RMS [mm]", 1e3, 1),
     "timing_median_s": ("instants against plates [ms]", 1e3, 0),
     "vertical_rms_body_weight": ("force against plates [% of weight]", 100.0, 1),
@@ -149,11 +149,12 @@ def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
         "sequence of touch-downs": ", ".join(map(readable, summary["sequence"])) or "none",
         "lowest centre of mass [m]": summary["com_height_min_m"],
         "lowest margin [N.m]": margin["min"],
-        "frames with a positive margin": _share(margin["share_positive"]),
+        "frames in contact": _share(margin["share_in_contact"]),
+        "of them with a positive margin": _share(margin["share_positive_in_contact"]),
         "limited by": None if margin["limiting"] is None else readable(margin["limiting"]),
         "shift onto the contacts [mm]": f"{1e3 * shifted['rms_m']:.1f} (RMS), {1e3 * shifted['max_m']:.1f} "
-        f"(largest), {used}; positive then in {_share(shifted['share_positive'])} of the frames, "
-        f"as recorded in {_share(recorded['share_positive'])}",
+        f"(largest), {used}; positive with it in {_share(shifted['share_positive_in_contact'])}, without in "
+        f"{_share(recorded['share_positive_in_contact'])} of the frames in contact",
     }
 
 

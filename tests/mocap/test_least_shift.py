@@ -48,7 +48,7 @@ def test_who_is_in_balance_is_left_alone():
     assert (margins.whole_body > INSIDE * WEIGHT).all()
     assert not moved.shift.any()
     assert moved.margins is margins
-    assert moved.balanced == 1.0
+    assert moved.margins.balanced == 1.0
     assert moved.believable
     # Nor does a foot alone draw whom it carries on its axis.
     _, moved = shifted(standing(0.01 * np.sin(TIME)), on_one_foot(0.1))
@@ -108,7 +108,7 @@ def test_no_shift_makes_a_fall_a_stand():
     assert np.abs(moved.shift).max() <= LARGEST_SHIFT + 1e-6
     assert (margins.whole_body < 0.0).all()
     # Only for an instant can 3 cm be gone through so fast that the zero moment point moves by 15.
-    assert moved.balanced < 0.3
+    assert moved.margins.balanced < 0.3
     assert not moved.believable
 
 
@@ -132,6 +132,8 @@ def test_in_flight_nothing_is_shifted_and_nonsense_is_refused():
     flight = ContactSchedule(StanceSequence([Phase(Stance((), 4.0 * WEIGHT), 2.0)]), [0.0, 2.0])
     _, moved = shifted(found, flight)
     assert not moved.shift.any()
+    assert moved.margins.balanced is None
+    assert not moved.believable
     with pytest.raises(InputError, match="valid: at least 0 m"):
         shifted(found, flight, inside=-1.0)
     with pytest.raises(InputError, match="valid: at least 0 m"):

@@ -180,12 +180,16 @@ class Analysis:
             "limiting": None if self.limiting is None else self.limiting.description,
             "limiting_contact": None if self.limiting is None else self.limiting.effector,
             "share_known": float(np.mean(known)),
+            "share_in_contact": float(np.mean(self.measured.margins.held)),
+            "share_positive_in_contact": self.measured.margins.balanced,
             "recorded": {
                 "share_positive": float(np.mean(self.measured.recorded_margins.whole_body > 0.0)),
+                "share_positive_in_contact": self.measured.recorded_margins.balanced,
                 "min": float(self.measured.recorded_margins.whole_body.min()),
             },
             "shifted": {
-                "share_positive": self.measured.shifted.balanced,
+                "share_positive": float(np.mean(self.measured.shifted.margins.whole_body > 0.0)),
+                "share_positive_in_contact": self.measured.shifted.margins.balanced,
                 "min": float(self.measured.shifted.margins.whole_body.min()),
                 "rms_m": self.measured.shifted.rms,
                 "max_m": float(self.measured.shifted.size.max()),

@@ -144,15 +144,14 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
     if margin["min"] is not None:
         shown["lowest margin"] = (
             f"{margin['min']:.1f} N.m at {margin['at_s']:.2f} s ({margin['limiting'] or 'in flight'}), "
-            f"positive in {100.0 * margin['share_positive']:.1f} % of the frames"
+            f"positive in {_share(margin)} of the frames in contact"
         )
         recorded, shifted = margin["recorded"], margin["shifted"]
-        share = 100.0 * recorded["share_positive"]
         size = f"{1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest)"
         shown["shifted"] = (
-            f"by {size}; as recorded positive in {share:.1f} %"
+            f"by {size}; as recorded positive in {_share(recorded)}"
             if margin["motion"] == "shifted"
-            else f"not; by {size} positive in {100.0 * shifted['share_positive']:.1f} %"
+            else f"not; by {size} positive in {_share(shifted)}"
         )
     for name in ("rula", "reba"):
         if effort[name] is not None:
@@ -183,6 +182,11 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
         )
         shown["plates: torques"] = f"{apart} N.m (RMS)"
     return shown
+
+
+def _share(margin: dict[str, Any]) -> str:
+    share = margin["share_positive_in_contact"]
+    return "none" if share is None else f"{100.0 * share:.1f} %"
 
 
 def _several(

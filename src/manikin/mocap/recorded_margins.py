@@ -53,6 +53,17 @@ class RecordedMargins:
         """Frame of the lowest margin of the whole body."""
         return int(np.argmin(self.whole_body))
 
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """(n,) whether there is any contact."""
+        return np.array([one is not None for one in self.polytopes], dtype=bool)[self.phase]
+
+    @property
+    def balanced(self) -> float | None:
+        """Share of the frames in contact in which the whole body's margin is positive; None without any."""
+        held = self.held
+        return float(np.mean(self.whole_body[held] > 0.0)) if held.any() else None
+
     def limiting(self, frame: int) -> LimitingConstraint | None:
         """Contact and limit that the nearest facet in a frame stands for; None in flight."""
         polytope = self.polytopes[int(self.phase[frame])]

@@ -58,7 +58,7 @@ KNOTS = 0.04
 """Time between the knots of the spline [s]: a shift up to some 10 Hz."""
 
 LEAST_BALANCED = 0.9
-"""Share of the frames that have to be in balance once shifted."""
+"""Share of the frames with contacts that have to be in balance once shifted."""
 
 PRICE = 1e4
 """Of a violation, per metre, for which a shift is not made longer."""
@@ -99,14 +99,9 @@ class LeastShift:
         return float(np.sqrt(np.mean(self.size**2)))
 
     @property
-    def balanced(self) -> float:
-        """Share of the frames with a positive margin, whole body."""
-        return float(np.mean(self.margins.whole_body > 0.0))
-
-    @property
     def believable(self) -> bool:
         """Whether the shift leads to balance; if not, contacts are missing, and it means nothing."""
-        return self.solved and self.balanced >= LEAST_BALANCED
+        return self.solved and (self.margins.balanced or 0.0) >= LEAST_BALANCED
 
 
 def least_shift(
