@@ -177,6 +177,7 @@ class Analysis:
             "limiting": None if self.limiting is None else self.limiting.description,
             "limiting_contact": None if self.limiting is None else self.limiting.effector,
             "share_known": float(np.mean(known)),
+            "share_in_flight": float(np.mean(~self.motion.support.any(axis=1))),
             "shifted": {
                 "share_positive": float(np.mean(self.shifted.margins.whole_body > 0.0)),
                 "min": float(self.shifted.margins.whole_body.min()),
