@@ -82,7 +82,8 @@ def test_who_does_not_fall_keeps_all_supports():
     q[:, 2] -= 0.3 * GRAVITY / (4.0 * np.pi) ** 2 * np.sin(4.0 * np.pi * time)
     targets = Targets(("pelvis",), ("pelvis",), np.zeros((1, 3)), q[:, None, :3], np.ones(1))
     found = Reconstruction(body, time, q, targets, np.zeros((len(time), 1)))
-    soles = {name: (np.zeros((len(time), 3)),) * 2 for name in ("left_foot", "right_foot")}
+    still = np.zeros((len(time), 3))
+    soles = dict.fromkeys(("left_foot", "right_foot"), (still, still + TOES))
     last = float(time[-1])
     given = [support("left_foot", 0.0, 1.6, last), support("right_foot", 1.5, last, last)]
     assert by_the_force(given, found, soles, [0.0], RATE) == tuple(given)

@@ -2,9 +2,10 @@
 
 Fast feet stop and start within a tenth of a second, which a low-pass of positions spreads. The centre of mass
 is heavier and slower, and knows more: in flight it falls with gravity, and while it does not, something
-carries it. So a support ends where a fall begins and begins where one ends; a time between two supports in
-which nothing was found but the body is carried belongs to the feet beside it; and who is carried between two
-falls stands on the foot that is lowest. In a walk the body never falls, so nothing changes but gaps.
+carries it. So a support ends where a fall begins and begins where one ends. A time between two supports in
+which nothing was found but the body is carried belongs to the feet beside it, up to where the later one is
+the slower one; who is carried between two falls stands on the lowest foot. In a walk the body never falls, so
+nothing changes but gaps.
 
 At both ends of a recording the low-pass knows one side only: there the force is taken for that half a period
 of the cutoff away.
@@ -16,11 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from manikin.low_pass import low_passed
 from manikin.mocap.free_fall import vertical_acceleration
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_supports import Support
 from manikin.mocap.runs import runs
+from manikin.mocap.support_levels import Track, slowest_speed, track
 from manikin.spatial import GRAVITY, FloatArray
 
 CUTOFF = 10.0
@@ -43,7 +44,7 @@ TOGETHER = 0.03
 AWAY = 0.10
 """Height above where a foot stood, or above a surface, up to which it can be what carries [m]."""
 
-NEAR = 0.05
+NEAR = 0.02
 """The same beside an end of the recording [m]: the fall that would bound the support is not seen."""
 
 SHORTEST = 0.08
@@ -55,19 +56,28 @@ SHORTEST_KEPT = 0.04
 
 @dataclass(frozen=True, eq=False)
 class _Foot:
-    """Ends of a sole, low-passed."""
+    """Ends of a sole."""
 
-    heel: FloatArray
-    toes: FloatArray
+    heel: Track
+    toes: Track
 
     @property
     def lowest(self) -> FloatArray:
         """(n,) height of the lower end [m]."""
-        return np.minimum(self.heel[:, 2], self.toes[:, 2])
+        return np.minimum(self.heel.positions[:, 2], self.toes.positions[:, 2])
+
+    @property
+    def speed(self) -> FloatArray:
+        """(n,) of the slowest point of the sole [m/s]."""
+        return slowest_speed(self.heel, self.toes)
+
+    def middle(self, first: int, stop: int) -> FloatArray:
+        """(3,) of the sole, as a median."""
+        return np.median(0.5 * (self.heel.positions + self.toes.positions)[first:stop], axis=0)
 
     def contact(self, frame: int) -> FloatArray:
         """(3,) its lower end."""
-        ends = self.heel[frame], self.toes[frame]
+        ends = self.heel.positions[frame], self.toes.positions[frame]
         return ends[0] if ends[0][2] < ends[1][2] else ends[1]
 
 
@@ -98,12 +108,12 @@ def by_the_force(
     force[:edge], force[n - edge :] = force[edge], force[n - edge - 1]
     falls = _falls(force, rate)
     feet = {
-        name: _Foot(low_passed(heel, CUTOFF, rate), low_passed(toes, CUTOFF, rate))
+        name: _Foot(track(heel, rate, CUTOFF), track(toes, rate, CUTOFF))
         for name, (heel, toes) in soles.items()
     }
     table = _Table(feet, list(supports), np.array(surfaces), rate, start, n)
     table.cut(falls)
-    table.fill(falls, force)
+    table.fill(falls)
     return tuple(table.supports)
 
 
@@ -158,7 +168,7 @@ class _Table:
                 kept.append(self.during(one, first, stop))
         self.supports = kept
 
-    def fill(self, falls: NDArray[np.bool_], force: FloatArray) -> None:
+    def fill(self, falls: NDArray[np.bool_]) -> None:
         """Where the body is carried and nothing was found, the feet beside carry, or the lowest one."""
         for first, stop, begin, end in list(self._gaps(~falls)):
             before = self._beside(first, 1) if begin == first else []
@@ -166,11 +176,11 @@ class _Table:
             if self._names(before) & self._names(after):
                 self._add(begin, end, self._names(before) | self._names(after))
                 continue
-            least = begin + int(np.argmin(force[begin:end])) if before and after else None
+            change = self._change(before, after, begin, end) if before and after else None
             for one in before:
-                self._until(one, end if least is None else least)
+                self._until(one, end if change is None else change)
             for one in after:
-                self._since(one, begin if least is None else least)
+                self._since(one, begin if change is None else change)
             if (first < begin or first == 0) and (end < stop or stop == self.frames):
                 self._add(begin, end)
 
@@ -210,12 +220,25 @@ class _Table:
         first = begin + int(high[-1]) + 1 if len(high) else begin
         self.supports[number] = self.during(self.supports[number], first, stop)
 
-    def _rises(self, number: int, frames: slice) -> NDArray[np.bool_]:
-        """Whether a foot is higher in frames beside a support than it may be and still carry."""
+    def _change(self, before: Sequence[int], after: Sequence[int], begin: int, end: int) -> int:
+        """Frame between two supports from which the foot of the later one is the slower one."""
+        early, late = (
+            np.min([self.feet[name].speed[begin:end] for name in self._names(ones)], axis=0)
+            for ones in (before, after)
+        )
+        slower = np.flatnonzero(late < early)
+        return begin + int(slower[0]) if len(slower) else end
+
+    def _above(self, number: int) -> FloatArray:
+        """(n,) height of a foot above where it stands during a support of it [m]."""
         one = self.supports[number]
         lowest = self.feet[one.effector].lowest
+        return lowest - np.median(lowest[slice(*self.span(one))])
+
+    def _rises(self, number: int, frames: slice) -> NDArray[np.bool_]:
+        """Whether a foot is higher in frames beside a support than it may be and still carry."""
         cut = frames.start == 0 or frames.stop == self.frames
-        return lowest[frames] > np.median(lowest[slice(*self.span(one))]) + (NEAR if cut else AWAY)
+        return self._above(number)[frames] > (NEAR if cut else AWAY)
 
     def _add(self, begin: int, end: int, others: Collection[str] = ()) -> None:
         """A support of the lowest foot, unless it is one of the others."""
@@ -232,7 +255,7 @@ class _Table:
         )
         if end - begin < SHORTEST * self.rate:
             return
-        place = np.append(np.median(0.5 * (foot.heel + foot.toes)[begin:end, :2], axis=0), height)
+        place = np.append(foot.middle(begin, end)[:2], height)
         instants = self.start + begin / self.rate, self.start + min(end, self.frames - 1) / self.rate
         ends = foot.contact(begin), foot.contact(end - 1)
         self.supports.append(Support(name, *instants, place, *ends, begin > 0, end < self.frames))
