@@ -83,7 +83,7 @@ def test_who_does_not_fall_keeps_all_supports():
     targets = Targets(("pelvis",), ("pelvis",), np.zeros((1, 3)), q[:, None, :3], np.ones(1))
     found = Reconstruction(body, time, q, targets, np.zeros((len(time), 1)))
     still = np.zeros((len(time), 3))
-    soles = dict.fromkeys(("left_foot", "right_foot"), (still, still + TOES))
+    soles = {"left_foot": (still, still + TOES), "right_foot": (still, still + TOES)}
     last = float(time[-1])
     given = [support("left_foot", 0.0, 1.6, last), support("right_foot", 1.5, last, last)]
     assert by_the_force(given, found, soles, [0.0], RATE) == tuple(given)
