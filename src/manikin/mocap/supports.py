@@ -6,7 +6,8 @@ and opens where it is fast or away from it. Speeds are compared with the highest
 low-pass filter turns the stop of a fast foot into a slope that is as high as the foot was fast. Surfaces are
 found from the recording itself (:mod:`manikin.mocap.support_levels`), so stairs need no description. Others:
 :mod:`manikin.mocap.seat_supports`, :mod:`manikin.mocap.ground_supports`, :mod:`manikin.mocap.hand_supports`.
-Nobody is supported who falls freely (:mod:`manikin.mocap.free_fall`).
+Nobody is supported who falls freely (:mod:`manikin.mocap.free_fall`), and somebody who does not is
+(:mod:`manikin.mocap.carried_times`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,6 +18,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.errors import InputError
+from manikin.mocap.carried_times import by_the_force
 from manikin.mocap.free_fall import while_carried
 from manikin.mocap.ground_supports import ground_supports
 from manikin.mocap.hand_supports import hand_supports
@@ -64,13 +66,17 @@ SHORTEST_CUT = 0.04
 """The same of a support that the recording cuts, of which a part is missing [s]."""
 
 
-def supports_of(found: Reconstruction, *, start: float = 0.0, cutoff: float = CUTOFF) -> RecordedSupports:
+def supports_of(
+    found: Reconstruction, *, start: float = 0.0, cutoff: float = CUTOFF, with_force: bool = True
+) -> RecordedSupports:
     """Supports of feet, seat, hands, knees, elbows and trunk of a reconstructed recording.
 
     Args:
         found: At least four instants at an even rate, not yet smoothed.
         start: What the first frame of the recording is on its clock [s].
         cutoff: Of the low-pass filter [Hz].
+        with_force: Whether the force that the motion needs tells when feet of a runner carry, see
+            :mod:`manikin.mocap.carried_times`; False for what the positions of the feet say alone.
 
     Raises:
         InputError: If the body has no feet with soles, there are too few instants, or the cutoff is too high.
@@ -87,6 +93,8 @@ def supports_of(found: Reconstruction, *, start: float = 0.0, cutoff: float = CU
         *hand_supports(found, floor, seats, rate, start=begin, cutoff=cutoff),
     )
     every = while_carried((*feet.supports, *others), found, rate, start=begin, cutoff=cutoff)
+    if with_force:
+        every = by_the_force(every, found, soles, feet.surfaces, rate, start=begin)
     return replace(feet, supports=tuple(sorted(every, key=lambda one: (one.start, one.effector))))
 
 
