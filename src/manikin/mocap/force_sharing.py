@@ -7,18 +7,20 @@ every frame, those are wanted whose wrenches ``f_i`` at the contacts change leas
     ``sum_i integral |f_i'|^2 + |f_i|^2 / T^2 dt``,
 
 with ``f_i = 0`` before the contact is made and after it is left. What one foot has to supply alone before
-and after continues into a double support that way, so that the foot behind keeps pushing ahead while the one
-in front brakes, as under people who walk; the least forces, which the second term asks for where little
-changes, would not have the feet push against each other at all. It is the thought of Ren, Jones and Howard
-("Whole body inverse dynamics over a complete gait cycle based only on measured kinematics", J. Biomech. 41,
-2008) for contacts of any number and kind.
+and after, if for longer than supports are known to, continues into a double support that way, so that the
+foot behind keeps pushing ahead while the one in front brakes, as under people who walk; the least forces,
+which the second term asks for where little changes, would not have the feet push against each other at all.
+It is the thought of Ren, Jones and Howard ("Whole body inverse dynamics over a complete gait cycle based only
+on measured kinematics", J. Biomech. 41, 2008) for contacts of any number and kind.
 
-Contacts push within their friction pyramids. With ``G`` the wrenches of unit pushes at the corners, one a
-column, and ``l`` pushes that supply the smooth shares, the pushes nearest to ``l`` are ``max(0, l + G^T y)``
-for the six multipliers ``y`` that solve ``G max(0, l + G^T y) + e y = w``, found by Newton's method for all
-frames of a phase at once. What they cannot supply, because the wrench is outside what the contacts admit, is
-added as the smallest wrenches at the contacts: the sum is always the whole wrench, so that the pelvis needs
-no hand from heaven, and a centre of pressure outside its sole is seen as such.
+Shares that the contacts can give stay as they are. Others become pushes within the friction pyramids: with
+``G`` the wrenches of unit pushes at the corners, one a column, and ``l`` the pushes of each contact that come
+next to its share, the nearest to ``l`` that supply the wrench are ``max(0, l + G^T y)`` for the six
+multipliers ``y`` that solve ``G max(0, l + G^T y) + e y = w``, found by Newton's method for all frames of a
+phase at once; caps and torsion limits of contacts are not regarded there. What they cannot supply, because
+the wrench is outside what the contacts admit, is added as the smallest wrenches at the contacts: the sum is
+always the whole wrench, so that the pelvis needs no hand from heaven, and a centre of pressure outside its
+sole is seen as such.
 """
 
 from collections.abc import Sequence
@@ -44,8 +46,13 @@ ROUNDS = 30
 LEVER = 0.1
 """Length by which a moment counts as much as a force [m]: about half a sole."""
 
-SLOW = 0.5
-"""``T`` [s]: a double support of walking is short beside it, standing is long."""
+SLOW = 0.2
+"""``T`` [s]: a double support of walking is short beside it, standing is long. Force plates under people who
+walk would have it longer, under one who stands after a step shorter."""
+
+ALONE = 0.05
+"""Time for which a contact has to carry alone to tell what it carries in the support of several beside [s]:
+instants of supports are known to some hundredths of a second."""
 
 
 def smooth_shares(wrench: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float) -> FloatArray:
@@ -134,14 +141,15 @@ def _smooth_run(
     The wrenches about their own points, moments per lever, are the unknowns: their changes and sizes are
     least squares, with one linear equation for the sum in every frame.
     """
-    made, places = held[first:end], points[first:end]
+    made = held[first:end]
+    places = np.where(made[..., None], points[first:end], 0.0)
     count = int(made.sum())
     index = np.full((end - first + 2, made.shape[1]), -1)
     index[1:-1][made] = np.arange(count)
     before, after = index[:-1], index[1:]
     # A change from one frame to the next; none is asked for across an end of the recording.
-    inside = np.zeros((len(before), 1), dtype=bool)
-    inside[1 if first == 0 else 0 : len(before) - 1 if end == len(held) else len(before)] = True
+    inside = np.ones((len(before), 1), dtype=bool)
+    inside[0], inside[-1] = _telling(held[:first][::-1], step), _telling(held[end:], step)
     changing = inside & ((before >= 0) | (after >= 0))
     frames, who = np.nonzero(changing)
     rows = np.arange(len(frames))
@@ -160,7 +168,7 @@ def _smooth_run(
         known[last] = -_about(found[end, who[last]], places[-1, who[last]])
     cost = change.T @ change + (step / SLOW) ** 2 * sparse.eye_array(count)
     frame, contact = np.nonzero(made)
-    middle = (places * made[..., None]).sum(axis=1) / made.sum(axis=1)[:, None]
+    middle = places.sum(axis=1) / made.sum(axis=1)[:, None]
     total = _about(found[first:end][frame, contact], middle[frame])  # the whole wrench, once per contact
     one = np.searchsorted(frame, np.arange(end - first))
     sums = _sums(frame, places[frame, contact] - middle[frame], end - first)
@@ -171,6 +179,17 @@ def _smooth_run(
     shares = np.zeros((end - first, made.shape[1], 6))
     shares[frame, contact] = wrench_at(solved, -places[frame, contact])
     return shares
+
+
+def _telling(beside: NDArray[np.bool_], step: float) -> bool:
+    """Whether the frames (n, c) beside a run, the nearest first, tell what is carried there.
+
+    In flight nothing is; one contact alone tells it if it is long enough, or lasts up to the recording's end.
+    """
+    if not len(beside):
+        return False
+    changed = np.flatnonzero((beside != beside[0]).any(axis=1))
+    return not beside[0].any() or not len(changed) or bool(changed[0] * step > ALONE)
 
 
 def _sums(frame: NDArray[np.int64], arm: FloatArray, frames: int) -> sparse.csr_array:
