@@ -7,6 +7,7 @@ from manikin.balance import pseudo_wrench, wrench_polytope
 from manikin.centroidal import (
     KeyframeProblem,
     Recording,
+    near_programme,
     plan_com_near_key_frames,
     plan_com_through_key_frames,
 )
@@ -75,6 +76,18 @@ def test_a_wanted_margin_is_kept_and_costs_nearness():
     assert wide.succeeded
     assert wide.d_min >= 6.0
     assert wide.rms >= usual.rms - 1e-4
+
+
+def test_more_margin_than_has_to_be_kept_is_wished_for(monkeypatch):
+    """Where none is required the lower half of the margins is larger than without the wish."""
+    recording, _ = stepping()
+    times = np.linspace(0.0, 3.0, 301)
+    wishing = plan_com_near_key_frames(asked(recording))
+    monkeypatch.setattr(near_programme, "ROOM_PULL", 0.0)
+    content = plan_com_near_key_frames(asked(recording))
+    low, lower = (np.sort(margins(found, times))[:150].mean() for found in (wishing, content))
+    assert low > lower + 1.0
+    assert wishing.rms < 0.01
 
 
 def test_stances_that_share_nothing_are_explained():

@@ -14,13 +14,18 @@ from manikin.motion.file import read_motions, write_motions
 from manikin.replan import against_recording, replan, window
 from manikin.replan.com import HEIGHT_ROOM
 from manikin.replan.contacts import (
+    EARLY,
+    REMNANT,
+    RISEN,
     landing_flat,
     leaving_with_the_hinge,
     on_one_seat,
+    rising_at_once,
     scene_under,
     within_toe_strength,
+    without_remnants,
 )
-from manikin.replan.effectors import effector_paths
+from manikin.replan.effectors import CUT_HEIGHT, effector_paths
 from manikin.replan.placements import effector_placements, toe_hinge
 from manikin.spatial import GRAVITY
 
@@ -78,6 +83,48 @@ def test_a_chair_does_not_move():
     found = [phase.stance["buttocks"].position.tolist() for phase in list(changed.sequence)[::2]]
     assert found == [[0.01, 0.0, 0.41]] * 3 + [[1.0, 0.0, 0.5]]
     assert all("buttocks" not in phase.stance for phase in list(changed.sequence)[1::2])
+
+
+def rolling(*durations):
+    """One foot that stands on its whole sole first and on its toes then, for some time each."""
+    whole = sole("left_foot", (0.0, 0.0, 0.0), length=0.26, width=0.11, friction=0.8)
+    feet = whole, replace(whole, part=SolePart.TOES)
+    phases = [
+        Phase(Stance([foot], 2000.0), lasting, lasting) for foot, lasting in zip(feet, durations, strict=True)
+    ]
+    return ContactSchedule(StanceSequence(phases), np.append(0.0, np.cumsum(durations)))
+
+
+@pytest.mark.parametrize(
+    ("durations", "left"),
+    [
+        ((0.5 * REMNANT, 0.3), [SolePart.TOES]),
+        ((0.3, 0.5 * REMNANT), [SolePart.FULL]),
+        ((2.0 * REMNANT, 0.3), [SolePart.FULL, SolePart.TOES]),
+    ],
+)
+def test_what_a_clip_cuts_to_an_instant_is_as_beside(durations, left):
+    changed = without_remnants(rolling(*durations))
+    assert [phase.stance["left_foot"].part for phase in changed.sequence] == left
+    assert changed.instants[[0, -1]] == pytest.approx([0.0, sum(durations)])
+    assert changed.durations == pytest.approx([phase.min_duration for phase in changed.sequence])
+
+
+def test_a_seat_is_left_as_soon_as_the_buttocks_rise(nod):
+    """They rise at 0.1 m/s from 0.4 s on, and so by what a seat follows them after 0.4 s and a little."""
+    body = nod.body
+    foot = sole("left_foot", (0.5, 0.0, 0.0), length=0.26, width=0.11, friction=0.8)
+    q = np.tile(body.standing_posture(), (101, 1))
+    place = effector_placements(body, q[:1], "buttocks")[0][0]
+    seat = sole("buttocks", place, length=0.2, width=0.3, friction=0.8)
+    time = np.linspace(0.0, 1.0, 101)
+    q[:, 2] += 0.1 * np.maximum(time - 0.4, 0.0)
+    stances = Stance([foot, seat], 2000.0), Stance([foot], 2000.0)
+    phases = [Phase(stance, d, d) for stance, d in zip(stances, (0.8, 0.2), strict=True)]
+    schedule = ContactSchedule(StanceSequence(phases), [0.0, 0.8, 1.0])
+    changed = rising_at_once(schedule, body, time, q)
+    assert changed.instants[1] == pytest.approx(0.4 + RISEN / 0.1, abs=0.011)
+    assert rising_at_once(schedule, body, time, np.tile(q[0], (101, 1))).instants[1] == 0.8
 
 
 def test_a_window_is_a_recording_of_its_own(walk):
@@ -155,6 +202,8 @@ def test_plan_and_execution_keep_to_the_recorded_postures(walked):
     assert np.degrees(told["wholebody"]["posture_rms_rad"]) < 8.0
     assert told["wholebody"]["max_torque_share"] <= 1.0
     assert told["wholebody"]["min_clearance_m"] >= 0.01
+    # Planned with the recorded rate of the angular momentum alone: 95 %.
+    assert told["wholebody"]["share_positive_margin"] > 0.97
     assert walked.execution.failure == ""
     assert len(walked.execution.touches) == 0
 
@@ -191,6 +240,62 @@ def test_feet_leave_while_their_toes_still_lie(walk):
             contact = stance[name]
             place = contact.position + contact.rotation_contact_to_world @ hinge
             assert np.linalg.norm(path[np.argmin(np.abs(clock - end))] - place) < 0.03
+
+
+def test_who_turns_on_the_toes_while_they_carry_does_not_leave_at_once(walk):
+    """With hinges that are nowhere near, and phases of half a second: a tenth of a second early, not more."""
+    found, supports = walk
+    even = smoothed(found)
+    schedule = landing_flat(recorded_schedule(even, supports, rolling=True), found.body)
+    instants = 0.5 * np.arange(len(schedule.instants))
+    slow = ContactSchedule(StanceSequence([Phase(phase.stance) for phase in schedule.sequence]), instants)
+    time = np.linspace(0.0, instants[-1], 200)
+    elsewhere = np.tile(even.q[-1] + np.eye(found.body.nq)[2], (200, 1))
+    after = leaving_with_the_hinge(slow, found.body, time, elsewhere)
+    earlier = instants - after.instants
+    assert sorted(set(np.round(earlier, 9))) == [0.0, EARLY]
+
+
+def test_a_foot_is_on_its_contact_up_to_the_instant_of_its_lift_off(walked):
+    """And no farther off by then than elsewhere: its hinge starts from rest."""
+    schedule, instants = walked.schedule, walked.schedule.instants
+    postures = walked.planned.q[np.round(1e3 * instants).astype(int)]
+    paths = effector_paths(walked.body, schedule, instants, postures)
+    left = 0
+    for index in range(1, len(schedule.sequence)):
+        before, after = schedule.sequence[index - 1].stance, schedule.sequence[index].stance
+        for name in set(before.effectors) - set(after.effectors):
+            assert paths.targets[name].weight[index] == 1.0
+            left += 1
+    assert left == 3
+    assert walked.adapted.certificate.max_support_error_m < 2e-3
+
+
+def test_a_foot_about_to_land_where_a_clip_ends_is_not_held_up(walk):
+    """Cut 30 ms before a touch-down its sole is not much higher than it was recorded, or has to be."""
+    found, supports = walk
+    end = next(s.start for s in supports.supports if s.start > supports.start + 0.3) - 0.03
+    part, held = window(found, supports, supports.start, end)
+    even = smoothed(part)
+    schedule = landing_flat(recorded_schedule(even, held, rolling=True), part.body)
+    paths = effector_paths(part.body, schedule, part.time, even.q)
+    half = 0.5 * part.body.sole_length
+    flying = [name for name in paths.targets if name not in schedule.sequence[-1].stance]
+    for name in flying:
+        target = paths.targets[name]
+        low = target.position[-1, 2] - half * abs(target.rotation[-1, 2, 0]) - held.surfaces[0]
+        recorded, turn = effector_placements(part.body, even.q[-1:], name)
+        was = recorded[0, 2] - half * abs(turn[0, 2, 0]) - held.surfaces[0]
+        assert low < max(was, CUT_HEIGHT) + 0.01
+    assert flying
+
+
+def test_a_motion_that_ends_at_speed_is_not_stopped_dead(walked):
+    """Load changes by less than a fifth of the weight in the last step, where one to rest would take all."""
+    ran = walked.execution.motion
+    load = ran.contact_force[:, :, 2].sum(axis=1)
+    assert abs(load[-1] - load[-2]) < 0.2 * walked.body.mass * GRAVITY
+    assert ran.time[-1] < walked.planned.time[-1]
 
 
 def test_a_foot_tilts_on_its_toes_as_far_as_it_was_recorded_to(walk):

@@ -5,7 +5,8 @@ person was not. Here the key frames pull instead, and balance is imposed every t
 pseudo-wrench ``m [a - g; p x (a - g)]`` ([Qiu2012]_ 4.6), bilinear in position and acceleration, is
 linearised about the last solution. Where the recorded rate of the angular momentum is known, the plan has
 one too, near it, and both wrenches keep their balance: that of the point mass and that of the body which
-turns ([Qiu2012]_ 4.51). All this is our own.
+turns ([Qiu2012]_ 4.51). More margin than has to be kept is wished for, and what lacks of it is paid for.
+All this is our own.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,6 +49,14 @@ key frames missed by a little more than a millimetre."""
 RESERVE = 8.0
 """Margin of the body that turns beyond that of the point mass: arms and legs meet the rate of its angular
 momentum only nearly [N.m]."""
+
+ROOM = 20.0
+"""Margin wished for beyond that: whoever follows a plan needs some to come back to it. A controller that
+keeps its forces 1 cm inside the soles has 7 N.m less [N.m]."""
+
+ROOM_PULL = 1.0
+"""Cost of the mean square of the share of it that lacks: all of it costs as much as key frames missed by a
+centimetre."""
 
 TURN_BEND = 1e-7
 """Cost of its mean squared second derivative, in that unit [s^4]."""
@@ -136,17 +145,21 @@ class NearProgramme:
         parts = self._objectives(shares, wanted)
         linear = np.hstack([line for _, line in parts])
         rows, bounds = self._balance(margin, near)
+        axes = [np.diag(np.repeat(np.arange(len(parts)) == number, 3)) for number in range(len(parts))]
+        whole = sum(np.kron(quadratic, axis) for (quadratic, _), axis in zip(parts, axes, strict=True))
+        lacking = len(self.phases)
+        cost = sparse.block_diag([whole, ROOM_PULL / lacking * sparse.eye_array(lacking)])
         solver = piqp.SparseSolver()
         solver.settings.verbose = False
-        axes = [np.diag(np.repeat(np.arange(len(parts)) == number, 3)) for number in range(len(parts))]
-        whole = sum(np.kron(2.0 * quadratic, axis) for (quadratic, _), axis in zip(parts, axes, strict=True))
-        cost = sparse.csc_matrix(whole)
+        free = np.full(linear.size, _NO_BOUND)
         solver.setup(
-            cost, 2.0 * linear.ravel(), None, None, rows, np.full(len(bounds), -_NO_BOUND), bounds
+            sparse.csc_matrix(2.0 * cost), 2.0 * np.append(linear.ravel(), np.zeros(lacking)), None, None,
+            rows, np.full(len(bounds), -_NO_BOUND), bounds,
+            np.append(-free, np.zeros(lacking)), np.append(free, np.ones(lacking)),
         )  # fmt: skip
         if solver.solve() != piqp.PIQP_SOLVED:
             return None
-        return solver.result.x.reshape(linear.shape), int(solver.result.info.iter)
+        return solver.result.x[: linear.size].reshape(linear.shape), int(solver.result.info.iter)
 
     def _objectives(self, shares: FloatArray, wanted: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """(n, n) and (n, 3) of CoM and turning: the objective is ``C' Q C + 2 l' C`` of each axis."""
@@ -179,8 +192,15 @@ class NearProgramme:
                     block = np.concatenate([block, turned], axis=2)
                 block = block.reshape(len(chosen), -1)
                 length = np.linalg.norm(block, axis=1)
-                blocks.append(sparse.csr_matrix(block / length[:, None]))
-                bounds.append((bound[chosen] - (0.0 if turn is None else RESERVE)) / length)
+                # Only the wrench that is planned for, not that of the point mass beside it, has room.
+                wished = 0.0 if turn is None and self.turning is not None else ROOM
+                lacks = sparse.csr_matrix(
+                    (-wished / length, (np.arange(len(chosen)), np.full(len(chosen), row))),
+                    shape=(len(chosen), len(self.phases)),
+                )
+                blocks.append(sparse.hstack([block / length[:, None], lacks]))
+                spare = wished + (0.0 if turn is None else RESERVE)
+                bounds.append((bound[chosen] - spare) / length)
         return sparse.vstack(blocks).tocsc(), np.concatenate(bounds)
 
     def _turns(self, polytope: WrenchPolytope) -> list[FloatArray | None]:

@@ -10,6 +10,7 @@ from manikin.centroidal import (
     CentroidalResult,
     GeometricConstraint,
     KeyframeProblem,
+    NearKeyFramesResult,
     Recording,
     height_band,
     plan_com,
@@ -45,11 +46,7 @@ def plan_recorded_com(
         required_margin: To keep all along [N.m].
     """
     if method == "keyframes":
-        return plan_com_near_key_frames(
-            KeyframeProblem(
-                mass, recording, start_velocity=None, goal_velocity=None, required_margin=required_margin
-            )
-        )
+        return plan_near_recorded_com(mass, recording, required_margin)
     return plan_com(
         CentroidalProblem(
             mass, _free_durations(recording), recording.com[0], recording.com[-1],
@@ -57,6 +54,22 @@ def plan_recorded_com(
             support_distance=farthest_support(recording), geometric=_recorded_heights(recording),
         )
     )  # fmt: skip
+
+
+def plan_near_recorded_com(
+    mass: float, recording: Recording, required_margin: float = 0.0
+) -> NearKeyFramesResult:
+    """Plan the centre of mass near the recorded one.
+
+    Args:
+        mass: [kg].
+        recording: Samples, key frames and stances, and the rate of the angular momentum.
+        required_margin: To keep all along [N.m].
+    """
+    asked = KeyframeProblem(
+        mass, recording, start_velocity=None, goal_velocity=None, required_margin=required_margin
+    )
+    return plan_com_near_key_frames(asked)
 
 
 def farthest_support(recording: Recording) -> float:

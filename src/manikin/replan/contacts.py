@@ -1,7 +1,8 @@
 """Stances and surfaces of a recorded person as a planned body can use them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,14 +18,26 @@ from manikin.spatial import GRAVITY, FloatArray, frozen_array
 RAISED = 0.02
 """A contact this far above the floor has a block under it [m]."""
 
+RISEN = 0.015
+"""Height of the buttocks over a seat from which it carries nothing [m]."""
+
 SAME_SEAT = 0.15
 """Seats nearer to each other are one [m]."""
 
 ROLLED = 0.02
 """Way of the hinge of the toes from which a foot counts as rolling over their tips [m]."""
 
-SHORTEST = 0.04
-"""What is left at least of a phase whose foot leaves earlier [s]."""
+EARLY = 0.1
+"""Time by which such a foot leaves earlier than recorded at most: one whose hinge has moved for longer
+carries, as a stealthy walker's does for most of a second [s]."""
+
+SHORTEST = 0.06
+"""What is left at least of a phase whose foot or seat is left earlier: the controller takes some 40 ms to
+load a foot [s]."""
+
+REMNANT = 0.08
+"""A part of a contact at a clip's end that lasts less is none of its own: a foot's tilt takes as long to set
+in [s]."""
 
 TOE_LOAD = 1.4
 """Load of a foot on its toes: above the second peak of a brisk walk's vertical force [body weights]."""
@@ -42,17 +55,22 @@ def landing_flat(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
     A recorded heel rolls down within some sixty milliseconds, on a round edge and a soft shoe; a stiff
     sole lands flat. Phases that do not differ any more are one.
     """
-    phases: list[Phase] = []
-    instants = [float(schedule.instants[0])]
-    for phase, end in zip(schedule.sequence, schedule.instants[1:], strict=True):
-        stance = Stance([_whole(contact, body) for contact in phase.stance], phase.stance.normal_force_cap)
-        if phases and _alike(phases[-1].stance, stance):
-            phases.pop()
-            instants.pop()
-        duration = float(end) - instants[-1]
-        phases.append(Phase(stance, duration, duration))
-        instants.append(float(end))
-    return ContactSchedule(StanceSequence(phases), instants)
+    flat = _with_contacts(schedule, lambda contact: _whole(contact, body))
+    return _joined(list(flat.sequence), flat.instants)
+
+
+def without_remnants(schedule: ContactSchedule) -> ContactSchedule:
+    """The same with no part of a foot at either end that a clip cuts to an instant.
+
+    Who lifts the heel 40 ms after a clip begins has it almost up by then, and 40 ms before it ends hardly:
+    the foot stands there as it does beside. Phases that do not differ any more are one.
+    """
+    phases = list(schedule.sequence)
+    durations = np.array(schedule.durations)
+    _without_first_remnants(phases, durations)
+    phases.reverse()
+    _without_first_remnants(phases, durations[::-1])
+    return _joined(phases[::-1], schedule.instants)
 
 
 def leaving_with_the_hinge(
@@ -90,12 +108,40 @@ def leaving_with_the_hinge(
             left = instants[index] if len(near) == 0 else time[near[-1]]
             if contact.part is SolePart.TOES and left < instants[index + 1]:
                 shortest = min(max(SHORTEST, time[1] - time[0]), instants[index + 1] - instants[index])
-                instants[index + 1] = max(left, instants[index] + shortest)
-    timed = [
-        replace(phase, min_duration=float(duration), max_duration=float(duration))
-        for phase, duration in zip(phases, np.diff(instants), strict=True)
-    ]
-    return ContactSchedule(StanceSequence(timed), instants)
+                earliest = max(instants[index] + shortest, instants[index + 1] - EARLY)
+                instants[index + 1] = max(left, earliest)
+    return _timed(phases, instants)
+
+
+def rising_at_once(
+    schedule: ContactSchedule, body: BodyModel, time: FloatArray, q: FloatArray
+) -> ContactSchedule:
+    """The same with a seat that is left as soon as the buttocks have risen from it.
+
+    Flesh and cushion follow a person up by some centimetres; a stiff seat does not, and would hold the
+    pelvis back while the rest of the body rises.
+
+    Args:
+        schedule: Contacts in time, a seat at one place.
+        body: Whose.
+        time: (n,) [s], on the schedule's clock.
+        q: (n, nq) recorded postures then.
+    """
+    if SEAT not in schedule.sequence.effectors:
+        return schedule
+    height = effector_placements(body, q, SEAT)[0][:, 2]
+    instants, phases = np.array(schedule.instants), list(schedule.sequence)
+    for index, (before, after) in enumerate(pairwise(phases)):
+        if set(before.stance.effectors) - set(after.stance.effectors) != {SEAT}:
+            continue
+        if not set(after.stance.effectors) <= set(before.stance.effectors):
+            continue
+        start, end = instants[index : index + 2]
+        seated = (time > start) & (time < end)
+        low = height[seated] < before.stance[SEAT].position[2] + RISEN
+        if np.any(low) and not low[-1]:
+            instants[index + 1] = min(max(float(time[seated][low][-1]), start + SHORTEST), end)
+    return _timed(phases, instants)
 
 
 def within_toe_strength(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
@@ -152,12 +198,49 @@ def scene_under(schedule: ContactSchedule, floor: float) -> Scene:
     return Scene(blocks, floor_height=floor)
 
 
+def _without_first_remnants(phases: list[Phase], durations: FloatArray) -> None:
+    """Replace what is cut by the beginning of a clip, or by the end of one whose phases come last first."""
+    for first in phases[0].stance:
+        name = first.effector
+        held = next((k for k, phase in enumerate(phases) if name not in phase.stance), len(phases))
+        parts = [phase.stance[name] for phase in phases[:held]]
+        count = next((k for k, part in enumerate(parts) if part.part is not first.part), None)
+        if count is None or durations[:count].sum() >= REMNANT:
+            continue
+        for index in range(count):
+            stance = phases[index].stance
+            contacts = [parts[count] if c.effector == name else c for c in stance]
+            phases[index] = replace(phases[index], stance=Stance(contacts, stance.normal_force_cap))
+
+
 def _with_contacts(schedule: ContactSchedule, change: Callable[[Contact], Contact]) -> ContactSchedule:
     phases = [
         replace(phase, stance=Stance(list(map(change, phase.stance)), phase.stance.normal_force_cap))
         for phase in schedule.sequence
     ]
     return ContactSchedule(StanceSequence(phases), schedule.instants)
+
+
+def _timed(phases: Sequence[Phase], instants: FloatArray) -> ContactSchedule:
+    timed = [
+        replace(phase, min_duration=float(duration), max_duration=float(duration))
+        for phase, duration in zip(phases, np.diff(instants), strict=True)
+    ]
+    return ContactSchedule(StanceSequence(timed), instants)
+
+
+def _joined(phases: Sequence[Phase], ends: FloatArray) -> ContactSchedule:
+    """A schedule of phases between instants (phases + 1,), those that do not differ as one."""
+    joined: list[Phase] = []
+    instants = [float(ends[0])]
+    for phase, end in zip(phases, ends[1:], strict=True):
+        if joined and _alike(joined[-1].stance, phase.stance):
+            joined.pop()
+            instants.pop()
+        duration = float(end) - instants[-1]
+        joined.append(Phase(phase.stance, duration, duration))
+        instants.append(float(end))
+    return ContactSchedule(StanceSequence(joined), instants)
 
 
 def _strong_part(contact: Contact, body: BodyModel) -> Contact:

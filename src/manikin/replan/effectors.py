@@ -40,14 +40,24 @@ pass nearer to the other leg than the body's soles and shanks can."""
 SHORTEST_JOINING = 0.2
 """Time in which a foot in flight at a clip's end does so at least, as long as there is so much [s]."""
 
+LONGEST_JOINING = 0.25
+"""Time in which any effector does so at most: buttocks that lag behind a person who rises make the arms swing
+up [s]."""
+
 SWING_HEIGHT = 0.03
 """Least height of a foot's lowest point in the middle of its flight [m]."""
+
+CUT_HEIGHT = 0.02
+"""The same at a clip's end that cuts a flight [m]."""
 
 ROUNDING = 0.005
 """Width of the bend between a flight that is lifted to that height and one that is not [m]."""
 
 TOES_BACK = 0.5
 """Share of the flight after which bent toes are straight again."""
+
+SAME_INSTANT = 1e-6
+"""Times nearer to each other are one [s]."""
 
 FLIGHT_POSITION, FLIGHT_ROTATION, FLIGHT_END = 0.2, 0.1, 0.25
 """Importance of position and orientation in the middle of a flight, and the share at either end of it in
@@ -119,13 +129,19 @@ class _Path:
         flat = np.isin(self.phases, [first + i for i, c in enumerate(contacts) if c.part is SolePart.FULL])
         rest = float(np.median(tilt[flat])) if np.any(flat) else 0.0
         for part, begin, end in _parts(contacts):
-            rows = (self.phases >= first + begin) & (self.phases < first + end)
+            # At the very instant of its lift-off it still is where it was.
+            left = np.abs(self.time - self.schedule.instants[first + end]) < SAME_INSTANT
+            rows = ((self.phases >= first + begin) & (self.phases < first + end)) | (
+                left & (end == len(contacts))
+            )
             contact = contacts[begin]
             place = np.tile(contact.position, (int(rows.sum()), 1))
             turn = np.tile(contact.rotation_contact_to_world, (len(place), 1, 1))
             if part is SolePart.TOES and self.hinge is not None:
                 start, over = self.schedule.instants[[first + begin, first + end]]
-                share = (self.time[rows] - start) / min(TILTING, over - start)
+                # A contact that a clip's end cuts goes on: there is no hurry.
+                lasting = over - start if first + end < len(self.schedule.sequence) else np.inf
+                share = (self.time[rows] - start) / min(TILTING, lasting)
                 angle = _up_to(LARGEST_TILT, np.maximum(tilt[rows] - rest, 0.0))
                 angle *= smooth_step(share) if begin > 0 else 1.0
                 turn = turn @ Rotation.from_rotvec(np.outer(angle, [0.0, 1.0, 0.0])).as_matrix()
@@ -141,9 +157,9 @@ class _Path:
         leaves, lands = first > 0, stop < len(self.time)
         start, end = self.time[max(first - 1, 0)], self.time[min(stop, len(self.time) - 1)]
         share = (self.time[rows] - start) / max(end - start, 1e-9)
-        joining = (
-            JOINING if leaves and lands else min(max(JOINING, SHORTEST_JOINING / max(end - start, 1e-9)), 1.0)
-        )
+        lasting = max(end - start, 1e-9)
+        joining = min(JOINING if leaves and lands else max(JOINING, SHORTEST_JOINING / lasting), 1.0)
+        joining = min(joining, LONGEST_JOINING / lasting)
         # The hinge of the toes starts from rest, and the foot keeps turning about it.
         arm = np.zeros(3) if self.hinge is None else self.hinge
         points = self.position + self.rotation @ arm
@@ -162,7 +178,7 @@ class _Path:
         near = np.maximum(share, 0.5 if not leaves else 0.0)
         near = np.clip(np.minimum(near, 0.5 if not lands else 1.0), 1e-6, 1.0 - 1e-6)
         if self.hinge is not None:
-            self._lift(rows, np.minimum(near, 1.0 - near))
+            self._lift(rows, np.minimum(near, 1.0 - near), share, (not leaves, not lands))
         self.weight[rows] = flight_weight(near, FLIGHT_POSITION, FLIGHT_END, FLIGHT_END)
         self.rotation_weight[rows] = flight_weight(near, FLIGHT_ROTATION, FLIGHT_END, FLIGHT_END)
         if self.hinge is not None:
@@ -182,17 +198,30 @@ class _Path:
         found = angle * (1.0 - smooth_step(gone)) + rate * lasting * gone * (1.0 - gone) ** 2
         return _up_to(LARGEST_TILT, np.maximum(found, 0.0))
 
-    def _lift(self, rows: slice, share: FloatArray) -> None:
-        """Keep heel, hinge and tips of a foot off the surface in flight."""
+    def _lift(self, rows: slice, near: FloatArray, share: FloatArray, cut: tuple[bool, bool]) -> None:
+        """Keep heel, hinge and tips of a foot off the surface in flight.
+
+        At a clip's end that cuts a flight, a foot may be as near to it as it was recorded, about to land.
+
+        Args:
+            rows: Samples of the flight.
+            near: (n,) share of the flight to its nearer contact.
+            share: (n,) of the flight since its beginning.
+            cut: Whether the clip begins, or ends, within it.
+        """
         tilt, half = _pitch(self.rotation[rows]), 0.5 * (self.body.sole_length or 0.0)
         height, hinge = self.position[rows, 2], 0.0 if self.hinge is None else float(self.hinge[0])
         ball = height - hinge * np.sin(tilt)
         tips = ball - (half - hinge) * np.sin(tilt - self.toes[rows])
         surface = min(c.position[2] for c in self._contacts())
         low = np.minimum(np.minimum(height + half * np.sin(tilt), ball), tips) - surface
-        missing = SWING_HEIGHT * np.minimum(1.0, 4.0 * share) - low
-        lift = ROUNDING * np.logaddexp(0.0, missing / ROUNDING)
-        self.position[rows, 2] += lift * np.minimum(1.0, 8.0 * share)
+        wanted = SWING_HEIGHT * np.minimum(1.0, 4.0 * near)
+        for is_cut, at, away in zip(cut, (0, -1), (share, 1.0 - share), strict=True):
+            if is_cut:
+                least = float(np.clip(low[at], CUT_HEIGHT, SWING_HEIGHT))
+                wanted = np.minimum(wanted, least + (SWING_HEIGHT - least) * np.minimum(1.0, 4.0 * away))
+        lift = ROUNDING * np.logaddexp(0.0, (wanted - low) / ROUNDING)
+        self.position[rows, 2] += lift * np.minimum(1.0, 8.0 * near)
 
     def _contacts(self) -> Iterator[Contact]:
         for phase in self.schedule.sequence:

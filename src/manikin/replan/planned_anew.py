@@ -15,15 +15,17 @@ from manikin.mocap import Reconstruction, RecordedSupports, motion_of, recorded_
 from manikin.mocap.recorded_stances import FRICTION
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
-from manikin.replan.com import METHODS, Method, plan_recorded_com
+from manikin.replan.com import METHODS, Method, plan_near_recorded_com, plan_recorded_com
 from manikin.replan.contacts import (
     landing_flat,
     leaving_with_the_hinge,
     on_one_seat,
+    rising_at_once,
     scene_under,
     within_toe_strength,
+    without_remnants,
 )
-from manikin.replan.whole_body import AdaptedMotion, adapt_postures, rate_on_contacts
+from manikin.replan.whole_body import AdaptedMotion, adapt_postures, rate_on_contacts, rate_on_plan
 from manikin.scene import Scene
 from manikin.simulation import Execution, execute
 from manikin.spatial import FloatArray
@@ -165,17 +167,37 @@ def replan(
     stances = recorded_schedule(even, supports, friction=friction, rolling=rolling)
     stances = on_one_seat(landing_flat(stances, found.body))
     stances = leaving_with_the_hinge(stances, found.body, supports.start + found.time, even.q)
-    stances = within_toe_strength(stances, found.body)
+    stances = rising_at_once(stances, found.body, supports.start + found.time, even.q)
+    stances = within_toe_strength(without_remnants(stances), found.body)
     time = supports.start + found.time
     recording = Recording(time, recorded.com, stances.sequence, stances.instants)
     velocity = np.gradient(recorded.com, recorded.time, axis=0, edge_order=2)[[0, -1]]
     scene = scene_under(stances, supports.surfaces[0] if supports.surfaces else 0.0)
     if method == "keyframes":
-        rate = rate_on_contacts(found.body, scene, recording, (even.time, even.q))
-        recording = recording.with_angular_momentum_rate(rate)
+        recording = _with_turning(found.body, scene, recording, (even.time, even.q), required_margin)
     com = plan_recorded_com(found.body.mass, recording, velocity, method, required_margin)
     result = Replan(method, found.body, scene, recording, recorded, com)
     return _executed(result, even) if execute and com.trajectory is not None else result
+
+
+def _with_turning(
+    body: BodyModel,
+    scene: Scene,
+    recording: Recording,
+    recorded: tuple[FloatArray, FloatArray],
+    margin: float,
+) -> Recording:
+    """The same with a rate of the angular momentum that the body can follow.
+
+    First that of the recorded postures on their contacts; and then that of the postures which are fitted to
+    the plan it leads to, for the fit gives way between both.
+    """
+    recording = recording.with_angular_momentum_rate(rate_on_contacts(body, scene, recording, recorded))
+    com = plan_near_recorded_com(body.mass, recording, margin)
+    if com.trajectory is None:
+        return recording
+    rate = rate_on_plan(body, scene, com.trajectory, recorded, recording)
+    return recording.with_angular_momentum_rate(rate)
 
 
 def _executed(result: Replan, even: Reconstruction) -> Replan:

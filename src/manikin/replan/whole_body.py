@@ -102,9 +102,7 @@ def adapt_postures(
     """
     schedule = trajectory.schedule
     task = _Task.of(body, scene, schedule, recorded, clock)
-    time = task.time
-    turning = trajectory.angular_momentum_rate(time)
-    spline = task.fit(trajectory.position(time), trajectory.acceleration(time), turning, SCALES)
+    spline = task.follow(trajectory)
     dense = np.linspace(0.0, trajectory.duration, max(2, round(trajectory.duration / STEP) + 1))
     motion, wrench = full_motion(body, schedule, polytopes, dense, *spline.evaluate(dense))
     ignored = ignored_pairs(body, scene, schedule, dense)
@@ -137,7 +135,35 @@ def rate_on_contacts(
         for values in (recording.com, second)
     )
     spline = task.fit(com, acceleration, np.zeros_like(com), LOOSE)
-    states = spline.evaluate(recording.time)
+    return _turning(body, spline, recording.time)
+
+
+def rate_on_plan(
+    body: BodyModel,
+    scene: Scene,
+    trajectory: CentroidalTrajectory,
+    recorded: tuple[FloatArray, FloatArray],
+    recording: Recording,
+) -> FloatArray:
+    """(n, 3) rate of the angular momentum of recorded postures adapted to a plan [N.m].
+
+    At a recording's samples.
+
+    Args:
+        body: The body.
+        scene: Obstacles and floor.
+        trajectory: Planned near the recording, at its pace.
+        recorded: (n,) instants [s] and (n, nq) postures.
+        recording: On whose stances it was planned.
+    """
+    clock = trajectory.schedule.instants, recording.key_times
+    spline = _Task.of(body, scene, trajectory.schedule, recorded, clock).follow(trajectory)
+    return _turning(body, spline, recording.time)
+
+
+def _turning(body: BodyModel, spline: ConfigurationSpline, time: FloatArray) -> FloatArray:
+    """(n, 3) rate of the angular momentum of a motion [N.m]."""
+    states = spline.evaluate(time)
     data, model = body.pinocchio.createData(), body.pinocchio
     return np.array([
         pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a).angular
@@ -179,6 +205,13 @@ class _Task:
         return cls(
             body, Proximity(body, scene), time, knots, reference, scale, paths.targets, tuple(paths.toes),
             ignored,
+        )  # fmt: skip
+
+    def follow(self, trajectory: CentroidalTrajectory) -> ConfigurationSpline:
+        """Fit to a planned centre of mass and its angular momentum."""
+        return self.fit(
+            trajectory.position(self.time), trajectory.acceleration(self.time),
+            trajectory.angular_momentum_rate(self.time), SCALES,
         )  # fmt: skip
 
     def fit(

@@ -43,7 +43,7 @@ SETTLING = 0.2
 in by the fraction of a millimetre that the contact needs to carry."""
 
 _AT_REST = 1e-2
-"""A motion whose first speeds are smaller than this begins at rest [m/s, rad/s]."""
+"""A motion whose first, or last, speeds are smaller than this begins, or ends, at rest [m/s, rad/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +162,8 @@ class _Run:
         settle = self._settling_steps()
         self.world.reset(self.plan.q[0], self.plan.v[0], start - settle * self.period)
         count = round((self.plan.duration + hold) / self.period) + 1
+        if hold == 0.0 and np.abs(self.plan.v[-1]).max() >= _AT_REST:
+            count -= 1  # At its end, a motion that ends at speed would be stopped dead.
         number = -settle
         while number < count + round(self.controller.clock.waited / self.period):
             time = start + number * self.period
