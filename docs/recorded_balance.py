@@ -391,8 +391,9 @@ def torque_text(trials: list[Trial]) -> str:
         "push against each other, as they do under people whose front foot brakes while the other still "
         "pushes off. What is left is the error of the motion itself, as in single support, and largest at "
         "the ankle just before the next touch-down: the low-pass begins the impact early, and the foot that "
-        "carries alone has to supply it. To let the next foot be loaded 20 to 50 ms before it is on the "
-        "ground was tried; it lowers the ankle's peaks and raises the hip's, so it was left.\n"
+        "carries alone has to supply it. To let the next foot be loaded 40 ms before it is on the ground was "
+        "tried: the ankle's peak falls from 1.5 of that by plates to 1.1 (median), but the hip's difference "
+        "rises from 17 to 21 N.m, so it was left.\n"
     )
 
 

@@ -153,8 +153,7 @@ def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
         "of them with a positive margin": _share(margin["share_positive_in_contact"]),
         "limited by": None if margin["limiting"] is None else readable(margin["limiting"]),
         "shift onto the contacts [mm]": f"{1e3 * shifted['rms_m']:.1f} (RMS), {1e3 * shifted['max_m']:.1f} "
-        f"(largest), {used}; positive with it in {_share(shifted['share_positive_in_contact'])}, without in "
-        f"{_share(recorded['share_positive_in_contact'])} of the frames in contact",
+        f"(largest), {used}" + _positive(recorded, shifted),
     }
 
 
@@ -231,6 +230,14 @@ def _execution(page: ReportPage, found: Mapping[str, Any], unit: str) -> None:
         "deepest penetration of a contact [mm]": _millimetres(found["max_penetration_m"]),
         "speed, per real time": found["realtime_factor"],
     })  # fmt: skip
+
+
+def _positive(recorded: Mapping[str, Any], shifted: Mapping[str, Any]) -> str:
+    """Shares of the frames in contact, where there are any."""
+    shares = [_share(one["share_positive_in_contact"]) for one in (shifted, recorded)]
+    if None in shares:
+        return ""
+    return f"; positive with it in {shares[0]}, without in {shares[1]} of the frames in contact"
 
 
 def _share(value: float | None) -> str | None:

@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from manikin.analysis import AnalysisOptions, analyze, analyze_file
+from manikin.analysis_directory import summary_of
+from manikin.analysis_report import report_page
 from manikin.balance import evaluate_balance
 from manikin.contact import Stance, sole
 from manikin.errors import InputError
 from manikin.mocap import read_recording
 from manikin.mocap.recorded_stances import STRONGEST
+from manikin.mocap.shifted_motion import LARGEST_RMS
 from manikin.spatial import GRAVITY
 
 
@@ -92,9 +95,25 @@ def test_the_motion_is_left_as_recorded_if_wanted(recordings_folder):
     for found, column in ((moved, "shifted_margin_Nm"), (plain, "recorded_margin_Nm")):
         np.testing.assert_array_equal(found.series()[column], found.motion.margin)
     assert moved.as_dict()["margin"]["recorded"]["min"] == plain.as_dict()["margin"]["min"]
-    assert (
-        plain.as_dict()["force_plates"]["cop_rms_m"] == plain.as_dict()["force_plates"]["cop_rms_recorded_m"]
+    plates = plain.as_dict()["force_plates"]
+    assert plates["cop_rms_m"] == plates["cop_rms_recorded_m"]
+
+
+def test_a_shift_that_does_not_lead_to_balance_is_not_applied(recordings_folder):
+    """A run at 30 frames per second, whose forces are known too badly; and a leap, all in flight."""
+    found = analyze_file(recordings_folder / "accad_male1_bvh/Male1_C03_Run.bvh")
+    margin = found.as_dict()["margin"]
+    assert margin["motion"] == "recorded"
+    assert margin["shifted"]["rms_m"] > LARGEST_RMS
+    np.testing.assert_array_equal(found.motion.q, found.measured.recorded.q)
+    assert any("measured is the motion as recorded" in line for line in found.remarks)
+    leap = analyze_file(
+        recordings_folder / "grf/nimble_opencap_s4/DJ1.trc", AnalysisOptions(frames=(114, 140))
     )
+    margin = leap.as_dict()["margin"]
+    assert (margin["motion"], margin["share_in_contact"]) == ("recorded", 0.0)
+    assert margin["share_positive_in_contact"] is None
+    assert "None" not in report_page(leap, summary_of(leap), "", {})
 
 
 @pytest.mark.parametrize(

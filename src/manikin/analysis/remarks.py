@@ -57,9 +57,9 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
     shifted = analysis.measured.shifted
     if supports.supports and shifted.solved and not shifted.believable:
         lines.append(
-            f"balanced in {100.0 * (shifted.margins.balanced or 0.0):.0f} % of the frames in contact only, "
-            f"even if shifted by up to {1e3 * shifted.size.max():.0f} mm: contacts were not found, or the "
-            "recording is cut; measured is the motion as recorded"
+            f"balanced in {100.0 * (shifted.margins.balanced or 0.0):.0f} % of the frames in contact "
+            f"if shifted by {1e3 * shifted.rms:.0f} mm (RMS): contacts were not found, or do not carry there; "
+            "measured is the motion as recorded"
         )
     if not shifted.solved:
         lines.append("no shift onto the contacts was found: the postures jump")

@@ -141,17 +141,19 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
         "phases [s]": " ".join(f"{duration:.2f}" for duration in summary["phase_durations_s"]),
         "lowest CoM": f"{summary['com_height_min_m']:.3f} m at {summary['com_height_min_at_s']:.2f} s",
     }
+    share = margin["share_positive_in_contact"]
     if margin["min"] is not None:
         shown["lowest margin"] = (
             f"{margin['min']:.1f} N.m at {margin['at_s']:.2f} s ({margin['limiting'] or 'in flight'}), "
-            f"positive in {_share(margin)} of the frames in contact"
+            + ("never in contact" if share is None else f"positive in {share:.1%} of the frames in contact")
         )
+    if share is not None:
         recorded, shifted = margin["recorded"], margin["shifted"]
         size = f"{1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest)"
         shown["shifted"] = (
-            f"by {size}; as recorded positive in {_share(recorded)}"
+            f"by {size}; as recorded positive in {recorded['share_positive_in_contact']:.1%}"
             if margin["motion"] == "shifted"
-            else f"not; by {size} positive in {_share(shifted)}"
+            else f"not; by {size} positive in {shifted['share_positive_in_contact']:.1%}"
         )
     for name in ("rula", "reba"):
         if effort[name] is not None:
@@ -182,11 +184,6 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
         )
         shown["plates: torques"] = f"{apart} N.m (RMS)"
     return shown
-
-
-def _share(margin: dict[str, Any]) -> str:
-    share = margin["share_positive_in_contact"]
-    return "none" if share is None else f"{100.0 * share:.1f} %"
 
 
 def _several(

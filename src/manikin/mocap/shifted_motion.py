@@ -57,6 +57,9 @@ INSIDE = 0.01
 KNOTS = 0.04
 """Time between the knots of the spline [s]: a shift up to some 10 Hz."""
 
+LARGEST_RMS = 0.01
+"""Longest shift that is believed, root mean square [m]."""
+
 LEAST_BALANCED = 0.9
 """Share of the frames with contacts that have to be in balance once shifted."""
 
@@ -100,8 +103,12 @@ class LeastShift:
 
     @property
     def believable(self) -> bool:
-        """Whether the shift leads to balance; if not, contacts are missing, and it means nothing."""
-        return self.solved and (self.margins.balanced or 0.0) >= LEAST_BALANCED
+        """Whether the shift leads to balance and is as short as a recording's errors.
+
+        If not, contacts are missing, and it means nothing.
+        """
+        balanced = self.margins.balanced or 0.0
+        return self.solved and balanced >= LEAST_BALANCED and self.rms <= LARGEST_RMS
 
 
 def least_shift(
