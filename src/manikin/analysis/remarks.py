@@ -58,7 +58,7 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
     if supports.supports and shifted.solved and not shifted.believable:
         lines.append(
             f"balanced in {100.0 * (shifted.margins.balanced or 0.0):.0f} % of the frames in contact "
-            f"if shifted by {1e3 * shifted.rms:.0f} mm (RMS): contacts were not found, or do not carry there; "
+            f"if shifted by {1e3 * shifted.rms:.0f} mm (RMS): contacts were not found, or do not carry; "
             "measured is the motion as recorded"
         )
     if not shifted.solved:
