@@ -1,5 +1,6 @@
 """Values that the tests of several rooms share."""
 
+import gc
 import os
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
@@ -33,6 +34,13 @@ def unit_of(nodeid):
         return module
     name, bracket, parameters = test.partition("[")
     return f"{module}[{parameters}" if bracket else f"{module}::{name}"
+
+
+def pytest_collection_finish():
+    """What is loaded by now stays: the collector of garbage need not look through it again and again."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(10_000, 20, 20)
 
 
 def pytest_collection_modifyitems(items):

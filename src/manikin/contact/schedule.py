@@ -59,9 +59,10 @@ class ContactSchedule:
         settling = np.zeros(len(times), dtype=bool)
         held = False
         for phase, start in zip(self.sequence, self.instants, strict=False):
-            if effector in phase.stance and not held:
-                settling |= (times >= start) & (times < start + phase.stance[effector].settle)
-            held = effector in phase.stance
+            carries = effector in phase.stance
+            if carries and not held and (lasting := phase.stance[effector].settle) > 0.0:
+                settling |= (times >= start) & (times < start + lasting)
+            held = carries
         return settling
 
     def swing_interval(self, swing: Swing) -> tuple[float, float]:

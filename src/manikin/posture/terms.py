@@ -164,9 +164,14 @@ class ReferenceTerm:
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """See :class:`Term`."""
+        return Linearised(configuration.q[7:] - self.angles, self._jacobian)
+
+    @cached_property
+    def _jacobian(self) -> FloatArray:
         count = len(self.angles)
         jacobian = np.hstack([np.zeros((count, 6)), np.eye(count)])
-        return Linearised(configuration.q[7:] - self.angles, jacobian)
+        jacobian.setflags(write=False)
+        return jacobian
 
     def describe(self, residual: FloatArray) -> str:
         """See :class:`Term`."""

@@ -44,6 +44,7 @@ class PairBounds:
         self._both_radii = self._radii[:, None] + self._radii[None, :] + _ROUNDING
         self._corners = np.array([box_corners(item.geometry) for item in objects]).reshape(-1, 8, 3)
         self.first, self.second = first, second
+        self._cells = first * (self._count + len(parts)) + second  # of the pairs in the flat table
         self._self_pair = second < self._count
         self._axes = ShapeAxes.of([item.geometry for item in objects])
         has_axis = np.append(self._axes.round, np.zeros(len(parts), dtype=bool))
@@ -77,7 +78,7 @@ class PairBounds:
             table[:, :, : self._count] = self._to_shapes(centres)
         if len(self._part_low):
             table[:, :, self._count :] = self._to_parts(centres)
-        return table[:, self.first, self.second]
+        return table.reshape(len(placed), -1).take(self._cells, axis=1)
 
     def corners(self, rotations: FloatArray, translations: FloatArray) -> FloatArray:
         """(n, shapes, 8, 3) corners of the boxes around the shapes in the world [m].
@@ -154,11 +155,11 @@ class PairBounds:
 
 def _least_over_spheres(gap: FloatArray, axis: int, shapes: int) -> FloatArray:
     """Reduce an axis of (sphere, shape) pairs to shapes; slices are faster than a strided minimum."""
-    pieces = np.split(gap, range(shapes, gap.shape[axis], shapes), axis=axis)
-    least = np.minimum(pieces[0], pieces[1])
-    for piece in pieces[2:]:
-        np.minimum(least, piece, out=least)
-    return least
+    by_sphere = np.moveaxis(gap, axis, 0)
+    least = np.minimum(by_sphere[:shapes], by_sphere[shapes : 2 * shapes])
+    for start in range(2 * shapes, len(by_sphere), shapes):
+        np.minimum(least, by_sphere[start : start + shapes], out=least)
+    return np.moveaxis(least, 0, axis)
 
 
 def shape_of(geometry: coal.CollisionGeometry) -> tuple[Shape, FloatArray]:

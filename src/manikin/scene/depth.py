@@ -1,5 +1,7 @@
 """Depth of a body shape inside a closed mesh that is not convex."""
 
+import math
+
 import coal
 import numpy as np
 
@@ -28,8 +30,11 @@ class ClosedMeshMeter:
         self._low, self._high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
         self._points, self._radius = _sample(geometry)
 
-    def __call__(self, place: coal.Transform3s, other: coal.Transform3s) -> Measured:
+    def __call__(
+        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
+    ) -> Measured:
         """Distance, normal and nearest points; see :class:`PairMeter`."""
+        del within
         outside = self._outside(place, other)
         rotation, translation = other.getRotation(), other.getTranslation()
         points = self._points @ place.getRotation().T + place.getTranslation()

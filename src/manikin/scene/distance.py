@@ -179,7 +179,7 @@ class Proximity:
         pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
         placements = self._placements()
         near = np.flatnonzero((self._lower(placements) < activation) & self._considered(ignore))
-        measured = self._measure(near.tolist(), *_split(placements))
+        measured = self._measure(near.tolist(), *_split(placements), activation)
         kept = [row for row, item in enumerate(measured) if item[0] < activation]
         rows = near[kept]
         distance = np.array([measured[row][0] for row in kept])
@@ -247,7 +247,7 @@ class Proximity:
             if sample > 0:
                 np.maximum(now, lower[sample - 1] - moved[sample - 1], out=now)
             pairs = np.flatnonzero((now < activation) & considered[sample]).tolist()
-            measured = self._measure(pairs, rotations[sample], translations[sample])
+            measured = self._measure(pairs, rotations[sample], translations[sample], activation)
             for pair, (distance, normal, on_body, _) in zip(pairs, measured, strict=True):
                 now[pair] = distance - SLACK
                 if distance < activation:
@@ -276,7 +276,7 @@ class Proximity:
         for index in np.argsort(lower, kind="stable").tolist():
             if lower[index] == np.inf or lower[index] > max(best.distance, 0.0):
                 break
-            distance = self._measure([index], *_split(placements))[0][0]
+            distance = self._measure([index], *_split(placements), -np.inf)[0][0]
             if distance < best.distance:
                 best = Clearance(distance, self.pairs[index])
         return best
@@ -313,7 +313,7 @@ class Proximity:
             _, pair = heapq.heappop(queue)
             column = lower[:, pair]
             sample = int(np.argmin(column))
-            distance = self._measure([pair], rotations[sample], translations[sample])[0][0]
+            distance = self._measure([pair], rotations[sample], translations[sample], -np.inf)[0][0]
             if distance < best.distance:
                 best = Clearance(distance, self.pairs[pair], sample)
             # Far from the sample the shape has moved too much for the bound to say anything.
@@ -368,8 +368,10 @@ class Proximity:
             )
         return np.array([self._considered(frozenset(item)) for item in ignore])
 
-    def _measure(self, indices: list[int], rotations: FloatArray, translations: FloatArray) -> list[Measured]:
-        """Distance, normal and the two nearest points of each pair, the body's shapes being placed.
+    def _measure(
+        self, indices: list[int], rotations: FloatArray, translations: FloatArray, within: float
+    ) -> list[Measured]:
+        """Distance and, where it is below ``within``, normal and nearest points of each pair.
 
         The vectors are buffers that the next measurement of the same pair overwrites.
         """
@@ -382,7 +384,7 @@ class Proximity:
                     # The shape's own transform: making new ones takes longer than many a distance.
                     places[key] = self._moving[key]
                     places[key].setTransform(rotations[key], translations[key])
-            found.append(self._meters[index](places[shape], places[other]))
+            found.append(self._meters[index](places[shape], places[other], within))
         return found
 
 

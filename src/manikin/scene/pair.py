@@ -1,7 +1,7 @@
 """Signed distance of one pair of Coal geometries."""
 
 import math
-from collections.abc import Callable
+from typing import Protocol
 
 import coal
 import numpy as np
@@ -11,8 +11,19 @@ from manikin.spatial import FloatArray
 Measured = tuple[float, FloatArray, FloatArray, FloatArray]
 """Distance [m], unit normal from the first to the second, nearest point on each."""
 
-Meter = Callable[[coal.Transform3s, coal.Transform3s], Measured]
-"""Measures one pair at the placements of both."""
+_BEYOND: FloatArray = np.full(3, np.nan)
+_BEYOND.setflags(write=False)
+
+
+class Meter(Protocol):
+    """Measures one pair at the placements of both."""
+
+    def __call__(
+        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
+    ) -> Measured:
+        """Distance, normal and nearest points; see :class:`PairMeter`."""
+        ...
+
 
 _FINE = 1e-8
 _SAFE = 1e-6
@@ -34,11 +45,19 @@ class PairMeter:
         self._request = _request(_SAFE if round_edged else _FINE)
         self._result = coal.DistanceResult()
 
-    def __call__(self, place: coal.Transform3s, other: coal.Transform3s) -> Measured:
+    def __call__(
+        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
+    ) -> Measured:
         """Measure at the two geometry-to-world placements.
 
+        Args:
+            place: Of the first geometry.
+            other: Of the second.
+            within: Only of a smaller distance are normal and points wanted [m]; reading them takes
+                longer than many a distance.
+
         Returns:
-            Distance, negative in penetration; normal; nearest points.
+            Distance, negative in penetration; normal; nearest points, the vectors NaN where not wanted.
         """
         result = self._result
         result.clear()
@@ -46,6 +65,8 @@ class PairMeter:
         if not abs(distance) < _FAILED:
             result.clear()
             distance = self._compute(place, other, _request(_SAFE), result)
+        if distance >= within:
+            return distance, _BEYOND, _BEYOND, _BEYOND
         normal = result.normal
         if not math.isfinite(normal[0]):
             normal = _fallback_normal(place, other)
@@ -63,8 +84,11 @@ class BallCylinderMeter:
         self._ball_radius = float(ball.radius)
         self._radius, self._half_length = float(cylinder.radius), float(cylinder.halfLength)
 
-    def __call__(self, place: coal.Transform3s, other: coal.Transform3s) -> Measured:
+    def __call__(
+        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
+    ) -> Measured:
         """Distance, normal and nearest points; see :class:`PairMeter`."""
+        del within
         rotation, origin = other.getRotation(), other.getTranslation()
         centre = place.getTranslation()
         nearest, outward, height = self._nearest(rotation.T @ (centre - origin))
@@ -97,8 +121,10 @@ class _Swapped:
     def __init__(self, meter: Meter) -> None:
         self._meter = meter
 
-    def __call__(self, place: coal.Transform3s, other: coal.Transform3s) -> Measured:
-        distance, normal, on_second, on_first = self._meter(other, place)
+    def __call__(
+        self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
+    ) -> Measured:
+        distance, normal, on_second, on_first = self._meter(other, place, within)
         return distance, -normal, on_first, on_second
 
 

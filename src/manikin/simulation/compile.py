@@ -14,6 +14,7 @@ world's and ``v = (v_l, w)``, ``a = (a_l, w')`` in the root's axes as in Pinocch
 * its generalised force is ``(R f, m)`` for our ``(f, m)``, so that the power is the same.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -23,6 +24,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from manikin.balance.friction import cross
 from manikin.body import BodyModel, Hinge, Segment, Shape, ShapeKind
 from manikin.scene import Scene
 from manikin.simulation.options import PhysicsOptions
@@ -65,7 +67,8 @@ class SimulationModel:
         """(nq,) configuration of ``qpos``; its quaternion is normalised."""
         q = np.array(qpos, dtype=np.float64)
         q[6], q[3:6] = q[3], q[4:7].copy()
-        q[3:7] /= np.linalg.norm(q[3:7])
+        quaternion = q[3:7]
+        quaternion /= math.sqrt(quaternion.dot(quaternion))
         return q
 
     def v_to_mujoco(self, q: ArrayLike, v: ArrayLike) -> FloatArray:
@@ -79,14 +82,14 @@ class SimulationModel:
     def a_to_mujoco(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> FloatArray:
         """(nv,) ``qacc`` of an acceleration at the state ``(q, v)``."""
         speed, acceleration = np.asarray(v, dtype=np.float64), np.array(a, dtype=np.float64)
-        acceleration[:3] += np.cross(speed[3:6], speed[:3])
+        acceleration[:3] += cross(speed[3:6], speed[:3])
         return _turned(root_rotation(q), acceleration)
 
     def a_from_mujoco(self, qpos: ArrayLike, qvel: ArrayLike, qacc: ArrayLike) -> FloatArray:
         """(nv,) acceleration of ``qacc`` at ``(qpos, qvel)``."""
-        speed = self.v_from_mujoco(qpos, qvel)
-        acceleration = _turned(root_rotation(self.q_from_mujoco(qpos)).T, qacc)
-        acceleration[:3] -= np.cross(speed[3:6], speed[:3])
+        to_root = root_rotation(self.q_from_mujoco(qpos)).T
+        speed, acceleration = _turned(to_root, qvel), _turned(to_root, qacc)
+        acceleration[:3] -= cross(speed[3:6], speed[:3])
         return acceleration
 
     def tau_to_mujoco(self, q: ArrayLike, tau: ArrayLike) -> FloatArray:
@@ -140,7 +143,7 @@ class SimulationModel:
 
 def root_rotation(q: ArrayLike) -> FloatArray:
     """(3, 3) rotation from the root's axes to the world's of a configuration."""
-    x, y, z, w = np.asarray(q, dtype=np.float64)[3:7]
+    x, y, z, w = np.asarray(q, dtype=np.float64)[3:7].tolist()
     return np.array(
         [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

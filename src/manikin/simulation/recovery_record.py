@@ -1,6 +1,7 @@
 """What happens while a pushed body keeps its balance, step by step, and what follows from it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -30,7 +31,7 @@ class RecoveryTrace:
         strategies: (n,) what decided the torques.
         gain_share: (n,) share of the largest posture gains.
         com_velocity: (n, 3) [m/s].
-        momentum: (n, 3) angular momentum about the centre of mass of each group of segments, by name.
+        momenta: Measures the angular momentum of groups of segments.
         power: (n,) power of the joints of each group, by name [W].
         fallbacks: Time [s] and reason of every step whose program was not solved.
         control_ms: Mean time of a control step [ms].
@@ -43,10 +44,20 @@ class RecoveryTrace:
     strategies: NDArray[np.str_]
     gain_share: FloatArray
     com_velocity: FloatArray
-    momentum: dict[str, FloatArray]
+    momenta: "SegmentMomenta"
     power: dict[str, FloatArray]
     fallbacks: tuple[tuple[float, str], ...]
     control_ms: float
+
+    @cached_property
+    def momentum(self) -> dict[str, FloatArray]:
+        """(n, 3) angular momentum about the centre of mass of each group, by name [kg.m^2/s].
+
+        Measured when it is asked for first; a search for the strongest push has no need of it.
+        """
+        motion = self.motion
+        rows = [self.momenta.at(*state) for state in zip(motion.q, motion.v, motion.com, strict=True)]
+        return {group: np.array([row[group] for row in rows]) for group in rows[0]}
 
     def work(self, group: str) -> tuple[float, float]:
         """Work given and taken by the joints of a group [J], both positive."""
@@ -97,7 +108,6 @@ class RecoveryRecorder:
         """Turn the steps into a trace."""
         outputs = [output for _, output, _, _ in self._rows]
         states = [output.state for output in outputs]
-        momentum = [self._momenta.at(state.q, state.v, state.com) for state in states]
         torque = np.array([output.tau for output in outputs])
         speed = np.array([state.v[6:] for state in states])
         joints = self._controller.groups.joints
@@ -112,7 +122,7 @@ class RecoveryRecorder:
             strategies=np.array([str(output.strategy) for output in outputs]),
             gain_share=np.array([output.gain_share for output in outputs]),
             com_velocity=np.array([state.momentum[:3] / state.mass for state in states]),
-            momentum={group: np.array([row[group] for row in momentum]) for group in momentum[0]},
+            momenta=self._momenta,
             power={
                 group: np.sum(torque[:, index] * speed[:, index], axis=1) for group, index in joints.items()
             },

@@ -156,9 +156,11 @@ class World:
         self._owners = tuple(_owner(model, geom) for geom in range(self._model.ngeom))
         self._segments = frozenset(segment.name for segment in model.body.segments)
         self._planned = np.zeros((self._model.ngeom, self._model.ngeom), dtype=bool)
-        self._leaning = np.zeros_like(self._planned)
+        self._leaning, self._leans = np.zeros_like(self._planned), False
         self._padded = np.array([name in padded and not segment for name, segment in self._owners])
+        self._pads = bool(self._padded.any())
         self._masks: dict[tuple[tuple[str, ...], bool], NDArray[np.bool_]] = {}
+        self._tables: dict[tuple[tuple[str, ...], str], NDArray[np.bool_]] = {}
         self._pushes: list[Push] = []
         self._grips: dict[str, Grip] = {}
         self._grip_forces: dict[str, FloatArray] = {}
@@ -294,6 +296,7 @@ class World:
         """
         supports = self._touching(pairs)
         self._leaning = self._touching(leaning) & ~supports
+        self._leans = bool(self._leaning.any())
         self._planned = supports | self._leaning
 
     def _touching(self, pairs: Sequence[tuple[Sequence[str], str]]) -> NDArray[np.bool_]:
@@ -322,7 +325,8 @@ class World:
             self._act()
             mujoco.mj_step(self._model, self._data)
             self._note_contacts()
-            self._total += self._constraint_wrench() - self._leaning_wrench()
+            wrench = self._constraint_wrench()
+            self._total += wrench - self._leaning_wrench() if self._leans else wrench
             self._steps += 1
 
     def mean_wrench(self) -> FloatArray:
@@ -339,9 +343,11 @@ class World:
     def _constraint_wrench(self) -> FloatArray:
         """Wrench of all contacts and grips in the last step; inner forces cancel in the root."""
         qpos, _, _ = self._before
-        force = self._data.qfrc_constraint[:3]
-        moment = root_rotation(self.model.q_from_mujoco(qpos)) @ self._data.qfrc_constraint[3:6]
-        total = np.concatenate((force, cross(qpos[:3], force) + moment))
+        generalised = self._data.qfrc_constraint
+        force, total = generalised[:3], np.empty(6)
+        total[:3] = force
+        moment = root_rotation(self.model.q_from_mujoco(qpos)) @ generalised[3:6]
+        np.add(cross(qpos[:3], force), moment, out=total[3:])
         for pull, position in self._grip_forces.values():
             total += np.concatenate((pull, cross(position, pull)))
         return total
@@ -389,10 +395,12 @@ class World:
         if self._data.ncon == 0:
             return
         contact = self._data.contact
-        geoms = contact.geom
-        padded = self._padded[geoms[:, 0]] | self._padded[geoms[:, 1]]
-        self._depth = max(self._depth, float((-contact.dist[~padded]).max(initial=0.0)))
-        self._padded_depth = max(self._padded_depth, float((-contact.dist[padded]).max(initial=0.0)))
+        geoms, depths = contact.geom, -contact.dist
+        if self._pads:
+            padded = self._padded[geoms[:, 0]] | self._padded[geoms[:, 1]]
+            self._padded_depth = max(self._padded_depth, float(depths[padded].max(initial=0.0)))
+            depths = depths[~padded]
+        self._depth = max(self._depth, float(depths.max(initial=0.0)))
         planned = self._planned[geoms[:, 0], geoms[:, 1]]
         if planned.all():
             return
@@ -404,10 +412,12 @@ class World:
 
     def touching(self, segments: Sequence[str], obstacle: str) -> bool:
         """Whether one of the segments was in contact with the obstacle in the last engine step."""
+        key = tuple(segments), obstacle
+        if key not in self._tables:
+            body, scene = self._mask(key[0], True), self._mask((obstacle,), False)
+            self._tables[key] = np.outer(body, scene) | np.outer(scene, body)
         geoms = self._data.contact.geom
-        body, scene = self._mask(tuple(segments), True), self._mask((obstacle,), False)
-        first, second = geoms[:, 0], geoms[:, 1]
-        return bool(np.any((body[first] & scene[second]) | (scene[first] & body[second])))
+        return bool(self._tables[key][geoms[:, 0], geoms[:, 1]].any())
 
     def _mask(self, names: tuple[str, ...], segments: bool) -> NDArray[np.bool_]:
         if (names, segments) not in self._masks:
@@ -420,7 +430,7 @@ class World:
         """Return accelerations and contact forces of the last engine step."""
         qpos, qvel, time = self._before
         contact, count = self._data.contact, self._data.ncon
-        parties = [self._parties(int(first), int(second)) for first, second in contact.geom]
+        parties = [self._parties(first, second) for first, second in contact.geom.tolist()]
         # The engine's contact frame has its x axis from the first geometry to the second and
         # its force is the one on the second.
         sign = np.array([-1.0 if swapped else 1.0 for *_, swapped in parties]).reshape(-1, 1)

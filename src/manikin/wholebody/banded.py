@@ -73,6 +73,7 @@ class BlockBandedSystem:
         self._blocks = np.zeros((self._bandwidth * size, d * d))
         self._coupled: list[FloatArray] = []
         self._right = np.zeros((size, d))
+        self._memory: FloatArray | None = None
 
     def add(self, hessian: FloatArray | None, gradient: FloatArray, order: int = 0) -> None:
         """Add per-sample terms on the spline's derivative of ``order``.
@@ -83,6 +84,7 @@ class BlockBandedSystem:
             order: 0 for values, 1 for rates, 2 for accelerations.
         """
         if hessian is not None:
+            self._memory = None
             self._blocks += self._products[order] @ hessian.reshape(len(hessian), -1)
         self._right -= self._rows[order] @ gradient
 
@@ -94,6 +96,7 @@ class BlockBandedSystem:
             gradient: (n, d) gradients of half the squared residuals.
             order: 0 for values, 1 for rates, 2 for accelerations.
         """
+        self._memory = None
         self._blocks[:, :: self._dimension + 1] += self._products[order] @ weight
         self._right -= self._rows[order] @ gradient
 
@@ -104,6 +107,7 @@ class BlockBandedSystem:
             jacobians: Three (n, m, d) derivatives, by value, rate and acceleration.
             residual: (n, m).
         """
+        self._memory = None
         n, m, d = jacobians[0].shape
         local = np.zeros((n, m, self._bandwidth, d))
         for order, jacobian in enumerate(jacobians):
@@ -118,14 +122,16 @@ class BlockBandedSystem:
             damping: One number, or one per control point.
         """
         size, d = self._basis.size, self._dimension
-        band = self._band()
+        if self._memory is None:  # a step is often solved for again with more damping
+            self._memory = self._assembled()
+        band = self._memory.copy().reshape(size * d, -1).T
         band[0] += np.repeat(np.broadcast_to(damping, size), d)
         return solveh_banded(
             band, self._right.ravel(), overwrite_ab=True, lower=True, check_finite=False
         ).reshape(size, d)
 
-    def _band(self) -> FloatArray:
-        """The matrix in LAPACK's lower banded storage: (bandwidth d + 1, size d), column by column.
+    def _assembled(self) -> FloatArray:
+        """The matrix in LAPACK's lower banded storage (bandwidth d + 1, size d), column by column, flat.
 
         The last row is zero; with it, a block of the matrix is an array that BLAS can add to in place.
         """
@@ -147,7 +153,7 @@ class BlockBandedSystem:
                 block = memory[begin : begin + depth**2].reshape(depth, depth).T
                 rows = local[start:stop].reshape(-1, depth)
                 dsyrk(1.0, rows.T, beta=1.0, c=block, lower=1, overwrite_c=1)
-        return memory.reshape(size * d, depth + 1).T
+        return memory
 
     def _pair_products(self, order: int) -> csr_matrix:
         values, first, size = self._basis.values[order], self._basis.first, self._basis.size

@@ -55,7 +55,7 @@ class MotionSampler:
         self._basis, self._mass = basis, body.mass
         indices = [body.effector_frame(name) for name in frames]
         self._shape_reader = PlacementReader(self._geometry_data.oMg)
-        self._frame_reader = PlacementReader([self._data.oMf[index] for index in indices])
+        self._frame_reader = PlacementReader(self._data.oMf, indices)
         moves = moves_by_joint(self._model)
         self._moving = [np.flatnonzero(moves[self._model.frames[index].parentJoint]) for index in indices]
 

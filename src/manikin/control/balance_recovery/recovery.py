@@ -124,6 +124,7 @@ class BalanceRecovery:
         """Keep the balance about another way to stand from now on."""
         self._begin_anew()
         self.standing = standing
+        self._calm = standing.area.shrunk(self.settings.posture_area)
         self._geometry = tuple(contact_geometry(self.body, contact, 0.0) for contact in standing.soles)
         self._switch = StrategySwitch(self.settings)
         self._alike = [
@@ -256,7 +257,7 @@ class BalanceRecovery:
 
     def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
         """Posture control with the ZMP well inside; None where it would leave."""
-        calm = zmp_rows(self.area.shrunk(self.settings.posture_area), loop, state.com, 0.0)
+        calm = zmp_rows(self._calm, loop, state.com, 0.0)
         gains = self.settings.posture
         stiff = gains.stiffness * (self.posture - state.q[7:])
         damped = -gains.damping * state.v[6:]

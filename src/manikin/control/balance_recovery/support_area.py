@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -39,16 +40,15 @@ class SupportArea:
             )
         return cls(convex_polygon(points[:, :2]), float(points[:, 2].mean()))
 
-    @property
+    @cached_property
     def centre(self) -> FloatArray:
         """(2,) mean of the corners [m]."""
         return self.corners.mean(axis=0)
 
     def reach(self, point: FloatArray) -> float:
         """How far out a point (2,) is: 0 in the centre, 1 on the edge, more outside."""
-        normals, offsets = self.half_planes()
-        room = offsets - normals @ self.centre
-        return float(np.max((normals @ (point - self.centre)) / room))
+        normals, _ = self._edges
+        return float(np.max((normals @ (point - self.centre)) / self._room))
 
     def inside(self, points: FloatArray) -> FloatArray:
         """Distance of points (..., 2) to the edge, negative outside [m]."""
@@ -82,10 +82,22 @@ class SupportArea:
 
     def half_planes(self, inset: float = 0.0) -> tuple[FloatArray, FloatArray]:
         """Unit outward normals (k, 2) and offsets (k,) with ``normals @ p <= offsets`` inside."""
+        normals, offsets = self._edges
+        return normals, offsets - inset
+
+    @cached_property
+    def _edges(self) -> tuple[FloatArray, FloatArray]:
+        """Normals (k, 2) and offsets (k,) of the edges."""
         along = np.roll(self.corners, -1, axis=0) - self.corners
         normals = np.column_stack((along[:, 1], -along[:, 0]))
         normals /= np.linalg.norm(normals, axis=1)[:, None]
-        return normals, np.sum(normals * self.corners, axis=1) - inset
+        return normals, np.sum(normals * self.corners, axis=1)
+
+    @cached_property
+    def _room(self) -> FloatArray:
+        """(k,) distances of the edges from the centre [m]."""
+        normals, offsets = self._edges
+        return offsets - normals @ self.centre
 
 
 def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float) -> LinearMap:
