@@ -86,7 +86,7 @@ EXECUTED = """
 
 The recorded postures are adapted to that CoM, its angular momentum and the exact stances in one smooth fit
 (postures and accelerations near the recorded ones, feet, CoM, distances), and the controller executes the
-result at the recorded speed from the first frame to one step before the last, after which it would be
+result at the recorded speed from the first frame to the last, or one step before it where it would be
 stopped dead. *Posture*: root mean square deviation of all hinges from the recording, without the toes,
 which no marker tells. *Torque*: largest share of a joint's strength in the plan. *Balanced*: share of the
 control steps with a positive margin of the measured contact forces. CoM and feet: errors from the plan.

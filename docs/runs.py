@@ -51,9 +51,10 @@ needs, for in flight the centre of mass falls with gravity. By `docs/runs.py`.
 
 `supports_of` takes both. The feet, low-passed at 5 Hz, say which foot, and when in a walk. The vertical
 force, from the centre of mass low-passed at {CUTOFF:g} Hz, says when a runner is carried: below {FALLING:g}
-of the weight nothing carries. A support ends where such a fall begins and begins where it ends; where the
-body is carried and nothing was found, the feet beside carry on as long as they are low, or else the lowest
-foot; both feet of a landing land together. In a walk the force never falls so low.
+of the weight nothing does. A support of a foot that would end or begin within such a fall ends where it
+begins or begins where it ends; where the body is carried and nothing was found, the feet beside carry on as
+long as they are low, or else the lowest foot if it is; both feet of a landing land together. In a walk the
+force never falls so low.
 
 The threshold is not fitted: low-passed at {CUTOFF:g} Hz, a force that is half a sine and has the weight as
 its mean has 0.09, 0.15, 0.21 and 0.31 of the weight left at touch-down and lift-off for stances and flights

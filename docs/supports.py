@@ -112,8 +112,9 @@ alone (`supports_of`). By `docs/supports.py`.
   whole trunk, where it is low and the trunk is 60° or more from upright.
 * **None** while the centre of mass falls freely, at a median of 0.8 g or more: as at the top of a jump, where
   feet are slow and may be as high as the box it began on.
-* **Runners**: while the motion needs less than 0.2 of the weight nothing carries, otherwise something does:
-  feet begin and end to carry then, and missed ones are added, see [recorded runs](runs.md).
+* **Runners**: feet do not begin or end to carry while the motion needs less than 0.2 of the weight; while it
+  needs more, the feet beside carry on as long as they are low, and missed ones are added, see [recorded
+  runs](runs.md).
 
 ## Beside force plates
 

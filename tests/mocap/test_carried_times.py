@@ -138,3 +138,16 @@ def test_a_drop_jump_lands_and_leaves_when_the_plates_say(recordings_folder):
     # Two frames of 100 Hz; by the feet alone 40 to 50 ms.
     assert len(errors) == 4
     assert max(errors) <= 0.025
+
+
+def test_feet_that_swing_in_the_air_carry_nothing():
+    """Somebody who hangs still, both feet to and fro between 3 and 53 cm above a surface."""
+    time = np.arange(0.0, 4.0, 1.0 / RATE)
+    body = human(1.75, 75.0)
+    q = np.tile(body.standing_posture(), (len(time), 1))
+    targets = Targets(("pelvis",), ("pelvis",), np.zeros((1, 3)), q[:, None, :3], np.ones(1))
+    found = Reconstruction(body, time, q, targets, np.zeros((len(time), 1)))
+    swing = np.cos(2.0 * np.pi * time / 1.5)
+    heel = np.column_stack([1.0 * swing, 0.0 * time, 0.28 + 0.25 * swing])
+    soles = {"left_foot": (heel, heel + TOES), "right_foot": (heel * [-1.0, 1.0, 1.0], heel + TOES)}
+    assert by_the_force((), found, soles, (0.0,), RATE) == ()

@@ -2,10 +2,12 @@
 
 Fast feet stop and start within a tenth of a second, which a low-pass of positions spreads. The centre of mass
 is heavier and slower, and knows more: in flight it falls with gravity, and while it does not, something
-carries it. So a support ends where a fall begins and begins where one ends. A time between two supports in
+carries it. So a support of a foot that ends or begins within a fall ends where it begins or begins where it
+ends; one that lasts all through a fall is left to the feet. A time between two supports in
 which nothing was found but the body is carried belongs to the feet beside it, up to where the later one is
-the slower one; who is carried between two falls stands on the lowest foot. In a walk the body never falls, so
-nothing changes but gaps.
+the slower one; who is carried between two falls stands on the lowest foot, if it is low. Where the same foot
+is on both sides, and the lowest as well, the gap stays: it stepped on the spot. In a walk the body never
+falls, so nothing changes but gaps.
 
 At both ends of a recording the low-pass knows one side only: there the force is taken for that half a period
 of the cutoff away.
@@ -246,7 +248,7 @@ class _Table:
         foot = self.feet[name]
         low = foot.lowest[begin:end]
         height = float(self.surfaces[np.argmin(np.abs(self.surfaces - low.min()))])
-        if name in others or abs(low.min() - height) > AWAY:
+        if name in others or abs(low.min() - height) > AWAY or np.median(low) - height > AWAY:
             return
         near = np.flatnonzero(low < low.min() + NEAR)
         begin, end = (

@@ -6,8 +6,8 @@ and opens where it is fast or away from it. Speeds are compared with the highest
 low-pass filter turns the stop of a fast foot into a slope that is as high as the foot was fast. Surfaces are
 found from the recording itself (:mod:`manikin.mocap.support_levels`), so stairs need no description. Others:
 :mod:`manikin.mocap.seat_supports`, :mod:`manikin.mocap.ground_supports`, :mod:`manikin.mocap.hand_supports`.
-Nobody is supported who falls freely (:mod:`manikin.mocap.free_fall`), and somebody who does not is
-(:mod:`manikin.mocap.carried_times`).
+Nobody is supported who falls freely (:mod:`manikin.mocap.free_fall`), and who does not is by the feet that
+are low then (:mod:`manikin.mocap.carried_times`).
 """
 
 from collections.abc import Mapping, Sequence

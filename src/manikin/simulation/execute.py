@@ -97,7 +97,8 @@ def execute(
         schedule: Its contacts in time.
         settings: Controller settings; the defaults when omitted.
         physics: Settings of the engine; :func:`default_physics` when omitted.
-        hold: Time to stand at the end [s].
+        hold: Time to stand at the end [s]. With none, the last step of a motion that ends at speed is left
+            out, for it would be stopped dead.
         pushes: Forces that disturb the execution, in real time, from the motion's first sample on its own;
             from then on a touch of the body with itself is no failure.
         padded: Obstacles that any part of the body may lean on, such as a backrest.
@@ -163,7 +164,7 @@ class _Run:
         self.world.reset(self.plan.q[0], self.plan.v[0], start - settle * self.period)
         count = round((self.plan.duration + hold) / self.period) + 1
         if hold == 0.0 and np.abs(self.plan.v[-1]).max() >= _AT_REST:
-            count -= 1  # At its end, a motion that ends at speed would be stopped dead.
+            count = max(count - 1, 1)  # At its end, a motion that ends at speed would be stopped dead.
         number = -settle
         while number < count + round(self.controller.clock.waited / self.period):
             time = start + number * self.period

@@ -10,7 +10,7 @@ from manikin.balance.polygon import convex_polygon, signed_distance
 from manikin.contact import Contact
 from manikin.control.balance_recovery.closed_loop import ClosedLoop, LinearMap
 from manikin.errors import InputError
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, frozen_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class SupportArea:
     @cached_property
     def centre(self) -> FloatArray:
         """(2,) mean of the corners [m]."""
-        return self.corners.mean(axis=0)
+        return frozen_array(self.corners.mean(axis=0), "centre")
 
     def reach(self, point: FloatArray) -> float:
         """How far out a point (2,) is: 0 in the centre, 1 on the edge, more outside."""
@@ -91,7 +91,9 @@ class SupportArea:
         along = np.roll(self.corners, -1, axis=0) - self.corners
         normals = np.column_stack((along[:, 1], -along[:, 0]))
         normals /= np.linalg.norm(normals, axis=1)[:, None]
-        return normals, np.sum(normals * self.corners, axis=1)
+        return frozen_array(normals, "normals"), frozen_array(
+            np.sum(normals * self.corners, axis=1), "offsets"
+        )
 
     @cached_property
     def _room(self) -> FloatArray:
