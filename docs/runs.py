@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from acknowledgements import THANKS
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -108,13 +109,6 @@ at both fewer frames are in balance as recorded, and none more once shifted. So 
 * *Half of the weight*: the witness is one number for all feet. In a run with both feet down it says nothing
   of which one.
 * *30 frames per second*: a flight of a run has two to four frames.
-"""
-THANKS = """
-## Acknowledgements
-
-The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with funding from
-NSF EIA-0196217. Motion capture data: ACCAD / The Ohio State University, Open Motion Project, CC BY 3.0
-Unported.
 """
 
 

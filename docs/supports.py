@@ -13,6 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from acknowledgements import THANKS
 from PIL import Image
 
 from manikin.errors import ManikinError
@@ -163,13 +164,6 @@ NO_HANDS = """
 Hands, knees, elbows and trunk support nobody in the recordings of walks and runs on free ground, {walks}
 of them: found were {found}; recordings without a support of a foot: {missing}. In {unseen} other recordings
 that the rules were not made on, of walks, runs, a jump and a box: {unseen_found}, and {unseen_missing}.
-"""
-THANKS = """
-## Acknowledgements
-
-The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with funding from
-NSF EIA-0196217. Motion capture data: ACCAD / The Ohio State University, Open Motion Project, CC BY 3.0
-Unported.
 """
 
 

@@ -11,7 +11,14 @@ from manikin.body.configuration import Configuration
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import InputError
 from manikin.mocap import Reconstruction, Targets, dynamics_of, least_shift, recorded_margins
-from manikin.mocap.shifted_motion import ACCELERATION_ERROR, ASIDE, INSIDE, LARGEST_SHIFT, PLACE_ERROR
+from manikin.mocap.shifted_motion import (
+    ACCELERATION_ERROR,
+    ASIDE,
+    INSIDE,
+    LARGEST_RMS,
+    LARGEST_SHIFT,
+    PLACE_ERROR,
+)
 from manikin.spatial import GRAVITY
 
 RATE, FRAMES = 100.0, 201
@@ -50,6 +57,7 @@ def test_who_is_in_balance_is_left_alone():
     assert moved.margins is margins
     assert moved.margins.balanced == 1.0
     assert moved.believable
+    assert not replace(moved, shift=moved.shift + np.eye(1, 3) * 1.1 * LARGEST_RMS).believable
     # Nor does a foot alone draw whom it carries on its axis.
     _, moved = shifted(standing(0.01 * np.sin(TIME)), on_one_foot(0.1))
     np.testing.assert_allclose(moved.shift, 0.0, atol=1e-6)
