@@ -330,7 +330,7 @@ def standing_text(one: Trial) -> str:
         f"{', '.join(places)} from the middle of our soles, ahead positive, with the markers of heels and "
         "toes at the same places of the soles each time. Hardly anybody stands so differently at both "
         "ends of one walk: plates and markers of this file seem to agree to several centimetres only, "
-        "which is most of its error.\n"
+        "which may be most of its error.\n"
     )
 
 
@@ -396,8 +396,8 @@ def torque_text(trials: list[Trial]) -> str:
         "pushes off. What is left is the error of the motion itself, as in single support, and largest at "
         "the ankle just before the next touch-down: the low-pass begins the impact early, and the foot that "
         "carries alone has to supply it. To let the next foot be loaded 40 ms before it is on the ground was "
-        "tried: the ankle's peak falls from 1.5 of that by plates to 1.1 (median), but the hip's difference "
-        "rises from 17 to 21 N.m, so it was left.\n"
+        "tried (loads that pass over 0.5 s): the ankle's peak falls from 1.5 of that by plates to 1.1 "
+        "(median), but the hip's difference rises from 17 to 21 N.m, so it was left.\n"
     )
 
 
