@@ -12,6 +12,7 @@ from manikin.centroidal import (
 )
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report, place
+from manikin.stages.world_frame import trajectory_in_world
 
 
 def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult:
@@ -44,7 +45,7 @@ def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[
     """
     report.finish("centroidal", block)
     if result.trajectory is not None:
-        report.keep("com_trajectory", result.trajectory.to_dict())
+        report.keep("com_trajectory", trajectory_in_world(result.trajectory, report.transform).to_dict())
 
 
 def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
