@@ -27,14 +27,15 @@ from manikin.balance.friction import (
 from manikin.balance.limiting import LimitingConstraint, limiting_constraint
 from manikin.balance.limits import contact_limits
 from manikin.contact import Contact, ContactKind, Stance
+from manikin.display import Displayed
 from manikin.errors import ContactError
 from manikin.normal_fan import fan_of_generators
 from manikin.polytope import Polytope, facet_rows, vertices_around
 from manikin.spatial import GRAVITY_VECTOR, FloatArray, finite_number, frozen_array
 
 
-@dataclass(frozen=True, eq=False)
-class WrenchPolytope(Polytope):
+@dataclass(frozen=True, eq=False, repr=False)
+class WrenchPolytope(Displayed, Polytope):
     """W_p: the wrenches that the scene can apply to the body ([Qiu2012]_ 4.36).
 
     Attributes:
@@ -51,6 +52,13 @@ class WrenchPolytope(Polytope):
     reference: FloatArray
     friction_model: FrictionModel
     stance_cap_multipliers: FloatArray
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        return {
+            "effectors": " ".join(self.stance.effectors), "facets": str(len(self.h)),
+            "reference": str(np.round(self.reference, 3).tolist()),
+        }  # fmt: skip
 
     def __init__(
         self,
