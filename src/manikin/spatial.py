@@ -248,6 +248,10 @@ class PlanarTransform:
         return moved
 
 
+IDENTITY = PlanarTransform()
+"""The transform between equal frames."""
+
+
 def rotation_vector(rotations: FloatArray) -> FloatArray:
     """(n, 3) rotation vectors of rotations (n, 3, 3), not longer than pi [rad]."""
     return np.asarray(Rotation.from_matrix(rotations).as_rotvec(), dtype=np.float64)

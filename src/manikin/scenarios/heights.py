@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from manikin.scenarios.expressions import Expression, functions_for
-from manikin.spatial import FloatArray, PlanarTransform
+from manikin.spatial import IDENTITY, FloatArray, PlanarTransform
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class HeightBand:
     upper_expression: Expression
     level: SupportLevel
     scale: float = 1.0
-    transform_expressions_to_world: PlanarTransform = PlanarTransform()
+    transform_expressions_to_world: PlanarTransform = IDENTITY
 
     def lower(self, x: Any, y: Any, z: Any) -> Any:
         """Lowest height of a CoM at (x, y, z) [m]; floats, arrays or CasADi expressions."""

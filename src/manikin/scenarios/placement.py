@@ -13,7 +13,7 @@ import numpy as np
 
 from manikin.scenarios.sections import ContactSection, StateSection
 from manikin.scenarios.validation import Moves, Section
-from manikin.spatial import PlanarTransform
+from manikin.spatial import IDENTITY, PlanarTransform
 
 TASK_GRID = 9
 """Decimals of the task frame's metres and degrees; direction components have three more."""
@@ -22,9 +22,7 @@ FILE_GRID = 12
 """Decimals of the metres and degrees of a scenario that is written at another place."""
 
 
-def task_frame(
-    start: StateSection, contacts: Mapping[str, ContactSection] | None = None
-) -> PlanarTransform:
+def task_frame(start: StateSection, contacts: Mapping[str, ContactSection] | None = None) -> PlanarTransform:
     """Transform from the frame of a task to the world, ``transform_task_to_world``.
 
     The origin is below the centre of mass at the start, or where the body stands there; x is the heading at
@@ -49,7 +47,7 @@ def start_heading_deg(start: StateSection, contacts: Mapping[str, ContactSection
         contacts: Of the first phase, where supports are given.
     """
     if contacts is None or start.heading_deg is not None:
-        return PlanarTransform().turned(start.heading_deg or 0.0)
+        return IDENTITY.turned(start.heading_deg or 0.0)
     headings = [item.yaw_deg for name, item in contacts.items() if "foot" in name]
     headings = headings or [_heading_deg(name, item) for name, item in contacts.items()]
     first = headings[0]
@@ -131,7 +129,7 @@ def _faces_down(contact: ContactSection) -> bool:
 
 def _angle(degrees: float, decimals: int) -> float:
     """The angle on the grid; -180 is 180."""
-    return PlanarTransform().turned(_rounded([degrees], decimals)[0])
+    return IDENTITY.turned(_rounded([degrees], decimals)[0])
 
 
 def _rounded(values: Any, decimals: int) -> list[float]:

@@ -10,7 +10,7 @@ from manikin.errors import InputError
 from manikin.motion.derived import phases_of
 from manikin.motion.file import MotionFile, read_motions
 from manikin.scenarios.heights import SupportLevel
-from manikin.spatial import FloatArray, PlanarTransform
+from manikin.spatial import IDENTITY, FloatArray, PlanarTransform
 
 SAME_PLACE = 0.01
 """Distance up to which a recorded contact is that of the scenario [m]."""
@@ -21,7 +21,7 @@ def load_recording(
     sequence: StanceSequence,
     stature: float,
     level: SupportLevel,
-    transform_recording_to_world: PlanarTransform = PlanarTransform(),
+    transform_recording_to_world: PlanarTransform = IDENTITY,
 ) -> Recording:
     """Read the CoM of a motion file and lay its timing over the stances of a scenario.
 

@@ -28,7 +28,7 @@ from manikin.scenarios.sections import (
 )
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.validation import place
-from manikin.spatial import FloatArray, PlanarTransform, frozen_array
+from manikin.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ class ScenarioValues:
         if constraint is None or constraint.height_band is None:
             return None
         band = constraint.height_band
-        frame = PlanarTransform() if band.frame is None else band.frame.transform_to_world()
+        frame = IDENTITY if band.frame is None else band.frame.transform_to_world()
         return HeightBand(
             Expression(band.lower), Expression(band.upper), self.support_level(), self.stature_scale, frame
         )

@@ -145,11 +145,14 @@ class Report:
     ) -> None:
         if self._directory is None:
             return
-        in_world = [None if one is None else motion_in_world(one, self.transform) for one in (planned, executed)]
+        transform = self.transform
         content = MotionFile(
-            *in_world, self._context.body, self._context.scene_in_world,
-            schedule_in_world(schedule, self.transform),
-        )  # fmt: skip
+            None if planned is None else motion_in_world(planned, transform),
+            None if executed is None else motion_in_world(executed, transform),
+            self._context.body,
+            self._context.scene_in_world,
+            schedule_in_world(schedule, transform),
+        )
         write_motions(self._directory.path / name, content)
 
 

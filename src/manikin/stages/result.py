@@ -7,7 +7,7 @@ from typing import Any
 from manikin.centroidal import CentroidalResult
 from manikin.motion import Motion
 from manikin.simulation import Execution, Recovery
-from manikin.spatial import PlanarTransform
+from manikin.spatial import IDENTITY, PlanarTransform
 from manikin.stages.report import Report
 from manikin.stages.world_frame import motion_in_world
 from manikin.wholebody import RefineResult, WholeBodyResult
@@ -38,7 +38,7 @@ class RunResult:
     execution: Execution | None
     directory: Path | None
     recovery: Recovery | None = None
-    transform_task_to_world: PlanarTransform = PlanarTransform()
+    transform_task_to_world: PlanarTransform = IDENTITY
 
     @classmethod
     def of(

@@ -163,7 +163,10 @@ def keep_paths(report: Report, plan: PlannedWalks) -> None:
     """Keep the ways of all who walk among the files of the run: instants [s], x, y [m], headings [rad]."""
     routes = {BODY: plan.route, **plan.others}
     report.keep(WALK_PATHS, {
-        name: {"time_s": route.time[::PATH_EVERY], "place": _in_world(route.place[::PATH_EVERY], report.transform)}
+        name: {
+            "time_s": route.time[::PATH_EVERY],
+            "place": _in_world(route.place[::PATH_EVERY], report.transform),
+        }
         for name, route in routes.items()
     })  # fmt: skip
 

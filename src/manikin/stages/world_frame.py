@@ -1,4 +1,4 @@
-"""Results of a run in the world: what was found in the frame of the task, written where the scenario stands."""
+"""Results of a run in the world: what was found in the frame of the task, moved to where that is."""
 
 import re
 from dataclasses import replace

@@ -4,7 +4,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from manikin.scenarios.validation import Moves, NonNegative, Number, Positive, Section, Vector3, refuse, rule_error
+from manikin.scenarios.validation import (
+    Moves,
+    NonNegative,
+    Number,
+    Positive,
+    Section,
+    Vector3,
+    refuse,
+    rule_error,
+)
 
 _KIND_KEYS: dict[str, tuple[str, ...]] = {
     "sole": ("normal", "sole", "friction", "normal_force_cap_N", "torsion_limit_Nm", "settle_s"),
@@ -27,11 +36,13 @@ class ContactSection(Section):
     kind: Literal["sole", "point", "grasp"] | None = Field(
         default=None, description="default: sole for a foot, grasp for a hand"
     )
-    position: Annotated[Vector3, Moves.POINT] = Field(description="of the contact (centre of a sole) in the world [m]")
+    position: Annotated[Vector3, Moves.POINT] = Field(
+        description="of the contact (centre of a sole) in the world [m]"
+    )
     yaw_deg: Annotated[Number, Moves.HEADING] = Field(
         default=0.0,
-        description="heading of the toes, or of the friction's axes of a point, counter-clockwise from world x "
-        "[deg]",
+        description="heading of the toes, or of the axes of a point's friction, counter-clockwise from "
+        "world x [deg]",
     )
     normal: Annotated[Vector3 | None, Moves.DIRECTION] = Field(
         default=None, description="surface normal, into the body (default up)"

@@ -51,7 +51,8 @@ class PhaseSection(Section):
         default=None, description="where the centre of mass should be when the phase begins [m]"
     )
     com_within_m: Vector3 = Field(
-        default=(0.05, 0.05, 0.05), description="how far it may be from there along x, y and z of the task frame, x being the heading "
+        default=(0.05, 0.05, 0.05),
+        description="how far it may be from there along x, y and z of the task frame, x being the heading "
         "at the start [m]",
     )
 

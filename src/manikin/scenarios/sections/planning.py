@@ -14,7 +14,10 @@ class WeightsSection(Section):
     margin: NonNegative | None = Field(default=None, description="of the smallest margin [1/(N.m)] or [1/N]")
     smoothness: NonNegative | None = Field(default=None, description="of the mean squared derivatives")
     duration: NonNegative | None = Field(default=None, description="of the duration [1/s]")
-    velocity: Weights3 | None = Field(default=None, description="along x, y, z of the task frame, x being the heading at the start [s^2/m^2]")
+    velocity: Weights3 | None = Field(
+        default=None,
+        description="along x, y, z of the task frame, x being the heading at the start [s^2/m^2]",
+    )
     acceleration: Weights3 | None = Field(default=None, description="along the same axes [s^4/m^2]")
     jerk: Weights3 | None = Field(default=None, description="along the same axes [s^6/m^2]")
 

@@ -58,7 +58,9 @@ class ActSection(Section):
 
     kind: Literal["push", "pull"] = Field(description="press with the palms, or hold on and draw")
     on: Text = Field(description="name of an obstacle; it does not move")
-    direction: Annotated[Vector3, Moves.DIRECTION] = Field(description="where the force on the object points; level")
+    direction: Annotated[Vector3, Moves.DIRECTION] = Field(
+        description="where the force on the object points; level"
+    )
     force_N: Positive = Field(description="force on the object [N]")
     ramp_s: Positive = Field(default=1.0, description="time in which the force rises from none [s]")
     hold_s: NonNegative = Field(default=2.0, description="time for which it is held then [s]")
