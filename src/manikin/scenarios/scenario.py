@@ -16,7 +16,7 @@ from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.tree import Tree
 from manikin.scenarios.validation import validate
 from manikin.scenarios.values import ScenarioValues
-from manikin.spatial import PlanarTransform
+from manikin.spatial import PlanarTransform, finite_number
 
 if TYPE_CHECKING:
     from manikin.body import BodyModel
@@ -80,8 +80,11 @@ class Scenario(Displayed, ScenarioValues):
             yaw_deg: Turn about the vertical through it, counter-clockwise [deg].
 
         Raises:
+            InputError: If a number is not finite.
             ScenarioError: If a coordinate becomes larger than a file may hold.
         """
+        x, y = finite_number(x, "moved x [m]"), finite_number(y, "moved y [m]")
+        yaw_deg = finite_number(yaw_deg, "moved yaw [deg]")
         return self._in_frame(PlanarTransform(x, y, yaw_deg), FILE_GRID)
 
     def in_task_frame(self) -> Scenario:
