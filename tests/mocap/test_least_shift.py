@@ -110,6 +110,20 @@ def test_a_tremble_of_a_millimetre_is_taken_out_by_less_than_one():
     assert moved.rms < 1.2e-3
 
 
+def test_the_floor_is_named_and_told_from_results():
+    """Who stands beyond the edge is held by the floor, who stands well inside by nothing."""
+    margins, moved = shifted(standing(np.zeros(FRAMES)), on_one_foot(-0.01), aside=None)
+    assert moved.floor == pytest.approx(INSIDE * WEIGHT)
+    assert moved.floor_length == pytest.approx(INSIDE)
+    assert moved.at_floor.mean() > 0.3
+    foot = margins.polytopes[0].stance.contacts[0]
+    ahead = foot.position[0] + 0.5 * LENGTH - moved.dynamics.zero_moment_point(0.0)[:, 0]
+    # There the centre of pressure is the floor from the edge, but for the facet's part in the forces.
+    np.testing.assert_allclose(ahead[moved.at_floor], INSIDE, rtol=0.05)
+    assert (ahead > 0.95 * INSIDE).all()
+    assert not shifted(standing(np.zeros(FRAMES)), on_one_foot(0.1), aside=None)[1].at_floor.any()
+
+
 def test_no_shift_makes_a_fall_a_stand():
     margins, moved = shifted(standing(np.zeros(FRAMES)), on_one_foot(-0.15))
     # Bounded per axis, so the body stays beyond the edge and its margin negative.
