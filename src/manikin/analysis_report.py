@@ -12,10 +12,10 @@ from manikin.version import __version__
 
 WORDS = (
     "Times are seconds on the recording's clock. The margin is the distance of the wrench that the motion "
-    "needs to the faces of what the contacts can give (Qiu 2012, 4.2.9), alpha = 1 m: below 0 the contacts, "
-    "as they were found, could not give it. Measured is the motion as recorded. Recordings tell "
-    "places to a centimetre and so leave accelerations open: a margin below 0 need not say that a person was "
-    "out of balance."
+    "needs to the faces of what the contacts can give (Qiu 2012, 4.2.9), moments about the CoM, "
+    "alpha = 1 m: below 0 the contacts, as they were found, could not give it. Measured is the motion as "
+    "recorded. Recordings tell places to a centimetre and so leave accelerations open: a margin below 0 need "
+    "not say that a person was out of balance."
 )
 SHIFTED = (
     "The shifted motion is the recorded one after the least shift of the whole body with which its contacts "
@@ -159,6 +159,10 @@ def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
         "sequence of touch-downs": ", ".join(map(readable, summary["sequence"])) or "none",
         "lowest centre of mass [m]": summary["com_height_min_m"],
         "lowest margin, as recorded [N.m]": margin["min"],
+        "smallest force at the CoM that would end balance [N]": margin["force_min_N"],
+        "smallest distance of the ZMP to the edge of the soles [mm]": None
+        if margin["zmp_distance_min_m"] is None
+        else f"{1e3 * margin['zmp_distance_min_m']:.0f}",
         "limited by": None if margin["limiting"] is None else readable(margin["limiting"]),
         "frames in contact": _share(margin["share_in_contact"]),
         "of them with a positive margin, as recorded": _share(margin["share_positive_in_contact"]),

@@ -32,7 +32,7 @@ def test_who_stands_is_pushed_by_their_weight_below_their_centre_of_mass(standin
 
 
 def test_margin_is_that_of_the_stance_found(standing):
-    """Built by hand from the places of the feet, about the middle between them."""
+    """Built by hand from the places of the feet, about the centre of mass."""
     body, frame = standing.body, 30
     feet = [standing.supports.of(name)[0] for name in ("left_foot", "right_foot")]
     soles = [
@@ -40,8 +40,8 @@ def test_margin_is_that_of_the_stance_found(standing):
         for one in feet
     ]
     stance = Stance(soles, STRONGEST * body.mass * GRAVITY)
-    middle = np.mean([contact.position for contact in soles], axis=0)
-    report = evaluate_balance(stance, body.mass, standing.motion.com[frame], reference=middle)
+    com = standing.motion.com[frame]
+    report = evaluate_balance(stance, body.mass, com, reference=com)
     assert standing.motion.margin[frame] == pytest.approx(report.margin, rel=1e-4)
     assert standing.point_mass_margin[frame] == pytest.approx(report.margin, rel=1e-4)
 

@@ -118,6 +118,8 @@ class Analysis(Displayed):
             "point_mass_margin_Nm": self.point_mass_margin,
             "recorded_margin_Nm": self.measured.recorded_margins.whole_body,
             **self._shifted_series(),
+            "balance_force_N": self.measured.recorded_margins.body.force,
+            "zmp_distance_m": self.measured.recorded_margins.body.zmp_distance,
             "vertical_force_N": self.vertical_force,
             "cop_x_m": self.cop[:, 0],
             "cop_y_m": self.cop[:, 1],
@@ -194,6 +196,7 @@ class Analysis(Displayed):
         known, lowest = np.isfinite(margin), None
         if known.any():
             lowest = int(np.nanargmin(margin))
+        body, held = self.measured.recorded_margins.body, self.measured.recorded_margins.held
         points = self.point_mass_margin[np.isfinite(self.point_mass_margin)]
         return {
             "form": WHOLE_BODY,
@@ -205,7 +208,7 @@ class Analysis(Displayed):
             "limiting": None if self.limiting is None else self.limiting.description,
             "limiting_contact": None if self.limiting is None else self.limiting.effector,
             "share_known": float(np.mean(known)),
-            "share_in_contact": float(np.mean(self.measured.recorded_margins.held)),
+            "share_in_contact": float(np.mean(held)),
             "share_positive_in_contact": self.measured.recorded_margins.balanced,
             "recorded": {
                 "share_positive": float(np.mean(self.measured.recorded_margins.whole_body > 0.0)),
@@ -213,6 +216,8 @@ class Analysis(Displayed):
                 "min": float(self.measured.recorded_margins.whole_body.min()),
             },
             "shifted": self.measured.shifted_dict(),
+            "force_min_N": float(body.force[held].min()) if held.any() else None,
+            "zmp_distance_min_m": body.min_zmp_distance,
             "point_mass_min": float(points.min()) if points.size else None,
             "point_mass_share_positive": float(np.mean(points > 0.0)) if points.size else None,
         }

@@ -37,13 +37,13 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline
 
-from manikin.balance import WrenchPolytope
+from manikin.balance import WrenchPolytope, wrench_about
 from manikin.balance.friction import cross
 from manikin.contact import ContactKind
 from manikin.errors import InputError
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_dynamics import RecordedDynamics, dynamics_of_postures
-from manikin.mocap.recorded_margins import RecordedMargins, margins_within, wrench_at
+from manikin.mocap.recorded_margins import RecordedMargins, margins_within
 from manikin.mocap.recorded_motion import level_heading
 from manikin.spatial import GRAVITY, FloatArray, finite_number, frozen_array, rotation_from_yaw
 
@@ -208,7 +208,7 @@ def _about_contacts(margins: RecordedMargins, wrench: FloatArray) -> FloatArray:
         polytope = margins.polytopes[number]
         if polytope is not None:
             frames = margins.phase == number
-            distance = polytope.distances(wrench_at(wrench[frames], polytope.reference))
+            distance = polytope.distances(wrench_about(wrench[frames], polytope.reference))
             found[frames] = (distance / _lengths(polytope)).min(axis=1)
     return found
 
@@ -221,7 +221,7 @@ def _violated(margins: RecordedMargins, wrench: FloatArray, kept: float, weight:
         if polytope is None:
             continue
         frames = np.flatnonzero(margins.phase == number)
-        distance = polytope.distances(wrench_at(wrench[frames], polytope.reference))
+        distance = polytope.distances(wrench_about(wrench[frames], polytope.reference))
         where, row = np.nonzero(distance < (kept - TOLERANCE * weight) * _lengths(polytope))
         found.append(np.column_stack([frames[where], row]))
     return np.vstack(found)
@@ -254,7 +254,7 @@ class _Rows:
     ) -> "_Rows":
         """``h - H w`` of (v, 6) rows in (v,) frames, moments about a point."""
         weight, (force, moment) = GRAVITY * dynamics.body.mass, (H[:, :3], H[:, 3:])
-        base = (h - np.sum(H * wrench_at(dynamics.wrench[frame], about), axis=1)) / weight
+        base = (h - np.sum(H * wrench_about(dynamics.wrench[frame], about), axis=1)) / weight
         # H_m . (s x f) = s . (f x H_m), and H_m . (c x s'') = s'' . (H_m x c)
         on_shift = cross(dynamics.wrench[frame, :3], moment) / weight
         on_bend = (force + cross(moment, dynamics.com[frame] - about)) / GRAVITY
