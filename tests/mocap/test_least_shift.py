@@ -86,7 +86,7 @@ def test_who_stands_beyond_the_edge_is_put_back_by_what_is_missing():
     # At rest 1 cm before the front edge, the centre of mass has to go back by that and by what is kept.
     margins, moved = shifted(standing(np.zeros(FRAMES)), on_one_foot(-0.01), aside=None)
     assert (margins.whole_body < 0.0).all()
-    # What is imposed is the distance of the zero moment point to the edge, but for the facet's part in forces.
+    # Imposed is the distance of the zero moment point to the edge, but for the facet's part in the forces.
     assert moved.margins.body.zmp_distance.min() > 0.95 * INSIDE
     np.testing.assert_allclose(moved.shift[:, 1], 0.0, atol=1e-6)
     # Standing still that far back would do as well, and costs more than leaning on accelerations.
