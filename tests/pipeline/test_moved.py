@@ -3,16 +3,14 @@
 The moved scenario's coordinates are written anew in the world; its run finds the frame of the task by itself.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from manikin.contact_planning import Endpoints
 from manikin.motion.file import read_motions
 from manikin.pipeline import run
 from manikin.scenarios import load_scenario
 from manikin.spatial import PlanarTransform
+from manikin.stages.world_frame import reason_in_world
 
 MOVE = (10.0, -7.0, 37.0)
 
@@ -77,20 +75,30 @@ def test_files_of_a_moved_run_are_in_the_world(both, name):
     assert there.directory is not None
     content = read_motions(there.directory / "motion.h5")
     scenario = load_scenario(there.directory / "scenario.yaml")
-    content = replace(content, scene=content.scene)
-    for phase in content.schedule.sequence:
-        for contact in phase.stance:
-            content.scene.touched_obstacle(contact, 0.005)
-            scenario.build_scene().touched_obstacle(contact, 0.005)
+    scene = scenario.build_scene()
+    for contact in (contact for phase in content.schedule.sequence for contact in phase.stance):
+        assert content.scene.touched_obstacle(contact, 0.005) == scene.touched_obstacle(contact, 0.005)
     kept = content.executed if content.planned is None else content.planned
     start = np.array(scenario.file.task.start.com or scenario.file.task.start.at)[:2]
     assert np.hypot(*(kept.com[0, :2] - start)) < 0.5
 
 
 def test_a_place_in_a_reason_is_one_of_the_world():
-    """Nobody stands inside a wall: the reason names the place as the file does."""
-    wall = "scene=[{name: wall, box: [1, 1, 3], position: [0, 0, 1.5]}]"
-    scenario = load_scenario("crouch", overrides=[wall])
+    """Nobody sits beside the chair: the reason names the place as the file does, to its digits."""
+    scenario = load_scenario("stand-up-chair", overrides=["task.start.at=[3.0, 1.0]"])
     reasons = [run(job).summary["failure"]["reason"] for job in (scenario, scenario.moved(*MOVE))]
-    assert "[0.0, 0.0] m" in reasons[0]
-    assert reasons[1] == reasons[0].replace("[0.0, 0.0] m", "[10.0, -7.0] m")
+    assert "[3.0, 1.0] m" in reasons[0]
+    # 10 + 3 cos 37 deg - sin 37 deg, -7 + 3 sin 37 deg + cos 37 deg
+    assert reasons[1] == reasons[0].replace("[3.0, 1.0] m", "[11.8, -4.4] m")
+
+
+@pytest.mark.parametrize(
+    ("reason", "moved"),
+    [
+        ("nothing near [1.0, 2.00] m", "nothing near [8.0, 2.0] m"),
+        ("at [-0.5, 0.25, 1.125] m and [0, 0] m", "at [9.75, 0.5, 1.125] m and [10.0, 1.0] m"),
+        ("margin [N.m] of phase [3] is at most 14.58", "margin [N.m] of phase [3] is at most 14.58"),
+    ],
+)
+def test_positions_in_a_reason_are_moved_and_heights_and_other_numbers_stay(reason, moved):
+    assert reason_in_world(reason, PlanarTransform(10.0, 1.0, 90.0)) == moved
