@@ -72,6 +72,12 @@ def test_the_head_passes_under_the_beam(name):
         assert result.summary["execution"]["lowest_com_m"] == pytest.approx(LOWEST_COM[name], abs=0.07)
 
 
+def test_a_knee_high_beam_ends_in_its_true_cause():
+    """0.4 m is less than the body folds to; the failure says so."""
+    failure = manikin.run("beam-H1C1@knee-high").summary["failure"]
+    assert "'beam' leaves 0.40 m above the supports; this body folds to no less than" in failure["reason"]
+
+
 @pytest.mark.parametrize(("name", "stature", "mass", "sex"), BODIES)
 def test_other_bodies_do_the_same(name, stature, mass, sex):
     """The scene does not grow with the body; margins of the scenario are kept by each ([Qiu2012]_ 5.4.4)."""
