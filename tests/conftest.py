@@ -93,6 +93,9 @@ class Runs:
 
     def __call__(self, name, variant=None, overrides=(), seed=None, body=()):
         """Result of a run, with its directory (``body``: stature [m], mass [kg], sex)."""
+        from manikin.scenarios import load_scenario
+
+        seed = load_scenario(name, variant, overrides).seed if seed is None else seed
         key = f"{name}@{variant}|{'|'.join(overrides)}|{seed}|{body}"
         if key not in self.read:
             place = self.folder / hashlib.sha256(key.encode()).hexdigest()[:16]
