@@ -14,25 +14,13 @@ from manikin.stages.world_frame import reason_in_world
 
 MOVE = (10.0, -7.0, 37.0)
 
-NAMES = ("platform", "stand-up-chair", "stairs", "push-back-500", "crouch")
+NAMES = ("platform", "stand-up-chair", "stairs", "push-back-500", "crouch", "goal-left")
 
 
-@pytest.fixture(scope="module")
-def both(tmp_path_factory):
-    """Runs of a scenario and of the same one moved, each once."""
-    found = {}
-
-    def once(name):
-        if name not in found:
-            scenario = load_scenario(name)
-            folder = tmp_path_factory.mktemp(name)
-            found[name] = (
-                run(scenario, out=folder / "here"),
-                run(scenario.moved(*MOVE), out=folder / "there"),
-            )
-        return found[name]
-
-    return once
+@pytest.fixture
+def both(runs):
+    """Runs of a scenario and of the same one moved."""
+    return lambda name: (runs(name), runs(name, moved=MOVE))
 
 
 @pytest.mark.slow
