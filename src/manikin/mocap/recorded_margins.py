@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.balance import LimitingConstraint, WrenchPolytope, wrench_polytope
-from manikin.balance.friction import cross
 from manikin.contact import ContactSchedule, Stance
 from manikin.mocap.recorded_dynamics import RecordedDynamics
-from manikin.spatial import FloatArray, frozen_array
+from manikin.spatial import FloatArray, cross, frozen_array
 
 
 @dataclass(frozen=True, eq=False)
