@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.balance import signed_distance
@@ -22,7 +22,6 @@ def test_on_level_points_the_room_is_the_distance_to_their_polygon():
     assert static_room(Stance([]), 75.0, np.zeros(3)) == -np.inf
 
 
-@settings(max_examples=20, deadline=None)
 @given(
     x=st.floats(-0.3, 0.3), y=st.floats(-0.5, 0.5), tilt=st.floats(-0.6, 0.6),
     model=st.sampled_from(FRICTION_MODELS),

@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 
 from manikin.contact.contact import Contact, ContactKind
 from manikin.contact.model import ContactModel, FrictionModel, default_normal_force_cap
+from manikin.display import Displayed
 from manikin.errors import ContactError
 
 
-@dataclass(frozen=True, eq=False)
-class Stance:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stance(Displayed):
     """A set of simultaneous contacts, one per effector.
 
     Attributes:
@@ -19,6 +20,14 @@ class Stance:
 
     contacts: tuple[Contact, ...]
     model: ContactModel
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        cap = "none" if self.normal_force_cap is None else f"{self.normal_force_cap:.0f} N"
+        return {
+            "contacts": " ".join(self.effectors), "friction_model": self.friction_model,
+            "normal_force_cap": cap,
+        }  # fmt: skip
 
     def __init__(
         self,
