@@ -43,9 +43,9 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
     if act is None or section is None:
         return planned
     q, contacts = planned.motion.q[-1], list(planned.schedule.sequence[-1].stance)
-    friction = context.scenario.explicit_supports().friction
-    largest = largest_force(context.body, q, contacts, act, friction)
-    forces = share_force(context.body, q, contacts, act, friction)
+    rub = context.scenario.explicit_supports().friction, context.scenario.contact_model.friction
+    largest = largest_force(context.body, q, contacts, act, *rub)
+    forces = share_force(context.body, q, contacts, act, *rub)
     report.finish("act", _summary(act, largest, forces))
     if forces is None or forces.torque_share > 1.0:
         weak = "friction and balance allow" if forces is None else f"{forces.tightest} allows"
