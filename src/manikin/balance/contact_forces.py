@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from manikin.balance.friction import pyramid_edges, pyramid_sides
-from manikin.contact import ContactKind, Stance
+from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
 from manikin.spatial import FloatArray, cross
 
 STEPS = 40
@@ -28,6 +28,9 @@ STEPS = 40
 
 HALVINGS = 8
 """Times that a Newton step is halved which does not bring the equations nearer to zero."""
+
+LEAST_NORMAL = 1.0
+"""Smallest normal force that friction is a share of [N]."""
 
 SOLVED = 1e-12
 """Error of the equations that is rounding, relative to the wrench."""
@@ -213,24 +216,69 @@ class _Program:
         return magnitude, (self.b[row] - self.A @ magnitude) / self.softness
 
 
-def friction_share(stance: Stance, names: Sequence[str], contact_force: FloatArray) -> FloatArray:
-    """(n,) largest share of the friction pyramid that any sole or point of a stance uses.
+@dataclass(frozen=True)
+class FrictionUse:
+    """Largest use of friction along a motion.
 
-    1 is on a side of the pyramid of the stance's friction model. Contacts with less than a newton of normal
-    force count for the force beyond the pyramid per newton.
+    Attributes:
+        model: Friction model that the use is measured in.
+        share: Largest share of the pyramid; 1 is on one of its sides, 0 without soles and points.
+        time: When [s].
+        effector: Whose.
+    """
+
+    model: FrictionModel
+    share: float
+    time: float
+    effector: str
+
+    def summary(self) -> dict[str, float | str]:
+        """Plain values for a run's summary."""
+        return {
+            "model": self.model, "max_share": self.share, "time_s": self.time, "effector": self.effector,
+        }  # fmt: skip
+
+
+def friction_share(contact: Contact, contact_force: FloatArray, friction_model: FrictionModel) -> FloatArray:
+    """(n,) share of its friction pyramid that the force of a sole or point uses; 1 is on a side of it.
+
+    A normal force below :data:`LEAST_NORMAL` counts as that much.
 
     Args:
-        stance: The contacts with their contact model.
-        names: Effectors of the columns of the forces.
-        contact_force: (n, c, 6) or (n, c, 3) forces in world axes [N].
+        contact: A sole or point.
+        contact_force: (n, 3) in world axes [N].
+        friction_model: The pyramid.
     """
-    most = np.zeros(len(contact_force))
-    for contact in stance:
-        if contact.kind is ContactKind.GRASP:
-            continue
-        column = list(names).index(contact.effector)
-        local = contact_force[:, column, :3] @ contact.rotation_contact_to_world
-        sides = pyramid_sides(contact, stance.friction_model)
-        used = (local[:, :2] @ sides[:, :2].T).max(axis=1) / -sides[0, 2]
-        most = np.maximum(most, used / np.maximum(local[:, 2], 1.0))
+    local = contact_force @ contact.rotation_contact_to_world
+    sides = pyramid_sides(contact, friction_model)
+    used = (local[:, :2] @ sides[:, :2].T).max(axis=1) / -sides[0, 2]
+    return used / np.maximum(local[:, 2], LEAST_NORMAL)
+
+
+def friction_use(
+    schedule: ContactSchedule, time: FloatArray, names: Sequence[str], contact_force: FloatArray
+) -> FrictionUse:
+    """Largest share of the friction that contact forces of a motion use, in the model of its stances.
+
+    Args:
+        schedule: Contacts in time.
+        time: (n,) [s].
+        names: Effectors of the columns of the forces.
+        contact_force: (n, c, 6) or (n, c, 3) in world axes [N].
+    """
+    phases = schedule.phase_at(time)
+    most = FrictionUse(schedule.sequence[0].stance.friction_model, 0.0, 0.0, "")
+    for number, phase in enumerate(schedule.sequence):
+        rows = np.flatnonzero(phases == number)
+        for contact in phase.stance:
+            if contact.kind is ContactKind.GRASP or not len(rows):
+                continue
+            force = contact_force[rows, list(names).index(contact.effector), :3]
+            shares = friction_share(contact, force, phase.stance.friction_model)
+            worst = int(np.argmax(shares))
+            if shares[worst] > most.share:
+                most = FrictionUse(
+                    phase.stance.friction_model, float(shares[worst]), float(time[rows[worst]]),
+                    contact.effector,
+                )  # fmt: skip
     return most

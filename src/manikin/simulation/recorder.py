@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.balance import wrench_polytope
+from manikin.balance.contact_forces import FrictionUse, friction_share
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.control import ControlOutput, SupportMode
 from manikin.control.supports import SupportInterval, support_intervals
@@ -110,6 +111,24 @@ class Recorder:
         moved = position - landing
         along = moved - (moved @ support.contact.normal) * support.contact.normal
         self.max_slip = max(self.max_slip, float(np.linalg.norm(along)))
+
+    def friction_use(self) -> FrictionUse:
+        """Largest use of friction by the forces that control counted on, in the model of the plan.
+
+        What slides to its place is left out: it has kinetic friction only, which is on the friction cone.
+        """
+        model = self._schedule.sequence[0].stance.friction_model
+        most = FrictionUse(model, 0.0, 0.0, "")
+        for sample in self.samples:
+            for name, support in sample.output.supports.items():
+                contact = support.contact
+                if contact is None or contact.kind is ContactKind.GRASP or support.settling:
+                    continue
+                force = sample.output.wrenches[name][None, :3]
+                share = float(friction_share(contact, force, model)[0])
+                if share > most.share:
+                    most = FrictionUse(model, share, sample.sensed.time, name)
+        return most
 
     # --- measures --------------------------------------------------------------------------
 

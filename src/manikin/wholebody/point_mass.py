@@ -54,7 +54,7 @@ def point_mass_motion(
         angular_momentum=rest,
         margin=_margins(problem, trajectory, polytopes, time),
         support=schedule.support(time, names),
-        contact_force=_contact_forces(trajectory, time, names),
+        contact_force=point_mass_forces(trajectory, time),
         contact_names=names,
         joint_names=(),
         margin_unit=problem.margin_unit,
@@ -77,8 +77,14 @@ def _margins(
     return margin
 
 
-def _contact_forces(trajectory: CentroidalTrajectory, time: FloatArray, names: tuple[str, ...]) -> FloatArray:
-    """(n, c, 6) forces and moments about each contact's origin [N, N.m]."""
+def point_mass_forces(trajectory: CentroidalTrajectory, time: FloatArray) -> FloatArray:
+    """(n, c, 6) contact forces of a CoM trajectory, with moments about each contact's origin [N, N.m].
+
+    Args:
+        trajectory: The plan.
+        time: (n,) [s].
+    """
+    names = trajectory.schedule.sequence.effectors
     schedule = trajectory.schedule
     corners = [_Corners(phase.stance, names) for phase in schedule.sequence]
     wrench, phases = trajectory.pseudo_wrench(time), schedule.phase_at(time)
@@ -120,6 +126,8 @@ class _Corners:
     def share(self, wrench: FloatArray, shares: FloatArray) -> FloatArray:
         """(c, 6) forces and moments that supply the wrench about the world origin."""
         size = len(self._owner)
+        if not size:
+            return np.zeros((self._count, 6))
         cost = np.diag(1.0 / shares[self._owner])
         upper = np.concatenate([self._upper, wrench, self._caps])
         lower = np.concatenate([np.zeros(size), wrench, np.full(len(self._caps), -1e30)])
