@@ -122,10 +122,12 @@ class Recorder:
         for sample in self.samples:
             for name, support in sample.output.supports.items():
                 contact = support.contact
-                if contact is None or contact.kind is ContactKind.GRASP or support.settling:
+                wrench = sample.output.wrenches.get(name)
+                if contact is None or wrench is None:
                     continue
-                force = sample.output.wrenches[name][None, :3]
-                share = float(friction_share(contact, force, model)[0])
+                if contact.kind is ContactKind.GRASP or support.settling:
+                    continue
+                share = float(friction_share(contact, wrench[None, :3], model)[0])
                 if share > most.share:
                     most = FrictionUse(model, share, sample.sensed.time, name)
         return most
