@@ -5,13 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from manikin.balance import pseudo_wrench, wrench_polytope
-from manikin.contact import Contact, Stance
+from manikin.contact import Contact, ContactModel, FrictionModel, Stance
 from manikin.contact_planning import Candidates, ContactRules, Situation
 from manikin.contact_planning.by_place import contact_at, score_by_place
 from manikin.spatial import GRAVITY, FloatArray
-
-BODY_WEIGHTS_CAP = 3.0
-"""Cap on the sum of the normal forces [body weights]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,16 +18,18 @@ class Loads:
     Attributes:
         mass: Of the body [kg].
         wrenches: (k, 6) force and moment about the world origin on the hands [N, N.m], of each load.
+        friction_model: Of the feet.
     """
 
     mass: float
     wrenches: FloatArray
+    friction_model: FrictionModel = "outer"
 
     def margins(self, feet: list[Contact], places: FloatArray) -> FloatArray:
         """(n,) least margin of all loads at each place (n, 3) of the centre of mass [N.m]."""
         if any(self._slides(feet, load) for load in self.wrenches):
             return np.full(len(places), -np.inf)
-        polytope = wrench_polytope(Stance(feet, BODY_WEIGHTS_CAP * self.mass * GRAVITY))
+        polytope = wrench_polytope(Stance(feet, model=ContactModel.of_body(self.mass, self.friction_model)))
         weight = pseudo_wrench(self.mass, places, np.zeros(3))
         return np.min([polytope.margin(weight - load) for load in self.wrenches], axis=0)
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from manikin.contact import Contact, SolePart
+from manikin.contact import BODY_WEIGHTS_CAP, Contact, SolePart
 from manikin.errors import InputError
 from manikin.spatial import finite_number
 
@@ -90,7 +90,8 @@ class SupportSettings:
         default_cap: Normal force limit of a contact that states none [body weights].
         sole_inset: The controller keeps its forces this far inside the edge of the sole [m].
         friction_share: Share of the friction of soles and points that it makes use of: a foot whose
-            load dips must not slip.
+            load dips must not slip. The friction model is that of the plan, the inner pyramid where the
+            plan has the outer one.
     """
 
     unload_time: float = 0.05
@@ -104,7 +105,7 @@ class SupportSettings:
     rolling_press_speed: float = 0.04
     press_time: float = 0.03
     press_depth: float = 0.03
-    default_cap: float = 3.0
+    default_cap: float = BODY_WEIGHTS_CAP
     sole_inset: float = 0.01
     friction_share: float = 1.0
 

@@ -276,6 +276,7 @@ class _Run:
             touches=world.touches,
             fallbacks=tuple(recorder.fallbacks),
             max_slip_m=recorder.max_slip,
+            friction=recorder.friction_use(),
             push=push_outcome(self.pushes, recorder, self.failure),
             schedule=recorder.delayed_schedule(),
         )

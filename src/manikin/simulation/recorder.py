@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.balance import wrench_polytope
+from manikin.balance.contact_forces import FrictionUse, friction_share
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.control import ControlOutput, SupportMode
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.motion import Motion
 from manikin.simulation.world import Sensed
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.spatial import FloatArray
 
 SWITCHING = 0.1
 """A support may touch its surface this long before and after its planned interval [s]."""
@@ -111,6 +112,26 @@ class Recorder:
         along = moved - (moved @ support.contact.normal) * support.contact.normal
         self.max_slip = max(self.max_slip, float(np.linalg.norm(along)))
 
+    def friction_use(self) -> FrictionUse:
+        """Largest use of friction by the forces that control counted on, in the model of the plan.
+
+        What slides to its place is left out: it has kinetic friction only, which is on the friction cone.
+        """
+        model = self._schedule.sequence[0].stance.friction_model
+        most = FrictionUse(model, 0.0, 0.0, "")
+        for sample in self.samples:
+            for name, support in sample.output.supports.items():
+                contact = support.contact
+                wrench = sample.output.wrenches.get(name)
+                if contact is None or wrench is None:
+                    continue
+                if contact.kind is ContactKind.GRASP or support.settling:
+                    continue
+                share = float(friction_share(contact, wrench[None, :3], model)[0])
+                if share > most.share:
+                    most = FrictionUse(model, share, sample.sensed.time, name)
+        return most
+
     # --- measures --------------------------------------------------------------------------
 
     def com_errors(self) -> FloatArray:
@@ -187,13 +208,13 @@ class Recorder:
         for index, phase in enumerate(self._schedule.sequence):
             rows = (phases == index) & ~settling
             if np.any(rows):
-                margins[rows] = wrench_polytope(_bounded(phase.stance, mass)).margin(totals[rows])
+                margins[rows] = wrench_polytope(phase.stance.bounded(mass)).margin(totals[rows])
         for row in (int(number) for number in np.flatnonzero(settling)):
             stance = self._schedule.sequence[int(phases[row])].stance
             if row in early:
-                stance = Stance((*stance, *early[row]), stance.normal_force_cap)
+                stance = stance.with_contacts((*stance, *early[row]))
             stance = self._as_measured(stance, self.samples[row])
-            margins[row] = wrench_polytope(_bounded(stance, mass)).margin(totals[row])
+            margins[row] = wrench_polytope(stance.bounded(mass)).margin(totals[row])
         return margins
 
     def _settling_rows(self) -> NDArray[np.bool_]:
@@ -226,7 +247,7 @@ class Recorder:
                 here = sample.output.state.frames[contact.effector].position
                 contact = replace(contact, position=here)
             contacts.append(contact)
-        return Stance(contacts, stance.normal_force_cap)
+        return stance.with_contacts(contacts)
 
     def motion(self, joint_names: Sequence[str], mass: float) -> Motion:
         """Turn the samples into a motion."""
@@ -256,11 +277,3 @@ def _lengths(vectors: list[FloatArray]) -> FloatArray:
 def near(interval: SupportInterval, time: float) -> bool:
     """Whether a support is planned at ``time`` [s] or has just been, or is about to be."""
     return interval.early - 1e-9 <= time <= interval.late + 1e-9
-
-
-def _bounded(stance: Stance, mass: float) -> Stance:
-    """The stance itself, or with a cap of three body weights where nothing bounds its forces."""
-    capped = stance.normal_force_cap is not None or all(
-        contact.kind is ContactKind.GRASP or contact.normal_force_cap is not None for contact in stance
-    )
-    return stance if capped else Stance(stance.contacts, 3.0 * mass * GRAVITY)

@@ -2,9 +2,13 @@
 
 from typing import Any
 
+import numpy as np
+
 from manikin.balance import pseudo_wrench
+from manikin.balance.contact_forces import friction_use
 from manikin.centroidal import (
     CentroidalResult,
+    CentroidalTrajectory,
     KeyframeProblem,
     KeyframeResult,
     plan_com,
@@ -12,6 +16,7 @@ from manikin.centroidal import (
 )
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report, place
+from manikin.wholebody.point_mass import point_mass_forces
 
 
 def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult:
@@ -58,6 +63,7 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
         "phase_durations_s": None if trajectory is None else trajectory.schedule.durations.tolist(),
         "min_margin": result.d_min,
         "margin_unit": result.problem.margin_unit,
+        "friction": None if trajectory is None else _friction(trajectory),
         "limiting_phase": result.limiting_phase,
         "limiting_contact": limiting_contact(result),
         "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
@@ -76,3 +82,14 @@ def limiting_contact(result: CentroidalResult) -> str | None:
     time = certificate.limiting_time
     wrench = pseudo_wrench(result.problem.mass, trajectory.position(time), trajectory.acceleration(time))
     return result.polytopes[certificate.limiting_phase].limiting(wrench).description
+
+
+FORCE_STEP = 0.02
+"""Time between the samples at which the use of friction is measured [s]."""
+
+
+def _friction(trajectory: CentroidalTrajectory) -> dict[str, float | str]:
+    """Use of friction by the contact forces of the point mass, the least ones that carry it."""
+    time = np.linspace(0.0, trajectory.duration, max(2, round(trajectory.duration / FORCE_STEP) + 1))
+    forces = point_mass_forces(trajectory, time)
+    return friction_use(trajectory.schedule, time, trajectory.schedule.sequence.effectors, forces).summary()

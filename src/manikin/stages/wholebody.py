@@ -8,6 +8,7 @@ from manikin.centroidal import CentroidalResult
 from manikin.motion import Motion
 from manikin.stages.context import RunContext
 from manikin.stages.key_postures import KeyedPlan
+from manikin.stages.planned_motion import use_of_friction
 from manikin.stages.report import Report
 from manikin.wholebody import WholeBodyResult, plan_whole_body
 from manikin.wholebody.point_mass import point_mass_motion
@@ -33,7 +34,8 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
     )  # fmt: skip
     drawn = rng.bit_generator.state != unused
     passage = context.passage(trajectory.schedule, result.motion).summary()
-    report.finish("wholebody", wholebody_summary(result) | passage | {"seed_matters": drawn})
+    used = {"friction": use_of_friction(trajectory.schedule, result.motion)}
+    report.finish("wholebody", wholebody_summary(result) | passage | used | {"seed_matters": drawn})
     if result.failure is not None:
         report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
     report.keep_motions(trajectory.schedule, result.motion)

@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 from scipy.sparse import block_diag, coo_array, vstack
 
 from manikin.balance.limits import contact_limits
-from manikin.contact import Contact, ContactKind, ContactSchedule, Stance
+from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
 from manikin.spatial import FloatArray, skew
 from manikin.wholebody.refine_physics import about, centre_of
 
@@ -51,7 +51,7 @@ class _Program:
 
     def __init__(self, stance: Stance) -> None:
         self._centre = centre_of(stance)
-        parts = [_limits(contact) for contact in stance]
+        parts = [_limits(contact, stance.friction_model) for contact in stance]
         maps = [_map(contact, self._centre) for contact in stance]
         self._balance = np.hstack([*maps, np.zeros((6, 1))])
         limits = np.zeros((sum(len(part[1]) for part in parts), self._balance.shape[1]))
@@ -108,9 +108,9 @@ def _map(contact: Contact, centre: FloatArray) -> FloatArray:
     return moved[:, :3] if forces_only else moved
 
 
-def _limits(contact: Contact) -> tuple[FloatArray, FloatArray]:
+def _limits(contact: Contact, model: FrictionModel) -> tuple[FloatArray, FloatArray]:
     """Rows (k, 6) and bounds (k,) of a contact, without those of moments that it does not have."""
-    limits = contact_limits(contact)
+    limits = contact_limits(contact, model)
     if contact.kind is ContactKind.GRASP and contact.max_moment == 0.0:
         kept = np.any(limits.A[:, :3] != 0.0, axis=1)
         return limits.A[kept], limits.b[kept]
