@@ -155,7 +155,7 @@ def compare_with_plates(
     weight = GRAVITY * dynamics.body.mass
     lift = (dynamics.vertical_force - measured.wrench[:, 2]) / weight
     apart = dynamics.zero_moment_point(height)[both] - zero_moment_point(measured.wrench[both], height)
-    theirs, _ = margins_of_wrenches(margins.polytopes, margins.phase, measured.wrench, dynamics.com)
+    theirs = margins_of_wrenches(margins.polytopes, margins.phase, measured.wrench, dynamics.com).margin
     mean = apart.mean(axis=0)
     return PlateComparison(
         int(measured.covered.sum()), int(both.sum()), _rms(lift[measured.covered]), _rms(lift[both]),

@@ -6,11 +6,12 @@ The wrench that a motion needs is known, and shared among its contacts by
 
 import numpy as np
 
+from manikin.balance import wrench_about
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.mocap.force_sharing import shared_wrenches, smooth_shares
 from manikin.mocap.recorded_dynamics import RecordedDynamics
-from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins, wrench_at
+from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
 from manikin.motion.motion import Motion
 from manikin.spatial import GRAVITY, FloatArray
 
@@ -86,7 +87,7 @@ def motion_on_contacts(
         frames = phases == number
         for contact in phase.stance:
             column = names.index(contact.effector)
-            forces[frames, column] = wrench_at(wrenches[frames, column], contact.position)
+            forces[frames, column] = wrench_about(wrenches[frames, column], contact.position)
     torques = torques_of(dynamics, names, wrenches)
     torques[:, :6] = 0.0
     return Motion(

@@ -31,12 +31,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline
 
+from manikin.balance import wrench_about
 from manikin.balance.friction import cross
+from manikin.balance.margin import wrench_levers
 from manikin.contact import ContactKind
 from manikin.errors import InputError
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_dynamics import RecordedDynamics, dynamics_of_postures
-from manikin.mocap.recorded_margins import RecordedMargins, margins_within, wrench_at
+from manikin.mocap.recorded_margins import RecordedMargins, margins_within
 from manikin.spatial import GRAVITY, FloatArray, finite_number, frozen_array
 
 PLACE_ERROR = 0.005
@@ -175,7 +177,8 @@ def _violated(margins: RecordedMargins, wrench: FloatArray, kept: float, weight:
         if polytope is None:
             continue
         frames = np.flatnonzero(margins.phase == number)
-        distance = polytope.distances(wrench_at(wrench[frames], polytope.reference))
+        distance = polytope.distances(wrench_about(wrench[frames], polytope.reference))
+        distance /= wrench_levers(polytope.H, margins.com[frames] - polytope.reference)
         where, row = np.nonzero(distance < kept - TOLERANCE * weight)
         found.append(np.column_stack([frames[where], row]))
     return np.vstack(found)
@@ -208,7 +211,7 @@ class _Rows:
     ) -> "_Rows":
         """``h - H w`` of (v, 6) rows in (v,) frames, moments about a point."""
         weight, (force, moment) = GRAVITY * dynamics.body.mass, (H[:, :3], H[:, 3:])
-        base = (h - np.sum(H * wrench_at(dynamics.wrench[frame], about), axis=1)) / weight
+        base = (h - np.sum(H * wrench_about(dynamics.wrench[frame], about), axis=1)) / weight
         # H_m . (s x f) = s . (f x H_m), and H_m . (c x s'') = s'' . (H_m x c)
         on_shift = cross(dynamics.wrench[frame, :3], moment) / weight
         on_bend = (force + cross(moment, dynamics.com[frame] - about)) / GRAVITY
@@ -249,7 +252,10 @@ def _facets(
         polytope = margins.polytopes[number]
         assert polytope is not None  # none is violated in flight
         frame, row = used[phases == number].T
-        parts.append(_Rows.of(dynamics, frame, polytope.H[row], polytope.h[row] - kept, polytope.reference))
+        # The lengths are those about the recorded centre of mass, which a small shift hardly changes.
+        lengths = wrench_levers(polytope.H, dynamics.com[frame] - polytope.reference)
+        least = kept * lengths[np.arange(len(row)), row]
+        parts.append(_Rows.of(dynamics, frame, polytope.H[row], polytope.h[row] - least, polytope.reference))
     return _Rows.joined(parts)
 
 
