@@ -33,6 +33,7 @@ from scipy.sparse.linalg import splu
 from manikin.balance import wrench_about
 from manikin.balance.friction import contact_to_world, cross, edge_wrenches
 from manikin.balance.limits import contact_limits
+from manikin.balance.motion_margin import wrench_about
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.mocap.runs import runs
 from manikin.spatial import FloatArray

@@ -70,7 +70,7 @@ class PlateComparison:
         cop_rms: Distance of the centres of pressure in single support, root mean square [m].
         cop_mean: Mean offset of ours in world x and y [m].
         margin_share: Share of the frames in which the plates' wrench has a positive margin on our stances.
-        margin_difference: Median of how far the margins are apart, about the middle of the contacts [N.m].
+        margin_difference: Median of how far the margins are apart, about the centre of mass [N.m].
     """
 
     frames: int

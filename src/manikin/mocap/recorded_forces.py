@@ -66,10 +66,10 @@ def motion_on_contacts(
 ) -> Motion:
     """The recorded motion with contacts, their forces, joint torques and the margin of balance.
 
-    The margin is that of the whole body about the middle of the contacts of each phase, see
+    The margin is that of the whole body about its centre of mass, see
     :func:`manikin.mocap.recorded_margins.recorded_margins`. In flight no contact can push: the torques are
-    those that the motion would need with nothing to push against, and the margin is minus the size of the
-    wrench that is missing. The pelvis' six generalised forces are zero: with contacts exactly (but for
+    those that the motion would need with nothing to push against, and the margin is minus the length of
+    the wrench that is missing. The pelvis' six generalised forces are zero: with contacts exactly (but for
     rounding), in flight what is missing is left out.
 
     Args:

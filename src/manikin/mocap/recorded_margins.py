@@ -1,11 +1,9 @@
 """How far recorded people are from losing their balance ([Qiu2012]_ 4.4).
 
 Every phase has one polytope of admissible wrenches; in every frame the margin is the distance of the wrench
-to its facets, for a point mass at the centre of mass (4.54) and for the whole body with its angular momentum
-(4.55, here by the derivatives of the motion, not by a difference of two frames), both by 4.56.
-
-Moments are about the centre of mass, so that margins do not depend on where people walk and scenes are
-comparable ([Qiu2012]_ 4.2.9, remark 2). The sign is the same about every point.
+to its facets with moments about the centre of mass ([Qiu2012]_ 4.2.9, remark 2), for a point mass there
+(4.54) and for the whole body with its angular momentum (4.55, here by the derivatives of the motion, not by a
+difference of two frames), both by 4.56. It is :func:`manikin.balance.motion_margin`, as of planned motions.
 """
 
 from collections.abc import Sequence
@@ -26,39 +24,49 @@ from manikin.contact import ContactSchedule, Stance
 from manikin.mocap.recorded_dynamics import RecordedDynamics
 from manikin.spatial import FloatArray
 
+FLIGHT = Stance(())
+"""Contacts of a phase without any."""
+
 
 @dataclass(frozen=True, eq=False)
 class RecordedMargins:
-    """Margins of each frame, alpha = 1 m; negative where the wrench is not admissible.
+    """Margins of each frame about the centre of mass, alpha = 1 m; negative outside of what is admissible.
 
     In flight there is nothing to push against: the only admissible wrench is 0, and the margin is minus the
     length of the one that the motion needs about its centre of mass: a ballistic flight needs none.
 
     Attributes:
-        whole_body: (n,) about the centre of mass [N.m].
-        point_mass: (n,) without angular momentum, about the same point [N.m].
-        force: (n,) smallest force at the centre of mass that ends the whole body's balance [N].
-        zmp_distance: (n,) of the whole body's ZMP to the edge of the support polygon, not a number where the
-            contacts do not span one plane [m].
+        body: (n,) of the whole body: margin [N.m], force at the centre of mass that would end balance [N],
+            distance of the zero moment point from the edge [m].
+        mass: (n,) the same without angular momentum.
         phase: (n,) index of the phase.
-        polytopes: One for each phase that has frames, by its index; None in flight.
+        polytopes: One for each phase that has frames, by its index, about the middle of its contacts; None in
+            flight.
         wrench: (n, 6) of the whole body about the world's origin [N, N.m].
         com: (n, 3) centre of mass [m].
     """
 
-    whole_body: FloatArray
-    point_mass: FloatArray
-    force: FloatArray
-    zmp_distance: FloatArray
+    body: MotionMargin
+    mass: MotionMargin
     phase: NDArray[np.int64]
     polytopes: tuple[WrenchPolytope | None, ...]
     wrench: FloatArray
     com: FloatArray
 
     @property
+    def whole_body(self) -> FloatArray:
+        """(n,) margin of the whole body [N.m]."""
+        return self.body.margin
+
+    @property
+    def point_mass(self) -> FloatArray:
+        """(n,) margin without angular momentum [N.m]."""
+        return self.mass.margin
+
+    @property
     def lowest(self) -> int:
         """Frame of the lowest margin of the whole body."""
-        return int(np.argmin(self.whole_body))
+        return self.body.lowest
 
     @property
     def held(self) -> NDArray[np.bool_]:
@@ -72,12 +80,12 @@ class RecordedMargins:
         return float(np.mean(self.whole_body[held] > 0.0)) if held.any() else None
 
     def limiting(self, frame: int) -> LimitingConstraint | None:
-        """Contact and limit that the nearest facet in a frame stands for; None in flight."""
+        """Contact and limit that the facet with the margin of a frame stands for; None in flight."""
         polytope = self.polytopes[int(self.phase[frame])]
         if polytope is None:
             return None
-        wrench = wrench_about(self.wrench[frame], polytope.reference)
-        return polytope.limiting(wrench, self.com[frame])
+        com = self.com[frame]
+        return polytope.at_reference(com).limiting(wrench_about(self.wrench[frame], com))
 
 
 def recorded_margins(
@@ -91,15 +99,10 @@ def recorded_margins(
         start: The schedule's clock at the motion's first instant [s].
     """
     phases = schedule.phase_at(dynamics.time + start)
-    present = [
-        number
-        for number, phase in enumerate(schedule.sequence)
-        if len(phase.stance) and np.any(phases == number)
-    ]
-    found = wrench_polytopes([schedule.sequence[number].stance for number in present])
-    known = dict(zip(present, found, strict=True))
-    polytopes = tuple(known.get(number) for number in range(len(schedule.sequence)))
-    return margins_within(polytopes, phases, dynamics)
+    stances = [phase.stance for phase in schedule.sequence]
+    held = [number for number in np.unique(phases).tolist() if len(stances[number])]
+    found = dict(zip(held, wrench_polytopes([stances[number] for number in held]), strict=True))
+    return margins_within([found.get(number) for number in range(len(stances))], phases, dynamics)
 
 
 def margins_within(
@@ -112,18 +115,17 @@ def margins_within(
         phases: (n,) index of the phase in each frame.
         dynamics: The motion.
     """
-    body = margins_of_wrenches(polytopes, phases, dynamics.wrench, dynamics.com)
-    mass = margins_of_wrenches(polytopes, phases, dynamics.point_mass_wrench, dynamics.com)
-    return RecordedMargins(
-        body.margin, mass.margin, body.force, body.zmp_distance, phases, tuple(polytopes), dynamics.wrench,
-        dynamics.com,
-    )  # fmt: skip
+    body, mass = (
+        margins_of_wrenches(polytopes, phases, wrench, dynamics.com)
+        for wrench in (dynamics.wrench, dynamics.point_mass_wrench)
+    )
+    return RecordedMargins(body, mass, phases, tuple(polytopes), dynamics.wrench, dynamics.com)
 
 
 def margins_of_wrenches(
     polytopes: Sequence[WrenchPolytope | None], phases: NDArray[np.int64], wrench: FloatArray, com: FloatArray
 ) -> MotionMargin:
-    """Margins of a series of wrenches.
+    """Margins of wrenches about the centre of mass in known polytopes.
 
     Args:
         polytopes: One for each phase; None for flight.
@@ -131,5 +133,5 @@ def margins_of_wrenches(
         wrench: (n, 6) about the world's origin [N, N.m].
         com: (n, 3) [m].
     """
-    stances = [Stance([]) if polytope is None else polytope.stance for polytope in polytopes]
+    stances = [FLIGHT if one is None else one.stance for one in polytopes]
     return motion_margin(stances, phases, wrench, com, polytopes=polytopes)
