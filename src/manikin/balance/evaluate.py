@@ -84,7 +84,7 @@ class BalanceReport(Displayed):
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
         return {
-            "balanced": str(self.balanced), "margin_about_com": f"{self.margin_about_com:.1f} N.m",
+            "balanced": str(self.balanced), "margin": f"{self.margin:.1f} N.m",
             "force_margin": f"{self.force_margin:.0f} N", "limiting": self.limiting.description,
         }  # fmt: skip
 

@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from manikin.balance import wrench_about
 from manikin.balance.friction import contact_to_world, cross, edge_wrenches
 from manikin.balance.limits import contact_limits
 from manikin.balance.motion_margin import wrench_about

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import expit
 
 from manikin.balance import stability_margins, wrench_polytope
+from manikin.balance.friction import cross
 from manikin.balance.margin import wrench_levers
 from manikin.contact import Stance
 from manikin.spatial import FloatArray
@@ -56,10 +57,7 @@ class BalanceRoom:
     def cost(
         self, wrench: FloatArray, com: FloatArray, wanted: float, violation: float, softness: float
     ) -> WrenchCost:
-        """Softened squares of what the distances to the facets lack, with derivatives by the wrench.
-
-        The rows' lengths with moments about the CoM change little on its way; their derivative is left
-        out: the least distance changes by a weight per metre, its row's length by less than one.
+        """Softened squares of what the distances to the facets lack, with derivatives by wrench and CoM.
 
         Args:
             wrench: (n, 6) about the world origin.
@@ -70,17 +68,24 @@ class BalanceRoom:
         """
         n = len(wrench)
         if self.is_flat:
-            return WrenchCost(np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6, 6)))
+            return WrenchCost(np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6, 6)), np.zeros((n, 3)))
         H = self.polytope.H
-        length = wrench_levers(H, com - self.polytope.reference)
+        arm = com - self.polytope.reference
+        length = wrench_levers(H, arm)
         distance = self.polytope.distances(wrench @ self._to_local.T) / length
         near = np.flatnonzero(np.any(distance < wanted + 6.0 * softness, axis=0))
         rows, missing = H[near] @ self._to_local, (wanted - distance[:, near]) / softness
         residual = softness * np.logaddexp(0.0, missing) / violation
-        slope = expit(missing) / violation / length[:, near]
+        length = length[:, near]
+        slope = expit(missing) / violation / length
+        # A row's length l has the derivative (H1 + H2 arm^) x H2 / l by the CoM.
+        moment = H[near, 3:]
+        at_com = H[near, :3] + cross(moment, arm[:, None, :])
+        by_length = residual * slope * distance[:, near] / length
         outer = (rows[:, :, None] * rows[:, None, :]).reshape(len(near), 36)
         return WrenchCost(
             0.5 * np.sum(residual**2, axis=1),
             (residual * slope) @ rows,
             (slope**2 @ outer).reshape(n, 6, 6),
+            np.einsum("nf,nfc->nc", by_length, cross(at_com, moment)),
         )

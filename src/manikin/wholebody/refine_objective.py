@@ -202,6 +202,8 @@ class RefineObjective(MotionObjective):
         wrench = WrenchSamples.of(motion, self._body.mass)
         cost = self.wrench_cost(wrench.value, motion.com, scales)
         out.sample_cost += cost.value
+        # The lengths of the rows change little with the CoM; the gradient alone has it.
+        out.gradient[0] += np.einsum("nc,ncq->nq", cost.by_com, wrench.com_jacobian)
         # With the curvature L L^T, the rows L^T db and the residual L^-1 gradient have its gradient
         # and its Gauss-Newton matrix.
         size = np.abs(cost.curvature).max(axis=(1, 2))
@@ -214,6 +216,7 @@ class RefineObjective(MotionObjective):
         """Physics violation and missing balance of wrenches (n, 6) about the world origin, CoM (n, 3)."""
         n = len(wrench)
         value, gradient, curvature = np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6, 6))
+        by_com = np.zeros((n, 3))
         weight = self._body.mass * 9.81
         for rows, forces, room, place in self._stances:
             part = wrench[rows]
@@ -227,7 +230,8 @@ class RefineObjective(MotionObjective):
             value[rows] += cost.value
             gradient[rows] += cost.gradient
             curvature[rows] += cost.curvature
-        return WrenchCost(value, gradient, curvature)
+            by_com[rows] += cost.by_com
+        return WrenchCost(value, gradient, curvature, by_com)
 
     def _wanted_margin(self, room: BalanceRoom, margin: float, place: FloatArray) -> float:
         """:meth:`BalanceRoom.wanted`, found once for each stance."""
