@@ -14,7 +14,7 @@ from manikin.results import result
 from manikin.scenarios import load_scenario
 from manikin.stages import ExecutionRequirements
 from manikin.wholebody.contact_slack import contact_slack
-from manikin.wholebody.refine_measures import whole_body_wrench
+from manikin.wholebody.full_motion import centroidal_state
 
 REFINED = ("wholebody.method=refine", "execution=attempted")
 
@@ -50,7 +50,7 @@ def test_the_balance_of_the_motion_file_is_that_of_linear_programs(risen):
     content = read_motions(risen.directory)
     motion = content.planned
     every = slice(None, None, 2)
-    wrench = whole_body_wrench(content.body, motion.q[every], motion.v[every], motion.a[every])
+    _, _, wrench = centroidal_state(content.body, motion.q[every], motion.v[every], motion.a[every])
     slack = contact_slack(content.schedule, motion.time[every], wrench)
     assert slack.min() > 0.0
     assert slack.min() == pytest.approx(

@@ -158,9 +158,12 @@ def test_violation_is_the_distance_to_what_forces_can_supply(stance):
 def test_margin_is_that_of_the_wrench_polytope(stance):
     room, rng = BalanceRoom(stance), np.random.default_rng(2)
     wrench = np.array([0.0, 0.0, 775.0, 0.0, 0.0, 0.0]) + 50.0 * rng.normal(size=(8, 6))
-    local = wrench @ about(centre_of(stance)).T
-    expected = wrench_polytope(stance, reference=centre_of(stance)).margin(local)
-    np.testing.assert_allclose(room.margin(wrench), expected, rtol=1e-9)
+    com = np.array([0.02, -0.03, 0.9]) + 0.1 * rng.normal(size=(8, 3))
+    expected = [
+        float(wrench_polytope(stance, reference=x).margin(about(x) @ w))
+        for w, x in zip(wrench, com, strict=True)
+    ]
+    np.testing.assert_allclose(room.margin(wrench, com), expected, rtol=1e-9)
 
 
 def test_efort_is_that_of_the_contact_planner(person):

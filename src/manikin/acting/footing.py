@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from manikin.balance import pseudo_wrench, wrench_polytope
+from manikin.balance import pseudo_wrench, stability_margins, wrench_about, wrench_polytopes
 from manikin.contact import Contact, ContactModel, FrictionModel, Stance
 from manikin.contact_planning import Candidates, ContactRules, Situation
 from manikin.contact_planning.by_place import contact_at, score_by_place
@@ -26,12 +26,21 @@ class Loads:
     friction_model: FrictionModel = "outer"
 
     def margins(self, feet: list[Contact], places: FloatArray) -> FloatArray:
-        """(n,) least margin of all loads at each place (n, 3) of the centre of mass [N.m]."""
+        """(n,) least margin about the CoM of all loads at each place (n, 3) of it [N.m]."""
         if any(self._slides(feet, load) for load in self.wrenches):
             return np.full(len(places), -np.inf)
-        polytope = wrench_polytope(Stance(feet, model=ContactModel.of_body(self.mass, self.friction_model)))
+        model = ContactModel.of_body(self.mass, self.friction_model)
+        (polytope,) = wrench_polytopes([Stance(feet, model=model)])
         weight = pseudo_wrench(self.mass, places, np.zeros(3))
-        return np.min([polytope.margin(weight - load) for load in self.wrenches], axis=0)
+        return np.min(
+            [
+                stability_margins(
+                    polytope, wrench_about(weight - load, polytope.reference), places
+                ).wrench_about_com
+                for load in self.wrenches
+            ],
+            axis=0,
+        )
 
     def _slides(self, feet: list[Contact], load: FloatArray) -> bool:
         """Whether feet on parallel surfaces slide under a load, wherever the centre of mass is."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from manikin.balance import wrench_polytope
+from manikin.balance import motion_margin
 from manikin.balance.contact_forces import FrictionUse, friction_share
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.control import ControlOutput, SupportMode
@@ -190,7 +190,7 @@ class Recorder:
         ]
 
     def margins(self, mass: float) -> FloatArray:
-        """(n,) wrench margin of the mean measured wrenches [N.m].
+        """(n,) margin about the CoM of the mean measured wrenches [N.m].
 
         The stance is the one planned for the beginning of the step, at its planned placements; what
         slides to its place on a seat is taken where it is, and from when it presses, up to
@@ -200,22 +200,20 @@ class Recorder:
             mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
         """
         totals = np.array([sample.total for sample in self.samples])
+        com = np.array([sample.output.state.com for sample in self.samples])
         phases = self._schedule.phase_at([sample.plan_time for sample in self.samples])
-        margins = np.empty(len(self.samples))
+        stances = [phase.stance.bounded(mass) for phase in self._schedule.sequence]
         settling = self._settling_rows()
         early = self._early_seats()
         settling[list(early)] = True
-        for index, phase in enumerate(self._schedule.sequence):
-            rows = (phases == index) & ~settling
-            if np.any(rows):
-                margins[rows] = wrench_polytope(phase.stance.bounded(mass)).margin(totals[rows])
+        index = np.array(phases)
         for row in (int(number) for number in np.flatnonzero(settling)):
             stance = self._schedule.sequence[int(phases[row])].stance
             if row in early:
                 stance = stance.with_contacts((*stance, *early[row]))
-            stance = self._as_measured(stance, self.samples[row])
-            margins[row] = wrench_polytope(stance.bounded(mass)).margin(totals[row])
-        return margins
+            index[row] = len(stances)
+            stances.append(self._as_measured(stance, self.samples[row]).bounded(mass))
+        return motion_margin(stances, index, totals, com).margin
 
     def _settling_rows(self) -> NDArray[np.bool_]:
         """(n,) whether a contact is still on its way to its place."""

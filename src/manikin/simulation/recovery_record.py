@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from manikin.balance import wrench_polytope
+from manikin.balance import motion_margin
 from manikin.body import BodyModel
 from manikin.body.limb import end_segments
 from manikin.contact import Stance, default_normal_force_cap
@@ -155,15 +155,15 @@ class RecoveryRecorder:
         )
 
     def _margins(self) -> FloatArray:
-        """(n,) margins of the measured wrenches, each in the polytope of the soles that carried."""
+        """(n,) margins about the CoM of the measured wrenches, in the polytopes of the soles that carried."""
         wrenches = np.array([wrench for *_, wrench in self._rows])
         standings = [output.standing for _, output, *_ in self._rows]
-        margins = np.empty(len(wrenches))
-        for standing in dict.fromkeys(standings):
-            stance = Stance(standing.soles, default_normal_force_cap(self._body.mass))
-            chosen = np.array([other is standing for other in standings])
-            margins[chosen] = wrench_polytope(stance).margin(wrenches[chosen])
-        return margins
+        com = np.array([output.state.com for _, output, *_ in self._rows])
+        known = {id(standing): number for number, standing in enumerate(dict.fromkeys(standings))}
+        cap = default_normal_force_cap(self._body.mass)
+        stances = [Stance(standing.soles, cap) for standing in dict.fromkeys(standings)]
+        phases = np.array([known[id(standing)] for standing in standings])
+        return motion_margin(stances, phases, wrenches, com).margin
 
 
 class SegmentMomenta:

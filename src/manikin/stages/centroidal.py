@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from manikin.balance import pseudo_wrench
 from manikin.balance.contact_forces import friction_use
 from manikin.centroidal import (
     CentroidalResult,
@@ -76,12 +75,8 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
 
 def limiting_contact(result: CentroidalResult) -> str | None:
     """Contact and limit behind the smallest margin, such as ``"left_foot: tipping over ..."``."""
-    certificate, trajectory = result.certificate, result.trajectory
-    if certificate is None or trajectory is None:
-        return None
-    time = certificate.limiting_time
-    wrench = pseudo_wrench(result.problem.mass, trajectory.position(time), trajectory.acceleration(time))
-    return result.polytopes[certificate.limiting_phase].limiting(wrench).description
+    limiting = result.limiting
+    return None if limiting is None else limiting.description
 
 
 FORCE_STEP = 0.02

@@ -10,10 +10,9 @@ from ctypes import c_int
 import daqp
 import numpy as np
 
-from manikin.balance import WrenchPolytope
+from manikin.balance import WrenchPolytope, motion_margin
 from manikin.balance.contact_forces import ContactGenerators
 from manikin.centroidal import CentroidalProblem, CentroidalTrajectory
-from manikin.centroidal.certificate import facet_margins
 from manikin.contact import ContactKind, Stance
 from manikin.motion import Motion
 from manikin.spatial import FloatArray, skew
@@ -31,7 +30,7 @@ def point_mass_motion(
     Args:
         problem: What was planned.
         trajectory: The plan.
-        polytopes: W_i of the phases about the world origin.
+        polytopes: W_i of the phases.
 
     Returns:
         The motion of :func:`manikin.body.point_mass.point_mass`, every :data:`STEP` and at the key
@@ -68,12 +67,15 @@ def _margins(
     time: FloatArray,
 ) -> FloatArray:
     """(n,) margin in the phase of each instant; at a key instant the smaller of both phases."""
+    schedule = trajectory.schedule
+    starts = np.searchsorted(time, schedule.instants - 1e-9)
+    owners = [np.arange(starts[k], starts[k + 1] + 1) for k in range(len(polytopes))]
+    rows, phases = np.concatenate(owners), np.repeat(np.arange(len(polytopes)), [len(own) for own in owners])
+    stances = [phase.stance for phase in schedule.sequence]
+    wrench, com = trajectory.pseudo_wrench(time), trajectory.position(time)
+    found = motion_margin(stances, phases, wrench[rows], com[rows], polytopes=polytopes)
     margin = np.full(len(time), np.inf)
-    instants = trajectory.schedule.instants
-    for phase, polytope in enumerate(polytopes):
-        inside = (time >= instants[phase] - 1e-9) & (time <= instants[phase + 1] + 1e-9)
-        blocks = [b.min(axis=1) for b in facet_margins(problem, trajectory, polytope, time[inside])]
-        margin[inside] = np.minimum(margin[inside], np.concatenate(blocks))
+    np.minimum.at(margin, rows, found.force if problem.margin_space == "force" else found.margin)
     return margin
 
 

@@ -55,7 +55,7 @@ class RefineResiduals:
         max_velocity_share: Largest share of a joint's velocity limit.
         max_physics_violation: Wrench that no admissible contact force supplies, about the stance's mean
             contact point with 1 m [N].
-        min_margin: Least margin of the whole body's wrench about the world origin, over the stances whose
+        min_margin: Least margin of the whole body's wrench about the CoM, over the stances whose
             wrenches fill a volume; infinite without any [N.m].
         max_torque_share: Largest share of a joint's torque limit.
         worst_times_s: When each of the errors is largest [s], by field name.

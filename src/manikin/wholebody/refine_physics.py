@@ -34,10 +34,12 @@ class WrenchSamples:
     Attributes:
         value: (n, 6) force and moment [N, N.m].
         jacobians: Three (n, 6, nq) derivatives, by the raw coordinates, their rates and second derivatives.
+        com_jacobian: (n, 3, nq) derivative of the CoM by the raw coordinates.
     """
 
     value: FloatArray
     jacobians: tuple[FloatArray, FloatArray, FloatArray]
+    com_jacobian: FloatArray
 
     @classmethod
     def of(cls, motion: MotionSamples, mass: float) -> "WrenchSamples":
@@ -54,7 +56,7 @@ class WrenchSamples:
             [motion.com_jacobian[:, :, :6] @ tangent, motion.com_jacobian[:, :, 6:]], axis=2
         )
         jacobians[0][:, 3:] -= skew(force) @ by_com
-        return cls(np.hstack([force, moment]), (jacobians[0], jacobians[1], jacobians[2]))
+        return cls(np.hstack([force, moment]), (jacobians[0], jacobians[1], jacobians[2]), by_com)
 
 
 def about(point: FloatArray) -> FloatArray:
@@ -77,16 +79,19 @@ class WrenchCost:
         value: (n,).
         gradient: (n, 6).
         curvature: (n, 6, 6) positive semi-definite.
+        by_com: (n, 3) derivative by the CoM at the same wrench.
     """
 
     value: FloatArray
     gradient: FloatArray
     curvature: FloatArray
+    by_com: FloatArray
 
     def __add__(self, other: "WrenchCost") -> "WrenchCost":
         return WrenchCost(
-            self.value + other.value, self.gradient + other.gradient, self.curvature + other.curvature
-        )
+            self.value + other.value, self.gradient + other.gradient, self.curvature + other.curvature,
+            self.by_com + other.by_com,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,5 +151,5 @@ class ContactForces:
         value = 0.5 * tolerance**2 * np.sum(multiplier**2, axis=1)
         value += 0.5 * np.sum(magnitude**2 / gain, axis=1)
         curvature = self._to_local.T @ np.linalg.inv(found.system) @ self._to_local
-        cost = WrenchCost(value, multiplier @ self._to_local, curvature)
+        cost = WrenchCost(value, multiplier @ self._to_local, curvature, np.zeros((len(value), 3)))
         return ForceShare(magnitude, tolerance**2 * multiplier, cost)
