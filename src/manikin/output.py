@@ -7,6 +7,7 @@
     DIR/motion.h5          planned motion, then planned and executed (manikin.motion.file)
     DIR/motion-NAME.h5     planned motion of somebody else who walks there
     DIR/summary.json       written when every stage is done
+    DIR/report.html        verdict, requirements, figures and numbers in one page that needs no other file
     DIR/motion.bvh         drawn from the files above, for animation programs
     DIR/figures/*.png      drawn from the files above
 
@@ -34,6 +35,7 @@ WALK_PATHS = "walk_paths"
 BODY = "the body"
 """In it, the body that the scenario is about."""
 SUMMARY = "summary.json"
+REPORT = "report.html"
 FIGURES = "figures"
 STAGES = "stages"
 
@@ -115,7 +117,7 @@ class RunDirectory:
 
     def _remove_earlier_run(self) -> None:
         # The summary goes first: without it the directory is known to be incomplete.
-        for name in (SUMMARY, MOTION, BVH):
+        for name in (SUMMARY, MOTION, BVH, REPORT):
             (self.path / name).unlink(missing_ok=True)
         # What a killed run was about to write stays behind as a hidden .NAME.*.tmp file.
         for pattern in (f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS, ".*.tmp", "*/.*.tmp"):

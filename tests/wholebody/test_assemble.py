@@ -223,12 +223,12 @@ def test_a_ceiling_below_the_head_is_reported_with_its_pair(person, step_com):
 )
 def test_the_certificate_refuses_forces_beyond_the_body_or_its_contacts(step_motion, name, what):
     residuals = step_motion.certificate
-    assert residuals.violation(WholeBodyRequirements()) is None
+    assert residuals.table(WholeBodyRequirements()).held
     excess = replace(residuals, **{f"max_{name}": 1.01})
-    found = excess.violation(WholeBodyRequirements())
+    found = excess.table(WholeBodyRequirements()).first_broken
     assert found is not None
-    assert found[0].startswith(what)
-    assert found[1] == residuals.worst_times_s[f"max_{name}"]
+    assert found.name.startswith(what)
+    assert found.time_s == residuals.worst_times_s[f"max_{name}"]
 
 
 @given(

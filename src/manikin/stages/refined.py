@@ -31,6 +31,8 @@ def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -
     passage = context.passage(result.schedule, result.motion).summary()
     block = refined_summary(result) | passage | {"seed_matters": context.plan is not None}
     report.finish("wholebody", block)
+    report.require("wholebody", result.requirements)
+    report.planned = result.succeeded
     if result.failure is not None:
         report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
     report.keep_motions(result.schedule, result.motion)
