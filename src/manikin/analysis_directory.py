@@ -4,7 +4,7 @@
 
     DIR/summary.json     what was measured
     DIR/series.csv       what was measured at every frame, units in the header
-    DIR/motion.h5        the reconstructed motion with its supports, forces and margins (manikin.motion.file)
+    DIR/motion.h5        the motion as recorded, and shifted, with supports, forces and margins
     DIR/report.html      all of it for people, in one file
 
     DIR/index.html, DIR/analyses.csv, DIR/analyses.json    of several recordings
@@ -83,9 +83,8 @@ def write_analysis(
     summary = summary_of(found, plan)
     sheet = recording_sheet(found, SHEET) if draw else ""
     pictures = _plan_pictures(plan) if draw and plan is not None else {}
-    content = MotionFile(recorded=found.motion, body=found.body)
-    if plan is not None:
-        content = replace(plan.content, recorded=found.motion)
+    content = MotionFile(body=found.body) if plan is None else plan.content
+    content = replace(content, recorded=found.motion, shifted=found.shifted_motion)
     write_motions(directory / MOTION, content)
     _write(directory / SERIES, _series_text(found))
     _write(directory / REPORT, report_page(found, summary, sheet, pictures))
@@ -149,6 +148,11 @@ def _row(entry: AnalysisEntry) -> dict[str, Any]:
         "share_positive_in_contact": margin.get("share_positive_in_contact"),
         "recorded_share_positive_in_contact": recorded.get("share_positive_in_contact"),
         "shift_rms_m": shifted.get("rms_m"),
+        "shift_believed": shifted.get("believed"),
+        "shifted_share_positive_in_contact": shifted.get("share_positive_in_contact"),
+        "shifted_share_at_floor_in_contact": shifted.get("share_at_floor_in_contact"),
+        "floor_m": shifted.get("floor_m"),
+        "floor_Nm": shifted.get("floor_Nm"),
         "timing_median_s": plates.get("timing_median_s"),
         "vertical_rms_body_weight": plates.get("vertical_rms_body_weight"),
         "cop_rms_m": plates.get("cop_rms_m"),

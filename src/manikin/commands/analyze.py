@@ -49,7 +49,7 @@ def analyze(
     load: Annotated[float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands.")] = 0.0,
     as_recorded: Annotated[
         bool,
-        typer.Option("--as-recorded", help="Measure the motion as it is, not shifted onto its contacts."),
+        typer.Option("--as-recorded", help="Look for no shifted motion to stand beside the recorded one."),
     ] = False,
     plan: Annotated[
         str | None,
@@ -145,16 +145,11 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
     if margin["min"] is not None:
         shown["lowest margin"] = (
             f"{margin['min']:.1f} N.m at {margin['at_s']:.2f} s ({margin['limiting'] or 'in flight'}), "
+            "as recorded; "
             + ("never in contact" if share is None else f"positive in {share:.1%} of the frames in contact")
         )
-    if share is not None:
-        recorded, shifted = margin["recorded"], margin["shifted"]
-        size = f"{1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest)"
-        shown["shifted"] = (
-            f"by {size}; as recorded positive in {recorded['share_positive_in_contact']:.1%}"
-            if margin["motion"] == "shifted"
-            else f"not; by {size} positive in {shifted['share_positive_in_contact']:.1%}"
-        )
+    if share is not None and (shifted := margin["shifted"]) is not None:
+        shown["shifted"] = _shifted(shifted)
     for name in ("rula", "reba"):
         if effort[name] is not None:
             one = effort[name]
@@ -184,6 +179,16 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
         )
         shown["plates: torques"] = f"{apart} N.m (RMS)"
     return shown
+
+
+def _shifted(shifted: dict[str, Any]) -> str:
+    """The shifted motion in a line."""
+    words = f"by {1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest), " + (
+        "to be believed" if shifted["believed"] else "not to be believed"
+    )
+    words += f": positive in {shifted['share_positive_in_contact']:.1%}"
+    floor = f"the imposed floor ({shifted['floor_m']:g} m x weight = {shifted['floor_Nm']:.1f} N.m)"
+    return f"{words}, in {shifted['share_at_floor_in_contact']:.1%} at {floor}"
 
 
 def _several(

@@ -3,7 +3,7 @@
 Layout (format version 1)::
 
     /                    attributes: format, format_version, created_by
-    /recorded, /planned, /executed   one group per motion; attributes: joint_names, contact_names
+    /shifted, /recorded, /planned, /executed   one group per motion; attributes: joint_names, contact_names
         time (n,) q (n, nq) v (n, nv) a (n, nv) tau (n, nv) com (n, 3)
         angular_momentum (n, 3) margin (n,) support (n, c) contact_force (n, c, 6)
                          each with the attributes: unit, description
@@ -24,6 +24,7 @@ import numpy as np
 from manikin.atomic import atomic_path
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
+from manikin.display import Displayed
 from manikin.errors import InputError, MotionFileError
 from manikin.motion.description import (
     body_from,
@@ -39,7 +40,7 @@ from manikin.version import __version__
 
 FORMAT = "manikin-motion"
 FORMAT_VERSION = 1
-GROUPS = ("recorded", "planned", "executed")
+GROUPS = ("shifted", "recorded", "planned", "executed")
 
 DATASETS: Mapping[str, tuple[str, str]] = {
     "time": ("s", "sample times, increasing"),
@@ -62,8 +63,8 @@ DATASETS: Mapping[str, tuple[str, str]] = {
 _Value = TypeVar("_Value")
 
 
-@dataclass(frozen=True, eq=False)
-class MotionFile:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionFile(Displayed):
     """Content of a motion file; what it does not hold is None.
 
     Attributes:
@@ -73,6 +74,7 @@ class MotionFile:
         scene: Where.
         schedule: With which contacts, when.
         recorded: Motion of a recorded person, reconstructed.
+        shifted: The recorded motion after the least shift onto its contacts.
     """
 
     planned: Motion | None = None
@@ -81,6 +83,15 @@ class MotionFile:
     scene: Scene | None = None
     schedule: ContactSchedule | None = None
     recorded: Motion | None = None
+    shifted: Motion | None = None
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        held = ("body", "scene", "schedule")
+        motions = {name: f"{motion.duration:.2f} s" for name, motion in self.motions.items()}
+        return motions | {
+            "with": " ".join(name for name in held if getattr(self, name) is not None) or "nothing"
+        }
 
     @property
     def motions(self) -> dict[str, Motion]:
@@ -177,6 +188,7 @@ def _content(file: h5py.File, source: str) -> MotionFile:
         scene=_read_json(file, "scene", scene_from, source),
         schedule=_read_json(file, "schedule", schedule_from, source),
         recorded=_read_motion(file, "recorded", source),
+        shifted=_read_motion(file, "shifted", source),
     )
     if not content.motions:
         raise MotionFileError(f"{source}: holds no motion; valid: a group {' or '.join(GROUPS)}")
