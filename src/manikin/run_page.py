@@ -4,10 +4,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from manikin.atomic import write_text
-from manikin.errors import MotionFileError
-from manikin.output import FIGURES, REPORT, read_summary
+from manikin.output import REPORT, read_summary
 from manikin.report_page import ReportPage
+from manikin.result_directory import FIGURES, write_result
 from manikin.results import verdict_line
 from manikin.version import __version__
 
@@ -35,13 +34,7 @@ def write_run_page(directory: str | Path) -> Path:
     """
     folder = Path(directory)
     page, file = run_page(folder, read_summary(folder)), folder / REPORT
-    try:
-        write_text(file, page.html())
-    except OSError as error:
-        raise MotionFileError(
-            f"{file}: cannot be written ({error.strerror}); valid: a writable directory"
-        ) from None
-    return file
+    return write_result(file, page.html())
 
 
 def run_page(folder: Path, summary: Mapping[str, Any]) -> ReportPage:

@@ -20,17 +20,9 @@ WALKING = ("goal-left", "goal-right", "corridor", "catch", "narrow")
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory):
-    """Results of the scenarios and their directories, each run once."""
-    found = {}
-
-    def once(name):
-        if name not in found:
-            directory = tmp_path_factory.mktemp(name)
-            found[name] = run(name, out=directory), directory
-        return found[name]
-
-    return once
+def ran(runs):
+    """Results of the scenarios and their directories."""
+    return lambda name: (runs(name), runs(name).directory)
 
 
 @pytest.fixture(scope="module")
