@@ -21,7 +21,7 @@ from manikin import collected
 from manikin.body import human
 from manikin.body.range_of_motion import HUMAN_HINGES
 from manikin.motion.file import DATASETS
-from manikin.results import markdown_table
+from manikin.results import counts_line, markdown_table
 from manikin.scenarios import json_schema
 from manikin.scenarios.stance_file import StanceFile
 
@@ -193,7 +193,7 @@ def kept_results() -> dict[str, Any]:
 def results_table() -> str:
     """The kept results, with their summary."""
     report = kept_results()["main"]
-    total = f"{report['succeeded']} of {len(report['runs'])} runs ended as expected."
+    total = f"{counts_line(report)}."
     return f"{markdown_table(report)}\n{total}\n"
 
 

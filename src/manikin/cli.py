@@ -28,7 +28,7 @@ from manikin.commands.console import (
     stdout_kept_clean,
 )
 from manikin.commands.ergonomics import ergonomics
-from manikin.commands.job import print_summary, run_job
+from manikin.commands.job import run_job
 from manikin.commands.library import library
 from manikin.commands.push import push
 from manikin.commands.statistics import statistics
@@ -151,7 +151,7 @@ def run(
         int | None, typer.Option(metavar="N", min=1, help="Runs at a time with 'all'; default: one per core.")
     ] = None,
 ) -> int:
-    """Plan a scenario, execute it in the physics engine and report."""
+    """Plan a scenario, execute it in the physics engine and report: proved, planned or failed."""
     if scenario == ALL:
         refuse(variant is not None, "--variant", "every variant is run")
         refuse(bool(overrides), "--set", "it belongs to one scenario")
@@ -169,12 +169,12 @@ def run(
     if seed is not None:
         job = job.with_seed(seed)
     directory = out if out is not None else None if json else Path("runs") / job.name
-    summary = run_job(job, directory, context.obj, draw=figures)
+    outcome = run_job(job, directory, context.obj, draw=figures)
     if json:
-        print_json(summary)
+        print_json(outcome.summary)
     else:
-        print_summary(summary, directory)
-    return DONE if summary["succeeded"] else FAILED
+        outcome.print()
+    return outcome.status
 
 
 app.command()(analyze)
@@ -391,7 +391,7 @@ def _run_all(
     from manikin import batch
     from manikin.atomic import write_text
     from manikin.result_directory import make_directory, to_json
-    from manikin.results import text_table
+    from manikin.results import counts_line, text_table, verdict_line
 
     runs = batch.built_in_jobs(statures=asked["stature_m"] is not None)
     if out is not None:
@@ -400,9 +400,8 @@ def _run_all(
     def report(entry: dict[str, Any], done: int) -> None:
         interruption.check()
         word = "as expected" if entry["as_expected"] else "NOT as expected"
-        what = "succeeded" if entry["succeeded"] else "failed"
-        name = entry["scenario"]
-        typer.echo(f"[{done}/{len(runs)}] {name}: {what}, {word}, {entry['wall_s']:.1f} s", err=True)
+        line = f"{verdict_line(entry)}, {word}, {entry['wall_s']:.1f} s"
+        typer.echo(f"[{done}/{len(runs)}] {line}", err=True)
 
     options = batch.RunOptions(out, draw and out is not None, arguments)
     found = asked | batch.run_jobs(runs, options.command, workers=workers, report=report)
@@ -412,8 +411,8 @@ def _run_all(
         print_json(found)
     else:
         typer.echo(text_table(found))
-        typer.echo(f"{found['succeeded']} as expected, {found['failed']} not, {found['wall_s']:.0f} s")
-    return FAILED if found["failed"] else DONE
+        typer.echo(counts_line(found))
+    return FAILED if found["not_as_expected"] else DONE
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ def climbing(cases):
 def test_a_refined_motion_keeps_every_requirement(name, request):
     _, result = request.getfixturevalue(name)
     assert result.failure is None, result.failure
-    assert result.certificate.violation(RefineRequirements()) is None
+    assert result.certificate.table(RefineRequirements()).held
 
 
 @pytest.mark.parametrize("name", ["crouching", "climbing"])
@@ -198,13 +198,12 @@ def test_the_certificate_catches_a_bad_motion(crouching):
     found = certify_refined(
         case.body, proximity, result.schedule, obstacles, motion, np.full(len(bad), 7.0), flat
     )
-    broken = found.broken(RefineRequirements())
+    broken = found.table(RefineRequirements()).broken
     assert broken >= {
         "max_support_error_m", "max_penetration_m", "max_velocity_share", "max_physics_violation",
         "min_margin",
     }  # fmt: skip
-    reason, _ = found.violation(RefineRequirements())
-    assert "support error" in reason
+    assert "support error" in found.table(RefineRequirements()).first_broken.reason
     assert found.max_support_error_m > 0.029
 
 

@@ -9,6 +9,7 @@ from manikin.balance import WrenchPolytope, least_zmp_distance
 from manikin.centroidal.feasibility import row_slopes
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.centroidal.trajectory import CentroidalTrajectory
+from manikin.requirement import Requirement, RequirementTable, requirement_table
 from manikin.spatial import FloatArray
 
 STEP = 1e-3
@@ -87,6 +88,28 @@ class Residuals:
     def within(self, tolerance: float = TOLERANCE) -> bool:
         """Whether every requirement is met."""
         return all(item.value <= tolerance for item in self.items)
+
+    def table(self, problem: CentroidalProblem) -> RequirementTable:
+        """The margin, the total duration, and the most violated of the other requirements.
+
+        Args:
+            problem: Whose requirements were measured.
+        """
+        others = [item for item in self.items if item.requirement not in ("balance margin", "total duration")]
+        worst = max(others, key=lambda item: item.severity, default=None)
+        duration = next((item for item in self.items if item.requirement == "total duration"), None)
+        longest = problem.max_duration
+        return requirement_table([
+            Requirement("min_margin", "margin of the centre of mass", problem.margin_unit, self.min_margin,
+                        ">=", problem.required_margin, self.limiting_time, f"phase {self.limiting_phase}",
+                        TOLERANCE),
+            None if duration is None or longest is None
+            else Requirement("duration_s", "duration", "s", duration.value + longest, "<=", longest,
+                             tolerance=TOLERANCE),
+            None if worst is None
+            else Requirement("max_violation", "violation of a constraint", worst.unit, max(worst.value, 0.0),
+                             "<=", TOLERANCE, worst.time, worst.requirement),
+        ])  # fmt: skip
 
     @property
     def rank(self) -> tuple[float, float]:

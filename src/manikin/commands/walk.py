@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
-from manikin.commands.console import DONE, FAILED, JsonOption, print_json, print_table, refuse
-from manikin.commands.job import print_ending, run_job
+from manikin.commands.console import DONE, JsonOption, print_json, refuse
+from manikin.commands.job import run_job
 from manikin.errors import InputError
 
 SHOWN = (
@@ -94,13 +94,13 @@ def walk(
         folder = around.folder
     job = Scenario(validate(ScenarioFile, data, "manikin walk"), "manikin walk", folder, {})
     directory = out if out is not None else None if json else Path("runs") / name
-    summary = run_job(job, directory, context.obj, draw=figures)
+    outcome = run_job(job, directory, context.obj, draw=figures)
+    found = outcome.summary["walk"]
     if json:
-        print_json({"max_stance_slide_m": None} | summary["walk"] | summary)
+        print_json({"max_stance_slide_m": None} | found | outcome.summary)
     else:
-        print_table({key: summary["walk"].get(key) for key in SHOWN})
-        print_ending(summary, directory)
-    return DONE if summary["succeeded"] else FAILED
+        outcome.print({key: found.get(key) for key in SHOWN})
+    return outcome.status
 
 
 def _state(place: Place) -> dict[str, Any]:

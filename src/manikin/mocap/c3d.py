@@ -74,9 +74,7 @@ def _library(file: str) -> Any:
     except ModuleNotFoundError as error:
         if error.name != "ezc3d":
             raise
-        raise InputError(
-            f"{file}: C3D files need ezc3d; install it with: pip install 'manikin[mocap]'"
-        ) from None
+        raise InputError(f"{file}: C3D files need ezc3d; install it with: pip install ezc3d") from None
     return ezc3d
 
 

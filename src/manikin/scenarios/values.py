@@ -106,7 +106,7 @@ class ScenarioValues:
 
     @property
     def execution_required(self) -> bool:
-        """Whether a fault of the execution is one of the run."""
+        """Whether the planned motion has to be executed for the run to succeed."""
         return self.file.execution == "required"
 
     @property

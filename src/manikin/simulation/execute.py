@@ -274,6 +274,7 @@ class _Run:
             wall_s=wall,
             control_ms=1e3 * control / len(recorder.samples),
             touches=world.touches,
+            counted_touches=touches,
             fallbacks=tuple(recorder.fallbacks),
             max_slip_m=recorder.max_slip,
             friction=recorder.friction_use(),

@@ -42,6 +42,7 @@ class Execution(Displayed):
         wall_s: Wall time [s].
         control_ms: Mean wall time of a control step [ms].
         touches: Touches that were not planned.
+        counted_touches: Those among them that are a failure: all but those of a pushed body with itself.
         fallbacks: Time [s] and reason of every control step whose program was not solved.
         max_slip_m: Farthest that an effector moved along its surface while in contact [m].
         push: What became of the pushes; None without one.
@@ -68,6 +69,7 @@ class Execution(Displayed):
     wall_s: float
     control_ms: float
     touches: tuple[Touch, ...]
+    counted_touches: tuple[Touch, ...]
     fallbacks: tuple[tuple[float, str], ...]
     max_slip_m: float
     push: PushOutcome | None = None
@@ -88,5 +90,6 @@ class Execution(Displayed):
         )  # fmt: skip
         block = {name: getattr(self, name) for name in names}
         block["friction"] = None if self.friction is None else self.friction.summary()
+        block["unplanned_touches"] = [touch.as_dict() for touch in self.touches]
         block["push"] = None if self.push is None else self.push.as_dict()
         return block

@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -27,6 +28,10 @@ class Touch:
     time: float
     segment: str
     other: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for the run's summary."""
+        return {"segment": self.segment, "other": self.other, "time_s": self.time}
 
     def __str__(self) -> str:
         return f"{self.segment} touches {self.other} at {self.time:.3f} s"

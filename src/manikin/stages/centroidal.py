@@ -47,6 +47,8 @@ def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[
         block: Its ``centroidal`` block.
     """
     report.finish("centroidal", block)
+    if result.certificate is not None:
+        report.require("centroidal", result.certificate.table(result.problem))
     if result.trajectory is not None:
         report.keep("com_trajectory", result.trajectory.to_dict())
 

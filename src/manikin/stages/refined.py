@@ -33,6 +33,8 @@ def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -
     used = {"friction": use_of_friction(result.schedule, result.motion)}
     block = refined_summary(result) | passage | used | {"seed_matters": context.plan is not None}
     report.finish("wholebody", block)
+    report.require("wholebody", result.requirements)
+    report.planned = result.succeeded
     if result.failure is not None:
         report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
     report.keep_motions(result.schedule, result.motion)

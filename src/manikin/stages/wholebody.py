@@ -36,6 +36,8 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
     passage = context.passage(trajectory.schedule, result.motion).summary()
     used = {"friction": use_of_friction(trajectory.schedule, result.motion)}
     report.finish("wholebody", wholebody_summary(result) | passage | used | {"seed_matters": drawn})
+    report.require("wholebody", result.requirements)
+    report.planned = result.succeeded
     if result.failure is not None:
         report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
     report.keep_motions(trajectory.schedule, result.motion)
@@ -53,6 +55,7 @@ def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | No
         return None
     motion = point_mass_motion(centroidal.problem, centroidal.trajectory, centroidal.polytopes)
     report.keep_motions(centroidal.trajectory.schedule, motion)
+    report.planned = centroidal.succeeded
     return motion
 
 

@@ -16,6 +16,7 @@ from manikin.body.limb import hanging_segment
 from manikin.centroidal import CentroidalTrajectory
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.motion import Motion
+from manikin.requirement import Requirement, RequirementTable, Sense, requirement_table
 from manikin.scene import Proximity
 from manikin.spatial import FloatArray
 from manikin.wholebody.meeting import Ignored, Meeting, meeting_errors
@@ -86,34 +87,28 @@ class WholeBodyResiduals:
     min_zmp_distance_m: float | None
     worst_times_s: dict[str, float]
 
-    def violation(self, requirements: WholeBodyRequirements) -> tuple[str, float] | None:
-        """Explain the first requirement that is not kept, with its time [s]; None when all are."""
-        for name, value, limit, what in self._checks(requirements):
-            if value > limit:
-                return f"{what} is {value:.4g}; allowed {limit:.4g}", self.worst_times_s[name]
-        return None
+    def table(self, requirements: WholeBodyRequirements) -> RequirementTable:
+        """Every requirement with its measured value; keys are the names of the fields."""
+        r, pair = requirements, " and ".join(self.closest_pair)
+        return requirement_table([
+            self._row("max_support_error_m", "support error", "m", r.support_error),
+            self._row("max_support_turn_rad", "support turn", "rad", r.support_turn),
+            None if self.max_meeting_error_m == 0.0  # nothing was met at speed
+            else self._row("max_meeting_error_m", "distance of a sliding contact from its surface", "m",
+                      r.meeting_error),
+            self._row("max_com_error_m", "centre-of-mass error", "m", r.com_error),
+            self._row("min_clearance_m", "clearance", "m", r.clearance, ">=", pair),
+            self._row("max_joint_limit_violation_rad", "joint range violation", "rad", r.joint_limit),
+            self._row("max_velocity_share", "share of a velocity limit", "", r.velocity_share),
+            self._row("max_missing_wrench", "missing wrench", "N, N.m", r.missing_wrench),
+            self._row("max_torque_share", "share of a torque limit", "", r.torque_share),
+        ])  # fmt: skip
 
-    def broken(self, requirements: WholeBodyRequirements) -> frozenset[str]:
-        """Names of the fields that are not kept."""
-        return frozenset(name for name, value, limit, _ in self._checks(requirements) if value > limit)
-
-    def _checks(self, requirements: WholeBodyRequirements) -> list[tuple[str, float, float, str]]:
-        """Field, value, limit and wording of every requirement."""
-        r = requirements
-        pair = " and ".join(self.closest_pair)
-        return [
-            ("max_support_error_m", self.max_support_error_m, r.support_error, "support error [m]"),
-            ("max_support_turn_rad", self.max_support_turn_rad, r.support_turn, "support turn [rad]"),
-            ("max_meeting_error_m", self.max_meeting_error_m, r.meeting_error,
-             "distance of what slides from its surface [m]"),
-            ("max_com_error_m", self.max_com_error_m, r.com_error, "centre-of-mass error [m]"),
-            ("min_clearance_m", -self.min_clearance_m, -r.clearance, f"clearance [m] of {pair}, negated,"),
-            ("max_joint_limit_violation_rad", self.max_joint_limit_violation_rad, r.joint_limit,
-             "joint range violation [rad]"),
-            ("max_velocity_share", self.max_velocity_share, r.velocity_share, "share of a velocity limit"),
-            ("max_missing_wrench", self.max_missing_wrench, r.missing_wrench, "missing wrench [N, N.m]"),
-            ("max_torque_share", self.max_torque_share, r.torque_share, "share of a torque limit"),
-        ]  # fmt: skip
+    def _row(
+        self, key: str, name: str, unit: str, limit: float, sense: Sense = "<=", where: str = ""
+    ) -> Requirement:
+        time = self.worst_times_s.get(key)
+        return Requirement(key, name, unit, float(getattr(self, key)), sense, limit, time, where)
 
 
 def certify(
