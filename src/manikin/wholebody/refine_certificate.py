@@ -27,7 +27,7 @@ class RefineRequirements:
         velocity_share: Largest share of a joint's velocity limit.
         physics_violation: Largest wrench that no admissible contact force supplies [N].
         margin: Least margin of the whole body's wrench, where the stance's wrenches fill a volume [N.m].
-        torque_share: Largest share of a joint's torque limit; None asks for none.
+        torque_share: Largest share of a joint's torque limit.
     """
 
     support_error: float = 1.0e-3
@@ -38,7 +38,7 @@ class RefineRequirements:
     velocity_share: float = 1.0
     physics_violation: float = 1.0
     margin: float = 0.0
-    torque_share: float | None = None
+    torque_share: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,7 @@ class RefineResiduals:
         min_margin: Least margin of the whole body's wrench about the world origin, over the stances whose
             wrenches fill a volume; infinite without any [N.m].
         max_torque_share: Largest share of a joint's torque limit.
+        tightest_joint: Name of that joint.
         worst_times_s: When each of the errors is largest [s], by field name.
     """
 
@@ -71,6 +72,7 @@ class RefineResiduals:
     max_physics_violation: float
     min_margin: float
     max_torque_share: float
+    tightest_joint: str
     worst_times_s: dict[str, float]
 
     def violation(self, requirements: RefineRequirements) -> tuple[str, float] | None:
@@ -88,7 +90,6 @@ class RefineResiduals:
         """Field, value, limit and wording of every requirement."""
         r = requirements
         pair = " and ".join(self.closest_pair)
-        torque = np.inf if r.torque_share is None else r.torque_share
         return [
             ("max_support_error_m", self.max_support_error_m, r.support_error, "support error [m]"),
             ("max_support_turn_rad", self.max_support_turn_rad, r.support_turn, "support turn [rad]"),
@@ -100,7 +101,8 @@ class RefineResiduals:
             ("max_physics_violation", self.max_physics_violation, r.physics_violation,
              "wrench without contact force [N]"),
             ("min_margin", -self.min_margin, -r.margin, "margin [N.m], negated,"),
-            ("max_torque_share", self.max_torque_share, torque, "share of a torque limit"),
+            ("max_torque_share", self.max_torque_share, r.torque_share,
+             f"share of a torque limit ({self.tightest_joint})"),
         ]  # fmt: skip
 
 
@@ -128,11 +130,12 @@ def certify_refined(
     angles = motion.q[:, 7:]
     limit = np.maximum(body.lower - angles, angles - body.upper).max(axis=1, initial=0.0)
     margin = np.where(np.array(flat)[schedule.phase_at(motion.time)], np.inf, motion.margin)
+    share = body.torque_share(motion.tau[:, 6:])
     series = {
         "max_support_error_m": support, "max_support_turn_rad": turn,
         "max_joint_limit_violation_rad": limit,
         "max_velocity_share": (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1, initial=0.0),
-        "max_torque_share": (np.abs(motion.tau[:, 6:]) / body.torque_limit).max(axis=1, initial=0.0),
+        "max_torque_share": share.max(axis=1, initial=0.0),
         "max_physics_violation": violation,
     }  # fmt: skip
     times = {name: float(motion.time[int(np.argmax(values))]) for name, values in series.items()}
@@ -147,5 +150,6 @@ def certify_refined(
         closest_pair=apart.pair or ("", ""),
         max_penetration_m=max(0.0, -float(flying.distance)),
         min_margin=float(margin.min()),
+        tightest_joint=body.joint_names[int(np.argmax(share.max(axis=0)))],
         worst_times_s=times,
     )
