@@ -16,6 +16,7 @@ from manikin.centroidal import CentroidalTrajectory
 from manikin.centroidal.certificate import phase_margins, phase_times
 from manikin.centroidal.feasibility import polytopes_of
 from manikin.contact import ContactSchedule, StanceSequence
+from manikin.display import Displayed
 from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
 from manikin.motion.derived import PhaseTable, com_velocity, effector_positions, phases_of
@@ -61,8 +62,8 @@ class ComTrack:
         return np.column_stack([np.interp(times, self.time, column) for column in self.position.T])
 
 
-@dataclass(frozen=True, eq=False)
-class RunRecord:
+@dataclass(frozen=True, eq=False, repr=False)
+class RunRecord(Displayed):
     """Everything that a run left behind; what it does not have is None or empty.
 
     Attributes:

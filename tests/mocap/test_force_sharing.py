@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.analysis import AnalysisOptions, analyze_file
@@ -77,7 +77,6 @@ def test_who_lands_nearly_at_once_stands_on_both_feet(alone):
     np.testing.assert_allclose(shares[20 + alone + 2 :, :, 2], 350.0, atol=1.0)
 
 
-@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**16))
 def test_shares_add_up_and_none_changes_less(seed):
     """Whatever is passed from one contact to another makes the sum of changes and sizes larger."""
@@ -132,7 +131,6 @@ def test_shares_that_contacts_can_give_stay_as_they_are():
     np.testing.assert_array_equal(shared_wrenches(soles(), parts.sum(axis=1), 700.0, parts), parts)
 
 
-@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**16))
 def test_shares_beyond_the_limits_become_near_ones_within(seed):
     """A force passed from one contact to the other that one of them cannot give: within, and near.

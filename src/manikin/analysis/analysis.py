@@ -10,6 +10,7 @@ from manikin.analysis.measured_motion import MeasuredMotion
 from manikin.analysis.on_plates import PlateReport
 from manikin.balance.limiting import LimitingConstraint
 from manikin.body import BodyModel
+from manikin.display import Displayed
 from manikin.ergonomics import Ergonomics
 from manikin.locomotion.segmentation import PathSegments
 from manikin.mocap.reconstruction import Reconstruction
@@ -20,8 +21,8 @@ from manikin.spatial import GRAVITY, FloatArray
 WHOLE_BODY = "whole-body"
 
 
-@dataclass(frozen=True, eq=False)
-class Analysis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Analysis(Displayed):
     """A recorded motion under the yardsticks of planned ones; instants are on the recording's clock [s].
 
     Attributes:
@@ -60,6 +61,13 @@ class Analysis:
     plates: PlateReport | None
     remarks: tuple[str, ...]
     wall: float
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        return {
+            "name": self.name, "duration": f"{self.motion.duration:.2f} s", "rate": f"{self.rate:g} Hz",
+            "stature": f"{self.body.stature or 0.0:.2f} m", "mass": f"{self.body.mass:.1f} kg",
+        }  # fmt: skip
 
     @property
     def body(self) -> BodyModel:

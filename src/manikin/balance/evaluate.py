@@ -20,6 +20,7 @@ from manikin.balance.margin import force_space, moment_space, stability_margins
 from manikin.balance.polygon import signed_distance
 from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytope
 from manikin.contact import ContactKind, Stance
+from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.polytope import Polytope
 from manikin.spatial import FloatArray, frozen_array
@@ -38,8 +39,8 @@ class GroundPoint:
     distance: float
 
 
-@dataclass(frozen=True, eq=False)
-class BalanceReport:
+@dataclass(frozen=True, eq=False, repr=False)
+class BalanceReport(Displayed):
     """Balance of one stance and CoM state.
 
     Attributes:
@@ -79,6 +80,13 @@ class BalanceReport:
     zmp: GroundPoint
     fri: GroundPoint | None
     cmp: GroundPoint
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        return {
+            "balanced": str(self.balanced), "margin_about_com": f"{self.margin_about_com:.1f} N.m",
+            "force_margin": f"{self.force_margin:.0f} N", "limiting": self.limiting.description,
+        }  # fmt: skip
 
     def as_dict(self, *, polytope: bool = False) -> dict[str, Any]:
         """JSON-ready numbers (SI); ``polytope`` adds H and h. Infinite or undefined becomes None."""

@@ -25,6 +25,7 @@ from manikin.body.segments import (
     hinges_of,
     segments_by_name,
 )
+from manikin.display import Displayed
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, frozen_array
 
@@ -32,8 +33,8 @@ OFF_AXIS = "off axis"
 """Value of ``masses`` in a signature of :attr:`BodyModel.off_axis_masses`."""
 
 
-@dataclass(frozen=True, eq=False)
-class BodyModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class BodyModel(Displayed):
     """A floating tree of rigid segments on hinges.
 
     The configuration vector is ``q = [root position (3), root quaternion xyzw (4), hinge
@@ -75,6 +76,14 @@ class BodyModel:
     strength: float = 1.0
     lengths: Mapping[str, float] = field(default_factory=dict)
     off_axis_masses: bool = False
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        stature = {} if self.stature is None else {"stature": f"{self.stature:.2f} m"}
+        return {
+            "name": self.name, **stature, "mass": f"{self.mass:.1f} kg", "segments": str(len(self.segments)),
+            "hinges": str(len(self.joint_names)), "limbs": str(len(self.limbs)),
+        }  # fmt: skip
 
     def __post_init__(self) -> None:
         index = segments_by_name(self.segments)

@@ -12,6 +12,7 @@ from manikin.centroidal.initial_guess import GuessStyle, guess, guess_styles
 from manikin.centroidal.optimise import Attempt, Targets, optimise, trajectory_of
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.centroidal.trajectory import CentroidalTrajectory
+from manikin.display import Displayed
 from manikin.spatial import FloatArray
 
 MAX_ROUNDS = 6
@@ -21,8 +22,8 @@ NEGLIGIBLE = 0.02
 """Share of the margin by which left-out facets may lower it without another round."""
 
 
-@dataclass(frozen=True, eq=False)
-class CentroidalResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class CentroidalResult(Displayed):
     """A trajectory with its certificate, or why there is none.
 
     Attributes:

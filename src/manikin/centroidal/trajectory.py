@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from manikin.balance import pseudo_wrench
 from manikin.contact import ContactSchedule, StanceSequence
+from manikin.display import Displayed
 from manikin.errors import InputError, SplineError
 from manikin.spatial import FloatArray, finite_number
 from manikin.spline import BSpline
 
 
-@dataclass(frozen=True, eq=False)
-class CentroidalTrajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class CentroidalTrajectory(Displayed):
     """``p(t) = p_s(sigma t)`` with ``sigma = 1 / T`` ([Qiu2012]_ 5.2-5.6).
 
     Before the start and after the end the body rests: the position is held and all

@@ -8,14 +8,15 @@ from manikin.comparison.com import com_difference, margin_difference
 from manikin.comparison.postures import PostureDifference, posture_differences, uncommon_joints
 from manikin.comparison.timing import TimingRow, timing_rows
 from manikin.contact import Stance
+from manikin.display import Displayed
 from manikin.record import ComTrack, RunRecord
 
 STAGES = ("point mass", "planned", "executed")
 """What may be compared of each run: the CoM plan, the planned and the executed motion."""
 
 
-@dataclass(frozen=True, eq=False)
-class RunComparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class RunComparison(Displayed):
     """Two runs side by side; differences are second less first.
 
     Attributes:

@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from manikin.display import Displayed
 from manikin.errors import ContactError
 from manikin.spatial import (
     FloatArray,
@@ -39,8 +40,8 @@ class SolePart(StrEnum):
     """What lies before the hinge of the toes, about which the foot tilts before it leaves."""
 
 
-@dataclass(frozen=True, eq=False)
-class Contact:
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(Displayed):
     """Where and how an effector touches the scene ([Qiu2012]_ 4.2.1).
 
     Use :func:`sole`, :func:`point` or :func:`grasp` to make one.

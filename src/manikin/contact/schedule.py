@@ -7,12 +7,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from manikin.contact.sequence import StanceSequence, Swing
 from manikin.contact.stance import Stance
+from manikin.display import Displayed
 from manikin.errors import ContactError
 from manikin.spatial import FloatArray, frozen_array
 
 
-@dataclass(frozen=True, eq=False)
-class ContactSchedule:
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactSchedule(Displayed):
     """A stance sequence with its key instants.
 
     Attributes:
@@ -22,6 +23,10 @@ class ContactSchedule:
 
     sequence: StanceSequence
     instants: FloatArray
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        return {"phases": str(len(self.sequence)), "end": f"{self.instants[-1]:.2f} s"}
 
     def __init__(self, sequence: StanceSequence, instants: ArrayLike) -> None:
         times = frozen_array(instants, "schedule instants [s]", (len(sequence) + 1,), ContactError)

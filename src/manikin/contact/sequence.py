@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from manikin.contact.contact import Contact
 from manikin.contact.stance import Stance
+from manikin.display import Displayed
 from manikin.errors import ContactError
 from manikin.spatial import finite_number
 
@@ -51,8 +52,8 @@ class Swing:
     end: Contact | None
 
 
-@dataclass(frozen=True, eq=False)
-class StanceSequence:
+@dataclass(frozen=True, eq=False, repr=False)
+class StanceSequence(Displayed):
     """Stances in order; consecutive ones share what the motion holds on to.
 
     Attributes:

@@ -4,12 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from manikin.contact.contact import Contact
+from manikin.display import Displayed
 from manikin.errors import ContactError
 from manikin.spatial import finite_number
 
 
-@dataclass(frozen=True, eq=False)
-class Stance:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stance(Displayed):
     """A set of simultaneous contacts, one per effector.
 
     Attributes:
@@ -21,6 +22,11 @@ class Stance:
 
     contacts: tuple[Contact, ...]
     normal_force_cap: float | None = None
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        cap = "none" if self.normal_force_cap is None else f"{self.normal_force_cap:.0f} N"
+        return {"contacts": " ".join(self.effectors), "normal_force_cap": cap}
 
     def __init__(self, contacts: Sequence[Contact], normal_force_cap: float | None = None) -> None:
         for item in contacts:

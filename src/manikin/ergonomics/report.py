@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
+from manikin.display import Displayed
 from manikin.ergonomics.assessment import PosturalAssessment, assess_posture
 from manikin.ergonomics.circumstances import Circumstances
 from manikin.ergonomics.effort import CumulativeEffort, cumulative_effort
@@ -23,8 +24,8 @@ NO_TORQUES = "the motion has no joint torques"
 """Reason of strength and effort of a recording without inverse dynamics."""
 
 
-@dataclass(frozen=True, eq=False)
-class Ergonomics:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ergonomics(Displayed):
     """Ergonomics of one motion; a part that could not be told is None, and ``missing`` says why.
 
     Attributes:

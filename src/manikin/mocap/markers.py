@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.gaps import LONGEST_GAP, Gap, filled, gaps_of
@@ -29,8 +30,8 @@ class Event:
     time: float
 
 
-@dataclass(frozen=True, eq=False)
-class MarkerRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class MarkerRecording(Displayed):
     """Markers at n instants; the world is z up.
 
     Attributes:

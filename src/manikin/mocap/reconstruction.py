@@ -6,13 +6,14 @@ from functools import cached_property
 import numpy as np
 
 from manikin.body import BodyModel
+from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.mocap.targets import Targets
 from manikin.spatial import FloatArray, frozen_array
 
 
-@dataclass(frozen=True, eq=False)
-class Reconstruction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reconstruction(Displayed):
     """Postures of a body that follow recorded points.
 
     Attributes:

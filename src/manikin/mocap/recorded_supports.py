@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.spatial import FloatArray, frozen_array
 
@@ -89,8 +90,8 @@ class SupportPhase:
         return self.end - self.start
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedSupports:
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordedSupports(Displayed):
     """The supports of a recorded motion.
 
     Attributes:

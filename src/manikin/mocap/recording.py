@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.spatial import FloatArray, finite_number, frozen_array
 
@@ -16,8 +17,8 @@ Y_UP_TO_Z_UP: FloatArray = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0
 Y_UP_TO_Z_UP.setflags(write=False)
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Displayed):
     """Joints of a skeleton at n instants; the world is z up.
 
     A joint's frame turns with the bone that begins there. With every rotation the identity the
@@ -43,6 +44,15 @@ class Recording:
     rotations: FloatArray
     root_positions: FloatArray
     rate: float
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        return {
+            "name": self.name,
+            "frames": str(len(self)),
+            "rate": f"{self.rate:g} Hz",
+            "joints": str(len(self.joint_names)),
+        }
 
     def __post_init__(self) -> None:
         where, joints = f"recording {self.name!r}", len(self.joint_names)

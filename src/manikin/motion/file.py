@@ -24,6 +24,7 @@ import numpy as np
 from manikin.atomic import atomic_path
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
+from manikin.display import Displayed
 from manikin.errors import InputError, MotionFileError
 from manikin.motion.description import (
     body_from,
@@ -62,8 +63,8 @@ DATASETS: Mapping[str, tuple[str, str]] = {
 _Value = TypeVar("_Value")
 
 
-@dataclass(frozen=True, eq=False)
-class MotionFile:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionFile(Displayed):
     """Content of a motion file; what it does not hold is None.
 
     Attributes:
@@ -81,6 +82,14 @@ class MotionFile:
     scene: Scene | None = None
     schedule: ContactSchedule | None = None
     recorded: Motion | None = None
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        held = ("body", "scene", "schedule")
+        motions = {name: f"{motion.duration:.2f} s" for name, motion in self.motions.items()}
+        return motions | {
+            "with": " ".join(name for name in held if getattr(self, name) is not None) or "nothing"
+        }
 
     @property
     def motions(self) -> dict[str, Motion]:

@@ -1,16 +1,21 @@
 """A whole-body motion sampled in time, with its contacts, forces and margin."""
 
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.display import Displayed
 from manikin.errors import MotionFileError
 from manikin.spatial import FloatArray
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion(Displayed):
     """Samples of one motion, planned or executed.
 
     Configuration vectors follow Pinocchio: ``q = [pelvis position, xyzw quaternion, joint
@@ -49,6 +54,13 @@ class Motion:
     joint_names: tuple[str, ...]
     margin_unit: str = "N.m"
 
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        return {
+            "duration": f"{self.duration:.2f} s", "samples": str(len(self.time)),
+            "hinges": str(len(self.joint_names)), "contacts": " ".join(self.contact_names),
+        }  # fmt: skip
+
     def __post_init__(self) -> None:
         n, c, nv = len(self.time), len(self.contact_names), len(self.joint_names) + 6
         wanted = {
@@ -71,6 +83,21 @@ class Motion:
     def duration(self) -> float:
         """Time from the first to the last sample [s]."""
         return float(self.time[-1] - self.time[0])
+
+    def to_frame(self) -> "DataFrame":
+        """Table with one row for each sample, indexed by time; units stand in the names of the columns."""
+        from pandas import DataFrame, Index
+
+        root = {f"pelvis_{axis}_m": self.q[:, k] for k, axis in enumerate("xyz")}
+        root |= {f"pelvis_q{axis}": self.q[:, 3 + k] for k, axis in enumerate("xyzw")}
+        columns = {f"com_{axis}_m": self.com[:, k] for k, axis in enumerate("xyz")}
+        columns |= {f"margin_{self.margin_unit}": self.margin} | root
+        for k, name in enumerate(self.joint_names):
+            columns |= {f"{name}_rad": self.q[:, 7 + k], f"{name}_Nm": self.tau[:, 6 + k]}
+        for k, name in enumerate(self.contact_names):
+            forces = {f"{name}_force_{axis}_N": self.contact_force[:, k, i] for i, axis in enumerate("xyz")}
+            columns |= {f"{name}_touches": self.support[:, k]} | forces
+        return DataFrame(columns, index=Index(self.time, name="time_s"))
 
     def arrays(self) -> dict[str, NDArray]:
         """The array fields by name, in their order of declaration."""

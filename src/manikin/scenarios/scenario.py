@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from manikin.contact import StanceSequence
+from manikin.display import Displayed
 from manikin.scenarios.overrides import override
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.tree import Tree
@@ -21,9 +22,18 @@ if TYPE_CHECKING:
     from manikin.scene import Scene
 
 
-@dataclass(frozen=True, eq=False)
-class Scenario(ScenarioValues):
+@dataclass(frozen=True, eq=False, repr=False)
+class Scenario(Displayed, ScenarioValues):
     """One job for the pipeline: the values of a scenario file and what is built from them."""
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        return {
+            "name": self.name,
+            "body": self.file.body.model,
+            "mass": f"{self.mass:.1f} kg",
+            "seed": str(self.seed),
+        }
 
     def with_body(
         self,

@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike
 
+from manikin.display import Displayed
 from manikin.errors import SceneError
 from manikin.scene.mesh import Convexity, Mesh, as_trimesh, load_mesh
 from manikin.scene.shapes import (
@@ -26,8 +27,8 @@ DRAWN_HALF_SIZE = 10.0
 """Half the side of the square that stands for an endless plane when drawn [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Obstacle:
+@dataclass(frozen=True, eq=False, repr=False)
+class Obstacle(Displayed):
     """A shape of the scene at a fixed place.
 
     Attributes:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.contact import Contact, ContactKind, Stance
+from manikin.display import Displayed
 from manikin.errors import ContactError, SceneError
 from manikin.scene.collision import collision_parts
 from manikin.scene.depth import part_meter
@@ -27,8 +28,8 @@ GRASP_REACH = 0.06
 _ALIGNED = float(np.cos(np.deg2rad(2.0)))
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene(Displayed):
     """Obstacles with unique names, the floor being one of them.
 
     Attributes:
@@ -38,6 +39,11 @@ class Scene:
 
     obstacles: tuple[Obstacle, ...]
     floor_height: float | None
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        names = [item.name for item in self.obstacles]
+        return {"obstacles": str(len(names)), "names": " ".join(names)}
 
     def __init__(self, obstacles: Sequence[Obstacle] = (), floor_height: float | None = 0.0) -> None:
         for item in obstacles:

@@ -4,13 +4,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from manikin.contact import ContactSchedule
+from manikin.display import Displayed
 from manikin.motion import Motion
 from manikin.simulation.pushed import PushOutcome
 from manikin.simulation.world import Touch
 
 
-@dataclass(frozen=True, eq=False)
-class Execution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Execution(Displayed):
     """An executed motion and how well it followed the plan.
 
     Attributes:

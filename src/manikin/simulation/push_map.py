@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.simulation.push_search import HeldImpulse
 from manikin.spatial import FloatArray
@@ -22,8 +23,8 @@ def equal_directions(count: int) -> tuple[float, ...]:
     return tuple(360.0 * number / count for number in range(count))
 
 
-@dataclass(frozen=True, eq=False)
-class PushMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class PushMap(Displayed):
     """The largest impulses held, by direction; every direction is searched, none follows from symmetry.
 
     Attributes:

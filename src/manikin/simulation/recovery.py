@@ -15,6 +15,7 @@ from manikin.control.balance_recovery import (
     capture_point,
 )
 from manikin.control.stepping import StepTaken
+from manikin.display import Displayed
 from manikin.motion import Motion
 from manikin.simulation.recovery_record import RecoveryTrace
 from manikin.simulation.world import Push, Touch
@@ -37,8 +38,8 @@ FOOT_SLID = 0.1
 """After a step a foot that slides by up to this is still one to stand on [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Recovery:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recovery(Displayed):
     """What became of a push.
 
     Attributes:

@@ -15,6 +15,7 @@ import numpy as np
 from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytope
 from manikin.body import BodyModel
 from manikin.centroidal import CentroidalTrajectory
+from manikin.display import Displayed
 from manikin.motion import Motion
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
@@ -96,8 +97,8 @@ class WholeBodySettings:
     manner: Manner = READY
 
 
-@dataclass(frozen=True, eq=False)
-class WholeBodyResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class WholeBodyResult(Displayed):
     """A whole-body motion, or the best attempt and what it breaks.
 
     Attributes:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from manikin.contact import ContactSchedule
+from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.spatial import finite_number
@@ -53,8 +54,8 @@ class RefineSettings:
                 raise InputError(f"refinement speed_share is {share:g}; valid: at most 1")
 
 
-@dataclass(frozen=True, eq=False)
-class RefineResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class RefineResult(Displayed):
     """A refined motion, or the best attempt and what it breaks.
 
     Attributes:
