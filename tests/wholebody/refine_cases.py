@@ -128,7 +128,7 @@ def on_wall(effector: str, number: int) -> Contact:
 
 def climb(moves: int, duration: float = 0.8) -> Case:
     """Climb the wall: left hand, right foot, right hand, left foot, again and again."""
-    body = human(1.75, 79.0, "male")
+    body = human(1.75, 79.0, "male", strength=2.0)  # 0.8 s a move is beyond the mean man
     bent = {"hip_flexion": 0.3, "knee_flexion": 0.4, "elbow_flexion": 1.2, "shoulder_flexion": 2.0}
     reference = body.posture({f"{side}_{name}": bent[name] for side in ("left", "right") for name in bent})
     maker = KeyMaker(body, wall(), reference, duration)

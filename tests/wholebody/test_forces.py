@@ -66,8 +66,8 @@ def strain(found):
 @pytest.mark.parametrize(
     ("effectors", "acceleration", "weakest"),
     [
-        (("right_foot", "right_hand"), (-1.0, 0.0, 0.0), "right_knee_rotation"),
         (("right_foot", "right_hand"), (-2.0, 1.0, 0.0), "right_knee_rotation"),
+        (("left_foot", "right_foot", "right_hand"), (-3.0, -1.0, 0.0), "left_hip_flexion"),
     ],
 )
 def test_forces_are_shared_within_the_strength_of_the_joints(monkeypatch, effectors, acceleration, weakest):

@@ -141,7 +141,7 @@ _THORAX = "0.75 of the lumbar's: the same muscles, fewer of them"
 _TRUNK_TURN = _estimate(1.25, "young men, quoted without a source")
 _TRUNK_SIDE = _printed(159.0, STOBBE, Grade.QUOTED)
 _TRUNK_BEND, _TRUNK_EXTEND = (_printed(value, STOBBE, Grade.QUOTED) for value in (143.0, 234.0))
-_KNEE_TURN = MassStrength(0.35, "Armour et al. 2004", Grade.QUOTED)
+_KNEE_TURN = _estimate(0.70, "muscles 0.35 (Armour et al. 2004, quoted), as much by the ligaments under load")
 _FOOT_SIDE = "quoted without a source"
 
 HUMAN_STRENGTH: Mapping[str, tuple[DirectionStrength, DirectionStrength]] = MappingProxyType({
