@@ -87,10 +87,12 @@ def test_in_flight_the_missing_wrench_about_the_com_counts():
     wrench = pseudo_wrench(MASS, com, np.array([[0.0, 0.0, -9.81], [0.0, 0.0, 0.0]]))
     found = motion_margin([Stance([])], [0, 0], wrench, com)
     lengths = np.linalg.norm(wrench[:, :3], axis=1)
-    assert lengths[1] == pytest.approx(MASS * 9.81, rel=1e-3) and lengths[0] < 1.0
+    assert lengths[1] == pytest.approx(MASS * 9.81, rel=1e-3)
+    assert lengths[0] < 1.0
     np.testing.assert_allclose(found.margin, -lengths, atol=1e-9)
     np.testing.assert_allclose(found.force, -lengths, atol=1e-9)
-    assert np.isnan(found.zmp_distance).all() and found.min_zmp_distance is None
+    assert np.isnan(found.zmp_distance).all()
+    assert found.min_zmp_distance is None
 
 
 def test_polytopes_that_are_known_are_used_whatever_their_reference():
@@ -105,7 +107,8 @@ def test_a_stance_that_was_moved_has_the_polytope_of_the_first_one_moved_along()
     here = _stances()[3]
     there = _moved(here, np.eye(3), np.array([4.0, -3.0, 0.5]))
     first, second = wrench_polytopes([here, there])
-    assert np.array_equal(first.H, second.H) and second.stance is there
+    assert np.array_equal(first.H, second.H)
+    assert second.stance is there
     np.testing.assert_allclose(second.reference - first.reference, [4.0, -3.0, 0.5], atol=1e-12)
     at_origin = wrench_polytopes([here, there], reference=(0.0, 0.0, 0.0))[1]
     direct = wrench_polytope(there)

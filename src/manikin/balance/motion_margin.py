@@ -51,9 +51,10 @@ class MotionMargin:
 
     def __repr__(self) -> str:
         zmp = self.min_zmp_distance
+        margin, force = self.margin.min(initial=np.inf), self.force.min(initial=np.inf)
         return (
-            f"MotionMargin({len(self.margin)} samples, least margin {self.margin.min(initial=np.inf):.2f} N.m, "
-            f"least force {self.force.min(initial=np.inf):.1f} N"
+            f"MotionMargin({len(self.margin)} samples, least margin {margin:.2f} N.m, "
+            f"least force {force:.1f} N"
             f"{'' if zmp is None else f', least ZMP distance {zmp:.3f} m'})"
         )
 
