@@ -136,6 +136,10 @@ def _harbo(per_kg: float, women: Women = Women.GENERAL) -> MassStrength:
     return MassStrength(per_kg, HARBO, Grade.QUOTED, women)
 
 
+def _both(strength: MassStrength) -> tuple[MassStrength, MassStrength]:
+    return strength, strength
+
+
 _HIGHER = 0.75
 _THORAX = "0.75 of the lumbar's: the same muscles, fewer of them"
 _TRUNK_TURN = _estimate(1.25, "young men, quoted without a source")
@@ -151,11 +155,11 @@ HUMAN_STRENGTH: Mapping[str, tuple[DirectionStrength, DirectionStrength]] = Mapp
     "thorax_flexion": (
         _estimate(_HIGHER * _TRUNK_EXTEND.per_kg, _THORAX), _estimate(_HIGHER * _TRUNK_BEND.per_kg, _THORAX),
     ),
-    "thorax_side_bend": (_estimate(_HIGHER * _TRUNK_SIDE.per_kg, _THORAX),) * 2,
-    "thorax_rotation": (_estimate(_HIGHER * _TRUNK_TURN.per_kg, _THORAX),) * 2,
+    "thorax_side_bend": _both(_estimate(_HIGHER * _TRUNK_SIDE.per_kg, _THORAX)),
+    "thorax_rotation": _both(_estimate(_HIGHER * _TRUNK_TURN.per_kg, _THORAX)),
     "neck_flexion": (_printed(51.0, FICE, Grade.PAPER), _printed(30.0, FICE, Grade.PAPER)),
-    "neck_side_bend": (_printed(32.0, FICE, Grade.PAPER),) * 2,
-    "neck_rotation": (_printed(13.0, FICE, Grade.PAPER),) * 2,
+    "neck_side_bend": _both(_printed(32.0, FICE, Grade.PAPER)),
+    "neck_rotation": _both(_printed(13.0, FICE, Grade.PAPER)),
     "shoulder_flexion": (
         _harbo(1.25, Women.SHOULDER), _printed(89.9, SHOULDER_STUDY, Grade.PAPER, Women.SHOULDER),
     ),
