@@ -74,7 +74,7 @@ HARBO = "Harbo et al. 2012, men of 25 y, 1.80 m, 80 kg"
 STOBBE = "Stobbe 1982, medians, in Chaffin and Andersson"
 FICE = "Fice et al. 2014"
 DELP = "Delp et al. 1996"
-ABDUCTION = "1.29 standing, moving (Sugimoto et al. 2014), 30 % more lying on the side (Cerda Vega et al. 2018)"
+ABDUCTION = "1.29 standing (Sugimoto et al. 2014), 30 % more lying on the side (Cerda Vega et al. 2018)"
 HIP_STUDY = "isometric hip study of 30 people, PMC11329127"
 SHOULDER_STUDY = "static at 0 deg, 26 men (Dynamic shoulder flexion strength ...)"
 
