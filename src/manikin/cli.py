@@ -135,6 +135,13 @@ def run(
         float | None, typer.Option(metavar="KG", min=35.0, max=160.0, help="Other mass, 35 to 160 kg.")
     ] = None,
     sex: Annotated[str | None, typer.Option(metavar="male|female", help="Other sex.")] = None,
+    age: Annotated[float | None, typer.Option(metavar="YEARS", help="Other age, 18 to 90 years.")] = None,
+    strength: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X", help="Torque limits relative to a healthy adult of that sex, size and age."
+        ),
+    ] = None,
     variant: Annotated[
         str | None, typer.Option(metavar="V", help="One of the scenario's variants; also NAME@V.")
     ] = None,
@@ -155,9 +162,10 @@ def run(
     if scenario == ALL:
         refuse(variant is not None, "--variant", "every variant is run")
         refuse(bool(overrides), "--set", "it belongs to one scenario")
-        given = {"--seed": seed, "--stature": stature, "--mass": mass, "--sex": sex}
+        body = {"--stature": stature, "--mass": mass, "--sex": sex, "--age": age, "--strength": strength}
+        given = {"--seed": seed} | body
         words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
-        _check_values(seed, stature, mass, sex)
+        _check_values(seed, stature, mass, sex, age, strength)
         directory = out if out is not None else None if json else Path("runs")
         asked = {"stature_m": stature, "seed": seed}
         return _run_all(directory, asked, tuple(words), context.obj, draw=figures, workers=jobs, json=json)
@@ -165,7 +173,7 @@ def run(
     from manikin.scenarios import load_scenario
 
     job = load_scenario(scenario, variant, overrides or ())
-    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex)
+    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex, age=age, strength=strength)
     if seed is not None:
         job = job.with_seed(seed)
     directory = out if out is not None else None if json else Path("runs") / job.name
@@ -369,11 +377,19 @@ def export(
     typer.echo(str(written))
 
 
-def _check_values(seed: int | None, stature: float | None, mass: float | None, sex: str | None) -> None:
+def _check_values(
+    seed: int | None,
+    stature: float | None,
+    mass: float | None,
+    sex: str | None,
+    age: float | None,
+    strength: float | None,
+) -> None:
     """Refuse a value once, and not once per run."""
     from manikin.scenarios import list_scenarios, load_scenario
 
-    job = load_scenario(next(iter(list_scenarios()))).with_body(stature_m=stature, mass_kg=mass, sex=sex)
+    job = load_scenario(next(iter(list_scenarios())))
+    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex, age=age, strength=strength)
     if seed is not None:
         job.with_seed(seed)
 

@@ -31,7 +31,8 @@ def test_forces_and_torques_keep_the_body_at_rest(body, brace, push, measure):
     assert np.abs(needed[:6]).max() < 2e-4 * 3.0 * body.mass * GRAVITY
     toes = np.array(["toe" in name for name in body.joint_names])
     assert np.abs(needed[6:] - forces.tau)[~toes].max() < 2e-4 * 3.0 * body.mass * GRAVITY
-    assert np.all(np.abs(forces.tau) <= max(forces.torque_share, 1.0) * body.torque_limit + 1e-6)
+    assert body.torque_share(forces.tau).max() == pytest.approx(forces.torque_share)
+    assert body.joint_names[int(np.argmax(body.torque_share(forces.tau)))] == forces.tightest
     assert forces.residual < 1e-6
 
 

@@ -1,8 +1,8 @@
 """What a posture can exert on an object: linear programs of the whole body at rest.
 
     max F   over the forces of feet and hands and F
-    s.t.    g(q) = tau + sum J^T f,   |tau| <= tau_max,   feet and pressing hands inside their friction
-            pyramids,   sum of the forces on the hands = -F d
+    s.t.    g(q) = tau + sum J^T f,   tau_min <= tau <= tau_max,   feet and pressing hands inside their
+            friction pyramids,   sum of the forces on the hands = -F d
 
 This knows nothing of how the posture was found; its points are those of the contacts, each on the
 segment that carries it, so that a load on the tip of a sole is paid for by the toes. The pyramids are those
@@ -127,15 +127,16 @@ class _Program:
     def _solve(
         self, cost: FloatArray, force: tuple[float, float | None], share: tuple[float, float | None]
     ) -> BracedForces | None:
-        count, limit = self._maps.shape[1], self._body.torque_limit
+        count, body = self._maps.shape[1], self._body
         zeros = np.zeros((6, 2))
         on_hands = self._wrenches[:3] * self._on_hands
         equal = np.vstack([
             np.hstack([self._maps[:6], zeros]),
             np.hstack([on_hands, self._act.direction[:, None], np.zeros((3, 1))]),
         ])  # fmt: skip
-        joints = np.hstack([self._maps[6:], np.zeros((len(limit), 1))])
-        below = np.vstack([np.hstack([-joints, -limit[:, None]]), np.hstack([joints, -limit[:, None]])])
+        joints = np.hstack([self._maps[6:], np.zeros((len(body.torque_upper), 1))])
+        most, least = body.torque_upper[:, None], body.torque_lower[:, None]
+        below = np.vstack([np.hstack([-joints, -most]), np.hstack([joints, least])])
         found = linprog(
             np.concatenate([np.zeros(count), cost]),
             A_ub=below, b_ub=np.concatenate([-self._bias[6:], self._bias[6:]]),
@@ -153,7 +154,7 @@ class _Program:
     def _forces(self, x: FloatArray) -> BracedForces:
         multipliers = x[:-2]
         needed = self._bias - self._maps @ multipliers
-        shares = np.abs(needed[6:]) / self._body.torque_limit
+        shares = self._body.torque_share(needed[6:])
         worst = int(np.argmax(shares))
         forces = [
             self._wrenches[:, self._owner == k] @ multipliers[self._owner == k]

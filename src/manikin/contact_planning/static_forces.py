@@ -54,8 +54,8 @@ def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 
 def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float:
     """Smallest share of the joints' torque limits with which a posture is held at rest.
 
-    Minimises ``max_j |tau_j| / tau_max_j`` over the contact forces, with ``tau = g(q) - sum J^T w`` and the
-    six rows of the root in equilibrium.
+    Minimises the largest share of a torque limit over the contact forces, with
+    ``tau = g(q) - sum J^T w`` and the six rows of the root in equilibrium.
 
     Args:
         body: The body.
@@ -76,10 +76,9 @@ def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float
     columns = np.column_stack(
         [jacobians[number].T @ wrench for number, wrench in zip(generators.contact, wrenches, strict=True)]
     )
-    limit = body.torque_limit
     count = len(wrenches)
-    above = np.column_stack([columns[6:], -limit])
-    below = np.column_stack([-columns[6:], -limit])
+    above = np.column_stack([columns[6:], body.torque_lower])
+    below = np.column_stack([-columns[6:], -body.torque_upper])
     found = linprog(
         np.append(np.zeros(count), 1.0),
         A_ub=np.vstack([above, below, np.append(generators.normal, 0.0)]),

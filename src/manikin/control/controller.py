@@ -367,7 +367,7 @@ class Controller:
             settings.joint_limit_horizon,
             settings.max_joint_acceleration,
         )
-        return JointBounds(body.torque_limit, self._damping, lower, upper)
+        return JointBounds(body.torque_lower, body.torque_upper, self._damping, lower, upper)
 
     def _solve(self, problem: ControlProblem) -> tuple[QPSolution | None, str]:
         solution = self._solver.solve(problem.program)

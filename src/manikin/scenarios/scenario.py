@@ -36,14 +36,19 @@ class Scenario(Displayed, ScenarioValues):
         }
 
     def with_body(
-        self, stature_m: float | None = None, mass_kg: float | None = None, sex: str | None = None
+        self,
+        stature_m: float | None = None,
+        mass_kg: float | None = None,
+        sex: str | None = None,
+        age: float | None = None,
+        strength: float | None = None,
     ) -> Scenario:
         """Return the same scenario for another body; what is None stays.
 
         Raises:
             ScenarioError: If a value is out of its range.
         """
-        given = {"stature_m": stature_m, "mass_kg": mass_kg, "sex": sex}
+        given = {"stature_m": stature_m, "mass_kg": mass_kg, "sex": sex, "age": age, "strength": strength}
         return self._changed(body={k: v for k, v in given.items() if v is not None})
 
     def with_seed(self, seed: int) -> Scenario:

@@ -33,7 +33,10 @@ def build_body(values: ScenarioValues) -> BodyModel:
     data, sole = values.file.body, values.sole
     length, width = (None, None) if sole is None else (sole.length_m, sole.width_m)
     try:
-        body = human(data.stature_m, data.mass_kg, data.sex, sole_length=length, sole_width=width)
+        body = human(
+            data.stature_m, data.mass_kg, data.sex, age=data.age, strength=data.strength,
+            sole_length=length, sole_width=width,
+        )  # fmt: skip
         return with_further_contacts(body, data.further_contacts) if data.further_contacts else body
     except InputError as error:
         path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)

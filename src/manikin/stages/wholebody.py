@@ -1,5 +1,6 @@
 """The whole-body stage: a motion of all joints that follows the centre of mass, and its report."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,9 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
         "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
         "max_velocity_share": certificate.max_velocity_share,
         "max_torque_share": certificate.max_torque_share,
+        "max_torque_joint": certificate.tightest_joint,
+        "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
+        "impacts": [asdict(impact) for impact in certificate.impacts],
         "min_margin": float(result.motion.margin.min()),
         "min_zmp_distance_m": certificate.min_zmp_distance_m,
         "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],

@@ -163,13 +163,13 @@ def plan_forces(
         matrix, target = _centred(generators, part.wrench)
         magnitude = share(matrix, target, cost**-2.0, _MISSING_COST).magnitude
         tau[rows] = part.needed - _apply(part.jacobians, generators, magnitude)
-        over = np.any(np.abs(tau[rows, 6:]) > body.torque_limit, axis=1)
+        over = np.any(body.torque_share(tau[rows, 6:]) > 1.0, axis=1)
         over |= np.any(magnitude > generators.limit, axis=1)
         for k in np.flatnonzero(over):
             joint_map = _joint_map(part.jacobians[k], generators)
             other = _share_within_limits(
                 generators, matrix, target[k], cost[k], part.needed[k, 6:], joint_map[6:],
-                TORQUE_SHARE * body.torque_limit,
+                TORQUE_SHARE * body.torque_lower, TORQUE_SHARE * body.torque_upper,
             )  # fmt: skip
             if other is not None:
                 magnitude[k] = other
@@ -299,7 +299,8 @@ def _share_within_limits(
     cost: FloatArray,
     needed: FloatArray,
     joint_map: FloatArray,
-    torque_limit: FloatArray,
+    torque_lower: FloatArray,
+    torque_upper: FloatArray,
 ) -> FloatArray | None:
     """Magnitudes (g,) that keep the joints' torques and the grasps' forces within their limits, or None.
 
@@ -310,7 +311,8 @@ def _share_within_limits(
         cost: (g,) cost of each magnitude.
         needed: (nv - 6,) joint torques without contacts [N.m].
         joint_map: (nv - 6, g) torque that a unit magnitude takes from each joint.
-        torque_limit: (nv - 6,) [N.m].
+        torque_lower: (nv - 6,) most negative joint torques [N.m].
+        torque_upper: (nv - 6,) largest ones [N.m].
     """
     cost = cost**2
     count = len(cost)
@@ -319,8 +321,8 @@ def _share_within_limits(
         np.diag(cost / cost.mean()),
         np.zeros(count),
         np.ascontiguousarray(np.vstack([matrix, joint_map])),
-        np.concatenate([limit, target, needed + torque_limit]),
-        np.concatenate([np.zeros(count), target, needed - torque_limit]),
+        np.concatenate([limit, target, needed - torque_lower]),
+        np.concatenate([np.zeros(count), target, needed - torque_upper]),
         np.concatenate([np.zeros(count), np.full(6, _EQUALITY), np.zeros(len(needed))]).astype(np.int32),
     )
     return np.maximum(np.asarray(solution, dtype=np.float64), 0.0) if flag > 0 else None

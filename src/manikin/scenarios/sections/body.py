@@ -1,15 +1,16 @@
 """Section of a scenario file: whose motion it is."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from manikin.body.strength import AGE_RANGE, DEFAULT_AGE
 from manikin.scenarios.sections.contact import SoleSection
 from manikin.scenarios.validation import Number, Positive, Section, Text, Vector3, refuse
 
 _KEYS = {
-    "human": ("stature_m", "mass_kg", "sex", "further_contacts"),
+    "human": ("stature_m", "mass_kg", "sex", "age", "strength", "further_contacts"),
     "point_mass": ("mass_kg",),
     "kudoh": (),
     "insect": ("length_m", "mass_kg"),
@@ -61,6 +62,14 @@ class BodySection(Section):
     )
     sex: Literal["male", "female"] = Field(
         default="male", description="which anthropometric table, of a human only"
+    )
+    age: Annotated[Number, Field(ge=AGE_RANGE[0], le=AGE_RANGE[1])] = Field(
+        default=DEFAULT_AGE,
+        description="age [years], of a human only; its strength depends on it, nothing else",
+    )
+    strength: Positive = Field(
+        default=1.0,
+        description="torque limits relative to a healthy adult of that sex, size and age, of a human only",
     )
     further_contacts: list[Literal["knees", "elbows", "pelvis"]] | None = Field(
         default=None,
