@@ -153,6 +153,13 @@ def run(
             help="Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable.",
         ),
     ] = None,
+    moved: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            metavar="X Y YAW_DEG",
+            help="Run the scenario elsewhere: its origin at X Y [m], turned about that [deg].",
+        ),
+    ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the run directory.")] = True,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Runs at a time with 'all'; default: one per core.")
@@ -162,6 +169,7 @@ def run(
     if scenario == ALL:
         refuse(variant is not None, "--variant", "every variant is run")
         refuse(bool(overrides), "--set", "it belongs to one scenario")
+        refuse(moved is not None, "--moved", "it belongs to one scenario")
         body = {"--stature": stature, "--mass": mass, "--sex": sex, "--age": age, "--strength": strength}
         given = {"--seed": seed} | body
         words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
@@ -176,6 +184,8 @@ def run(
     job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex, age=age, strength=strength)
     if seed is not None:
         job = job.with_seed(seed)
+    if moved is not None:
+        job = job.moved(*moved)
     directory = out if out is not None else None if json else Path("runs") / job.name
     outcome = run_job(job, directory, context.obj, draw=figures)
     if json:

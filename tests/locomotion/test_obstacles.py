@@ -10,6 +10,7 @@ from manikin.errors import InputError
 from manikin.locomotion import START, Walker, WalkObstacle, walking_path
 from manikin.locomotion.obstacles import clearance
 from manikin.locomotion.programme import _distance
+from manikin.spatial import PlanarTransform
 
 AHEAD = (0.0, 3.0, np.pi / 2)
 SQUARE = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
@@ -200,3 +201,27 @@ def test_bad_obstacles_are_refused_in_one_line(make, message):
     with pytest.raises(InputError) as caught:
         make()
     assert str(caught.value) == message
+
+
+@pytest.mark.parametrize("move", [(10.0, -7.0, 37.0), (-3.0, 0.5, 180.0)])
+def test_a_path_around_obstacles_does_not_depend_on_where_the_scene_stands(move):
+    """Ways are sought on a grid: with other axes they, and the local optimum they lead to, would differ."""
+    transform = PlanarTransform(*move)
+    walls = [
+        [[1.5, 0.3], [1.6, 0.3], [1.6, 3.0], [1.5, 3.0]],
+        [[1.5, -3.0], [1.6, -3.0], [1.6, -0.1], [1.5, -0.1]],
+    ]
+    talking = WalkObstacle.moving_disc("talking", (0.0, 3.0), [(2.5, 1.0), (2.5, 0.2)], 0.2)
+    obstacles = [*(WalkObstacle(f"wall {number}", corners) for number, corners in enumerate(walls)), talking]
+    moved = [one.moved(transform, 12) for one in obstacles]
+    ends = [
+        np.append(transform.points(x[:2]), x[2] + transform.yaw) for x in (START, np.array([3.0, 0.5, 0.4]))
+    ]
+    here = walking_path(START, (3.0, 0.5, 0.4), obstacles=obstacles)
+    there = walking_path(*ends, obstacles=moved)
+    assert here.succeeded
+    assert there.succeeded
+    assert there.cost == pytest.approx(here.cost, rel=1e-9)
+    assert there.duration == pytest.approx(here.duration, rel=1e-9)
+    np.testing.assert_allclose(there.place[:, :2], transform.points(here.place[:, :2]), atol=1e-8)
+    assert clearance(moved, Walker(), there.place, there.time).min() >= 0.05 - 1e-4

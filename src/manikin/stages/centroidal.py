@@ -15,6 +15,7 @@ from manikin.centroidal import (
 )
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report, place
+from manikin.stages.world_frame import trajectory_in_world
 from manikin.wholebody.point_mass import point_mass_forces
 
 
@@ -50,7 +51,7 @@ def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[
     if result.certificate is not None:
         report.require("centroidal", result.certificate.table(result.problem))
     if result.trajectory is not None:
-        report.keep("com_trajectory", result.trajectory.to_dict())
+        report.keep("com_trajectory", trajectory_in_world(result.trajectory, report.transform).to_dict())
 
 
 def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
