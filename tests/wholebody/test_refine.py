@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import ContactError, InputError
+from manikin.motion.dynamics import centroidal_motion
 from manikin.posture import PostureProblem, generate_posture
 from manikin.scene import Proximity, Scene
 from manikin.spatial import GRAVITY_VECTOR
 from manikin.wholebody import refine_motion
-from manikin.wholebody.full_motion import centroidal_state
 from manikin.wholebody.refine_certificate import RefineRequirements, certify_refined
 from manikin.wholebody.refine_contacts import contact_variables
 from manikin.wholebody.refine_input import KeyPath, stretched_around, stretched_for_speed
@@ -78,9 +78,9 @@ def test_margin_is_positive_every_10_ms(name, request):
     time = np.arange(0.0, result.motion.time[-1], 0.01)
     q = result.spline.evaluate(time).q
     v, a = differences(body, time, q)
-    com, _, wrench = centroidal_state(body, q, v, a)
+    found = centroidal_motion(body, q, v, a)
     margin, violation = balance_of(
-        result.schedule, rooms_of(result.schedule), time[1:-1], wrench[1:-1], com[1:-1]
+        result.schedule, rooms_of(result.schedule), time[1:-1], found.wrench[1:-1], found.com[1:-1]
     )
     assert margin.min() > 0.0
     assert violation.max() == 0.0

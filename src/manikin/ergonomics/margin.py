@@ -3,21 +3,15 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 
-from manikin.balance import (
-    WrenchPolytope,
-    pseudo_wrench,
-    stability_margins,
-    wrench_about,
-    wrench_polytopes,
-)
+from manikin.balance import WrenchPolytope, stability_margins, wrench_about, wrench_polytopes
 from manikin.balance.limiting import LimitingConstraint
 from manikin.balance.zmp_path import contact_wrench
 from manikin.body import BodyModel, Configuration
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, ContactSchedule, Stance, default_normal_force_cap, point, sole
 from manikin.motion import Motion
+from manikin.motion.dynamics import centroidal_motion
 from manikin.spatial import FloatArray, finite_number
 
 FRICTION = 0.8
@@ -169,10 +163,6 @@ def _margin(W: WrenchPolytope, wrench: FloatArray, com: FloatArray) -> float:
 
 def _dynamic_wrench(body: BodyModel, motion: Motion, row: int) -> tuple[FloatArray, FloatArray]:
     """CoM (3,) and (6,) wrench about the world's origin that the motion needs of its contacts [N, N.m]."""
-    data = body.pinocchio.createData()
-    pin.computeCentroidalMomentumTimeVariation(
-        body.pinocchio, data, motion.q[row], motion.v[row], motion.a[row]
-    )
-    rate = data.dhg.vector
-    com = np.array(data.com[0])
-    return com, pseudo_wrench(body.mass, com, rate[:3] / body.mass, rate[3:])
+    rows = slice(row, row + 1)
+    found = centroidal_motion(body, motion.q[rows], motion.v[rows], motion.a[rows])
+    return found.com[0], found.wrench[0]

@@ -15,10 +15,10 @@ from manikin.balance import motion_margin
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Stance
 from manikin.contact_planning.efort import Task
+from manikin.motion.dynamics import centroidal_motion
 from manikin.scene import Proximity
 from manikin.scene.distance import moves_by_joint
 from manikin.spatial import FloatArray
-from manikin.wholebody.full_motion import centroidal_state
 from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_contacts import contact_variables
 from manikin.wholebody.refine_efort import LEAST, efort_with_derivative, limb_directions
@@ -175,8 +175,8 @@ def measure(
     """
     v, a = differences(body, time, q)
     step = float(time[1] - time[0])
-    com, _, wrench = centroidal_state(body, q, v, a)
-    margin, violation = balance_of(schedule, rooms, time, wrench, com)
+    found = centroidal_motion(body, q, v, a)
+    margin, violation = balance_of(schedule, rooms, time, found.wrench, found.com)
     error, slide, cost = _contact_terms(body, path, schedule, time, q, v, task)
     outside = np.maximum(body.lower - q[:, 7:], q[:, 7:] - body.upper).max()
     clearance = proximity.minimum_over(q, obstacles.during_flights(), tolerance=1e-5)

@@ -7,11 +7,12 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
+from manikin.motion.dynamics import centroidal_motion
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.configuration_spline import ConfigurationSpline
 from manikin.wholebody.contact_slack import contact_slack
-from manikin.wholebody.full_motion import centroidal_state, full_motion
+from manikin.wholebody.full_motion import full_motion
 from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_certificate import RefineResiduals, certify_refined
 from manikin.wholebody.refine_measures import balance_of, sample_uniformly
@@ -76,7 +77,7 @@ def least_slack(
     body: BodyModel, schedule: ContactSchedule, spline: ConfigurationSpline, time: FloatArray
 ) -> tuple[float, float]:
     """Least slack of the contacts' limits at samples (n,) [s] of a motion, and when [s]."""
-    _, _, wrench = centroidal_state(body, *spline.evaluate(time))
+    wrench = centroidal_motion(body, *spline.evaluate(time)).wrench
     slack = contact_slack(schedule, time, wrench)
     worst = int(np.argmin(slack))
     return float(slack[worst]), float(time[worst])

@@ -26,9 +26,9 @@ from scipy.optimize import minimize
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence
 from manikin.errors import ContactError
+from manikin.motion.dynamics import centroidal_motion
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
-from manikin.wholebody.full_motion import centroidal_state
 from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_measures import room_of
 from manikin.wholebody.refine_physics import LEAST_VARIABLE, ContactForces
@@ -89,8 +89,8 @@ class VariableSamples:
         still = np.zeros((len(q), body.nv))
         place, _ = _effectors(body, names, keys[1], np.zeros((len(keys[1]), body.nv)))
         speed = {name: np.zeros(len(keys[0])) for name in names}
-        com, _, wrench = centroidal_state(body, q, still, still)
-        return cls(time, wrench, com, keys[0], place, speed)
+        found = centroidal_motion(body, q, still, still)
+        return cls(time, found.wrench, found.com, keys[0], place, speed)
 
     @classmethod
     def of_motion(
@@ -99,8 +99,8 @@ class VariableSamples:
     ) -> "VariableSamples":  # fmt: skip
         """A motion at ``time`` (n,) with configurations, velocities and accelerations."""
         place, speed = _effectors(body, names, states[0], states[1])
-        com, _, wrench = centroidal_state(body, *states)
-        return cls(time, wrench, com, time, place, speed)
+        found = centroidal_motion(body, *states)
+        return cls(time, found.wrench, found.com, time, place, speed)
 
 
 class VariableChoice:
