@@ -269,13 +269,3 @@ def test_clearance_of_a_flight_rises_and_falls(person):
     assert by_sample[1] == pytest.approx(-0.01)
     assert by_sample[2] == pytest.approx(0.02)
     assert by_sample[3] < 0.0
-
-
-@pytest.mark.slow
-def test_a_long_crouch(cases):
-    """Six steps under the slab."""
-    result = refine_motion(*cases.crouch(5))
-    assert result.succeeded, result.failure
-    assert result.after.squared_accelerations <= result.before.squared_accelerations / 5.0
-    assert result.after.physics_violation <= result.before.physics_violation / 10.0
-    assert result.after.min_margin > 0.0
