@@ -47,7 +47,7 @@ from manikin.mocap.phase_sequence import kind_of, mirrored
 from manikin.mocap.recorded_clip import com_and_tops
 from manikin.mocap.sequence_consistency import initials, mirror_image
 from manikin.mocap.statistics import clip_as_dict
-from manikin.output import to_json
+from manikin.result_directory import to_json
 
 BOTH, LEFT, RIGHT = ("left_foot", "right_foot"), ("left_foot",), ("right_foot",)
 

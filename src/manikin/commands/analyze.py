@@ -93,11 +93,11 @@ def _one(
     method, execute = plan
     with stdout_kept_clean():
         from manikin.analysis import analyze_file
-        from manikin.analysis_directory import check_directory, summary_of, write_analysis
+        from manikin.analysis_directory import AnalysisDirectory, summary_of, write_analysis
 
         chosen = None if method is None else _method(method)
         if directory is not None:
-            check_directory(directory)
+            AnalysisDirectory(directory)
         found, planned = analyze_file(path, options), None
         if chosen is not None:
             from manikin.replan import replan
@@ -197,12 +197,12 @@ def _several(
 ) -> int:  # fmt: skip
     from manikin.analysis import AnalysisJob
     from manikin.analysis_batch import analyze_files, directories_for
-    from manikin.analysis_directory import check_directory, write_overview
+    from manikin.analysis_directory import AnalysisDirectory, write_overview
     from manikin.batch import usable_cores
     from manikin.progress import StageProgress
 
     if directory is not None:
-        check_directory(directory)
+        AnalysisDirectory(directory)
     folders = [None] * len(paths) if directory is None else directories_for(paths, directory)
     work = [AnalysisJob(path, folder, draw) for path, folder in zip(paths, folders, strict=True)]
     began, entries = clock.perf_counter(), {}
