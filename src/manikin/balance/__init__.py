@@ -18,6 +18,7 @@ from manikin.balance.margin import StabilityMargins, force_space, moment_space, 
 from manikin.balance.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
 from manikin.balance.support_plane import SupportPlane, least_zmp_distance, support_plane
 from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytope
+from manikin.callable_package import make_callable
 
 __all__ = [
     "BalanceReport",
@@ -51,3 +52,5 @@ __all__ = [
     "wrench_polytope",
     "zero_moment_point",
 ]
+
+make_callable(__name__)
