@@ -103,7 +103,7 @@ differentiated twice. Segment masses lie off the lines between joints (Dumas, Ch
 trunk without markers tilts so that its upper end has a third of what is fast in the pelvis' motion. Nothing
 is fitted to the plates but the mass of the person; the cutoff at touch-downs was chosen with them.
 
-*Shifted*, and what `manikin analyze` measures, is the motion of the whole body shifted by the smooth path
+`manikin analyze` measures the motion as recorded. *Shifted* is the whole body moved by the smooth path
 that is least and leaves the centre of pressure {1e2 * INSIDE:.0f} cm inside of the edges of the soles, if
 none longer than {1e2 * LARGEST_SHIFT:.0f} cm along an axis is needed, and rather near the axis of a foot that
 carries alone
@@ -387,8 +387,7 @@ def torque_text(trials: list[Trial]) -> str:
         found = [compare_torques(*kind(one), one.measured) for one in walks if one.measured is not None]
         medians.append([np.median([each[k].rms for each in found if each]) for k in range(len(JOINTS))])
     told = "; ".join(
-        f"{readable(joint)} {', '.join(f'{row[k]:.0f}' for row in medians)}"
-        for k, joint in enumerate(JOINTS)
+        f"{readable(joint)} {', '.join(f'{row[k]:.0f}' for row in medians)}" for k, joint in enumerate(JOINTS)
     )
     return (
         f"\nMedians over the walks, least, smooth, shifted: {told} N.m. Least forces do not let the feet "
@@ -693,9 +692,9 @@ def margin_figure(one: Trial) -> None:
     assert one.measured is not None
     figure = Figure(figsize=(8.0, 6.4), layout="constrained")
     both = figure.subplots(2, 1, sharex=True)
-    theirs, _ = margins_of_wrenches(
+    theirs = margins_of_wrenches(
         one.margins.polytopes, one.margins.phase, one.measured.wrench, one.dynamics.com
-    )
+    ).margin
     covered = np.where(one.measured.covered, theirs, np.nan)
     axes = both[0]
     shade(axes, one)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from manikin.body import human
 from manikin.export.bvh import to_bvh
@@ -16,6 +17,15 @@ from manikin.motion import Motion
 from manikin.motion.file import MotionFile
 
 FEET = ("left_foot", "right_foot")
+
+# The examples of a property do not depend on the machine: no clock, the same draws in every run, no memory of
+# others. `--hypothesis-profile=thorough` draws more, and others in each run.
+settings.register_profile(
+    "standard", deadline=None, derandomize=True, database=None, max_examples=25,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)  # fmt: skip
+settings.register_profile("thorough", settings.get_profile("standard"), derandomize=False, max_examples=300)
+settings.load_profile("standard")
 
 
 APART = frozenset({

@@ -8,7 +8,8 @@ import pytest
 
 from manikin.atomic import atomic_path, write_text
 from manikin.errors import MotionFileError
-from manikin.output import RunDirectory, read_summary, to_json
+from manikin.output import RunDirectory, read_summary
+from manikin.result_directory import to_json
 
 
 def test_files_of_a_run(tmp_path):

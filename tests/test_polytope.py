@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog, minimize
 
@@ -9,7 +9,6 @@ from manikin.polytope import Polytope
 
 CUBE = Polytope(np.vstack([np.eye(3), -np.eye(3)]), np.ones(6))
 seeds = st.integers(0, 10_000)
-moderate = settings(max_examples=25, deadline=None, derandomize=True)
 
 
 def in_hull(points, x):
@@ -116,7 +115,6 @@ def test_vertices_round_trip():
     assert all(np.abs(points - v).max(axis=1).min() < 1e-9 for v in found)
 
 
-@moderate
 @given(seeds, st.integers(2, 6))
 def test_hull_agrees_with_convex_combinations(seed, dimension):
     rng = np.random.default_rng(seed)
@@ -129,7 +127,6 @@ def test_hull_agrees_with_convex_combinations(seed, dimension):
             assert in_hull(points, x) == (margin > 0)
 
 
-@moderate
 @given(seeds, st.integers(2, 6), st.integers(0, 5))
 def test_flat_hulls_hold_their_points_and_nothing_beside_them(seed, dimension, rank):
     """Margin 0 on the flat; off it, minus the largest component across it."""
@@ -147,7 +144,6 @@ def test_flat_hulls_hold_their_points_and_nothing_beside_them(seed, dimension, r
         assert -0.25 - 1e-10 <= P.margin(x) <= -least + 1e-10
 
 
-@moderate
 @given(seeds)
 def test_margin_inside_is_the_distance_to_the_complement(seed):
     """The ball of the margin's radius fits, a larger one does not."""
@@ -164,7 +160,6 @@ def test_margin_inside_is_the_distance_to_the_complement(seed):
         assert P.margin(x + 1.001 * margin * nearest) < 0
 
 
-@moderate
 @given(seeds)
 def test_margin_outside_is_a_lower_bound_of_the_distance_and_exact_before_a_facet(seed):
     rng = np.random.default_rng(seed)
@@ -186,7 +181,6 @@ def test_margin_outside_is_a_lower_bound_of_the_distance_and_exact_before_a_face
     assert P.margin(x) == pytest.approx(-0.3, abs=1e-9)
 
 
-@moderate
 @given(seeds, st.integers(2, 5), st.integers(1, 5))
 def test_sum_with_segments_equals_the_hull_of_all_corners(seed, dimension, count):
     """Refining the normal fan and brute force give the same facets, flat sums included."""

@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline as ScipySpline
 
@@ -22,8 +22,6 @@ from manikin.spline import (
 # Values are of order one; sums of k products of such numbers round to about 1e-15.
 ROUNDING = 1e-12
 
-derandomised = settings(max_examples=60, deadline=None, derandomize=True)
-
 
 @st.composite
 def splines(draw: st.DrawFn, min_degree: int = 1) -> BSpline:
@@ -39,7 +37,6 @@ def inner_times(spline: BSpline, count: int = 41) -> np.ndarray:
     return np.linspace(*spline.domain, count)
 
 
-@derandomised
 @given(splines())
 def test_basis_functions_add_up_to_one_and_none_is_negative(spline: BSpline):
     values = basis_matrix(spline.degree, spline.knots, inner_times(spline))
@@ -47,7 +44,6 @@ def test_basis_functions_add_up_to_one_and_none_is_negative(spline: BSpline):
     assert values.min() >= 0.0
 
 
-@derandomised
 @given(splines(), st.integers(0, 4))
 def test_every_derivative_is_that_of_scipy(spline: BSpline, order: int):
     t = inner_times(spline)
@@ -59,7 +55,6 @@ def test_every_derivative_is_that_of_scipy(spline: BSpline, order: int):
     assert np.allclose(spline(t, order), reference, atol=1e-10 * scale)
 
 
-@derandomised
 @given(splines(min_degree=3))
 def test_first_derivative_is_the_limit_of_differences(spline: BSpline):
     span = spline.domain[1]
@@ -71,7 +66,6 @@ def test_first_derivative_is_the_limit_of_differences(spline: BSpline):
     assert np.allclose(differences, spline(t, 1), atol=1e-6 * (1.0 + scale))
 
 
-@derandomised
 @given(splines(), st.integers(0, 3))
 def test_discretisation_matrix_times_control_points_is_the_curve(spline: BSpline, order: int):
     t = inner_times(spline)
@@ -80,7 +74,6 @@ def test_discretisation_matrix_times_control_points_is_the_curve(spline: BSpline
     assert np.allclose(matrix @ spline.control_points, values, atol=1e-9 * (1 + np.abs(values).max()))
 
 
-@derandomised
 @given(splines(min_degree=2))
 def test_derivative_control_points_make_the_derivative_curve(spline: BSpline):
     matrix = derivative_matrix(spline.degree, spline.knots, 2)
@@ -96,7 +89,6 @@ def test_half_open_spans_belong_to_their_right_end_only_at_the_last_knot():
     assert np.array_equal(basis_matrix(0, knots, [0.0, 1.0, 3.0]), [[1, 0], [0, 1], [0, 1]])
 
 
-@derandomised
 @given(splines())
 def test_span_basis_agrees_with_the_matrix_for_numbers_and_for_symbols(spline: BSpline):
     k, knots = spline.degree, spline.knots
@@ -123,7 +115,6 @@ def test_symbolic_knots_have_the_derivative_of_the_basis_with_respect_to_a_knot(
     assert np.allclose(jacobian[:, k + 2], differences, atol=1e-8)
 
 
-@derandomised
 @given(splines(min_degree=2), st.integers(0, 2**16))
 def test_end_conditions_are_met(spline: BSpline, seed: int):
     """[Qiu2012]_ 2.45-2.50 with the correction of 2.49."""
@@ -140,7 +131,6 @@ def test_end_conditions_are_met(spline: BSpline, seed: int):
             assert np.allclose(curve(end, order), value, atol=1e-9 * 10**order)
 
 
-@derandomised
 @given(splines())
 def test_bezier_points_give_the_pieces_back(spline: BSpline):
     s = np.linspace(0.0, 1.0, 7)

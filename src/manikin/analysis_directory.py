@@ -4,7 +4,7 @@
 
     DIR/summary.json     what was measured
     DIR/series.csv       what was measured at every frame, units in the header
-    DIR/motion.h5        the reconstructed motion with its supports, forces and margins (manikin.motion.file)
+    DIR/motion.h5        the motion as recorded, and shifted, with supports, forces and margins
     DIR/report.html      all of it for people, in one file
 
     DIR/index.html, DIR/analyses.csv, DIR/analyses.json    of several recordings
@@ -24,10 +24,9 @@ import numpy as np
 from manikin.analysis import Analysis, AnalysisEntry
 from manikin.analysis_report import overview_page, report_page
 from manikin.analysis_sheet import recording_sheet
-from manikin.atomic import write_text
-from manikin.errors import MotionFileError
 from manikin.motion.file import MotionFile, write_motions
-from manikin.output import MOTION, SUMMARY, make_directory, to_json
+from manikin.output import MOTION, SUMMARY
+from manikin.result_directory import ResultDirectory, make_directory, write_result
 
 if TYPE_CHECKING:
     from manikin.replan import Replan
@@ -40,24 +39,11 @@ OVERVIEW = "index.html"
 TABLE = "analyses.csv"
 ANALYSES = "analyses.json"
 
-OURS = (REPORT, SERIES, MOTION, SUMMARY, OVERVIEW, TABLE, ANALYSES)
 
+class AnalysisDirectory(ResultDirectory):
+    """Directory of an analysis, or of several with their overview."""
 
-def check_directory(path: Path) -> None:
-    """Create a directory for an analysis, or take over that of an earlier one.
-
-    Raises:
-        MotionFileError: If it cannot be written, or holds something else.
-    """
-    if path.exists() and not path.is_dir():
-        raise MotionFileError(f"{path}: is a file; valid: a directory for the analysis")
-    make_directory(path)
-    content = sorted(item.name for item in path.iterdir() if not item.name.startswith("."))
-    if content and not {REPORT, OVERVIEW, SUMMARY} & set(content):
-        raise MotionFileError(
-            f"{path}: holds {content[0]!r} but no {REPORT}, so it is not an earlier analysis; "
-            "valid: a new or empty directory, or that of an analysis"
-        )
+    kind, marks = "analysis", (REPORT, OVERVIEW, SUMMARY)
 
 
 def summary_of(found: Analysis, plan: "Replan | None" = None) -> dict[str, Any]:
@@ -83,13 +69,12 @@ def write_analysis(
     summary = summary_of(found, plan)
     sheet = recording_sheet(found, SHEET) if draw else ""
     pictures = _plan_pictures(plan) if draw and plan is not None else {}
-    content = MotionFile(recorded=found.motion, body=found.body)
-    if plan is not None:
-        content = replace(plan.content, recorded=found.motion)
+    content = MotionFile(body=found.body) if plan is None else plan.content
+    content = replace(content, recorded=found.motion, shifted=found.shifted_motion)
     write_motions(directory / MOTION, content)
-    _write(directory / SERIES, _series_text(found))
-    _write(directory / REPORT, report_page(found, summary, sheet, pictures))
-    _write(directory / SUMMARY, to_json(summary) + "\n")
+    write_result(directory / SERIES, _series_text(found))
+    write_result(directory / REPORT, report_page(found, summary, sheet, pictures))
+    write_result(directory / SUMMARY, summary)
 
 
 def _plan_pictures(plan: "Replan") -> dict[str, bytes]:
@@ -118,14 +103,14 @@ def write_overview(entries: Sequence[AnalysisEntry], overview: dict[str, Any], d
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    _write(directory / TABLE, text.getvalue())
+    write_result(directory / TABLE, text.getvalue())
     links = {
         str(entry.job.path): f"{entry.job.directory.relative_to(directory).as_posix()}/{REPORT}"
         for entry in entries
         if entry.job.directory is not None and entry.summary is not None
     }
-    _write(directory / OVERVIEW, overview_page(rows, overview, links))
-    _write(directory / ANALYSES, to_json(overview) + "\n")
+    write_result(directory / OVERVIEW, overview_page(rows, overview, links))
+    write_result(directory / ANALYSES, overview)
 
 
 def _row(entry: AnalysisEntry) -> dict[str, Any]:
@@ -149,6 +134,11 @@ def _row(entry: AnalysisEntry) -> dict[str, Any]:
         "share_positive_in_contact": margin.get("share_positive_in_contact"),
         "recorded_share_positive_in_contact": recorded.get("share_positive_in_contact"),
         "shift_rms_m": shifted.get("rms_m"),
+        "shift_believed": shifted.get("believed"),
+        "shifted_share_positive_in_contact": shifted.get("share_positive_in_contact"),
+        "shifted_share_at_floor_in_contact": shifted.get("share_at_floor_in_contact"),
+        "floor_m": shifted.get("floor_m"),
+        "floor_Nm": shifted.get("floor_Nm"),
         "timing_median_s": plates.get("timing_median_s"),
         "vertical_rms_body_weight": plates.get("vertical_rms_body_weight"),
         "cop_rms_m": plates.get("cop_rms_m"),
@@ -164,12 +154,3 @@ def _series_text(found: Analysis) -> str:
     text.write(",".join(columns) + "\n")
     np.savetxt(text, np.column_stack(list(columns.values())), fmt="%.6g", delimiter=",")
     return text.getvalue()
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        write_text(path, text)
-    except OSError as error:
-        raise MotionFileError(
-            f"{path}: cannot be written ({error.strerror}); valid: a writable directory"
-        ) from None

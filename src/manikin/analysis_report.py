@@ -11,13 +11,21 @@ from manikin.report_page import ReportPage
 from manikin.version import __version__
 
 WORDS = (
-    "Times are seconds on the recording's clock. The margin is the distance of the "
-    "wrench that the motion needs to the faces of what the contacts can give (Qiu 2012, 4.2.9), moments "
-    "about the middle of the contacts, alpha = 1 m: below 0 the contacts, as they were found, could not "
-    "give it. Recordings tell places to a centimetre and so leave accelerations open: measured is the motion "
-    "after the least shift of the whole body with which the contacts can give it, if there is one, else as "
-    "it was recorded."
+    "Times are seconds on the recording's clock. The margin is the distance of the wrench that the motion "
+    "needs to the faces of what the contacts can give (Qiu 2012, 4.2.9), moments about the CoM, "
+    "alpha = 1 m: below 0 the contacts, as they were found, could not give it. Measured is the motion as "
+    "recorded. Recordings tell places to a centimetre and so leave accelerations open: a margin below 0 need "
+    "not say that a person was out of balance."
 )
+SHIFTED = (
+    "The shifted motion is the recorded one after the least shift of the whole body with which its contacts "
+    "can carry it. The shift imposes a margin, the floor: the centre of pressure is kept that far inside of "
+    "the edges of the soles, wherever that is possible. Where the floor holds the shift, the margin of the "
+    "shifted motion says nothing about the person, and no number is given."
+)
+AT_FLOOR = "at the imposed floor"
+"""Stands for a margin of a shifted motion that the shift imposed."""
+
 COLUMNS: dict[str, tuple[str, float, int]] = {
     "duration_s": ("duration [s]", 1.0, 2),
     "frames": ("frames", 1, 0),
@@ -27,9 +35,10 @@ COLUMNS: dict[str, tuple[str, float, int]] = {
     "supports": ("supports", 1, 0),
     "phases": ("phases", 1, 0),
     "com_height_min_m": ("lowest CoM [m]", 1.0, 3),
-    "margin_min_Nm": ("lowest margin [N.m]", 1.0, 1),
-    "share_positive_in_contact": ("positive margin [% of frames in contact]", 100.0, 1),
-    "recorded_share_positive_in_contact": ("positive as recorded [%]", 100.0, 1),
+    "margin_min_Nm": ("lowest margin as recorded [N.m]", 1.0, 1),
+    "share_positive_in_contact": ("positive as recorded [% of frames in contact]", 100.0, 1),
+    "shifted_share_positive_in_contact": ("positive once shifted [%]", 100.0, 1),
+    "shifted_share_at_floor_in_contact": ("at the imposed floor [% of frames in contact]", 100.0, 1),
     "shift_rms_m": ("shift, RMS [mm]", 1e3, 1),
     "timing_median_s": ("instants against plates [ms]", 1e3, 0),
     "vertical_rms_body_weight": ("force against plates [% of weight]", 100.0, 1),
@@ -73,14 +82,17 @@ def report_page(
     page.text("In brackets: the support began before the recording, or went on after it.")
     page.heading("Phases")
     page.table(
-        ("phase", "from [s]", "to [s]", "duration [s]", "lowest margin [N.m]", "supports"),
+        ("phase", "from [s]", "to [s]", "duration [s]", "lowest margin as recorded [N.m]",
+         "once shifted [N.m]", "supports"),
         [
             (number, one["start_s"], one["end_s"], one["end_s"] - one["start_s"], one["margin_min_Nm"],
+             _shifted_lowest(one["shifted_margin_min_Nm"], one["shifted_at_floor"]),
              ", ".join(map(readable, one["effectors"])) or "flight")
             for number, one in enumerate(summary["phases"])
         ],
-        decimals=(None, 3, 3, 3, 1),
+        decimals=(None, 3, 3, 3, 1, 1),
     )  # fmt: skip
+    _shift(page, summary["margin"])
     if summary["segments"]:
         page.heading("Walking: where people look is where they go (nonholonomic), or not (holonomic)")
         page.table(
@@ -138,8 +150,6 @@ def overview_page(
 
 def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
     margin, residual = summary["margin"], summary["reconstruction_residual_m"]
-    recorded, shifted = margin["recorded"], margin["shifted"]
-    used = "applied" if margin["motion"] == "shifted" else "not applied"
     return {
         "duration [s]": summary["duration_s"],
         "frames": summary["frames"],
@@ -148,13 +158,42 @@ def _headline(summary: Mapping[str, Any]) -> dict[str, Any]:
         f"{1e3 * residual['max']:.1f} (largest)",
         "sequence of touch-downs": ", ".join(map(readable, summary["sequence"])) or "none",
         "lowest centre of mass [m]": summary["com_height_min_m"],
-        "lowest margin [N.m]": margin["min"],
-        "frames in contact": _share(margin["share_in_contact"]),
-        "of them with a positive margin": _share(margin["share_positive_in_contact"]),
+        "lowest margin, as recorded [N.m]": margin["min"],
+        "smallest force at the CoM that would end balance [N]": margin["force_min_N"],
+        "smallest distance of the ZMP to the edge of the soles [mm]": None
+        if margin["zmp_distance_min_m"] is None
+        else f"{1e3 * margin['zmp_distance_min_m']:.0f}",
         "limited by": None if margin["limiting"] is None else readable(margin["limiting"]),
-        "shift onto the contacts [mm]": f"{1e3 * shifted['rms_m']:.1f} (RMS), {1e3 * shifted['max_m']:.1f} "
-        f"(largest), {used}" + _positive(recorded, shifted),
+        "frames in contact": _share(margin["share_in_contact"]),
+        "of them with a positive margin, as recorded": _share(margin["share_positive_in_contact"]),
     }
+
+
+def _shift(page: ReportPage, margin: Mapping[str, Any]) -> None:
+    """The shifted motion, beside the recorded one."""
+    shifted = margin["shifted"]
+    if shifted is None:
+        return
+    page.heading("Shifted onto the contacts")
+    page.text(SHIFTED)
+    page.numbers({
+        "to be believed": "yes" if shifted["believed"] else "no",
+        "shift of the whole body [mm]": f"{_millimetres(shifted['rms_m'])} (RMS), "
+        f"{_millimetres(shifted['max_m'])} (largest)",
+        "imposed floor": f"{shifted['floor_m']:.3f} m per body weight: {shifted['floor_Nm']:.1f} N.m about "
+        "the middle of the contacts" + _at_floor(shifted["margin_at_floor_Nm"]),
+        "frames in contact at the floor": _share(shifted["share_at_floor_in_contact"]),
+        "frames that the contacts can carry": _share(shifted["share_positive_in_contact"]),
+        "lowest margin [N.m]": _shifted_lowest(shifted["min"], shifted["min_at_floor"]),
+    })  # fmt: skip
+
+
+def _at_floor(margin: float | None) -> str:
+    return "" if margin is None else f"; there the margin is {margin:.1f} N.m (median)"
+
+
+def _shifted_lowest(value: float | None, at_floor: bool | None) -> float | str | None:
+    return AT_FLOOR if at_floor else value
 
 
 def _plates(page: ReportPage, plates: Mapping[str, Any]) -> None:
@@ -172,17 +211,19 @@ def _plates(page: ReportPage, plates: Mapping[str, Any]) -> None:
         "positive margin of the measured forces": of("margin_share_positive", 100.0, "% of these frames"),
         "frames with one foot on a plate": plates["single_support_frames"],
         "error of the centre of pressure, RMS": of("cop_rms_m", 1e3, "mm"),
-        "the same of the motion as recorded": of("cop_rms_recorded_m", 1e3, "mm"),
+        "the same of the shifted motion": of("cop_rms_shifted_m", 1e3, "mm"),
     })  # fmt: skip
     if plates["torques"]:
         page.table(
-            ("torque", "frames", "difference, RMS [N.m]", "mean [N.m]", "largest [N.m]", "by plates [N.m]"),
+            ("torque", "frames", "difference, RMS [N.m]", "once shifted [N.m]", "mean [N.m]", "largest [N.m]",
+             "by plates [N.m]"),
             [
-                (readable(joint), one["frames"], one["rms_Nm"], one["mean_Nm"], one["peak_Nm"],
+                (readable(joint), one["frames"], one["rms_Nm"],
+                 (plates["torques_shifted"].get(joint) or {}).get("rms_Nm"), one["mean_Nm"], one["peak_Nm"],
                  one["peak_by_plates_Nm"])
                 for joint, one in plates["torques"].items()
             ],
-            decimals=(None, 0, 1, 1, 1, 1),
+            decimals=(None, 0, 1, 1, 1, 1, 1),
         )  # fmt: skip
         page.text("Of both legs, while the foot is on a plate of its own.")
 
@@ -230,14 +271,6 @@ def _execution(page: ReportPage, found: Mapping[str, Any], unit: str) -> None:
         "deepest penetration of a contact [mm]": _millimetres(found["max_penetration_m"]),
         "speed, per real time": found["realtime_factor"],
     })  # fmt: skip
-
-
-def _positive(recorded: Mapping[str, Any], shifted: Mapping[str, Any]) -> str:
-    """Shares of the frames in contact, where there are any."""
-    shares = [_share(one["share_positive_in_contact"]) for one in (shifted, recorded)]
-    if None in shares:
-        return ""
-    return f"; positive with it in {shares[0]}, without in {shares[1]} of the frames in contact"
 
 
 def _share(value: float | None) -> str | None:

@@ -105,11 +105,13 @@ def _bands(analysis: Analysis) -> list[_Band]:
         measured = np.where(analysis.plates.compared, analysis.plates.vertical_force, np.nan)
         forces["force plates"] = (measured / analysis.weight, ink)
     margins = {
-        "whole body": (analysis.motion.margin, ours),
-        "point mass": (analysis.point_mass_margin, ink),
+        "as recorded": (analysis.motion.margin, ours),
+        "as a point mass": (analysis.point_mass_margin, ink),
     }
-    if analysis.measured.believed:
-        margins["as recorded"] = (analysis.measured.recorded_margins.whole_body, soft)
+    if (shifted := analysis.measured.believed) is not None:
+        margins["shifted"] = (shifted.margins.whole_body, COLOURS["shifted"])
+        floor = np.where(shifted.at_floor, shifted.margins.whole_body, np.nan)
+        margins["at the imposed floor"] = (floor, soft)
     bands = [
         _scaled("vertical force [body weight]", forces, 0.0),
         _scaled("margin [N.m]", margins, 0.0, 0.01),

@@ -390,7 +390,7 @@ def _run_all(
 ) -> int:
     from manikin import batch
     from manikin.atomic import write_text
-    from manikin.output import make_directory, to_json
+    from manikin.result_directory import make_directory, to_json
     from manikin.results import text_table
 
     runs = batch.built_in_jobs(statures=asked["stature_m"] is not None)

@@ -16,9 +16,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from manikin.atomic import write_text
 from manikin.errors import InputError, MotionFileError
-from manikin.output import FIGURES, make_directory, to_json
+from manikin.result_directory import ResultDirectory, to_json
 from manikin.simulation import PushMap
 from manikin.version import __version__
 
@@ -38,13 +37,14 @@ def maps_as_dict(maps: Sequence[PushMap]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-class MapDirectory:
+class MapDirectory(ResultDirectory):
     """Reads and writes the files of some maps.
 
     Attributes:
-        path: The directory.
         maps: As far as they are known.
     """
+
+    kind, marks = "map", (MAP,)
 
     def __init__(self, path: str | Path, asked: Sequence[PushMap]) -> None:
         """Create the directory, or go on with what an earlier run has found there.
@@ -57,19 +57,10 @@ class MapDirectory:
             MotionFileError: If it cannot be written, or holds something that is no map.
             InputError: If it holds maps of something else.
         """
-        self.path, self.maps = Path(path), tuple(asked)
-        if self.path.exists() and not self.path.is_dir():
-            raise MotionFileError(f"{self.path}: is a file; valid: a directory for the map")
-        make_directory(self.path)
+        super().__init__(path)
+        self.maps = tuple(asked)
         if (self.path / MAP).exists():
             self.maps = self._taken_over(_read(self.path / MAP))
-        elif content := sorted(item.name for item in self.path.iterdir() if not item.name.startswith(".")):
-            raise MotionFileError(
-                f"{self.path}: holds {content[0]!r} but no {MAP}, so it is not that of an earlier map; "
-                "valid: a new or empty directory, or that of a map"
-            )
-        for file in self.path.glob(".*.tmp"):  # what a killed run was about to write
-            file.unlink()
 
     def keep(self, maps: Sequence[PushMap]) -> None:
         """Write what is known by now.
@@ -78,19 +69,8 @@ class MapDirectory:
             MotionFileError: If it cannot be written.
         """
         self.maps = tuple(maps)
-        try:
-            write_text(self.path / TABLE, _table(self.maps))
-            write_text(self.path / MAP, to_json(maps_as_dict(self.maps)) + "\n")
-        except OSError as error:
-            problem = f"{self.path}: cannot be written ({error.strerror})"
-            raise MotionFileError(f"{problem}; valid: a writable directory") from None
-
-    @property
-    def figures(self) -> Path:
-        """Folder of the figure, created when asked for."""
-        folder = self.path / FIGURES
-        make_directory(folder)
-        return folder
+        self.write(TABLE, _table(self.maps))
+        self.write(MAP, maps_as_dict(self.maps))
 
     def _taken_over(self, data: Mapping[str, Any]) -> tuple[PushMap, ...]:
         """Maps of an earlier run.

@@ -15,15 +15,12 @@ that were done and nothing half-written.
 """
 
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from manikin.atomic import write_text
 from manikin.errors import MotionFileError
+from manikin.result_directory import FIGURES, ResultDirectory, write_result
 
 SCENARIO = "scenario.yaml"
 MOTION = "motion.h5"
@@ -34,7 +31,6 @@ WALK_PATHS = "walk_paths"
 BODY = "the body"
 """In it, the body that the scenario is about."""
 SUMMARY = "summary.json"
-FIGURES = "figures"
 STAGES = "stages"
 
 
@@ -49,12 +45,10 @@ def other_motions(directory: Path) -> dict[str, Path]:
     return {path.name.removeprefix(first).removesuffix(last): path for path in sorted(directory.glob(OTHERS))}
 
 
-class RunDirectory:
-    """Writes the files of one run.
+class RunDirectory(ResultDirectory):
+    """Writes the files of one run; those of an earlier run are removed first."""
 
-    Attributes:
-        path: The directory.
-    """
+    kind, marks = "run", (SCENARIO,)
 
     def __init__(self, path: str | Path) -> None:
         """Create the directory, or take over that of an earlier run and remove its files.
@@ -62,26 +56,13 @@ class RunDirectory:
         Raises:
             MotionFileError: If it cannot be created, or holds something that is not a run.
         """
-        self.path = Path(path)
-        if self.path.exists() and not self.path.is_dir():
-            raise MotionFileError(f"{self.path}: is a file; valid: a directory for the run's files")
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-            self._check_ours()
-            self._remove_earlier_run()
-        except OSError as error:
-            raise self._unwritable(self.path, error) from None
-
-    @property
-    def figures(self) -> Path:
-        """Folder of the figures, created when asked for."""
-        folder = self.path / FIGURES
-        folder.mkdir(exist_ok=True)
-        return folder
+        super().__init__(path)
+        # The summary goes first: without it the directory is known to be incomplete.
+        self.remove(SUMMARY, MOTION, BVH, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS)
 
     def write_scenario(self, yaml_text: str) -> Path:
         """Keep the resolved scenario."""
-        return self._write(self.path / SCENARIO, yaml_text)
+        return self.write(SCENARIO, yaml_text)
 
     def write_stage(self, name: str, result: Mapping[str, Any]) -> Path:
         """Keep what a stage found, as soon as it is known.
@@ -90,55 +71,11 @@ class RunDirectory:
             name: Of the stage, such as ``"centroidal"``.
             result: Plain values and arrays.
         """
-        folder = self.path / STAGES
-        folder.mkdir(exist_ok=True)
-        return self._write(folder / f"{name}.json", to_json(result) + "\n")
+        return write_result(self.folder(STAGES) / f"{name}.json", result)
 
     def write_summary(self, summary: Mapping[str, Any]) -> Path:
         """Write the summary; the last thing a run does."""
-        return self._write(self.path / SUMMARY, to_json(summary) + "\n")
-
-    def _write(self, path: Path, text: str) -> Path:
-        try:
-            write_text(path, text)
-        except OSError as error:
-            raise self._unwritable(path, error) from None
-        return path
-
-    def _check_ours(self) -> None:
-        content = [item.name for item in self.path.iterdir() if not item.name.startswith(".")]
-        if content and SCENARIO not in content:
-            raise MotionFileError(
-                f"{self.path}: holds {sorted(content)[0]!r} but no {SCENARIO}, so it is not an earlier run; "
-                "valid: a new or empty directory, or that of an earlier run"
-            )
-
-    def _remove_earlier_run(self) -> None:
-        # The summary goes first: without it the directory is known to be incomplete.
-        for name in (SUMMARY, MOTION, BVH):
-            (self.path / name).unlink(missing_ok=True)
-        # What a killed run was about to write stays behind as a hidden .NAME.*.tmp file.
-        for pattern in (f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS, ".*.tmp", "*/.*.tmp"):
-            for file in self.path.glob(pattern):
-                file.unlink()
-
-    @staticmethod
-    def _unwritable(path: Path, error: OSError) -> MotionFileError:
-        return MotionFileError(f"{path}: cannot be written ({error.strerror}); valid: a writable directory")
-
-
-def make_directory(path: Path) -> None:
-    """Create a directory that several runs share, unless it is there.
-
-    Raises:
-        MotionFileError: If it cannot be created.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise MotionFileError(
-            f"{path}: cannot be made ({error.strerror}); valid: a directory for the runs"
-        ) from None
+        return self.write(SUMMARY, summary)
 
 
 def read_summary(path: str | Path) -> dict[str, Any]:
@@ -159,22 +96,3 @@ def read_summary(path: str | Path) -> dict[str, Any]:
     if not isinstance(summary, dict):
         raise MotionFileError(f"{file}: is not a JSON object; valid: as written by manikin")
     return summary
-
-
-def to_json(value: Any, indent: int | None = 2) -> str:
-    """JSON text of plain values and numpy arrays; NaN and infinity, which JSON lacks, become null."""
-    return json.dumps(_plain(value), indent=indent, allow_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

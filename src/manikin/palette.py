@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 COLOURS = {
     "recorded": "#6A51A3",
+    "shifted": "#B3A2D6",
     "planned": "#0072B2",
     "executed": "#D55E00",
     "left_foot": "#009E73",

@@ -5,12 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from manikin.atomic import write_text
 from manikin.body import BodyModel
 from manikin.comparison import RunComparison
 from manikin.contact_planning.single_contact import ContactAnswer
 from manikin.ergonomics import Ergonomics
-from manikin.errors import MotionFileError
 from manikin.export import export_motion
 from manikin.figures import (
     ChoicePanel,
@@ -24,9 +22,9 @@ from manikin.figures import (
 )
 from manikin.figures.write import save_figure
 from manikin.locomotion.words import WordSlice, equal_paths
-from manikin.output import FIGURES, to_json
 from manikin.palette import readable
 from manikin.record import read_run
+from manikin.result_directory import FIGURES, make_directory, write_result
 from manikin.scene import Scene
 from manikin.simulation import PushMap, PushTrials
 
@@ -82,13 +80,8 @@ def write_comparison_products(
     """
     folder = Path(directory)
     file = folder / COMPARISON
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        write_text(file, to_json(comparison.as_dict()) + "\n")
-    except OSError as error:
-        raise MotionFileError(
-            f"{folder}: cannot be written ({error.strerror}); valid: a writable directory"
-        ) from None
+    make_directory(folder)
+    write_result(file, comparison.as_dict())
     report = progress or _silent
     return [file, *write_comparison(comparison, folder, lambda share: report("figures", share))]
 
@@ -142,13 +135,7 @@ def write_ergonomics_csv(found: Ergonomics, path: str | Path) -> Path:
     Raises:
         MotionFileError: If the file cannot be written.
     """
-    try:
-        write_text(path, found.csv())
-    except OSError as error:
-        raise MotionFileError(
-            f"{path}: cannot be written ({error.strerror}); valid: a file in a writable folder"
-        ) from None
-    return Path(path)
+    return write_result(path, found.csv())
 
 
 def write_push_map_figure(maps: Sequence[PushMap], trials: PushTrials, folder: Path) -> Path:

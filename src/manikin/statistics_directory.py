@@ -17,7 +17,6 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from manikin.atomic import write_text
 from manikin.errors import FigureError, MotionFileError
 from manikin.figures import (
     LowestPoints,
@@ -34,7 +33,7 @@ from manikin.mocap.phase_sequence import PhaseSequence
 from manikin.mocap.published_phases import published_distances, published_heights, published_phases
 from manikin.mocap.recorded_clip import RecordedClip
 from manikin.mocap.statistics import GroupStatistics, StatisticsSettings
-from manikin.output import FIGURES, make_directory, to_json
+from manikin.result_directory import FIGURES, make_directory, write_result
 
 STATISTICS = "statistics.json"
 PHASES = "phases.csv"
@@ -57,13 +56,10 @@ def write_statistics(
     if folder.exists() and not folder.is_dir():
         raise MotionFileError(f"{folder}: is a file; valid: a directory for the statistics")
     make_directory(folder / FIGURES)
-    files = [folder / STATISTICS, folder / PHASES]
-    try:
-        write_text(files[0], to_json(content) + "\n")
-        write_text(files[1], phase_table(sequences))
-    except OSError as error:
-        problem = f"{folder}: cannot be written ({error.strerror})"
-        raise MotionFileError(f"{problem}; valid: a writable directory") from None
+    files = [
+        write_result(folder / STATISTICS, content),
+        write_result(folder / PHASES, phase_table(sequences)),
+    ]
     for name, figure in figures.items():
         files.append(folder / FIGURES / f"{name}.png")
         save_figure(figure, files[-1])

@@ -17,10 +17,10 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from manikin.atomic import atomic_path, write_text
+from manikin.atomic import atomic_path
 from manikin.errors import InputError, MotionFileError
 from manikin.locomotion.words import HEADINGS, THESIS_WORDS, WordGrid, WordSlice, count_words, shares
-from manikin.output import FIGURES, make_directory, to_json
+from manikin.result_directory import ResultDirectory, to_json, writing
 from manikin.version import __version__
 
 WORDS = "words.json"
@@ -59,14 +59,15 @@ def partition_as_dict(
     }  # fmt: skip
 
 
-class WordsDirectory:
+class WordsDirectory(ResultDirectory):
     """Reads and writes the slices of a partition.
 
     Attributes:
-        path: The directory.
         grid: Of the places.
         slices: Those that are known, by their heading [deg].
     """
+
+    kind, marks = "partition", (WORDS,)
 
     def __init__(self, path: str | Path, grid: WordGrid) -> None:
         """Create the directory, or go on with what an earlier run has solved there.
@@ -79,31 +80,14 @@ class WordsDirectory:
             MotionFileError: If it cannot be written, or holds something that is no partition.
             InputError: If it holds a partition of another grid.
         """
-        self.path, self.grid = Path(path), grid
-        if self.path.exists() and not self.path.is_dir():
-            raise MotionFileError(f"{self.path}: is a file; valid: a directory for the words")
-        make_directory(self.path)
+        super().__init__(path)
+        self.grid = grid
         if (self.path / WORDS).exists():
             self._check_grid()
-        elif content := sorted(item.name for item in self.path.iterdir() if not item.name.startswith(".")):
-            raise MotionFileError(
-                f"{self.path}: holds {content[0]!r} but no {WORDS}, so it is not that of earlier words; "
-                "valid: a new or empty directory, or that of words"
-            )
-        make_directory(self.path / SLICES)
-        for file in (*self.path.glob(".*.tmp"), *self.path.glob("*/.*.tmp")):  # left by a killed run
-            file.unlink()
         files = {heading: self._file(heading) for heading in HEADINGS}
         self.slices = {
             heading: _read(file, grid, heading) for heading, file in files.items() if file.exists()
         }
-
-    @property
-    def figures(self) -> Path:
-        """Folder of the figures, created when asked for."""
-        folder = self.path / FIGURES
-        make_directory(folder)
-        return folder
 
     def begin(self, headings: Sequence[int]) -> None:
         """Say which slices are asked for, before any is solved.
@@ -111,8 +95,8 @@ class WordsDirectory:
         Raises:
             MotionFileError: If it cannot be written.
         """
-        self._write_summary({"manikin": __version__, "complete": False, "grid": self.grid.as_dict(),
-                             "headings_deg": list(headings)})  # fmt: skip
+        self.write(WORDS, {"manikin": __version__, "complete": False, "grid": self.grid.as_dict(),
+                           "headings_deg": list(headings)})  # fmt: skip
 
     def keep(self, one: WordSlice) -> None:
         """Write a slice.
@@ -122,11 +106,9 @@ class WordsDirectory:
         """
         heading = round(one.heading_deg)
         self.slices[heading] = one
-        try:
-            with atomic_path(self._file(heading)) as temporary, temporary.open("wb") as file:
-                np.savez_compressed(file, **{name: getattr(one, name) for name in _ARRAYS})
-        except OSError as error:
-            raise self._unwritable(error) from None
+        file = self._file(heading)
+        with writing(file), atomic_path(file) as temporary, temporary.open("wb") as opened:
+            np.savez_compressed(opened, **{name: getattr(one, name) for name in _ARRAYS})
 
     def finish(self, headings: Sequence[int]) -> dict[str, Any]:
         """Write and return the summary of the slices that are asked for.
@@ -135,22 +117,11 @@ class WordsDirectory:
             MotionFileError: If it cannot be written.
         """
         summary = partition_as_dict(self.grid, headings, self.slices)
-        self._write_summary(summary)
+        self.write(WORDS, summary)
         return summary
 
     def _file(self, heading: int) -> Path:
-        return self.path / SLICES / f"{heading:03d}.npz"
-
-    def _write_summary(self, summary: Mapping[str, Any]) -> None:
-        try:
-            write_text(self.path / WORDS, to_json(summary) + "\n")
-        except OSError as error:
-            raise self._unwritable(error) from None
-
-    def _unwritable(self, error: OSError) -> MotionFileError:
-        return MotionFileError(
-            f"{self.path}: cannot be written ({error.strerror}); valid: a writable directory"
-        )
+        return self.folder(SLICES) / f"{heading:03d}.npz"
 
     def _check_grid(self) -> None:
         file = self.path / WORDS

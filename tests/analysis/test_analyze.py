@@ -32,7 +32,7 @@ def test_who_stands_is_pushed_by_their_weight_below_their_centre_of_mass(standin
 
 
 def test_margin_is_that_of_the_stance_found(standing):
-    """Built by hand from the places of the feet, about the middle between them."""
+    """Built by hand from the places of the feet, about the centre of mass."""
     body, frame = standing.body, 30
     feet = [standing.supports.of(name)[0] for name in ("left_foot", "right_foot")]
     soles = [
@@ -40,8 +40,8 @@ def test_margin_is_that_of_the_stance_found(standing):
         for one in feet
     ]
     stance = Stance(soles, STRONGEST * body.mass * GRAVITY)
-    middle = np.mean([contact.position for contact in soles], axis=0)
-    report = evaluate_balance(stance, body.mass, standing.motion.com[frame], reference=middle)
+    com = standing.motion.com[frame]
+    report = evaluate_balance(stance, body.mass, com, reference=com)
     assert standing.motion.margin[frame] == pytest.approx(report.margin, rel=1e-4)
     assert standing.point_mass_margin[frame] == pytest.approx(report.margin, rel=1e-4)
 
@@ -83,30 +83,64 @@ def test_same_file_same_numbers(standing, standing_file):
     }
 
 
-def test_the_motion_is_left_as_recorded_if_wanted(recordings_folder):
-    """Shifted and recorded motion differ by the shift of the pelvis, and the margins with them."""
+def test_the_motion_as_recorded_leads_and_the_shifted_one_stands_beside_it(recordings_folder):
+    """Both differ by the shift of the pelvis, and the margins with them."""
     path = recordings_folder / "grf/nimble_opencap_s4/walkingTS1.trc"
-    moved, plain = analyze_file(path), analyze_file(path, AnalysisOptions(as_recorded=True))
-    assert moved.as_dict()["margin"]["motion"] == "shifted"
-    assert plain.as_dict()["margin"]["motion"] == "recorded"
-    shift = moved.motion.q[:, :3] - plain.motion.q[:, :3]
-    np.testing.assert_allclose(np.linalg.norm(shift, axis=1), moved.measured.shifted.size, atol=1e-12)
-    np.testing.assert_array_equal(moved.motion.q[:, 7:], plain.motion.q[:, 7:])
-    for found, column in ((moved, "shifted_margin_Nm"), (plain, "recorded_margin_Nm")):
-        np.testing.assert_array_equal(found.series()[column], found.motion.margin)
-    assert moved.as_dict()["margin"]["recorded"]["min"] == plain.as_dict()["margin"]["min"]
-    plates = plain.as_dict()["force_plates"]
-    assert plates["cop_rms_m"] == plates["cop_rms_recorded_m"]
+    both, plain = analyze_file(path), analyze_file(path, AnalysisOptions(as_recorded=True))
+    told, shifted = both.as_dict(), both.shifted_motion
+    assert shifted is not None
+    assert told["margin"]["motion"] == "recorded"
+    np.testing.assert_array_equal(both.motion.q, plain.motion.q)
+    np.testing.assert_array_equal(both.motion.tau, plain.motion.tau)
+    shift = shifted.q[:, :3] - both.motion.q[:, :3]
+    np.testing.assert_allclose(np.linalg.norm(shift, axis=1), both.series()["shift_m"], atol=1e-12)
+    np.testing.assert_array_equal(shifted.q[:, 7:], both.motion.q[:, 7:])
+    np.testing.assert_array_equal(both.series()["recorded_margin_Nm"], both.motion.margin)
+    np.testing.assert_array_equal(both.series()["shifted_margin_Nm"], shifted.margin)
+    assert told["margin"]["min"] == told["margin"]["recorded"]["min"] == both.motion.margin.min() < 0.0
+    assert told["ergonomics"]["margin"]["min"] == told["margin"]["min"]
+    plates = told["force_plates"]
+    assert plates["cop_rms_m"] == plates["cop_rms_recorded_m"] > plates["cop_rms_shifted_m"]
+    # Without a shifted motion nothing is told of one.
+    assert plain.shifted_motion is None
+    assert plain.as_dict()["margin"]["shifted"] is None
+    assert plain.as_dict()["force_plates"]["torques_shifted"] == {}
+    assert not {"shifted_margin_Nm", "shift_m"} & set(plain.series())
+    for page in (report_page(one, summary_of(one), "", {}) for one in (both, plain)):
+        assert "lowest margin, as recorded" in page
+    assert "imposed floor" not in page
 
 
-def test_a_shift_that_does_not_lead_to_balance_is_not_applied(recordings_folder):
+def test_no_number_that_the_shift_imposed_is_given_as_a_result(recordings_folder):
+    """In this walk the shift is held by its floor, 0.01 m times the weight, in every support of one foot."""
+    found = analyze_file(recordings_folder / "accad_male1_bvh/Male1_B3_Walk.bvh")
+    shifted, told = found.measured.believed, found.as_dict()
+    assert shifted is not None
+    floor = 0.01 * found.weight
+    assert told["margin"]["shifted"]["floor_m"] == pytest.approx(0.01)
+    assert told["margin"]["shifted"]["floor_Nm"] == pytest.approx(floor)
+    assert told["margin"]["shifted"]["min"] is None
+    assert told["margin"]["shifted"]["min_at_floor"]
+    held = [one for one in told["phases"] if one["shifted_at_floor"]]
+    assert len(held) == sum(len(one["effectors"]) == 1 for one in told["phases"])
+    for one in told["phases"]:
+        assert (one["shifted_margin_min_Nm"] is None) == one["shifted_at_floor"]
+        recorded = found.motion.margin[(found.time >= one["start_s"]) & (found.time < one["end_s"])]
+        assert one["margin_min_Nm"] == recorded.min()
+    page = report_page(found, summary_of(found), "", {})
+    assert page.count("at the imposed floor") == len(held) + 1
+    assert f"{told['margin']['shifted']['floor_Nm']:.1f} N.m" in page
+
+
+def test_a_shift_that_does_not_lead_to_balance_is_not_believed(recordings_folder):
     """A run at 30 frames per second, whose forces are known too badly; and a leap, all in flight."""
     found = analyze_file(recordings_folder / "accad_male1_bvh/Male1_C03_Run.bvh")
     margin = found.as_dict()["margin"]
-    assert margin["motion"] == "recorded"
+    assert not margin["shifted"]["believed"]
+    assert found.shifted_motion is None
     assert margin["shifted"]["rms_m"] > LARGEST_RMS
     np.testing.assert_array_equal(found.motion.q, found.measured.recorded.q)
-    assert any("measured is the motion as recorded" in line for line in found.remarks)
+    assert any("is not to be believed" in line for line in found.remarks)
     leap = analyze_file(
         recordings_folder / "grf/nimble_opencap_s4/DJ1.trc", AnalysisOptions(frames=(114, 140))
     )
@@ -143,13 +177,13 @@ def test_a_recorded_walk_beside_its_plates(recordings_folder):
     plates = found.as_dict()["force_plates"]
     assert plates["timing_median_s"] < 0.030
     assert plates["vertical_rms_body_weight"] < 0.10
-    # And 97 % of the frames in balance, the body shifted by less than its markers tell.
+    # And 97 % of the frames can be carried, the body shifted by less than its markers tell.
     margin = found.as_dict()["margin"]
-    assert margin["motion"] == "shifted"
-    assert margin["share_positive"] == margin["shifted"]["share_positive"] > 0.97
-    assert margin["recorded"]["share_positive"] < margin["share_positive"]
+    assert margin["shifted"]["believed"]
+    assert margin["shifted"]["share_positive"] > 0.97 > margin["share_positive"]
+    assert margin["recorded"]["share_positive"] == margin["share_positive"]
     assert margin["shifted"]["rms_m"] < 0.002
-    assert plates["cop_rms_m"] == plates["cop_rms_shifted_m"] < plates["cop_rms_recorded_m"]
+    assert plates["cop_rms_shifted_m"] < plates["cop_rms_recorded_m"]
     assert found.plates is not None
     both = found.plates.compared
     assert np.median(found.plates.vertical_force[both]) == pytest.approx(found.weight, rel=0.1)

@@ -130,7 +130,7 @@ def test_malformed_wrenches_are_refused(two_soles):
         wrench_polytope(two_soles).limiting([0, 0, 1])
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=10)
 @given(st.integers(0, 10_000))
 def test_shares_predict_how_the_margin_grows_with_each_limit(random_stance, seed):
     """Raising the stance cap or a grasp limit moves each facet by its share (a dual multiplier)."""

@@ -9,7 +9,7 @@ from manikin.errors import InputError
 from manikin.spatial import skew
 
 seeds = st.integers(0, 100_000)
-few = settings(max_examples=12, deadline=None, derandomize=True)
+few = settings(max_examples=12)
 COM = np.array([0.03, 0.02, 0.9])
 
 

@@ -76,7 +76,7 @@ def test_every_row_is_needed_and_tight(name, contact_program):
 
 
 @names
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 @given(
     st.integers(0, 100_000),
     st.sampled_from([0.0, 1.0, 100.0]),

@@ -10,7 +10,6 @@ from manikin.errors import ContactError, InputError
 from manikin.spatial import GRAVITY_VECTOR, rotation_from_rpy
 
 seeds = st.integers(0, 100_000)
-moderate = settings(max_examples=30, deadline=None, derandomize=True)
 # HiGHS satisfies constraints to 1e-7 of a kilonewton.
 SOLVER = 2e-4
 
@@ -30,7 +29,6 @@ def assert_same_set(W, program, rng, rows=5, shots=4):
             assert W.margin(at_boundary) == pytest.approx(0.0, abs=SOLVER)
 
 
-@moderate
 @given(seeds)
 def test_stances_under_a_sum_cap_equal_the_program_over_contact_forces(random_stance, contact_program, seed):
     rng = np.random.default_rng(seed)
@@ -40,7 +38,7 @@ def test_stances_under_a_sum_cap_equal_the_program_over_contact_forces(random_st
     assert_same_set(W, contact_program(stance, reference=reference), rng)
 
 
-@settings(max_examples=12, deadline=None, derandomize=True)
+@settings(max_examples=12)
 @given(seeds)
 def test_own_caps_and_a_sum_cap_together_equal_the_program(random_stance, contact_program, seed):
     rng = np.random.default_rng(seed)
@@ -48,7 +46,7 @@ def test_own_caps_and_a_sum_cap_together_equal_the_program(random_stance, contac
     assert_same_set(wrench_polytope(stance), contact_program(stance), rng)
 
 
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=8)
 @given(seeds)
 def test_soles_with_a_torsion_limit_equal_the_program(random_stance, contact_program, seed):
     """CoP and the safe eight-row torsion form replace the corners' forces."""
@@ -57,7 +55,7 @@ def test_soles_with_a_torsion_limit_equal_the_program(random_stance, contact_pro
     assert_same_set(wrench_polytope(stance), contact_program(stance), rng)
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=10)
 @given(seeds)
 def test_the_inner_pyramid_equals_its_program_and_lies_in_the_outer(random_stance, contact_program, seed):
     rng = np.random.default_rng(seed)
@@ -69,7 +67,6 @@ def test_the_inner_pyramid_equals_its_program_and_lies_in_the_outer(random_stanc
     assert wrench_polytope(stance).margin(np.array(corners)).min() > -SOLVER
 
 
-@moderate
 @given(seeds)
 def test_membership_of_random_wrenches_agrees_with_the_program(random_stance, contact_program, seed):
     rng = np.random.default_rng(seed)
@@ -259,7 +256,6 @@ def test_a_body_without_mass_is_refused(mass):
         pseudo_wrench(mass, (0, 0, 1), (0, 0, 0))
 
 
-@moderate
 @given(seeds)
 def test_moving_the_reference_is_exact(random_stance, seed):
     """A polytope moved to another reference is the one computed there."""
@@ -272,7 +268,6 @@ def test_moving_the_reference_is_exact(random_stance, seed):
     np.testing.assert_allclose(moved.margin(w), direct.margin(w), atol=1e-6)
 
 
-@moderate
 @given(seeds)
 def test_margins_about_the_com_do_not_feel_a_rigid_motion_of_the_world(random_stance, seed):
     """Stance and state turned and shifted together (gravity included) keep their margins.

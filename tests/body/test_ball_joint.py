@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
@@ -11,7 +11,6 @@ from manikin.body import Configuration, human
 from manikin.body.ball_joint import ball_angles, ball_rotation
 from manikin.errors import BodyError
 
-SOME = settings(max_examples=60, deadline=None, derandomize=True)
 JOINTS = ("left_thigh", "right_thigh", "left_upper_arm", "right_upper_arm", "lumbar", "neck")
 
 
@@ -25,7 +24,6 @@ def test_rotation_is_that_of_the_body(name):
     np.testing.assert_allclose(ball_rotation([h.axis for h in part.hinges], angles), wanted, atol=1e-12)
 
 
-@SOME
 @given(arrays(float, 4, elements=st.floats(-1.0, 1.0)), st.sampled_from(JOINTS), st.floats(-3.0, 3.0))
 def test_angles_give_the_rotation_back(quaternion, name, middle):
     """Any rotation, the singular ones among them, to 1e-7; angles lie within half a turn of the middle."""

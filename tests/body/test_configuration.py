@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, difference, human, integrate, interpolate, random_configuration
@@ -14,7 +14,6 @@ STEP = 1e-6
 # velocities of a few rad/s multiply that by less than ten.
 CLOSE = 1e-8
 
-MANY = settings(max_examples=25, deadline=None, derandomize=True)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -30,7 +29,6 @@ def along(q, v, evaluate):
     return (forward - backward) / (2 * STEP)
 
 
-@MANY
 @given(SEEDS)
 def test_com_jacobian(seed):
     q, v, _ = draw(seed)
@@ -39,7 +37,6 @@ def test_com_jacobian(seed):
     np.testing.assert_allclose(state.com_velocity, state.com_jacobian @ v, atol=1e-12)
 
 
-@MANY
 @given(SEEDS)
 def test_effector_and_point_jacobians(seed):
     q, v, rng = draw(seed)
@@ -59,7 +56,6 @@ def test_effector_and_point_jacobians(seed):
         np.testing.assert_allclose(velocity, along(q, v, lambda c, n=name: c.point(n, offset)), atol=CLOSE)
 
 
-@MANY
 @given(SEEDS)
 def test_bias_accelerations(seed):
     """``Jdot v`` is the acceleration along a motion of constant ``v``."""
@@ -79,7 +75,6 @@ def test_bias_accelerations(seed):
     )
 
 
-@MANY
 @given(SEEDS)
 def test_momentum_is_the_sum_over_the_segments(seed):
     """Linear and angular momentum about the centre of mass, added up segment by segment."""
@@ -99,7 +94,6 @@ def test_momentum_is_the_sum_over_the_segments(seed):
     np.testing.assert_allclose(state.linear_momentum, BODY.mass * state.com_velocity, atol=1e-9)
 
 
-@MANY
 @given(SEEDS)
 def test_equation_of_motion_and_newton_euler(seed):
     """``M a + h`` is inverse dynamics; its root part is Newton's and Euler's law for the whole body."""
@@ -114,7 +108,6 @@ def test_equation_of_motion_and_newton_euler(seed):
     np.testing.assert_allclose(rotation @ force[:3], momentum_rate[:3] - weight, atol=1e-8)
 
 
-@MANY
 @given(SEEDS)
 def test_power_of_gravity_and_inertia(seed):
     """The power of ``M a + h`` is the rate of kinetic plus potential energy."""
@@ -172,7 +165,6 @@ def test_results_are_kept_and_cannot_be_changed():
     assert np.abs(state.com_jacobian - before).max() > 0.01
 
 
-@MANY
 @given(SEEDS)
 def test_difference_undoes_integration(seed):
     q, v, rng = draw(seed, speed=0.5)

@@ -7,19 +7,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, LimbSpec, ShapeKind, creature_from_urdf, random_configuration
 from manikin.body.urdf import read_urdf
 from manikin.errors import BodyError
 
-SOME = settings(
-    max_examples=60,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
 DOG = Path(__file__).with_name("data") / "dog.urdf"
 NAMES = [f"{end}_{side}" for end in ("front", "rear") for side in ("left", "right")]
 LIMBS = {name: {"tip": f"{name}_foot", "position": (0.02, 0.0, 0.0)} for name in NAMES}
@@ -70,7 +64,6 @@ def test_limbs_are_chains_and_know_their_reflections(dog):
     assert [limb.mirror for limb in dog.limbs] == ["front_right", "front_left", "rear_right", "rear_left"]
 
 
-@SOME
 @given(st.integers(0, 2**32 - 1))
 def test_mechanics_are_those_of_another_reader(dog, dog_file, seed):
     """Mass matrix, centre of mass and feet against Pinocchio's own URDF reader, to 1e-9."""
@@ -197,7 +190,6 @@ def test_what_is_no_description_is_refused(tmp_path, content):
         read_urdf(tmp_path / "none.urdf")
 
 
-@SOME
 @given(st.integers(0, 10**6), st.binary(max_size=3))
 def test_a_damaged_description_is_read_or_refused(dog_file, place, junk):
     whole = dog_file.read_bytes()

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
@@ -14,7 +14,6 @@ from manikin.errors import BodyError
 SEXES = st.sampled_from(["male", "female"])
 STATURES = st.floats(1.50, 2.00)
 MASSES = st.floats(45.0, 120.0)
-SOME = settings(max_examples=25, deadline=None, derandomize=True)
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +53,6 @@ def test_joint_order_is_that_of_the_pinocchio_model(body):
     np.testing.assert_array_equal(body.pinocchio.upperEffortLimit[6:], body.torque_limit)
 
 
-@SOME
 @given(STATURES, MASSES, SEXES)
 def test_stature_and_mass_are_those_asked_for(stature, mass, sex):
     body = human(stature, mass, sex)
@@ -66,7 +64,6 @@ def test_stature_and_mass_are_those_asked_for(stature, mass, sex):
     assert top - sole == pytest.approx(stature, abs=1e-9)
 
 
-@SOME
 @given(STATURES, MASSES, SEXES)
 def test_centre_of_mass_of_a_standing_person(stature, mass, sex):
     """Between 0.55 and 0.57 of the stature above the sole, above the middle of the foot."""
@@ -78,7 +75,6 @@ def test_centre_of_mass_of_a_standing_person(stature, mass, sex):
     assert -0.015 * stature < standing.com[0] - sole[0] < 0.0
 
 
-@SOME
 @given(STATURES, MASSES, SEXES)
 def test_standing_body_has_flat_soles_and_clear_limbs(stature, mass, sex):
     body = human(stature, mass, sex)

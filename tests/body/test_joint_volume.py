@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -21,7 +21,6 @@ from manikin.body.human_volumes import FILE, load_volumes, save_volumes
 from manikin.body.natural_range import ball_range
 from manikin.errors import BodyError
 
-SOME = settings(max_examples=60, deadline=None, derandomize=True)
 STEP = np.deg2rad(4.0)
 ANGLES = arrays(float, 3, elements=st.floats(-3.5, 3.5))
 
@@ -67,7 +66,6 @@ def test_hollows_stay_and_gaps_are_filled(bent_volume):
     assert filled.contains(ring[inside]).all()
 
 
-@SOME
 @given(ANGLES, ANGLES)
 def test_distance_changes_no_faster_than_angles(bent_volume, first, second):
     """At most by the square root of 3 times the way, which linear interpolation allows at worst."""
@@ -75,7 +73,6 @@ def test_distance_changes_no_faster_than_angles(bent_volume, first, second):
     assert change <= np.sqrt(3.0) * np.linalg.norm(first - second) + 1e-12
 
 
-@SOME
 @given(arrays(float, 3, elements=st.floats(-1.0, 1.0)))
 def test_gradient_is_the_derivative(round_volume, place):
     """Inside one cell, by central differences; the interpolant is cubic there."""
@@ -89,7 +86,6 @@ def test_gradient_is_the_derivative(round_volume, place):
     np.testing.assert_allclose(round_volume.gradient(middle), difference, atol=1e-8)
 
 
-@SOME
 @given(arrays(float, 3, elements=st.floats(-4.0, 4.0)))
 def test_gradient_is_the_derivative_off_the_grid_too(round_volume, place):
     """Along one axis, two or three beyond the grid; away from the planes between cells."""

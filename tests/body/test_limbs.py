@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import (
@@ -121,7 +121,6 @@ def test_forward_kinematics_of_a_limb_are_those_of_the_whole_body(body, limb):
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=7, max_size=7))
-@settings(max_examples=30, deadline=None)
 def test_the_jacobian_of_an_arm_is_the_derivative_of_its_position(shares):
     body = BODIES["human"]
     chain = LimbKinematics(body, limb_named(body, "left_arm"))

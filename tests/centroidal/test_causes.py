@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.balance import wrench_polytope
@@ -35,7 +35,6 @@ def failure_of(task):
     return assess_feasibility(task, polytopes_of(task)).failure
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
 @given(st.floats(0.02, 0.6), st.floats(0.05, 1.0))
 def test_standing_on_a_slope_needs_its_tangent_as_friction(slope, friction):
     """Coulomb along the line of greatest slope, one of the pyramid's axes; without a grey zone of 1 %."""

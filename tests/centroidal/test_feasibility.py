@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.balance import pseudo_wrench
@@ -23,7 +23,6 @@ def test_radius_is_that_of_the_inscribed_ball_of_the_overlap():
     assert intersection_radii([box(0.0, 1.0), shifted]) == pytest.approx([0.25])
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
 @given(st.floats(-3.0, 3.0), st.floats(0.1, 2.0), st.floats(0.1, 2.0))
 def test_disjoint_polytopes_have_a_negative_radius(distance: float, first: float, second: float):
     """Proposition 1: the sign of the radius says whether the polytopes meet."""
@@ -111,7 +110,6 @@ def test_what_cannot_be_met_is_named_before_solving(platform, changes, requireme
     assert "\n" not in result.failure.reason
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
 @given(st.integers(0, 2**16))
 def test_best_margin_is_not_exceeded_by_any_acceleration(seed: int):
     """The linear programme over accelerations against random ones."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
@@ -179,7 +179,6 @@ def test_the_optimum_meets_the_kkt_conditions(platform_stances, margin):
     assert (solution.multipliers > 1e-9).any() == (margin > 0.0)
 
 
-@settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), size=st.floats(1e-4, 1e-2))
 def test_perturbations_that_keep_the_key_frames_raise_the_objective(found, seed, size):
     """Nothing limits this solution but the equalities, so that every feasible direction is uphill."""
@@ -320,7 +319,6 @@ def test_bad_problems_are_refused_in_one_line(platform_stances, options, says):
     assert "\n" not in str(error.value)
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     inner=st.lists(st.floats(0.01, 0.99), min_size=1, max_size=12, unique=True),
     extra=st.integers(0, 12),

@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.centroidal import CeilingHeight, Zone, height_below, keep_out
@@ -36,7 +36,6 @@ def test_the_widest_of_several_headings_counts():
 
 
 @given(x=coordinates, y=coordinates)
-@settings(max_examples=60, deadline=None, derandomize=True)
 def test_the_surface_lies_between_its_heights_and_falls_towards_the_obstacle(x, y):
     """Half the way to the obstacle's middle the bound is never higher."""
     middle = OUTLINE.mean(axis=0)
@@ -47,7 +46,6 @@ def test_the_surface_lies_between_its_heights_and_falls_towards_the_obstacle(x, 
 
 @pytest.mark.filterwarnings("ignore::FutureWarning")  # CasADi announces a change of its numpy support
 @given(x=st.floats(-0.3, 1.1), y=st.floats(-1.6, 1.6))
-@settings(max_examples=60, deadline=None, derandomize=True)
 def test_the_surface_is_smooth_and_the_same_for_casadi(x, y):
     """Its symbolic gradient is the finite difference of the numbers; second derivatives are bounded."""
     symbols = ca.SX.sym("x"), ca.SX.sym("y")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.centroidal.facets import facet_distances, nearest_facets, with_violated
@@ -15,7 +15,6 @@ from manikin.spatial import GRAVITY, GRAVITY_VECTOR
 from manikin.spline import BSpline, bernstein_matrix, clamped_knots
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
 @given(st.integers(3, 6), st.lists(st.floats(0.1, 2.0), min_size=1, max_size=8), st.integers(0, 2**16))
 def test_spline_and_bezier_pieces_are_the_same_curve(degree: int, durations: list[float], seed: int):
     """Phases as polynomials with k - 1 continuous derivatives are the spline of 5.4.3."""

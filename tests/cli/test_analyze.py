@@ -112,7 +112,7 @@ def test_a_recording_is_planned_anew_beside_it(standing_file, tmp_path, capsys):
     assert plan["min_margin"] > 0.0
     assert plan["execution"]["fell"] is False
     found = read_motions(out)
-    assert list(found.motions) == ["recorded", "planned", "executed"]
+    assert list(found.motions) == ["shifted", "recorded", "planned", "executed"]
     assert (out / "report.html").read_text().count("data:image/png;base64") >= 3
     assert main(["analyze", str(standing_file), "--plan", "quickly", "--json"]) == BAD_INPUT
     assert "--plan is 'quickly'; valid: " in capsys.readouterr().err

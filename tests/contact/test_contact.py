@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.contact import (
@@ -31,7 +31,6 @@ def test_a_sole_has_its_corners_around_its_centre():
 
 
 @given(st.floats(-3.0, 3.0), st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda n: np.linalg.norm(n) > 0.1))
-@settings(max_examples=60, deadline=None, derandomize=True)
 def test_a_tilted_sole_lies_in_the_plane_of_its_normal(yaw, normal):
     foot = sole("left_foot", (0.1, 0.2, 0.3), yaw, normal=normal, **SIZE)
     unit = np.array(normal) / np.linalg.norm(normal)

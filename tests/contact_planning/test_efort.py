@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import spearmanr
@@ -21,7 +21,6 @@ from manikin.contact_planning import (
 from manikin.errors import InputError
 
 SEEDS = st.integers(0, 10_000)
-SOME = settings(max_examples=40, deadline=None)
 
 
 def jacobian_and_direction(seed, joints=7):
@@ -31,7 +30,6 @@ def jacobian_and_direction(seed, joints=7):
 
 
 @given(SEEDS)
-@SOME
 def test_the_ratio_is_the_largest_force_along_the_task_with_torques_of_unit_norm(seed):
     """``f_T^-2 = v^T J J^T v = |J^T v|^2``: torques of a force ``f v`` have the norm ``f / f_T``."""
     jacobian, v = jacobian_and_direction(seed)
@@ -42,7 +40,6 @@ def test_the_ratio_is_the_largest_force_along_the_task_with_torques_of_unit_norm
 
 
 @given(SEEDS)
-@SOME
 def test_the_ellipsoids_are_images_of_unit_balls(seed):
     """Speeds of unit joint speeds fill one, forces of unit torques the other; axes are inverse."""
     jacobian, v = jacobian_and_direction(seed)
@@ -60,7 +57,6 @@ def test_the_ellipsoids_are_images_of_unit_balls(seed):
 
 
 @given(SEEDS)
-@SOME
 def test_efort_does_not_depend_on_the_frame(seed):
     jacobian, v = jacobian_and_direction(seed)
     normal = np.roll(v, 1)
@@ -109,7 +105,6 @@ def test_signs_of_a_hand_that_pulls():
 
 
 @given(SEEDS, st.floats(0.1, 1.0))
-@SOME
 def test_the_exertable_force_keeps_every_limit_and_is_the_largest(seed, friction):
     """Against random forces scaled to the limits; a grasp can do at least what friction can."""
     jacobian, v = jacobian_and_direction(seed)

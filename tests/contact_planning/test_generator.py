@@ -3,7 +3,7 @@
 import coal
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, LimbKinematics, human, insect, integrate, limb_named, limbs_of
@@ -84,7 +84,6 @@ def test_contacts_at_a_wall_are_true(person, at_wall, name):
 
 
 @given(st.floats(-0.15, 0.1), st.floats(-0.2, 0.2), st.floats(-0.4, 0.4), st.integers(0, 5))
-@settings(max_examples=25, deadline=None)
 def test_whatever_is_found_is_true(person, at_wall, x, y, yaw, number):
     limb = limbs_of(person)[number]
     move = np.zeros(person.nv)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, human, limb_named, with_further_contacts
@@ -62,7 +62,6 @@ def generator():
 
 
 @given(st.floats(-0.0015, 0.0295), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
-@settings(max_examples=25, deadline=None)
 def test_a_pelvis_that_the_root_brings_near_a_seat_touches_it(generator, gap, x, y):
     """The contact lies on the seat below the buttocks, has their patch, and nothing of the body has moved."""
     q = sitting(gap, (x, y))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.balance import signed_distance
@@ -23,7 +23,6 @@ def test_on_level_points_the_room_is_the_distance_to_their_polygon():
     assert static_room([], 75.0, np.zeros(3), CAP) == -np.inf
 
 
-@settings(max_examples=20, deadline=None)
 @given(x=st.floats(-0.3, 0.3), y=st.floats(-0.5, 0.5), tilt=st.floats(-0.6, 0.6))
 def test_the_room_agrees_with_the_region_of_the_wrench_polytope(x, y, tilt):
     """Two independent ways: balanced in one when balanced in the other, the room not below the distance."""

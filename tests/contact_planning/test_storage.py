@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human, insect
@@ -66,12 +66,6 @@ def test_misuse_is_refused(person, creature, few, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@settings(
-    max_examples=30,
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-    derandomize=True,
-)
 @given(st.floats(0.0, 1.0), st.binary(max_size=20))
 def test_a_damaged_file_is_refused_or_the_same(person, few, tmp_path, place, junk):
     """Cut short or with other bytes in the middle; the archive's check sums notice."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human, kudoh
@@ -15,7 +15,6 @@ from manikin.spatial import GRAVITY
 BODIES = {"kudoh": kudoh(), "human": human()}
 KUDOH = BODIES["kudoh"]
 FORWARD = np.array([1.0, 0.0])
-SOME = settings(max_examples=30, deadline=None, derandomize=True)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +67,6 @@ def test_arms_go_up_apart_and_then_down(name):
     assert arms.wish(state, 2.3) is not None
 
 
-@SOME
 @given(angle=st.floats(-np.pi, np.pi), reach=st.floats(0.0, 3.0))
 def test_only_a_far_fall_ahead_raises_them(angle, reach):
     controller = BalanceRecovery(KUDOH, KUDOH.standing_posture())
@@ -100,7 +98,6 @@ def turning_state(controller, speed):
     return controller.evaluate(KUDOH.standing_posture(), v)
 
 
-@SOME
 @given(speed=st.floats(0.5, 5.0), share=st.floats(0.0, 1.5))
 def test_stopping_uses_up_the_range_that_is_left(controller, speed, share):
     """The settled point is beyond the capture point by ``M / (m g) (1 - exp(-w L / M))``."""

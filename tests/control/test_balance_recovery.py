@@ -29,7 +29,7 @@ from manikin.control.dynamics import Dynamics
 from manikin.errors import BodyError, InputError
 from manikin.spatial import GRAVITY
 
-SOME = settings(max_examples=15, deadline=None, derandomize=True)
+SOME = settings(max_examples=15)
 SEEDS = st.integers(0, 2**32 - 1)
 BODIES = {"kudoh": kudoh(), "human": human()}
 

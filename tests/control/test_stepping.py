@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -34,7 +34,6 @@ LIMITS = StepSettings()
 
 
 @given(x=st.floats(-1.0, 1.0), y=st.floats(-1.0, 1.0), inset=st.floats(0.0, 0.03))
-@settings(max_examples=40, deadline=None)
 def test_the_closest_point_of_an_area_is_in_it_and_none_is_closer(x, y, inset):
     area = SupportArea.of(SOLES)
     point = np.array([x, y])
@@ -59,7 +58,6 @@ def test_the_capture_point_runs_away_as_that_of_a_pendulum():
 
 
 @given(ahead=st.floats(0.0, 0.2), angle=st.floats(-np.pi, np.pi), steps=st.integers(1, 2))
-@settings(max_examples=30, deadline=None)
 def test_steps_capture_within_the_limits(ahead, angle, steps):
     """Checked with the hull of the corners instead of the half planes that the search has."""
     area = SupportArea.of(SOLES)
@@ -99,7 +97,6 @@ def test_the_first_steps_offered_are_the_quickest():
 
 
 @given(x=st.floats(-0.6, 0.6), y=st.floats(-0.3, 0.3), moved=st.floats(-0.1, 0.1), at=st.floats(0.05, 0.2))
-@settings(max_examples=50, deadline=None)
 def test_a_foot_comes_to_rest_at_a_goal_that_moves(x, y, moved, at):
     start, duration, tick = np.array([0.02, 0.15, 0.0]), 0.3, 0.005
     goal, other = start + np.array([x, y, 0.0]), start + np.array([x + moved, y, 0.0])
@@ -128,7 +125,6 @@ def test_a_foot_comes_to_rest_at_a_goal_that_moves(x, y, moved, at):
 @given(
     moment=st.floats(50.0, 400.0), momentum=st.floats(5.0, 100.0), reach=st.floats(0.5, 20.0),
 )  # fmt: skip
-@settings(max_examples=40, deadline=None)
 def test_the_excess_is_brought_back_and_no_more(moment, momentum, reach):
     """A flywheel on a pendulum, simulated with many schedules: the best one ends at the edge."""
     weight = 70.0 * GRAVITY
@@ -152,7 +148,6 @@ def test_the_excess_is_brought_back_and_no_more(moment, momentum, reach):
 
 
 @given(share=st.floats(0.0, 3.0), pull=st.floats(-5.0, 5.0), time=st.floats(0.01, 0.3))
-@settings(max_examples=40, deadline=None)
 def test_a_pendulum_on_springy_ankles_sways_as_integrated(share, pull, time):
     expected = solve_ivp(
         lambda _, s: [s[1], FREQUENCY**2 * (1.0 - share) * s[0] + pull], (0.0, time), [0.02, 0.3],

@@ -22,7 +22,7 @@ def state_at(body, seed):
     return q, rng.normal(size=body.nv), rng.normal(size=body.nv)
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 10_000))
 def test_jacobian_and_drift_give_the_acceleration(body, seed):
     """``J a + drift`` is the second derivative of a frame and of the CoM along a motion."""
@@ -57,7 +57,6 @@ def test_dynamics_matches_inverse_dynamics(body):
     assert np.allclose(frame.jacobian @ v, frame.twist, atol=1e-12)
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
 @given(mu=st.floats(0.05, 1.5), seed=st.integers(0, 1000))
 def test_pyramid_edges_lie_on_the_friction_cone(mu, seed):
     """Unit normal force, tangential part mu: the inner pyramid, for any orientation."""
@@ -109,7 +108,6 @@ def test_grasp_forces_are_bounded_along_world_axes(body):
         assert np.allclose(basis.lower, -basis.upper)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
 @given(angle=st.floats(-2, 2), speed=st.floats(-20, 20))
 def test_acceleration_bounds_are_never_contradictory(angle, speed):
     """Lower never exceeds upper, and a joint inside its range is sent to neither end."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human, insect, kudoh, random_configuration
@@ -130,7 +130,6 @@ def test_a_hand_before_the_other_shoulder_is_across_the_midline():
     assert np.rad2deg(across.outward[0]) == pytest.approx(-70.0, abs=1e-6)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_the_mirror_image_has_the_angles_of_the_other_side(seed):
     rng = np.random.default_rng(seed)

@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import random_configuration
@@ -154,7 +154,6 @@ def test_seated_upright_is_better_supported(body):
     assert scored(body, Circumstances(trunk_supported=True), contacts=seat)["trunk"] == 1
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["none", "static", "load"]))
 def test_mirroring_a_posture_swaps_the_sides(body, seed, what):
     given_ = {"none": None, "static": Circumstances(static=True), "load": Circumstances(load_kg=12.0)}[what]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human
@@ -50,7 +50,6 @@ def test_work_and_squared_share_of_a_sine():
     assert found.mean_share == pytest.approx(np.sqrt(0.5 / len(BODY.joint_names)), rel=1e-6)
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.floats(0.1, 20.0), st.floats(0.1, 5.0))
 def test_effort_grows_with_the_square_of_torque_and_with_time(size, slower):
     one = cumulative_effort(BODY, with_torque(lambda t: 10.0 * np.ones_like(t), duration=2.0))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
@@ -58,7 +58,6 @@ def test_experiment_targets_are_of_every_category_on_both_sides():
         assert {category_of(goal) for goal in targets if goal[0] * side > 0} == {*HEADINGS_DEG, None}
 
 
-@settings(max_examples=50, deadline=None)
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-7, 7), st.floats(-7, 7))
 def test_goals_seen_from_a_start(x, y, heading, turned):
     """What is seen leads back to the goal."""

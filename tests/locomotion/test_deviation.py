@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
@@ -69,7 +69,6 @@ def test_duration_and_rate_do_not_matter_but_the_way_of_going_does():
     assert lag.average == pytest.approx(1.0 / 6.0, abs=0.01)
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10**6), st.integers(2, 8))
 def test_shifted_walks_deviate_by_the_spread_of_their_shifts(seed, count):
     rng = np.random.default_rng(seed)

@@ -46,7 +46,7 @@ def experiment():
     return walking_paths(START, list(experiment_targets()))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.floats(0.05, 20.0), st.floats(0.5, 3.0), st.floats(-3.0, 3.0), st.floats(0.3, 4.0))
 def test_straight_walks_match_the_closed_form(distance, forward, heading, time):
     """T = (36 a1 d^2 / a0)^(1/4) and J = 4/3 a0 T, the minimum of a0 T + 12 a1 d^2 / T^3."""
@@ -109,7 +109,7 @@ def test_mirrored_targets_have_mirrored_paths(experiment):
             assert one.velocity[:, 1].min() == pytest.approx(-other.velocity[:, 1].max(), abs=1e-3)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.floats(-5, 5), st.floats(-5, 5), st.floats(-np.pi, np.pi))
 def test_cost_does_not_depend_on_where_and_whither(x, y, turn):
     cos, sin = np.cos(turn), np.sin(turn)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
@@ -216,7 +216,6 @@ def _wander(seed, n, rate):
     return shoulders(np.cumsum(speed, axis=0) / rate, np.cumsum(turning) / rate, rate=rate)
 
 
-@settings(max_examples=60, deadline=None)
 @given(wandering, st.sampled_from([0.0, 0.01, 0.05, 0.3]))
 def test_on_line_labels_are_those_of_function_1_delayed(paths, half_step):
     rule = SegmentationRule(half_step=half_step)
@@ -230,7 +229,6 @@ def test_on_line_labels_are_those_of_function_1_delayed(paths, half_step):
     assert labels == segment_path(paths, off).labels.tolist()
 
 
-@settings(max_examples=60, deadline=None)
 @given(wandering)
 def test_segments_tile_the_walk(paths):
     found = segment_path(paths)
@@ -246,7 +244,6 @@ def test_segments_tile_the_walk(paths):
     assert sum(found.share(kind) for kind in KINDS) == pytest.approx(1.0)
 
 
-@settings(max_examples=40, deadline=None)
 @given(wandering, st.floats(-3.0, 3.0), st.floats(-5.0, 5.0))
 def test_deviations_do_not_depend_on_place_and_change_sign_in_the_mirror(paths, turn, shift):
     turning = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])

@@ -61,7 +61,7 @@ def check(footprints, path, rule):
         assert seconds >= (rule.single if len(held) == 1 else rule.double) - ROUNDING
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     st.floats(0.5, 4.0),
     st.floats(-np.pi, np.pi),

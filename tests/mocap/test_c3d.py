@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
@@ -13,12 +13,6 @@ from manikin.mocap import read_c3d, read_recording
 
 pytest.importorskip("ezc3d", reason="the extra mocap is not installed")
 
-SOME = settings(
-    max_examples=300,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
 
 CORNERS = [[0.6, 0.4, 0.0], [0.0, 0.4, 0.0], [0.0, 0.0, 0.0], [0.6, 0.0, 0.0]]
 """Of the plate, in the order of the format: (+x, +y) of the plate's own axes first [m]."""
@@ -245,7 +239,6 @@ def test_every_shorter_file_is_refused(c3d_file):
             read_c3d(c3d_file)
 
 
-@SOME
 @given(
     st.lists(st.tuples(st.floats(0.0, 1.0), st.binary(min_size=1, max_size=4)), min_size=1, max_size=4),
     st.sampled_from(["header", "parameters", "data"]),

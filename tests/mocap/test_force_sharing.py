@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.analysis import AnalysisOptions, analyze_file
+from manikin.balance import wrench_about
 from manikin.balance.limits import contact_limits
 from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
@@ -18,7 +19,6 @@ from manikin.mocap.plate_torques import compare_torques, plate_torques
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_dynamics import dynamics_of
 from manikin.mocap.recorded_forces import contact_wrenches, motion_on_contacts
-from manikin.mocap.recorded_margins import wrench_at
 from manikin.mocap.targets import Targets
 
 STEP = 0.01
@@ -34,7 +34,7 @@ def steps(frames=60, first=20, last=40):
 
 def pushed(frames, place, force=(50.0, 0.0, 700.0)):
     """(n, 6) a constant force at a place."""
-    return wrench_at(np.tile(np.r_[force, np.zeros(3)], (frames, 1)), -np.asarray(place, dtype=float))
+    return wrench_about(np.tile(np.r_[force, np.zeros(3)], (frames, 1)), -np.asarray(place, dtype=float))
 
 
 def test_a_contact_is_loaded_from_nothing_to_all():
@@ -77,7 +77,6 @@ def test_who_lands_nearly_at_once_stands_on_both_feet(alone):
     np.testing.assert_allclose(shares[20 + alone + 2 :, :, 2], 350.0, atol=1.0)
 
 
-@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**16))
 def test_shares_add_up_and_none_changes_less(seed):
     """Whatever is passed from one contact to another makes the sum of changes and sizes larger."""
@@ -92,7 +91,7 @@ def test_shares_add_up_and_none_changes_less(seed):
     assert not shares[~held].any()
 
     def cost(given):
-        own = wrench_at(given, points)
+        own = wrench_about(given, points)
         own[..., 3:] /= LEVER
         own[~held] = 0.0
         changes = np.diff(own, axis=0)
@@ -120,7 +119,7 @@ def beyond_limits(stance, shares):
     found = []
     for contact, share in zip(stance, shares.swapaxes(0, 1), strict=True):
         limits, turn = contact_limits(contact), contact.rotation_contact_to_world
-        there = wrench_at(share, contact.position)
+        there = wrench_about(share, contact.position)
         local = np.hstack([there[:, :3] @ turn, there[:, 3:] @ turn])
         found.append((local @ limits.A.T - limits.b).max(axis=1))
     return np.array(found).T
@@ -132,7 +131,6 @@ def test_shares_that_contacts_can_give_stay_as_they_are():
     np.testing.assert_array_equal(shared_wrenches(soles(), parts.sum(axis=1), 700.0, parts), parts)
 
 
-@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**16))
 def test_shares_beyond_the_limits_become_near_ones_within(seed):
     """A force passed from one contact to the other that one of them cannot give: within, and near.
@@ -155,7 +153,7 @@ def test_shares_beyond_the_limits_become_near_ones_within(seed):
     least = shared_wrenches(stance, near.sum(axis=1), 700.0)
 
     def away(given):
-        apart = np.array([wrench_at((given - near)[:, k], PLACES[k]) for k in range(2)])
+        apart = np.array([wrench_about((given - near)[:, k], PLACES[k]) for k in range(2)])
         apart[..., 3:] /= LEVER
         return float(np.linalg.norm(apart))
 

@@ -50,7 +50,6 @@ def passing(speed, begin, end, slide=0.0):
     return Reconstruction(BODY, time, q, targets, residual)
 
 
-@settings(max_examples=50, deadline=None)
 @given(st.lists(st.booleans(), max_size=60), st.integers(1, 8))
 def test_lasting_runs_are_apart_and_long_and_leave_nothing_long_out(holds, shortest):
     frames = np.array(holds, dtype=bool)
@@ -62,7 +61,6 @@ def test_lasting_runs_are_apart_and_long_and_leave_nothing_long_out(holds, short
             assert any(a <= first and stop <= b for a, b in found)
 
 
-@settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(st.booleans(), st.booleans()), max_size=60))
 def test_a_switch_changes_only_where_it_is_told_to(steps):
     closes, opens = (np.array([step[k] for step in steps], dtype=bool) for k in (0, 1))
@@ -92,7 +90,7 @@ def test_places_are_those_of_effectors_knees_and_segments():
     assert knee[0, 2] < hand[0, 2] < neck[0, 2]
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.floats(0.0, 2.0), st.floats(0.0, 2e-3), st.integers(0, 2**16))
 def test_hands_that_hang_support_nothing(speed, noise, seed):
     q = standing(2.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human, random_configuration
@@ -83,7 +83,6 @@ def test_gradient_and_matrix_are_those_of_the_cost(body):
     np.testing.assert_allclose(matrix, np.tril(expected), atol=1e-6)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.integers(0, 10_000))
 def test_a_step_keeps_its_bounds_and_is_level_within_them(seed):
     """Of any quadratic the slope is zero along every unknown that is not on its bound."""

@@ -86,8 +86,8 @@ def test_who_stands_beyond_the_edge_is_put_back_by_what_is_missing():
     # At rest 1 cm before the front edge, the centre of mass has to go back by that and by what is kept.
     margins, moved = shifted(standing(np.zeros(FRAMES)), on_one_foot(-0.01), aside=None)
     assert (margins.whole_body < 0.0).all()
-    # A margin in N.m is the distance to the edge times the force, but for the facet's part in the forces.
-    assert moved.margins.whole_body.min() > 0.95 * INSIDE * WEIGHT
+    # Imposed is the distance of the zero moment point to the edge, but for the facet's part in the forces.
+    assert moved.margins.body.zmp_distance.min() > 0.95 * INSIDE
     np.testing.assert_allclose(moved.shift[:, 1], 0.0, atol=1e-6)
     # Standing still that far back would do as well, and costs more than leaning on accelerations.
     back = np.zeros_like(moved.shift)
@@ -106,8 +106,22 @@ def test_a_tremble_of_a_millimetre_is_taken_out_by_less_than_one():
     margins, moved = shifted(standing(tremble), on_one_foot(0.035))
     inner = slice(20, -20)
     assert np.mean(margins.whole_body[inner] > 0.0) < 0.9
-    assert moved.margins.whole_body[inner].min() > 0.9 * INSIDE * WEIGHT
+    assert moved.margins.body.zmp_distance[inner].min() > 0.9 * INSIDE
     assert moved.rms < 1.2e-3
+
+
+def test_the_floor_is_named_and_told_from_results():
+    """Who stands beyond the edge is held by the floor, who stands well inside by nothing."""
+    margins, moved = shifted(standing(np.zeros(FRAMES)), on_one_foot(-0.01), aside=None)
+    assert moved.floor == pytest.approx(INSIDE * WEIGHT)
+    assert moved.floor_length == pytest.approx(INSIDE)
+    assert moved.at_floor.mean() > 0.3
+    foot = margins.polytopes[0].stance.contacts[0]
+    ahead = foot.position[0] + 0.5 * LENGTH - moved.dynamics.zero_moment_point(0.0)[:, 0]
+    # There the centre of pressure is the floor from the edge, but for the facet's part in the forces.
+    np.testing.assert_allclose(ahead[moved.at_floor], INSIDE, rtol=0.05)
+    assert (ahead > 0.95 * INSIDE).all()
+    assert not shifted(standing(np.zeros(FRAMES)), on_one_foot(0.1), aside=None)[1].at_floor.any()
 
 
 def test_no_shift_makes_a_fall_a_stand():

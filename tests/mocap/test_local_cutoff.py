@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
@@ -12,7 +12,6 @@ RATE = 100.0
 TIME = np.arange(400) / RATE
 
 
-@settings(max_examples=30, deadline=None)
 @given(frequency=st.floats(0.5, 20.0), cutoff=st.floats(2.0, 12.0))
 def test_one_cutoff_is_the_filter_of_second_order_without_delay(frequency, cutoff):
     wave = np.sin(2.0 * np.pi * frequency * TIME + 0.3)[:, None]
@@ -25,7 +24,6 @@ def test_one_cutoff_is_the_filter_of_second_order_without_delay(frequency, cutof
         np.testing.assert_allclose(found, theirs, atol=0.02)
 
 
-@settings(max_examples=20, deadline=None)
 @given(slope=st.floats(-10.0, 10.0), start=st.floats(-5.0, 5.0), instants=st.lists(st.floats(0.0, 4.0)))
 def test_a_straight_line_stays(slope, start, instants):
     line = (start + slope * TIME)[:, None]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
@@ -49,7 +49,6 @@ def test_a_marker_seen_only_for_a_moment_is_not_made_up():
     assert not np.any(found.with_gaps_filled(1.0).seen[[0, 8, 15], 0])
 
 
-@settings(deadline=None, max_examples=50)
 @given(st.lists(st.booleans(), min_size=1, max_size=60), st.integers(0, 20))
 def test_filling_changes_nothing_that_was_seen(seen, longest):
     """Whatever was seen stays; what is left of the gaps is long, at an end or beside too few frames."""
@@ -92,7 +91,6 @@ def test_a_window_has_its_plates_and_events():
         found.cut(30, 30)
 
 
-@settings(deadline=None, max_examples=50)
 @given(st.integers(0, 10**6))
 def test_centre_of_pressure_of_any_surface(seed):
     """A force at a point of a sloping surface with a free moment about its normal: the point comes back."""

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.ndimage import uniform_filter1d
 
@@ -14,12 +14,6 @@ from manikin.export.bvh import to_bvh
 from manikin.mocap import read_amc, read_asf, read_bvh, read_recording
 from manikin.motion import Motion
 
-SOME = settings(
-    max_examples=60,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
 CMU = 0.0254 / 0.45
 
 
@@ -202,7 +196,6 @@ def test_what_is_no_recording_is_refused_in_one_line(amc_file, content, name):
         assert one_line(error)
 
 
-@SOME
 @given(st.integers(0, 10**6), st.binary(max_size=4))
 def test_a_damaged_file_is_read_or_refused(bvh_file, amc_file, place, junk):
     """Bytes replaced anywhere, or the file cut short there: never another exception."""

@@ -47,7 +47,7 @@ from manikin.mocap.phase_sequence import kind_of, mirrored
 from manikin.mocap.recorded_clip import com_and_tops
 from manikin.mocap.sequence_consistency import initials, mirror_image
 from manikin.mocap.statistics import clip_as_dict
-from manikin.output import to_json
+from manikin.result_directory import to_json
 
 BOTH, LEFT, RIGHT = ("left_foot", "right_foot"), ("left_foot",), ("right_foot",)
 
@@ -275,7 +275,6 @@ def test_recordings_that_begin_anywhere_are_compared_from_a_phase():
 # --- placements
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.floats(-3.0, 3.0), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.booleans())
 def test_placements_do_not_depend_on_the_world(turn, x, y, from_lowest):
     origin = com_extreme if from_lowest else first_stance
@@ -356,7 +355,6 @@ def test_distances_are_those_of_geometry():
     assert (shares[0], shares[-1]) == (0.0, 1.0)
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.floats(0.2, 0.6), st.floats(0.0, 0.15))
 def test_room_below_a_bar_is_what_the_head_leaves(low, higher):
     clip = walker(low=low)
@@ -434,7 +432,7 @@ def test_misuse_is_refused_in_one_line(make, told):
     assert "\n" not in str(refused.value)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.integers(0, 2**16))
 def test_tops_are_the_highest_points_of_the_shapes(seed):
     """Against Coal's boxes around the shapes, which touch the highest points of capsules and spheres."""

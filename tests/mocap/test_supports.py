@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human
@@ -54,7 +54,6 @@ def walk(rate, length, rise):
     }
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     rate=st.sampled_from([60.0, 100.0, 250.0]),
     length=st.floats(0.3, 0.8),

@@ -4,18 +4,11 @@ import csv
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
 from manikin.mocap import read_mot, read_recording, read_trc
-
-SOME = settings(
-    max_examples=150,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
 
 TRC = """PathFileType\t4\t(X/Y/Z)\twalk.trc
 DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames
@@ -200,7 +193,6 @@ def test_what_is_neither_is_refused_in_one_line(tmp_path, content):
             read(file)
 
 
-@SOME
 @given(st.integers(0, 10**6), st.binary(max_size=4))
 def test_a_damaged_file_is_read_or_refused(trc_file, place, junk):
     """Bytes replaced anywhere, or the file cut short there: never another exception, never fewer frames."""

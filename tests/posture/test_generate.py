@@ -91,7 +91,7 @@ def test_a_neighbouring_posture_is_found_from_the_first(platform):
     st.floats(-0.03, 0.06), st.floats(-0.05, 0.05), st.floats(0.55, 0.95),
     st.floats(-0.2, 0.2), st.floats(-0.05, 0.1),
 )  # fmt: skip
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 def test_every_centre_of_mass_over_the_feet_is_reached(on_the_floor, x, y, z, stride, widen):
     """From an almost upright stance to a deep squat, feet apart and in stride."""
     problem = on_the_floor()

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, human, insect, integrate
@@ -37,7 +37,6 @@ def test_the_distance_of_a_body_is_that_of_its_worst_ball_joint():
 
 
 @given(st.integers(0, 10_000))
-@settings(max_examples=30, deadline=None)
 def test_the_term_has_the_derivative_of_its_residual(seed):
     """Central differences inside cells of the volumes' grids, where the distance is smooth."""
     rng = np.random.default_rng(seed)

@@ -48,7 +48,7 @@ def numerical_jacobian(residual, q, h=1e-6):
 
 @pytest.mark.parametrize("name", list(TERMS))
 @given(seed=seeds)
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=8)
 def test_jacobian_is_the_derivative(name, seed):
     """Central differences with h = 1e-6 are good to about 1e-9 / h * eps: 1e-6 allows for turns near pi."""
     term, configuration = TERMS[name], Configuration(BODY)
@@ -61,7 +61,7 @@ def test_jacobian_is_the_derivative(name, seed):
 
 
 @given(seed=seeds)
-@settings(max_examples=6, deadline=None, derandomize=True)
+@settings(max_examples=6)
 def test_clearance_gradient_is_the_derivative(seed):
     """Distances to a box and between limbs, near the standing posture where faces are smooth."""
     rng = np.random.default_rng(seed)

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
@@ -27,7 +27,6 @@ from manikin.reachability.pose import angles_between, between, distance, tilt
 from manikin.scene import Box, Cylinder, Mesh, Obstacle, Scene
 from manikin.spatial import rotation_from_rpy
 
-moderate = settings(max_examples=60, deadline=None, derandomize=True)
 coordinate = st.floats(-1.5, 1.5)
 pose = st.tuples(coordinate, coordinate, coordinate, *[st.floats(-3.1, 3.1)] * 3).map(
     lambda c: root_pose(c[:3], rotation_from_rpy(*c[3:]))
@@ -56,7 +55,6 @@ def plain(bug):
 
 
 @given(at=pose)
-@moderate
 def test_condition_is_that_of_independent_measurements(plain, bug, at):
     """Trunk distance in closed form, limbs by linear programs; limbs inside the block touch no face."""
     free = ball_to_box(at[:3], BLOCK) > 0.1
@@ -74,7 +72,6 @@ def kept(bug):
 
 
 @given(first=pose, second=pose, share=st.floats(0.0, 1.0))
-@moderate
 def test_nothing_is_missed_between_checked_poses(kept, plain, first, second, share):
     """A way whose checked poses hold with margins satisfies the plain condition everywhere."""
     count = kept.steps_between(first, second)
@@ -94,7 +91,6 @@ def stricter(bug):
 
 
 @given(at=pose)
-@moderate
 def test_more_limbs_are_harder(stricter, at):
     held = [checker.holds(at) for checker in stricter]
     assert held[0] >= held[1]
@@ -203,7 +199,6 @@ def test_trunk_shapes_lie_where_the_body_has_them(person, reaches):
 
 
 @given(radius=st.floats(0.05, 0.5), margin=st.floats(0.001, 0.1))
-@moderate
 def test_shrunk_volume_keeps_its_margin(radius, margin):
     """Every face is left behind by the margin that is told."""
     points = np.random.default_rng(0).normal(size=(40, 3))
@@ -217,7 +212,6 @@ def test_shrunk_volume_keeps_its_margin(radius, margin):
 
 
 @given(first=pose, second=pose, third=pose)
-@moderate
 def test_distance_is_a_metric(first, second, third):
     assert distance(first, second) == distance(second, first)
     assert distance(first, first) <= 1e-7
@@ -233,7 +227,6 @@ def test_distance_uses_squares():
 
 
 @given(yaw=st.floats(-3.0, 3.0), lean=st.floats(0.01, 3.0))
-@moderate
 def test_tilt_is_the_angle_to_the_vertical(yaw, lean):
     assert tilt(root_pose((0, 0, 0), rotation_from_rpy(0.0, lean, yaw))) == pytest.approx(lean, abs=1e-6)
 

@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from manikin.errors import InputError
 from manikin.reachability.pose import angles_between
 from manikin.reachability.root_path import RootLimits, RootPath
-
-moderate = settings(max_examples=30, deadline=None, derandomize=True)
 
 
 def walk(seed, count, turn=0.4, stride=0.3):
@@ -34,7 +32,6 @@ paths = st.builds(
 
 
 @given(path=paths)
-@moderate
 def test_speed_limits_are_kept_and_used(path):
     """Differences between neighbouring times stay below every limit; somewhere one is nearly met."""
     times = np.linspace(0.0, path.duration, 4001)
@@ -48,7 +45,6 @@ def test_speed_limits_are_kept_and_used(path):
 
 
 @given(path=paths, share=st.floats(0.001, 0.999))
-@moderate
 def test_rates_are_the_derivatives(path, share):
     h = 1e-6
     before, after = path.poses([share - h, share + h])
@@ -58,7 +54,6 @@ def test_rates_are_the_derivatives(path, share):
 
 
 @given(path=paths)
-@moderate
 def test_motion_stays_below_its_bounds(path):
     """Length and turn of each span, measured finely, are no more than what the bounds say."""
     borders, lengths, angles = path.span_bounds
@@ -69,7 +64,6 @@ def test_motion_stays_below_its_bounds(path):
 
 
 @given(path=paths, shares=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=5))
-@moderate
 def test_time_and_parameter_are_inverse(path, shares):
     np.testing.assert_allclose(path.share_of(path.time_of(shares)), shares, atol=1e-9)
     assert angles_between(path.at_times(0.0)[0], path.start) < 1e-7

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
@@ -14,7 +14,6 @@ from manikin.reachability.steering import LocalPlanner, Way
 from manikin.scene import Box, Obstacle, Scene
 from manikin.spatial import rotation_from_rpy
 
-moderate = settings(max_examples=40, deadline=None, derandomize=True)
 pose = st.tuples(
     st.floats(-1.2, 1.2), st.floats(-1.2, 1.2), st.floats(0.13, 0.45), *[st.floats(-3.1, 3.1)] * 3
 ).map(lambda c: root_pose(c[:3], rotation_from_rpy(*c[3:])))
@@ -33,7 +32,6 @@ def dense(planner, points, count=200):
 
 
 @given(first=pose, second=pose, share=st.floats(0.05, 0.95))
-@moderate
 def test_local_planner_is_symmetric_and_true(planner, first, second, share):
     """Both ends give the same answer, and what is joined holds wherever it is looked at."""
     if not (planner.holds(first) and planner.holds(second)):

@@ -5,7 +5,7 @@ import math
 import casadi
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import ScenarioError
@@ -38,7 +38,6 @@ def test_arithmetic(text, value):
     assert Expression(text)(0.5, 0.75, 1.9) == pytest.approx(value, abs=1e-14)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
 @given(st.lists(st.floats(0.1, 0.9), min_size=3, max_size=3), st.sampled_from(FUNCTIONS))
 def test_casadi_and_numpy_agree_on_every_function(values, function):
     arguments = "x, y" if function in ("atan2", "arctan2", "min", "max") else "x"

@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.contact import ContactKind
@@ -439,7 +439,6 @@ def test_reference_stature_changes_nothing():
     np.testing.assert_array_equal(band.lower(x, y, z), band.lower_expression(x, y, z))
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
 @given(st.floats(1.55, 1.95), st.floats(-0.5, 1.2), st.floats(-0.5, 1.2))
 def test_heights_scale_about_the_supports(stature, x, y):
     scenario = PLATFORM.with_body(stature_m=stature)

@@ -4,7 +4,7 @@ import re
 
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import ScenarioError
@@ -25,7 +25,6 @@ CHILD = {
 SINGLE = st.integers(0, 9) | st.lists(st.integers(0, 9), max_size=2)
 SECTIONS = st.dictionaries(st.sampled_from("abc"), SINGLE, max_size=3)
 TREES = st.dictionaries(st.sampled_from("abc"), SINGLE | SECTIONS, max_size=3).map(Tree)
-QUIET = settings(max_examples=50, deadline=None, derandomize=True)
 
 
 def write(folder, data, name="child.yaml"):
@@ -34,13 +33,11 @@ def write(folder, data, name="child.yaml"):
     return path
 
 
-@QUIET
 @given(TREES)
 def test_merging_nothing_or_itself_changes_nothing(tree):
     assert merge(tree, Tree({})).data == merge(Tree({}), tree).data == merge(tree, tree).data == tree.data
 
 
-@QUIET
 @given(TREES, TREES)
 def test_what_lies_above_is_all_there_and_nothing_below_is_lost_beside_it(below, above):
     merged = merge(below, above)

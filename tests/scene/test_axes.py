@@ -3,7 +3,7 @@
 import coal
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -12,7 +12,6 @@ from manikin.scene.axes import ShapeAxes, segment_distances
 GEOMETRIES = (coal.Capsule(0.05, 0.4), coal.Capsule(0.03, 0.2), coal.Sphere(0.1), coal.Box(0.1, 0.2, 0.3))
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([(0, 1), (1, 0), (0, 2), (2, 1), (2, 2)]))
 def test_round_shapes_are_as_far_apart_as_coal_says(seed, pair):
     """Apart, to 1e-9 m: both are closed forms."""
@@ -28,7 +27,6 @@ def test_round_shapes_are_as_far_apart_as_coal_says(seed, pair):
     assert axes.round.tolist() == [True, True, True, False]
 
 
-@settings(max_examples=200, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-12, 1e-7, 1e-6, 1e-4, 1.0]))
 def test_no_two_points_of_segments_are_nearer(seed, skew):
     """Also of segments that are parallel, or nearly, to 1e-6 m.

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import SceneError
@@ -34,7 +34,6 @@ def covered(found, points):
     return gap.min(axis=1).max()
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
 @given(length, length, length, count)
 def test_spheres_cover_every_primitive_with_at_most_the_count(a, b, c, number):
     rng = np.random.default_rng(0)
@@ -44,7 +43,6 @@ def test_spheres_cover_every_primitive_with_at_most_the_count(a, b, c, number):
         assert covered(found, random_points_inside(shape, rng)) <= 1e-9
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
 @given(length, length, length, count)
 def test_no_sphere_reaches_farther_beyond_the_shape_than_said(a, b, c, number):
     """Points of the spheres' surfaces against the exact distance to the box and the capsule."""

@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
@@ -34,7 +34,6 @@ TIGHT, ROUGH = 1e-7, 1e-5
 coordinate = st.floats(-1.0, 1.0)
 point = st.tuples(coordinate, coordinate, coordinate).map(np.array)
 rotation = st.tuples(*[st.floats(-3.1, 3.1)] * 3).map(lambda rpy: rotation_from_rpy(*rpy))
-moderate = settings(max_examples=60, deadline=None, derandomize=True)
 PROBES = {
     "sphere": coal.Sphere(0.1),
     "capsule": coal.Capsule(0.08, 0.3),
@@ -64,28 +63,24 @@ def cylinder_distance(points, radius, length):
     return outside + np.minimum(np.maximum(across, along), 0.0)
 
 
-@moderate
 @given(point)
 def test_ball_and_box_inside_and_outside(free_body, pose, place):
     distance, _ = measure(free_body, pose, coal.Sphere(0.1), Box((1.0, 0.6, 0.8)), place)
     assert distance == pytest.approx(box_distance(place, [0.5, 0.3, 0.4]) - 0.1, abs=TIGHT)
 
 
-@moderate
 @given(point)
 def test_ball_and_ball(free_body, pose, place):
     distance, _ = measure(free_body, pose, coal.Sphere(0.1), Sphere(0.3), place)
     assert distance == pytest.approx(np.linalg.norm(place) - 0.4, abs=TIGHT)
 
 
-@moderate
 @given(point)
 def test_ball_and_cylinder_inside_and_outside(free_body, pose, place):
     distance, _ = measure(free_body, pose, coal.Sphere(0.1), Cylinder(0.3, 0.9), place)
     assert distance == pytest.approx(cylinder_distance(place, 0.3, 0.9) - 0.1, abs=ROUGH)
 
 
-@moderate
 @given(point, rotation)
 def test_ball_and_cylinder_in_either_order_are_mirror_images(free_body, pose, place, turn):
     """Moving the cylinder about the ball is moving the ball about the cylinder the other way."""
@@ -101,7 +96,6 @@ def test_ball_and_cylinder_in_either_order_are_mirror_images(free_body, pose, pl
     assert ball.normal[0] @ (ball.on_other - ball.on_body)[0] == pytest.approx(there, abs=1e-12)
 
 
-@moderate
 @given(point, rotation)
 def test_capsule_and_capsule_are_two_segments(free_body, pose, place, turn):
     distance, _ = measure(free_body, pose, coal.Capsule(0.05, 0.4), Capsule(0.07, 0.6), place, turn)
@@ -117,7 +111,6 @@ def test_capsule_and_capsule_are_two_segments(free_body, pose, place, turn):
     assert distance == pytest.approx(best - 0.12, abs=TIGHT)
 
 
-@moderate
 @given(point, rotation)
 @pytest.mark.parametrize("shape", [Box((1.0, 0.6, 0.8)), Cylinder(0.3, 0.9)])
 def test_capsule_and_convex_solid_while_the_axis_is_outside(free_body, pose, shape, place, turn):
@@ -136,7 +129,6 @@ def test_capsule_and_convex_solid_while_the_axis_is_outside(free_body, pose, sha
     assert distance == pytest.approx(best - 0.05, abs=ROUGH if isinstance(shape, Cylinder) else TIGHT)
 
 
-@moderate
 @given(point, rotation, rotation)
 @pytest.mark.parametrize("name", sorted(PROBES))
 def test_half_space_depth_is_that_of_the_deepest_point(free_body, pose, name, place, turn, tilt):
@@ -150,7 +142,6 @@ def test_half_space_depth_is_that_of_the_deepest_point(free_body, pose, name, pl
     assert np.allclose(result.normal[0], -normal, atol=1e-9)
 
 
-@moderate
 @given(point, rotation)
 @pytest.mark.parametrize("name", sorted(PROBES))
 def test_a_plane_pushes_to_the_side_on_which_less_is_in_the_way(free_body, pose, name, place, turn):
@@ -174,7 +165,6 @@ def test_box_and_box_along_a_face_normal(free_body, pose, height):
     assert distance == pytest.approx(height - 0.2, abs=TIGHT)
 
 
-@moderate
 @given(point, rotation, point, rotation)
 @pytest.mark.parametrize("name", sorted(PROBES))
 def test_a_common_rigid_motion_changes_nothing(free_body, pose, name, place, turn, shift, common):
@@ -187,7 +177,6 @@ def test_a_common_rigid_motion_changes_nothing(free_body, pose, name, place, tur
         assert first.pairs == second.pairs
 
 
-@moderate
 @given(point, rotation)
 @pytest.mark.parametrize("name", sorted(PROBES))
 def test_a_mesh_box_is_the_box(free_body, pose, name, place, turn):
@@ -206,7 +195,6 @@ def l_shaped_step():
     return Mesh(solid.vertices, solid.faces, "step")
 
 
-@moderate
 @given(st.floats(-0.3, 2.3), st.floats(-0.3, 2.3), st.floats(-0.3, 1.3))
 def test_ball_and_closed_mesh_that_is_not_convex(free_body, pose, x, y, z):
     """The solid is the union of two boxes; its signed distance is known in and out."""

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import SceneError
@@ -25,7 +25,6 @@ def test_bad_placements_and_shapes_are_refused():
         Obstacle("car", Sphere(1.0), translation=(0.0, np.nan, 0.0))
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
 @given(ANGLE, ANGLE, ANGLE)
 def test_bounds_hold_the_drawn_triangles_tightly(roll, pitch, yaw):
     """A drawn round shape is inscribed, so it misses the true bounds by its facets' sagitta only."""

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.contact import Stance, grasp, point, sole
@@ -72,7 +72,6 @@ def test_normals_must_agree():
     assert scene.supporting_surface(side).obstacle == "platform"
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
 @given(
     st.floats(-0.6, 0.6),
     st.floats(-0.6, 0.6),

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, human, integrate, random_configuration
@@ -15,7 +15,6 @@ from manikin.simulation.compile import root_rotation
 from manikin.simulation.scene_geoms import obstacle_of
 
 EXACT = 1e-9
-SOME = settings(max_examples=20, deadline=None, derandomize=True)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -39,7 +38,6 @@ def full_mass_matrix(model, data):
     return matrix
 
 
-@SOME
 @given(st.floats(1.50, 2.00), st.floats(45.0, 120.0), st.sampled_from(["male", "female"]), SEEDS)
 def test_engines_agree(stature, mass, sex, seed):
     """Mass, centre of mass, mass matrix, bias forces and effectors agree to 1e-9.
@@ -94,7 +92,6 @@ def test_motors_are_torques(model):
     np.testing.assert_allclose(data.qfrc_actuator[:6], 0.0, atol=1e-12)
 
 
-@SOME
 @given(SEEDS)
 def test_states_translate_there_and_back(model, seed):
     rng, q, v, data = random_state(model, seed)
@@ -108,7 +105,6 @@ def test_states_translate_there_and_back(model, seed):
     assert force @ data.qvel == pytest.approx(tau @ v, abs=1e-10)  # the same power
 
 
-@SOME
 @given(SEEDS)
 def test_acceleration_is_the_derivative_of_the_translated_velocity(model, seed):
     """Includes the w x v term of the free root; central difference, error about 1e-8."""

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import (
@@ -44,7 +44,6 @@ def creatures(tmp_path_factory):
     }
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
 @given(st.sampled_from(["dog", "insect"]), st.integers(0, 2**32 - 1))
 def test_engines_agree_on_creatures(creatures, name, seed):
     """Mass, centre of mass, mass matrix and effectors agree to 1e-9 for random configurations."""

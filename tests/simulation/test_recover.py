@@ -266,7 +266,7 @@ def test_a_push_is_held_on_one_foot(body, force):
     assert np.abs(found.trace.motion.contact_force[:, other]).max() == 0.0
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(distance=st.floats(0.1, 0.6))
 def test_feet_are_as_far_apart_as_wanted(distance):
     """Both soles stay flat on the ground, and the centre of mass is over the middle between them.

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
@@ -140,7 +140,6 @@ poses = st.tuples(*[st.floats(-1, 1)] * 3, *[st.floats(-1.5, 1.5)] * 3, st.float
 
 
 @given(poses, poses, poses, st.floats(0, 2), st.floats(0, 2))
-@settings(max_examples=60, deadline=None, derandomize=True)
 def test_the_metric_is_one(a, b, c, rotation_weight, time_weight):
     """Symmetric, and straight edges are the shortest (triangle inequality)."""
     metric = Metric(rotation_weight, time_weight)

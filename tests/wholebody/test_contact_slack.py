@@ -30,7 +30,7 @@ def schedule_of(contacts, cap=1500.0):
 
 
 @pytest.mark.parametrize("name", STANCES)
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_slack_and_margin_have_one_sign(name, seed):
     rng = np.random.default_rng(seed)

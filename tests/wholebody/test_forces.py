@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
@@ -97,7 +97,6 @@ def test_a_wrench_that_no_sharing_can_bear_is_still_supplied():
     assert found.missing_wrench[0] < 5e-3
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.sampled_from((("left_foot", "right_foot"), ("left_foot", "right_foot", "right_hand"))),
     st.integers(0, 2**32 - 1),
@@ -152,7 +151,6 @@ def test_a_grasp_gives_no_more_than_it_may(monkeypatch):
     assert found.missing_wrench[0] < 2e-3
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**31), st.integers(6, 40), st.booleans())
 def test_many_wrenches_are_shared_as_an_active_set_method_shares_each(seed, count, reachable):
     """The optimum is unique; both are exact but for rounding, 1e-6 of the largest magnitude."""

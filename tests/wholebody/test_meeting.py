@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human
@@ -62,7 +62,6 @@ def test_contacts_made_at_rest_meet_nothing():
     assert meeting_at(BODY, SCENE, standing, np.array([0.5])) is None
 
 
-@settings(deadline=None, max_examples=30)
 @given(st.floats(-0.004, 0.03), st.floats(-0.4, 0.4))
 def test_the_error_is_the_distance_of_the_lower_buttock(height, roll):
     """Two capsules along x: turned by ``roll``, the lower one comes down by a sin - r (cos - 1)."""

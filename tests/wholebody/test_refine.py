@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human
@@ -234,7 +234,6 @@ def test_inputs_that_do_not_fit_are_refused(person):
         refine_motion(person, Scene(), [0.0, 1.0], q, other)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.floats(0.0, 4.2))
 def test_contact_variables_are_one_in_contact_and_fade_out(time):
     schedule = crouch_schedule()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import InputError
@@ -53,7 +53,6 @@ def test_only_slow_phases_are_shortened(results):
 
 
 @given(st.lists(st.floats(0.5, 1.0), min_size=5, max_size=5))
-@settings(max_examples=20, deadline=None)
 def test_keys_move_with_their_phases(results, factors):
     case = results[0]
     path, schedule = shortened(KeyPath(case.time, case.q), case.schedule, np.array(factors))

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, human
@@ -155,7 +155,6 @@ def test_of_two_hands_that_are_not_there_the_one_that_is_needed_stays():
 
 
 @given(st.lists(st.floats(0.05, 1.0), min_size=8, max_size=8), st.floats(0.0, 1.0), st.floats(-0.1, 0.2))
-@settings(max_examples=40, deadline=None)
 def test_the_problem_of_a_phase_is_convex_and_solved(ends, share, com_x):
     """Between two variables its value is below the chord, and nowhere below that of the solution."""
     from manikin.wholebody.refine_physics import ContactForces

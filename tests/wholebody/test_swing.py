@@ -3,7 +3,7 @@
 import coal
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -63,7 +63,6 @@ def curves(draw):
 
 
 @given(curves())
-@settings(max_examples=30, deadline=None, derandomize=True)
 def test_swing_starts_and_ends_exactly_at_rest(curve):
     """Pose exact, velocity and acceleration zero at both ends, and constant outside."""
     state = curve.evaluate([curve.start_time - 1, curve.start_time, curve.end_time, curve.end_time + 1])
@@ -79,7 +78,6 @@ def test_swing_starts_and_ends_exactly_at_rest(curve):
 
 
 @given(curves())
-@settings(max_examples=30, deadline=None, derandomize=True)
 def test_velocity_and_acceleration_are_the_derivatives(curve):
     """Central differences of poses and velocities agree with the closed forms."""
     h = 1e-5 * curve.duration
@@ -102,7 +100,6 @@ def test_velocity_and_acceleration_are_the_derivatives(curve):
 
 
 @given(curves())
-@settings(max_examples=20, deadline=None, derandomize=True)
 def test_rotations_stay_rotations(curve):
     """Products of exponentials are orthonormal to rounding."""
     rotation = curve.evaluate(np.linspace(curve.start_time, curve.end_time, 50)).rotation

@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manikin.analysis.measured_motion import MeasuredMotion
 from manikin.analysis.on_plates import PlateReport
@@ -32,10 +33,11 @@ class Analysis(Displayed):
         sex: Table of segment masses that was used.
         found: Reconstruction, not smoothed.
         supports: Of feet, hands and seat.
-        motion: Smoothed and, where that is to be believed, shifted onto its contacts, with torques, forces
-            and whole-body margin; its time is 0 at the first instant.
-        point_mass_margin: (n,) its margin without angular momentum [N.m].
-        measured: The motion as recorded, and shifted.
+        motion: As recorded, smoothed, with torques, forces and whole-body margin; its time is 0 at the first
+            instant.
+        shifted_motion: The same shifted onto its contacts, where that is to be believed; else None.
+        point_mass_margin: (n,) margin of the motion as recorded without angular momentum [N.m].
+        measured: The motion as recorded, and shifted, with the margins of both.
         limiting: What limits the lowest margin; None if no margin is known.
         cop: (n, 2) centre of pressure that the motion needs [m]; NaN in flight, and below 20 N.
         segments: Holonomic and nonholonomic stretches; None where nobody walks upright.
@@ -52,6 +54,7 @@ class Analysis(Displayed):
     found: Reconstruction
     supports: RecordedSupports
     motion: Motion
+    shifted_motion: Motion | None
     point_mass_margin: FloatArray
     measured: MeasuredMotion
     limiting: LimitingConstraint | None
@@ -94,10 +97,13 @@ class Analysis(Displayed):
         """(n,) of the centre of mass above the lowest surface stood on, or the world's zero [m]."""
         return self.motion.com[:, 2] - min(self.supports.surfaces, default=0.0)
 
+    def frames_of(self, phase: SupportPhase) -> NDArray[np.bool_]:
+        """(n,) whether a frame is in a phase, the end of which is left out."""
+        return (self.time >= phase.start - 1e-9) & (self.time < phase.end - 1e-9)
+
     def lowest_margin(self, phase: SupportPhase) -> float | None:
-        """Of a phase, its end left out [N.m]; None where none is known."""
-        inside = (self.time >= phase.start - 1e-9) & (self.time < phase.end - 1e-9)
-        known = self.motion.margin[inside & np.isfinite(self.motion.margin)]
+        """Of the motion as recorded in a phase [N.m]; None where none is known."""
+        known = self.motion.margin[self.frames_of(phase) & np.isfinite(self.motion.margin)]
         return float(known.min()) if known.size else None
 
     def series(self) -> dict[str, FloatArray]:
@@ -111,8 +117,9 @@ class Analysis(Displayed):
             "margin_Nm": self.motion.margin,
             "point_mass_margin_Nm": self.point_mass_margin,
             "recorded_margin_Nm": self.measured.recorded_margins.whole_body,
-            "shifted_margin_Nm": self.measured.shifted.margins.whole_body,
-            "shift_m": self.measured.shifted.size,
+            **self._shifted_series(),
+            "balance_force_N": self.measured.recorded_margins.body.force,
+            "zmp_distance_m": self.measured.recorded_margins.body.zmp_distance,
             "vertical_force_N": self.vertical_force,
             "cop_x_m": self.cop[:, 0],
             "cop_y_m": self.cop[:, 1],
@@ -125,6 +132,16 @@ class Analysis(Displayed):
             columns |= {f"plates_cop_{name}_m": self.plates.cop[:, axis] for axis, name in enumerate("xy")}
         skipped = ("time_s", "margin_Nm")
         return columns | {name: one for name, one in self.ergonomics.series().items() if name not in skipped}
+
+    def _shifted_series(self) -> dict[str, FloatArray]:
+        shifted = self.measured.shifted
+        if shifted is None:
+            return {}
+        return {
+            "shifted_margin_Nm": shifted.margins.whole_body,
+            "shifted_at_floor": shifted.at_floor.astype(np.float64),
+            "shift_m": shifted.size,
+        }
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready numbers (SI), as ``manikin analyze --json`` prints them."""
@@ -149,13 +166,7 @@ class Analysis(Displayed):
             "surfaces_m": list(supports.surfaces),
             "sequence": list(supports.sequence),
             "key_frames_s": list(supports.key_frames),
-            "phases": [
-                {
-                    "start_s": one.start, "end_s": one.end, "effectors": list(one.effectors),
-                    "margin_min_Nm": self.lowest_margin(one),
-                }
-                for one in supports.phases
-            ],
+            "phases": [self._phase(one) for one in supports.phases],
             "phase_durations_s": [one.duration for one in supports.phases],
             "com_height_min_m": float(self.com_height[lowest]),
             "com_height_min_at_s": float(self.time[lowest]),
@@ -172,15 +183,24 @@ class Analysis(Displayed):
             "wall_s": self.wall,
         }  # fmt: skip
 
+    def _phase(self, phase: SupportPhase) -> dict[str, Any]:
+        shifted, is_floor = self.measured.lowest_shifted(self.frames_of(phase))
+        return {
+            "start_s": phase.start, "end_s": phase.end, "effectors": list(phase.effectors),
+            "margin_min_Nm": self.lowest_margin(phase),
+            "shifted_margin_min_Nm": shifted, "shifted_at_floor": is_floor,
+        }  # fmt: skip
+
     def _margin(self) -> dict[str, Any]:
         margin = self.motion.margin
         known, lowest = np.isfinite(margin), None
         if known.any():
             lowest = int(np.nanargmin(margin))
+        body, held = self.measured.recorded_margins.body, self.measured.recorded_margins.held
         points = self.point_mass_margin[np.isfinite(self.point_mass_margin)]
         return {
             "form": WHOLE_BODY,
-            "motion": "shifted" if self.measured.believed else "recorded",
+            "motion": "recorded",
             "unit": self.motion.margin_unit,
             "min": None if lowest is None else float(margin[lowest]),
             "at_s": None if lowest is None else float(self.time[lowest]),
@@ -188,20 +208,16 @@ class Analysis(Displayed):
             "limiting": None if self.limiting is None else self.limiting.description,
             "limiting_contact": None if self.limiting is None else self.limiting.effector,
             "share_known": float(np.mean(known)),
-            "share_in_contact": float(np.mean(self.measured.margins.held)),
-            "share_positive_in_contact": self.measured.margins.balanced,
+            "share_in_contact": float(np.mean(held)),
+            "share_positive_in_contact": self.measured.recorded_margins.balanced,
             "recorded": {
                 "share_positive": float(np.mean(self.measured.recorded_margins.whole_body > 0.0)),
                 "share_positive_in_contact": self.measured.recorded_margins.balanced,
                 "min": float(self.measured.recorded_margins.whole_body.min()),
             },
-            "shifted": {
-                "share_positive": float(np.mean(self.measured.shifted.margins.whole_body > 0.0)),
-                "share_positive_in_contact": self.measured.shifted.margins.balanced,
-                "min": float(self.measured.shifted.margins.whole_body.min()),
-                "rms_m": self.measured.shifted.rms,
-                "max_m": float(self.measured.shifted.size.max()),
-            },
+            "shifted": self.measured.shifted_dict(),
+            "force_min_N": float(body.force[held].min()) if held.any() else None,
+            "zmp_distance_min_m": body.min_zmp_distance,
             "point_mass_min": float(points.min()) if points.size else None,
             "point_mass_share_positive": float(np.mean(points > 0.0)) if points.size else None,
         }

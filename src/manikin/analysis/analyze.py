@@ -51,7 +51,7 @@ class AnalysisOptions:
         sex: Table of segment masses, ``"male"`` or ``"female"``.
         friction: Of soles on the ground.
         load: Carried in the hands [kg], for RULA and REBA.
-        as_recorded: Whether the motion is left as it was recorded, and not shifted onto its contacts.
+        as_recorded: Whether no shifted motion is looked for, to stand beside the recorded one.
     """
 
     frames: tuple[int, int] | None = None
@@ -137,25 +137,28 @@ def analyze(
         schedule = recorded_schedule(found, supports, friction=given.friction)
         dynamics = dynamics_of(found, touch_downs=touch_downs)
     recorded = recorded_margins(dynamics, schedule, supports.start)
-    shifted = least_shift(found, dynamics, recorded)
-    measured = MeasuredMotion(dynamics, recorded, shifted, not given.as_recorded and shifted.believable)
-    margins = measured.margins
-    motion = motion_on_contacts(measured.dynamics, schedule, supports.start, margins)
+    shifted = None if given.as_recorded else least_shift(found, dynamics, recorded)
+    measured = MeasuredMotion(dynamics, recorded, shifted)
+    motion = motion_on_contacts(dynamics, schedule, supports.start, recorded)
+    beside: Motion | None = None
+    if (believed := measured.believed) is not None:
+        beside = motion_on_contacts(believed.dynamics, schedule, supports.start, believed.margins)
     ground = min(supports.surfaces, default=0.0)
     report: PlateReport | None = None
     if plates:
-        report = plate_report(plates, supports, schedule, measured, motion, mass)
+        report = plate_report(plates, supports, schedule, measured, (motion, beside), mass)
     neck = upright_neck(found.body, motion.q)
     circumstances = Circumstances(
         load_kg=given.load, neck_upright_deg=0.0 if neck is None else float(np.degrees(neck))
     )
     ergonomics = ergonomics_of(
-        found.body, motion, given=circumstances, untold=found.neutral, lowest=_lowest(motion, margins)
+        found.body, motion, given=circumstances, untold=found.neutral, lowest=_lowest(motion, recorded)
     )
     analysis = Analysis(
         name=name or recording.name, source=recording.name, rate=recording.rate, sex=given.sex, found=found,
-        supports=supports, motion=motion, point_mass_margin=margins.point_mass, measured=measured,
-        limiting=margins.limiting(margins.lowest), cop=_centre_of_pressure(measured.dynamics, motion, ground),
+        supports=supports, motion=motion, shifted_motion=beside, point_mass_margin=recorded.point_mass,
+        measured=measured, limiting=recorded.limiting(recorded.lowest),
+        cop=_centre_of_pressure(dynamics, motion, ground),
         segments=walked_segments(found), ergonomics=ergonomics, plates=report, remarks=(), wall=0.0,
     )  # fmt: skip
     return replace(analysis, remarks=remarks_on(analysis, recording), wall=clock.perf_counter() - began)

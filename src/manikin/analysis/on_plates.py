@@ -30,11 +30,11 @@ class PlateReport:
         compared: (n,) whether every support is on a plate, so that the plates tell all there is.
         mass: Of the person, by them [kg]; None where they cannot tell.
         timing: Touch-downs and lift-offs beside those of the plates.
-        forces: Errors of forces and centres of pressure of the motion; None where no foot alone was on a
-            plate.
-        recorded: The same of the motion as it was recorded.
-        shifted: The same of it shifted onto its contacts.
-        torques: Of the legs; empty where no foot was on a plate of its own.
+        forces: Errors of forces and centres of pressure of the motion as recorded; None where no foot alone
+            was on a plate.
+        shifted: The same of it shifted onto its contacts; None as well if no shift was looked for.
+        torques: Of the legs, of the motion as recorded; empty where no foot was on a plate of its own.
+        shifted_torques: The same of the shifted motion; empty if that is not to be believed.
     """
 
     vertical_force: FloatArray
@@ -43,9 +43,9 @@ class PlateReport:
     mass: float | None
     timing: tuple[TimingError, ...]
     forces: PlateComparison | None
-    recorded: PlateComparison | None
     shifted: PlateComparison | None
     torques: tuple[TorqueComparison, ...]
+    shifted_torques: tuple[TorqueComparison, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready numbers (SI); None where there was nothing to compare."""
@@ -58,22 +58,28 @@ class PlateReport:
             "timing_max_s": float(np.max(errors)) if errors else None,
             "vertical_rms_body_weight": None if forces is None else forces.vertical_rms,
             "cop_rms_m": None if forces is None else forces.cop_rms,
-            "cop_rms_recorded_m": None if self.recorded is None else self.recorded.cop_rms,
+            "cop_rms_recorded_m": None if forces is None else forces.cop_rms,
             "cop_rms_shifted_m": None if self.shifted is None else self.shifted.cop_rms,
             "frames": int(self.compared.sum()),
             "single_support_frames": None if forces is None else forces.single_frames,
             "margin_share_positive": None if forces is None else forces.margin_share,
-            "torques": {
-                one.joint: {
-                    "frames": one.frames,
-                    "rms_Nm": one.rms,
-                    "mean_Nm": one.mean,
-                    "peak_Nm": one.peak,
-                    "peak_by_plates_Nm": one.peak_by_plates,
-                }
-                for one in self.torques
-            },
+            "torques": _torques(self.torques),
+            "torques_shifted": _torques(self.shifted_torques),
         }
+
+
+def _torques(compared: Sequence[TorqueComparison]) -> dict[str, dict[str, float]]:
+    """JSON-ready, by joint."""
+    return {
+        one.joint: {
+            "frames": one.frames,
+            "rms_Nm": one.rms,
+            "mean_Nm": one.mean,
+            "peak_Nm": one.peak,
+            "peak_by_plates_Nm": one.peak_by_plates,
+        }
+        for one in compared
+    }
 
 
 def measured_mass(
@@ -94,7 +100,7 @@ def measured_mass(
 
 def plate_report(
     plates: Sequence[ForcePlate], supports: RecordedSupports, schedule: ContactSchedule,
-    measured: MeasuredMotion, motion: Motion, mass: float | None,
+    measured: MeasuredMotion, motions: tuple[Motion, Motion | None], mass: float | None,
 ) -> PlateReport:  # fmt: skip
     """Hold a motion against the plates under it.
 
@@ -103,7 +109,7 @@ def plate_report(
         supports: Of the motion.
         schedule: Its stances.
         measured: The motion, with the person's mass.
-        motion: The same with forces and torques.
+        motions: As recorded, and shifted where that is to be believed, with forces and torques.
         mass: Of the person, by the plates [kg].
     """
     forces = plate_forces(plates, measured.recorded.time + supports.start, schedule)
@@ -111,15 +117,14 @@ def plate_report(
     with np.errstate(divide="ignore", invalid="ignore"):
         cop = zero_moment_point(forces.wrench, height)
     loaded = forces.wrench[:, 2] > 20.0
-    shifted = measured.shifted
-    recorded, moved = (
-        compare_with_plates(dynamics, margins, forces, height)
-        for dynamics, margins in (
-            (measured.recorded, measured.recorded_margins), (shifted.dynamics, shifted.margins)
-        )
-    )  # fmt: skip
+    shifted, moved, moved_torques = measured.shifted, None, ()
+    if shifted is not None:
+        moved = compare_with_plates(shifted.dynamics, shifted.margins, forces, height)
+        if motions[1] is not None:
+            moved_torques = compare_torques(shifted.dynamics, motions[1], forces)
     return PlateReport(
         forces.wrench[:, 2], np.where(loaded[:, None], cop, np.nan), forces.covered, mass,
-        timing_errors(supports, plates), moved if measured.believed else recorded, recorded, moved,
-        compare_torques(measured.dynamics, motion, forces),
+        timing_errors(supports, plates),
+        compare_with_plates(measured.recorded, measured.recorded_margins, forces, height), moved,
+        compare_torques(measured.recorded, motions[0], forces), moved_torques,
     )  # fmt: skip

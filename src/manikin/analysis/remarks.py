@@ -55,13 +55,13 @@ def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> 
             f"nothing supports for {max(flights):.2f} s: the person may touch something that is not recorded"
         )
     shifted = analysis.measured.shifted
-    if supports.supports and shifted.solved and not shifted.believable:
+    if supports.supports and shifted is not None and shifted.solved and not shifted.believable:
         lines.append(
             f"balanced in {100.0 * (shifted.margins.balanced or 0.0):.0f} % of the frames in contact "
             f"if shifted by {1e3 * shifted.rms:.0f} mm (RMS): contacts were not found, or do not carry; "
-            "measured is the motion as recorded"
+            "the shifted motion is not to be believed"
         )
-    if not shifted.solved:
+    if shifted is not None and not shifted.solved:
         lines.append("no shift onto the contacts was found: the postures jump")
     mass = None if analysis.plates is None else analysis.plates.mass
     if mass is not None and abs(mass / analysis.body.mass - 1.0) > OTHER_MASS:

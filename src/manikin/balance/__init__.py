@@ -15,9 +15,10 @@ from manikin.balance.friction import FrictionModel
 from manikin.balance.limiting import LimitingConstraint, LimitShare
 from manikin.balance.limits import ContactLimits, LimitKind, contact_limits
 from manikin.balance.margin import StabilityMargins, force_space, moment_space, stability_margins
+from manikin.balance.motion_margin import MotionMargin, motion_margin, wrench_about
 from manikin.balance.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
 from manikin.balance.support_plane import SupportPlane, least_zmp_distance, support_plane
-from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytope
+from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytope, wrench_polytopes
 from manikin.callable_package import make_callable
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "LimitKind",
     "LimitShare",
     "LimitingConstraint",
+    "MotionMargin",
     "StabilityMargins",
     "SupportPlane",
     "WrenchPolytope",
@@ -42,6 +44,7 @@ __all__ = [
     "force_space",
     "least_zmp_distance",
     "moment_space",
+    "motion_margin",
     "polygon_of_halfplanes",
     "pseudo_wrench",
     "signed_distance",
@@ -49,7 +52,9 @@ __all__ = [
     "support_height",
     "support_plane",
     "support_polygon",
+    "wrench_about",
     "wrench_polytope",
+    "wrench_polytopes",
     "zero_moment_point",
 ]
 

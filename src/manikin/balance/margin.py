@@ -10,7 +10,9 @@ from manikin.errors import InputError
 from manikin.polytope import Polytope
 from manikin.spatial import FloatArray, frozen_array, skew
 
-_CHUNK = 1024
+_BLOCK = 200_000
+"""Distances looked at together: they stay in the processor's cache."""
+
 _NO_LEVER = 1e-12
 
 
@@ -84,18 +86,43 @@ def stability_margins(W: WrenchPolytope, wrench: ArrayLike, com: ArrayLike) -> S
     w = np.broadcast_to(w, (*shape, 6)).reshape(-1, 6)
     x = np.broadcast_to(x, (*shape, 3)).reshape(-1, 3)
     found = np.empty((4, len(w)))
-    for start in range(0, len(w), _CHUNK):
-        part = slice(start, start + _CHUNK)
+    step = max(1, _BLOCK // max(1, len(W)))
+    for start in range(0, len(w), step):
+        part = slice(start, start + step)
         found[:, part] = _margins(W, w[part], x[part] - W.reference)
     return StabilityMargins(*(row.reshape(shape) for row in found))
+
+
+def force_levers(H: FloatArray, arm: FloatArray) -> FloatArray:
+    """(n, m) ``|H1 + H2 arm^|``: change of each row per newton at points ``arm`` (n, 3) from the reference.
+
+    Args:
+        H: (m, 6) rows over force and moment.
+        arm: (n, 3) from the point of the rows' moments [m].
+    """
+    force, (x, y, z) = H[:, :3], H[:, 3:].T
+    zero = np.zeros_like(x)
+    squares = np.zeros((len(arm), len(H)))
+    for axis, turned in enumerate(((zero, -z, y), (z, zero, -x), (-y, x, zero))):
+        squares += (force[:, axis] + arm @ np.array(turned)) ** 2
+    return np.sqrt(squares)
+
+
+def wrench_levers(H: FloatArray, arm: FloatArray) -> FloatArray:
+    """(n, m) lengths that rows have with moments about points ``arm`` (n, 3) from the reference.
+
+    Args:
+        H: (m, 6) rows over force and moment.
+        arm: (n, 3) from the point of the rows' moments [m].
+    """
+    return np.hypot(force_levers(H, arm), np.linalg.norm(H[:, 3:], axis=1))
 
 
 def _margins(W: WrenchPolytope, wrench: FloatArray, arm: FloatArray) -> FloatArray:
     """(4, n) margins in the order of :class:`StabilityMargins`."""
     distances = W.distances(wrench)
     moment_lever = np.linalg.norm(W.H[:, 3:], axis=1)
-    at_com = W.H[:, :3] + np.einsum("mi,nij->nmj", W.H[:, 3:], skew(arm))
-    force_lever = np.linalg.norm(at_com, axis=-1)
+    force_lever = force_levers(W.H, arm)
     return np.stack(
         [
             _smallest(distances, force_lever),
@@ -109,6 +136,8 @@ def _margins(W: WrenchPolytope, wrench: FloatArray, arm: FloatArray) -> FloatArr
 def _smallest(distances: FloatArray, lever: FloatArray) -> FloatArray:
     """Smallest ``distance / lever``; rows without lever count only when they are broken."""
     still = lever < _NO_LEVER
+    if not still.any():
+        return (distances / lever).min(axis=1)
     ratio = distances / np.where(still, 1.0, lever)
     out_of_reach = np.where(distances < 0, -np.inf, np.inf)
     return np.where(still, out_of_reach, ratio).min(axis=1)

@@ -12,6 +12,7 @@ margin of a wrench is then 0 at best, and negative as soon as the equality is br
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -145,7 +146,7 @@ def wrench_polytope(
         ContactError: If the normal force of a contact is bounded by no cap.
     """
     origin = frozen_array(reference, "reference [m]", (3,), ContactError)
-    local = np.mean([contact.position for contact in stance], axis=0) if len(stance) else origin
+    local = _middle(stance) if len(stance) else origin
     caps = _Caps.of(stance)
     generators, levels = _generators(stance, caps, friction_model, local)
     segments = [_grasp_segments(c, local) for c in stance if c.kind is ContactKind.GRASP]
@@ -154,6 +155,53 @@ def wrench_polytope(
     H, h, multipliers = facet_rows(fan, max(1.0, float(np.abs(generators).max(initial=0.0))))
     of_stance = np.zeros(len(h)) if caps.total is None else multipliers[:, -1] / caps.total
     return WrenchPolytope(_moved(H, local, origin), h, stance, origin, friction_model, of_stance)
+
+
+def wrench_polytopes(
+    stances: Sequence[Stance],
+    *,
+    friction_model: FrictionModel = "pyramid",
+    reference: ArrayLike | None = None,
+) -> tuple[WrenchPolytope, ...]:
+    """W_p of several stances; a stance that is an earlier one moved elsewhere is not computed again.
+
+    Args:
+        stances: Contacts and caps.
+        friction_model: As for :func:`wrench_polytope`.
+        reference: (3,) point of all moments [m]; of each stance the middle of its own contacts when omitted.
+
+    Raises:
+        ContactError: If the normal force of a contact is bounded by no cap.
+    """
+    known: dict[tuple[Any, ...], WrenchPolytope] = {}
+    found = []
+    for stance in stances:
+        centre = _middle(stance)
+        shape = _shape_of(stance, centre)
+        if shape not in known:
+            known[shape] = wrench_polytope(stance, friction_model=friction_model, reference=centre)
+        like = known[shape]
+        local = WrenchPolytope(
+            like.H, like.h, stance, centre, like.friction_model, like.stance_cap_multipliers
+        )  # fmt: skip
+        found.append(local if reference is None else local.at_reference(reference))
+    return tuple(found)
+
+
+def _middle(stance: Stance) -> FloatArray:
+    """Mean of the contacts' origins; the world origin without any [m]."""
+    return np.mean([contact.position for contact in stance] or [np.zeros(3)], axis=0)
+
+
+def _shape_of(stance: Stance, centre: FloatArray) -> tuple[Any, ...]:
+    """What a wrench polytope depends on but for the place of the stance, lengths to a nanometre."""
+    contacts = []
+    for contact in stance:
+        place = np.concatenate([contact.points_in_world - centre, contact.normal[None]])
+        limits = (contact.friction, contact.normal_force_cap, contact.torsion_limit, contact.max_force)
+        numbers = tuple((np.round(place, 9) + 0.0).ravel().tolist())
+        contacts.append((str(contact.kind), numbers, *map(str, limits), contact.max_moment))
+    return (stance.normal_force_cap, *sorted(contacts))
 
 
 @dataclass(frozen=True)

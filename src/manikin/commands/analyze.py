@@ -49,7 +49,7 @@ def analyze(
     load: Annotated[float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands.")] = 0.0,
     as_recorded: Annotated[
         bool,
-        typer.Option("--as-recorded", help="Measure the motion as it is, not shifted onto its contacts."),
+        typer.Option("--as-recorded", help="Look for no shifted motion to stand beside the recorded one."),
     ] = False,
     plan: Annotated[
         str | None,
@@ -93,11 +93,11 @@ def _one(
     method, execute = plan
     with stdout_kept_clean():
         from manikin.analysis import analyze_file
-        from manikin.analysis_directory import check_directory, summary_of, write_analysis
+        from manikin.analysis_directory import AnalysisDirectory, summary_of, write_analysis
 
         chosen = None if method is None else _method(method)
         if directory is not None:
-            check_directory(directory)
+            AnalysisDirectory(directory)
         found, planned = analyze_file(path, options), None
         if chosen is not None:
             from manikin.replan import replan
@@ -145,16 +145,11 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
     if margin["min"] is not None:
         shown["lowest margin"] = (
             f"{margin['min']:.1f} N.m at {margin['at_s']:.2f} s ({margin['limiting'] or 'in flight'}), "
+            "as recorded; "
             + ("never in contact" if share is None else f"positive in {share:.1%} of the frames in contact")
         )
-    if share is not None:
-        recorded, shifted = margin["recorded"], margin["shifted"]
-        size = f"{1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest)"
-        shown["shifted"] = (
-            f"by {size}; as recorded positive in {recorded['share_positive_in_contact']:.1%}"
-            if margin["motion"] == "shifted"
-            else f"not; by {size} positive in {shifted['share_positive_in_contact']:.1%}"
-        )
+    if share is not None and (shifted := margin["shifted"]) is not None:
+        shown["shifted"] = _shifted(shifted)
     for name in ("rula", "reba"):
         if effort[name] is not None:
             one = effort[name]
@@ -186,18 +181,28 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
     return shown
 
 
+def _shifted(shifted: dict[str, Any]) -> str:
+    """The shifted motion in a line."""
+    words = f"by {1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest), " + (
+        "to be believed" if shifted["believed"] else "not to be believed"
+    )
+    words += f": positive in {shifted['share_positive_in_contact']:.1%}"
+    floor = f"the imposed floor ({shifted['floor_m']:g} m x weight = {shifted['floor_Nm']:.1f} N.m)"
+    return f"{words}, in {shifted['share_at_floor_in_contact']:.1%} at {floor}"
+
+
 def _several(
     paths: Sequence[Path], directory: Path | None, options: Any, interruption: Interruption,
     jobs: int | None, *, draw: bool, json: bool,
 ) -> int:  # fmt: skip
     from manikin.analysis import AnalysisJob
     from manikin.analysis_batch import analyze_files, directories_for
-    from manikin.analysis_directory import check_directory, write_overview
+    from manikin.analysis_directory import AnalysisDirectory, write_overview
     from manikin.batch import usable_cores
     from manikin.progress import StageProgress
 
     if directory is not None:
-        check_directory(directory)
+        AnalysisDirectory(directory)
     folders = [None] * len(paths) if directory is None else directories_for(paths, directory)
     work = [AnalysisJob(path, folder, draw) for path, folder in zip(paths, folders, strict=True)]
     began, entries = clock.perf_counter(), {}

@@ -59,7 +59,7 @@ def _shown(value: Any) -> str:
 
 def print_json(value: dict[str, Any]) -> None:
     """Print the one object that ``--json`` promises."""
-    from manikin.output import to_json
+    from manikin.result_directory import to_json
 
     typer.echo(to_json(value))
 

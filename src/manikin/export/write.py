@@ -9,8 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from manikin.atomic import write_text
 from manikin.errors import InputError, MotionFileError
+from manikin.result_directory import write_result
 
 if TYPE_CHECKING:
     from manikin.motion import Motion
@@ -74,12 +74,7 @@ def export_motion(
     folder = Path(source) if Path(source).is_dir() else Path(source).parent
     path = Path(out) if out is not None else folder / f"motion.{format_name}"
     text = _text(content, motion, format_name, rate, source)
-    try:
-        write_text(path, text)
-    except OSError as error:
-        problem = f"{path}: cannot be written ({error.strerror})"
-        raise MotionFileError(f"{problem}; valid: a file in a writable directory") from None
-    return path
+    return write_result(path, text)
 
 
 def _text(

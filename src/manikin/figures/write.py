@@ -13,7 +13,7 @@ from PIL import Image
 
 from manikin.atomic import atomic_path
 from manikin.comparison import RunComparison
-from manikin.errors import FigureError, MotionFileError
+from manikin.errors import FigureError
 from manikin.figures.com import com_figure
 from manikin.figures.compare_com import compare_planes_figure, compare_scene_figure
 from manikin.figures.compare_margin import compare_margin_figure
@@ -32,6 +32,7 @@ from manikin.figures.tracking import tracking_figure
 from manikin.figures.walk_paths import walk_paths_figure
 from manikin.figures.zmp import zmp_figure
 from manikin.record import RunRecord
+from manikin.result_directory import writing
 
 FIGURES: dict[str, Callable[[RunRecord], Figure]] = {
     "com": com_figure,
@@ -131,12 +132,8 @@ def save_figure(figure: Figure, path: Path) -> None:
     Raises:
         MotionFileError: If it cannot be written.
     """
-    try:
-        with atomic_path(path) as temporary:
-            temporary.write_bytes(png_of(figure))
-    except OSError as error:
-        problem = f"{path}: cannot be written ({error.strerror})"
-        raise MotionFileError(f"{problem}; valid: a writable folder") from None
+    with writing(path), atomic_path(path) as temporary:
+        temporary.write_bytes(png_of(figure))
 
 
 def png_of(figure: Figure) -> bytes:

@@ -13,9 +13,10 @@ from enum import StrEnum
 
 import numpy as np
 
+from manikin.balance import wrench_about
 from manikin.contact import ContactSchedule
 from manikin.mocap.recorded_dynamics import CUTOFF, RecordedDynamics
-from manikin.mocap.recorded_margins import RecordedMargins, wrench_at
+from manikin.mocap.recorded_margins import RecordedMargins
 
 
 class Cause(StrEnum):
@@ -71,7 +72,7 @@ def balance_losses(
     for frame in np.flatnonzero(margins.whole_body <= 0.0).tolist():
         others = [margins.polytopes[k] for k in range(before[frame], after[frame] + 1)]
         wrench = dynamics.wrench[frame]
-        if any(one is not None and one.margin(wrench_at(wrench, one.reference)) > 0.0 for one in others):
+        if any(one is not None and one.margin(wrench_about(wrench, one.reference)) > 0.0 for one in others):
             cause = Cause.CHANGE
         elif margins.polytopes[int(margins.phase[frame])] is None:
             cause = Cause.FLIGHT

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from manikin.mocap.free_fall import vertical_acceleration
 from manikin.mocap.reconstruction import Reconstruction
-from manikin.mocap.recorded_supports import Support
+from manikin.mocap.recorded_supports import Support, median_place
 from manikin.mocap.runs import runs
 from manikin.mocap.support_levels import Track, slowest_speed, track
 from manikin.spatial import GRAVITY, FloatArray
@@ -75,7 +75,7 @@ class _Foot:
 
     def middle(self, first: int, stop: int) -> FloatArray:
         """(3,) of the sole, as a median."""
-        return np.median(0.5 * (self.heel.positions + self.toes.positions)[first:stop], axis=0)
+        return median_place(0.5 * (self.heel.positions + self.toes.positions)[first:stop])
 
     def contact(self, frame: int) -> FloatArray:
         """(3,) its lower end."""

@@ -32,8 +32,8 @@ from scipy.sparse.linalg import splu
 
 from manikin.balance.friction import contact_to_world, cross, edge_wrenches
 from manikin.balance.limits import contact_limits
+from manikin.balance.motion_margin import wrench_about
 from manikin.contact import Contact, ContactKind, Stance
-from manikin.mocap.recorded_margins import wrench_at
 from manikin.mocap.runs import runs
 from manikin.spatial import FloatArray
 
@@ -105,7 +105,7 @@ def _admissible(stance: Stance, shares: FloatArray, weight: float) -> NDArray[np
     fine = np.ones(len(shares), dtype=bool)
     for contact, share in zip(stance, shares.swapaxes(0, 1), strict=True):
         limits, turn = contact_limits(contact), contact.rotation_contact_to_world
-        there = wrench_at(share, contact.position)
+        there = wrench_about(share, contact.position)
         local = np.hstack([there[:, :3] @ turn, there[:, 3:] @ turn])
         fine &= (local @ limits.A.T - limits.b).max(axis=1) <= SOFTNESS * weight
     return fine
@@ -130,7 +130,7 @@ def _nearest(stance: Stance, wrench: FloatArray, weight: float, near: FloatArray
     shares += _smallest([contact.position - middle for contact in stance], wanted - shares.sum(axis=1))
     shares = shares * weight
     shares[..., 3:] *= LEVER
-    return wrench_at(shares, -middle)
+    return wrench_about(shares, -middle)
 
 
 def _smooth_run(
@@ -177,7 +177,7 @@ def _smooth_run(
     solved = splu(sparse.csc_matrix(system)).solve(right)[: 6 * count].reshape(count, 6)
     solved[:, 3:] *= LEVER
     shares = np.zeros((end - first, made.shape[1], 6))
-    shares[frame, contact] = wrench_at(solved, -places[frame, contact])
+    shares[frame, contact] = wrench_about(solved, -places[frame, contact])
     return shares
 
 
@@ -211,14 +211,14 @@ def _carried(arm: FloatArray) -> FloatArray:
 
 def _about(wrench: FloatArray, point: FloatArray) -> FloatArray:
     """(k, 6) about points (k, 3), moments per lever."""
-    moved = wrench_at(wrench, point)
+    moved = wrench_about(wrench, point)
     moved[:, 3:] /= LEVER
     return moved
 
 
 def _scaled(wrench: FloatArray, middle: FloatArray, weight: float) -> FloatArray:
     """(..., 6) about a point, per body weight and lever."""
-    wanted = wrench_at(wrench, middle) / weight
+    wanted = wrench_about(wrench, middle) / weight
     wanted[..., 3:] /= LEVER
     return wanted
 

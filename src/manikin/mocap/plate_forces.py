@@ -70,7 +70,7 @@ class PlateComparison:
         cop_rms: Distance of the centres of pressure in single support, root mean square [m].
         cop_mean: Mean offset of ours in world x and y [m].
         margin_share: Share of the frames in which the plates' wrench has a positive margin on our stances.
-        margin_difference: Median of how far the margins are apart, about the middle of the contacts [N.m].
+        margin_difference: Median of how far the margins are apart, about the centre of mass [N.m].
     """
 
     frames: int
@@ -155,7 +155,7 @@ def compare_with_plates(
     weight = GRAVITY * dynamics.body.mass
     lift = (dynamics.vertical_force - measured.wrench[:, 2]) / weight
     apart = dynamics.zero_moment_point(height)[both] - zero_moment_point(measured.wrench[both], height)
-    theirs, _ = margins_of_wrenches(margins.polytopes, margins.phase, measured.wrench, dynamics.com)
+    theirs = margins_of_wrenches(margins.polytopes, margins.phase, measured.wrench, dynamics.com).margin
     mean = apart.mean(axis=0)
     return PlateComparison(
         int(measured.covered.sum()), int(both.sum()), _rms(lift[measured.covered]), _rms(lift[both]),

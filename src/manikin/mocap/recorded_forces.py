@@ -6,11 +6,12 @@ The wrench that a motion needs is known, and shared among its contacts by
 
 import numpy as np
 
+from manikin.balance import wrench_about
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.mocap.force_sharing import shared_wrenches, smooth_shares
 from manikin.mocap.recorded_dynamics import RecordedDynamics
-from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins, wrench_at
+from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
 from manikin.motion.motion import Motion
 from manikin.spatial import GRAVITY, FloatArray
 
@@ -65,10 +66,10 @@ def motion_on_contacts(
 ) -> Motion:
     """The recorded motion with contacts, their forces, joint torques and the margin of balance.
 
-    The margin is that of the whole body about the middle of the contacts of each phase, see
+    The margin is that of the whole body about its centre of mass, see
     :func:`manikin.mocap.recorded_margins.recorded_margins`. In flight no contact can push: the torques are
-    those that the motion would need with nothing to push against, and the margin is minus the size of the
-    wrench that is missing. The pelvis' six generalised forces are zero: with contacts exactly (but for
+    those that the motion would need with nothing to push against, and the margin is minus the length of
+    the wrench that is missing. The pelvis' six generalised forces are zero: with contacts exactly (but for
     rounding), in flight what is missing is left out.
 
     Args:
@@ -86,7 +87,7 @@ def motion_on_contacts(
         frames = phases == number
         for contact in phase.stance:
             column = names.index(contact.effector)
-            forces[frames, column] = wrench_at(wrenches[frames, column], contact.position)
+            forces[frames, column] = wrench_about(wrenches[frames, column], contact.position)
     torques = torques_of(dynamics, names, wrenches)
     torques[:, :6] = 0.0
     return Motion(

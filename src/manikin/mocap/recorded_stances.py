@@ -34,12 +34,13 @@ from manikin.contact import (
 from manikin.errors import InputError
 from manikin.mocap.ground_supports import TRUNK
 from manikin.mocap.reconstruction import Reconstruction
-from manikin.mocap.recorded_supports import RecordedSupports, Support
+from manikin.mocap.recorded_motion import level_heading
+from manikin.mocap.recorded_supports import RecordedSupports, Support, median_place
 from manikin.mocap.runs import runs
 from manikin.mocap.seat_supports import SEAT
 from manikin.mocap.support_levels import REST
 from manikin.mocap.supports import sole_points
-from manikin.spatial import GRAVITY, FloatArray, frozen_array
+from manikin.spatial import GRAVITY, FloatArray, frozen_array, rotation_from_yaw
 
 FRICTION = 0.8
 """Coefficient of friction of shoes and seats."""
@@ -48,7 +49,7 @@ STRONGEST = 4.0
 """Largest sum of normal forces, per body weight: above what walking, sitting down and running reach."""
 
 HAND_FORCE = 100.0
-"""Largest force of a hand along each axis ([Qiu2012]_ 7.2) [N]."""
+"""Largest force of a hand ahead, aside and up, each ([Qiu2012]_ 7.2) [N]."""
 
 ON_GROUND = 0.2
 """Height above a surface up to which a hand, knee or elbow rests on it, and does not hold something [m]."""
@@ -145,7 +146,7 @@ class _SoleEnds:
     def contact(self, support: Support, length: float, width: float, friction: float) -> Contact:
         """The full sole where the foot lies flat."""
         heading = np.mean((self.toes - self.heel)[self.flat], axis=0)
-        place = np.median(0.5 * (self.heel + self.toes)[self.flat], axis=0)
+        place = median_place(0.5 * (self.heel + self.toes)[self.flat])
         place[2], yaw = support.place[2], float(np.arctan2(heading[1], heading[0]))
         return sole(support.effector, place, yaw, length=length, width=width, friction=friction)
 
@@ -171,9 +172,11 @@ def _other_contact(
     if below:
         place = np.array([place[0], place[1], below[0]])
     if stature is None or (name != SEAT and not below):
-        return grasp(name, place, max_force=HAND_FORCE)
+        held = grasp(name, place, max_force=HAND_FORCE)
+        return replace(held, rotation_contact_to_world=rotation_from_yaw(level_heading(found.q[frames])))
     if name not in (SEAT, TRUNK):
-        return point(name, place, friction=friction)
+        rotation = rotation_from_yaw(level_heading(found.q[frames]))
+        return point(name, place, rotation=rotation, friction=friction)
     size = (SEAT_LENGTH, SEAT_WIDTH) if name == SEAT else (TRUNK_LENGTH, SEAT_WIDTH)
     # Who sits looks along x of the pelvis, who lies has the shoulders along its z.
     along = Rotation.from_quat(found.q[frames, 3:7]).apply(

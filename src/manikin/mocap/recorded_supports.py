@@ -10,6 +10,29 @@ from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.spatial import FloatArray, frozen_array
 
+SMALL = 1e-4
+"""Distances much below this one count by their squares in a median place [m], which makes it unique."""
+
+MEDIAN_STEPS = 60
+"""Steps towards a median place; the same number always, so that equal motions give equal places."""
+
+
+def median_place(positions: FloatArray) -> FloatArray:
+    """Median of (n, 3) places that does not depend on where x and y point, (3,) [m].
+
+    On the level it is the place with the least sum of distances to all (the spatial median, by the steps of
+    Weiszfeld); a median of each coordinate would turn with the axes. In height it is the ordinary median.
+
+    Args:
+        positions: (n, 3), at least one [m].
+    """
+    level = positions[:, :2] - positions[0, :2]
+    place = level.mean(axis=0)
+    for _ in range(MEDIAN_STEPS):
+        weight = 1.0 / np.sqrt(np.sum((level - place) ** 2, axis=1) + SMALL**2)
+        place = weight @ level / weight.sum()
+    return np.append(positions[0, :2] + place, np.median(positions[:, 2]))
+
 
 @dataclass(frozen=True, eq=False)
 class Support:
@@ -19,7 +42,7 @@ class Support:
         effector: Name of the body's effector.
         start: Touch-down, or the first instant of the recording [s].
         end: Lift-off, or the last instant of the recording [s].
-        place: (3,) where the effector is, as a median; of a foot, its height is that of the surface [m].
+        place: (3,) where the effector is, a :func:`median_place`; of a foot, at its surface's height [m].
         first_contact: (3,) heel or toes, whichever touched down, or the effector, then [m].
         last_contact: (3,) heel or toes, whichever lifted off, or the effector, then [m].
         start_seen: Whether the touch-down is in the recording.
@@ -65,7 +88,7 @@ def support_between(
     (first, stop), last = frames, len(positions) - 1
     return Support(
         effector, start + first / rate, start + min(stop, last) / rate,
-        np.median(positions[first:stop], axis=0), positions[first], positions[stop - 1],
+        median_place(positions[first:stop]), positions[first], positions[stop - 1],
         first > 0, stop <= last,
     )  # fmt: skip
 

@@ -17,9 +17,15 @@ wrench of the shifted body is
 
 linear in ``s`` but for its product with itself, so that this is a quadratic program; ``s`` is a spline of
 fifth degree, differentiated by the differences with which the motion is, but for the turning of the pelvis.
-The margins that are told are measured on the shifted motion. Only facets that a solution violates enter the
-program, a few at a time. What no shift up to a bound repairs stays as far as it must: the largest violation
-of each frame is paid for at a price.
+The margins that are told are measured on the shifted motion. Where a facet at the imposed margin, the floor,
+holds the shift, the margin of the shifted motion says nothing about the person (:attr:`LeastShift.at_floor`).
+
+The imposed margin is a distance to the facets with moments about the middle of the contacts of the phase,
+per body weight: of a facet at which a sole tips it is the distance of the centre of pressure from the edge.
+It does not depend on the world's origin, and the bounds of a shift are along the person's own axes at the
+first instant, so the shift does not depend on the world's heading either. Only facets that a solution
+violates enter the program, a few at a time. What no shift up to a bound repairs stays as far as it must: the
+largest violation of each frame is paid for at a price.
 """
 
 from collections.abc import Sequence
@@ -31,13 +37,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline
 
+from manikin.balance import WrenchPolytope, wrench_about
 from manikin.balance.friction import cross
 from manikin.contact import ContactKind
 from manikin.errors import InputError
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_dynamics import RecordedDynamics, dynamics_of_postures
-from manikin.mocap.recorded_margins import RecordedMargins, margins_within, wrench_at
-from manikin.spatial import GRAVITY, FloatArray, finite_number, frozen_array
+from manikin.mocap.recorded_margins import RecordedMargins, margins_within
+from manikin.mocap.recorded_motion import level_heading
+from manikin.spatial import GRAVITY, FloatArray, finite_number, frozen_array, rotation_from_yaw
 
 PLACE_ERROR = 0.005
 """``e``: of the centre of mass by markers [m]."""
@@ -49,10 +57,13 @@ ASIDE = 0.02
 """``a``: force plates under 11 straight walks of seven people say 6 to 25 mm, root mean square [m]."""
 
 LARGEST_SHIFT = 0.03
-"""Bound on each component of the shift [m]: more is no error of a recording."""
+"""Bound on the shift ahead, to the left and up, each [m]: more is no error of a recording."""
 
 INSIDE = 0.01
-"""Margin that is kept, per body weight [m]: so far from the edge of a sole is the centre of pressure."""
+"""Margin that is imposed, per body weight [m]: so far from the edge of a sole is the centre of pressure."""
+
+AT_FLOOR = 2e-4
+"""Difference from the imposed margin, per body weight, up to which a facet of the program is at it [m]."""
 
 KNOTS = 0.04
 """Time between the knots of the spline [s]: a shift up to some 10 Hz."""
@@ -84,12 +95,22 @@ class LeastShift:
         margins: Of the shifted motion.
         shift: (n, 3) of the whole body in each frame, world frame [m].
         solved: Whether one was found; if not, the motion is as recorded, or shifted too little.
+        floor: Margin that was imposed, moments about the middle of the contacts [N.m].
+        at_floor: (n,) whether a facet at the floor holds the shift: there the margin of the shifted motion
+            was imposed, and is no result of the recording.
     """
 
     dynamics: RecordedDynamics
     margins: RecordedMargins
     shift: FloatArray
     solved: bool
+    floor: float
+    at_floor: NDArray[np.bool_]
+
+    @property
+    def floor_length(self) -> float:
+        """The imposed margin per body weight [m]."""
+        return self.floor / (GRAVITY * self.dynamics.body.mass)
 
     @property
     def size(self) -> FloatArray:
@@ -124,7 +145,7 @@ def least_shift(
         found: The reconstruction of the person.
         dynamics: Of its smooth postures.
         margins: Of ``dynamics`` on its stances.
-        inside: Margin to keep, per body weight [m].
+        inside: Margin to impose, per body weight [m].
         aside: ``a`` [m]; None to shift no more than the contacts ask for.
 
     Raises:
@@ -137,6 +158,7 @@ def least_shift(
     weight = GRAVITY * dynamics.body.mass
     kept, spline = inside * weight, _Spline.over(dynamics.time)
     axes = _sole_axes(dynamics, margins) if aside is not None else _Rows.none()
+    turn = rotation_from_yaw(level_heading(dynamics.q[:1]))
     shift, bend = np.zeros((len(dynamics), 3)), np.zeros((len(dynamics), 3))
     used, solved = np.zeros((0, 2), dtype=np.int64), True
     for number in range(ROUNDS):
@@ -145,19 +167,23 @@ def least_shift(
         if len(known) == len(used) and (number or not len(axes.frame)):
             break
         used = known
-        coefficients = _solve(_facets(dynamics, margins, used, kept), axes.scaled(aside or 1.0), spline)
+        facets = _facets(dynamics, margins, used, kept)
+        coefficients = _solve(facets.turned(turn), axes.scaled(aside or 1.0).turned(turn), spline)
         if coefficients is None:
             solved = False
             break
+        coefficients = coefficients @ turn.T
         shift, bend = spline.values @ coefficients, spline.second @ coefficients
-    if not shift.any():
-        return LeastShift(dynamics, margins, frozen_array(shift, "shift"), solved)
-    q = np.array(dynamics.q)
-    q[:, :3] += shift
-    moved = dynamics_of_postures(replace(found, body=dynamics.body), q)
-    return LeastShift(
-        moved, margins_within(margins.polytopes, margins.phase, moved), frozen_array(shift, "shift"), solved
-    )
+    moved, held, at_floor = dynamics, margins, np.zeros(len(dynamics), dtype=bool)
+    if shift.any():
+        left = _about_contacts(margins, _shifted_wrench(dynamics, shift, bend)) - kept
+        at_floor = np.abs(left) <= AT_FLOOR * weight
+        q = np.array(dynamics.q)
+        q[:, :3] += shift
+        moved = dynamics_of_postures(replace(found, body=dynamics.body), q)
+        held = margins_within(margins.polytopes, margins.phase, moved)
+    at_floor.setflags(write=False)
+    return LeastShift(moved, held, frozen_array(shift, "shift"), solved, kept, at_floor)
 
 
 def _shifted_wrench(dynamics: RecordedDynamics, shift: FloatArray, bend: FloatArray) -> FloatArray:
@@ -165,6 +191,26 @@ def _shifted_wrench(dynamics: RecordedDynamics, shift: FloatArray, bend: FloatAr
     force = dynamics.body.mass * bend
     moment = cross(shift, dynamics.wrench[:, :3]) + cross(dynamics.com, force)
     return dynamics.wrench + np.hstack([force, moment])
+
+
+def _lengths(polytope: WrenchPolytope) -> FloatArray:
+    """(m,) lengths of the rows of a polytope with moments about the middle of its contacts."""
+    middle = np.mean([contact.position for contact in polytope.stance], axis=0)
+    force, moment = polytope.H[:, :3], polytope.H[:, 3:]
+    force = force + cross(moment, middle - polytope.reference)
+    return np.sqrt(np.sum(force**2, axis=1) + np.sum(moment**2, axis=1))
+
+
+def _about_contacts(margins: RecordedMargins, wrench: FloatArray) -> FloatArray:
+    """(n,) margins of (n, 6) wrenches with moments about the middle of the contacts [N.m]; NaN in flight."""
+    found = np.full(len(wrench), np.nan)
+    for number in np.unique(margins.phase):
+        polytope = margins.polytopes[number]
+        if polytope is not None:
+            frames = margins.phase == number
+            distance = polytope.distances(wrench_about(wrench[frames], polytope.reference))
+            found[frames] = (distance / _lengths(polytope)).min(axis=1)
+    return found
 
 
 def _violated(margins: RecordedMargins, wrench: FloatArray, kept: float, weight: float) -> NDArray[np.int64]:
@@ -175,8 +221,8 @@ def _violated(margins: RecordedMargins, wrench: FloatArray, kept: float, weight:
         if polytope is None:
             continue
         frames = np.flatnonzero(margins.phase == number)
-        distance = polytope.distances(wrench_at(wrench[frames], polytope.reference))
-        where, row = np.nonzero(distance < kept - TOLERANCE * weight)
+        distance = polytope.distances(wrench_about(wrench[frames], polytope.reference))
+        where, row = np.nonzero(distance < (kept - TOLERANCE * weight) * _lengths(polytope))
         found.append(np.column_stack([frames[where], row]))
     return np.vstack(found)
 
@@ -208,7 +254,7 @@ class _Rows:
     ) -> "_Rows":
         """``h - H w`` of (v, 6) rows in (v,) frames, moments about a point."""
         weight, (force, moment) = GRAVITY * dynamics.body.mass, (H[:, :3], H[:, 3:])
-        base = (h - np.sum(H * wrench_at(dynamics.wrench[frame], about), axis=1)) / weight
+        base = (h - np.sum(H * wrench_about(dynamics.wrench[frame], about), axis=1)) / weight
         # H_m . (s x f) = s . (f x H_m), and H_m . (c x s'') = s'' . (H_m x c)
         on_shift = cross(dynamics.wrench[frame, :3], moment) / weight
         on_bend = (force + cross(moment, dynamics.com[frame] - about)) / GRAVITY
@@ -228,6 +274,10 @@ class _Rows:
     def scaled(self, unit: float) -> "_Rows":
         """The same in another unit of length."""
         return _Rows(self.frame, self.base / unit, self.on_shift / unit, self.on_bend / unit)
+
+    def turned(self, axes: FloatArray) -> "_Rows":
+        """The same for shifts along the columns of ``axes`` (3, 3)."""
+        return _Rows(self.frame, self.base, self.on_shift @ axes, self.on_bend @ axes)
 
     def taken(self, spline: "_Spline") -> list[sparse.csr_array]:
         """What the coefficients of each axis take, (v, k) each."""
@@ -249,7 +299,8 @@ def _facets(
         polytope = margins.polytopes[number]
         assert polytope is not None  # none is violated in flight
         frame, row = used[phases == number].T
-        parts.append(_Rows.of(dynamics, frame, polytope.H[row], polytope.h[row] - kept, polytope.reference))
+        left = polytope.h[row] - kept * _lengths(polytope)[row]
+        parts.append(_Rows.of(dynamics, frame, polytope.H[row], left, polytope.reference))
     return _Rows.joined(parts)
 
 
@@ -296,7 +347,7 @@ class _Spline:
 
 
 def _solve(facets: _Rows, axes: _Rows, spline: _Spline) -> FloatArray | None:
-    """(k, 3) coefficients of the least shift that keeps to the facets, as far as its bound allows.
+    """(k, 3) coefficients of the least shift that keeps to the facets, as far as its bounds allow.
 
     None where the solver finds none, as for postures that jump.
     """

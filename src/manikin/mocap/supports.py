@@ -23,7 +23,7 @@ from manikin.mocap.free_fall import while_carried
 from manikin.mocap.ground_supports import ground_supports
 from manikin.mocap.hand_supports import hand_supports
 from manikin.mocap.reconstruction import Reconstruction
-from manikin.mocap.recorded_supports import RecordedSupports, Support
+from manikin.mocap.recorded_supports import RecordedSupports, Support, median_place
 from manikin.mocap.runs import lasting, runs, switch
 from manikin.mocap.seat_supports import lying, seat_supports
 from manikin.mocap.support_levels import (
@@ -260,7 +260,7 @@ def _supports(
     """
     rate, last, found = points[0].rate, touching.shape[1] - 1, []
     for first, stop in lasting(np.logical_or.reduce(touching), SHORTEST * rate, SHORTEST_CUT * rate):
-        place = np.median(np.mean([point.positions[first:stop] for point in points[:2]], axis=0), axis=0)
+        place = median_place(np.mean([point.positions[first:stop] for point in points[:2]], axis=0))
         place[2] = _surface_at(float(place[2]), surfaces).height
         begins, ends = (points[int(np.argmax(touching[:, frame]))] for frame in (first, stop - 1))
         found.append(

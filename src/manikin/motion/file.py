@@ -3,7 +3,7 @@
 Layout (format version 1)::
 
     /                    attributes: format, format_version, created_by
-    /recorded, /planned, /executed   one group per motion; attributes: joint_names, contact_names
+    /shifted, /recorded, /planned, /executed   one group per motion; attributes: joint_names, contact_names
         time (n,) q (n, nq) v (n, nv) a (n, nv) tau (n, nv) com (n, 3)
         angular_momentum (n, 3) margin (n,) support (n, c) contact_force (n, c, 6)
                          each with the attributes: unit, description
@@ -40,7 +40,7 @@ from manikin.version import __version__
 
 FORMAT = "manikin-motion"
 FORMAT_VERSION = 1
-GROUPS = ("recorded", "planned", "executed")
+GROUPS = ("shifted", "recorded", "planned", "executed")
 
 DATASETS: Mapping[str, tuple[str, str]] = {
     "time": ("s", "sample times, increasing"),
@@ -74,6 +74,7 @@ class MotionFile(Displayed):
         scene: Where.
         schedule: With which contacts, when.
         recorded: Motion of a recorded person, reconstructed.
+        shifted: The recorded motion after the least shift onto its contacts.
     """
 
     planned: Motion | None = None
@@ -82,6 +83,7 @@ class MotionFile(Displayed):
     scene: Scene | None = None
     schedule: ContactSchedule | None = None
     recorded: Motion | None = None
+    shifted: Motion | None = None
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
@@ -186,6 +188,7 @@ def _content(file: h5py.File, source: str) -> MotionFile:
         scene=_read_json(file, "scene", scene_from, source),
         schedule=_read_json(file, "schedule", schedule_from, source),
         recorded=_read_motion(file, "recorded", source),
+        shifted=_read_motion(file, "shifted", source),
     )
     if not content.motions:
         raise MotionFileError(f"{source}: holds no motion; valid: a group {' or '.join(GROUPS)}")

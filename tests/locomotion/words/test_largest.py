@@ -11,7 +11,7 @@ from manikin.errors import InputError
 from manikin.locomotion.words.largest import clothoid_words
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.floats(-2.0, 2.0), st.floats(3.0, 9.0), st.floats(0.0, 6.28))
 def test_words_lead_to_the_goal_without_curvature(x, y, heading):
     for one in clothoid_words((x, y, heading))[:4]:

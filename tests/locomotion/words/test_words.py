@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -46,7 +46,6 @@ def test_a_goal_straight_ahead_is_walked_to_straight():
     assert path.switches.size == 0
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6))
 def test_system_leads_to_the_goal_and_the_cost_is_its_integral(seed):
     """The system (3.2), integrated by another method under u2, ends at the goal to 1e-8."""
@@ -89,7 +88,6 @@ def test_a_path_that_is_no_optimum_fails_the_maximum_principle():
     assert found.position[0] > 1e-3
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10**6))
 def test_mirrored_goals_have_mirrored_words_and_equal_costs(seed):
     """Left and right are alike: x and the heading mirrored swap I and D."""

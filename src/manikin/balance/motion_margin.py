@@ -1,0 +1,149 @@
+"""Margin along a motion: how far every sample is from losing balance, in what its stance can give.
+
+The one place where a series of wrenches is held against the stances of its phases: planned, executed,
+recorded, of a point mass or of a whole body. All of it is independent of the world's origin and axes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.balance.friction import FrictionModel, cross
+from manikin.balance.margin import stability_margins
+from manikin.balance.support_plane import support_plane
+from manikin.balance.wrench import WrenchPolytope, wrench_polytopes
+from manikin.balance.zmp_path import LEAST_LOAD
+from manikin.contact import Stance
+from manikin.errors import InputError
+from manikin.spatial import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class MotionMargin:
+    """Distances of every sample from the loss of balance; negative where it is lost already.
+
+    Attributes:
+        margin: (n,) residual ball of W_p with moments about the CoM, alpha = 1 m
+            ([Qiu2012]_ 4.2.9 case 3, remark 2) [N.m].
+        force: (n,) smallest force at the CoM that ends balance ([Qiu2012]_ 4.2.9 case 1) [N]; infinite
+            where no force alone does.
+        zmp_distance: (n,) of the ZMP to the edge of the support polygon [m]; not a number where the
+            contacts do not span one plane, or something is grasped, or less than
+            :data:`~manikin.balance.zmp_path.LEAST_LOAD` presses on it.
+    """
+
+    margin: FloatArray
+    force: FloatArray
+    zmp_distance: FloatArray
+
+    @property
+    def lowest(self) -> int:
+        """Sample of the lowest margin."""
+        return int(np.argmin(self.margin))
+
+    @property
+    def min_zmp_distance(self) -> float | None:
+        """Least distance of the ZMP to the edge [m]; None where it is not known at any sample."""
+        known = self.zmp_distance[np.isfinite(self.zmp_distance)]
+        return float(known.min()) if len(known) else None
+
+    def __repr__(self) -> str:
+        zmp = self.min_zmp_distance
+        margin, force = self.margin.min(initial=np.inf), self.force.min(initial=np.inf)
+        return (
+            f"MotionMargin({len(self.margin)} samples, least margin {margin:.2f} N.m, "
+            f"least force {force:.1f} N"
+            f"{'' if zmp is None else f', least ZMP distance {zmp:.3f} m'})"
+        )
+
+
+def motion_margin(
+    stances: Sequence[Stance],
+    phases: ArrayLike,
+    wrench: ArrayLike,
+    com: ArrayLike,
+    *,
+    polytopes: Sequence[WrenchPolytope | None] | None = None,
+    friction_model: FrictionModel = "pyramid",
+) -> MotionMargin:
+    """Margins of a series of pseudo-wrenches, each in the polytope of its phase.
+
+    Without any contact the only admissible wrench is 0: margin and force are then the negative lengths of
+    the wrench about the CoM and of its force. A ballistic flight needs none.
+
+    Args:
+        stances: Of each phase.
+        phases: (n,) index of the phase of each sample.
+        wrench: (n, 6) force and moment about the world origin that the contacts have to give [N, N.m].
+        com: (n, 3) [m].
+        polytopes: W_p of each phase, about any point, where it is known already; else each stance's is
+            computed once, and only for phases with samples.
+        friction_model: Of the polytopes that are computed.
+
+    Raises:
+        InputError: If the shapes do not fit.
+        ContactError: If the normal force of a contact is bounded by no cap.
+    """
+    w, x, row_phases = _series(wrench, com, phases, len(stances))
+    margin, force, zmp = (np.full(len(w), np.nan) for _ in range(3))
+    present = np.unique(row_phases).tolist()
+    known = _polytopes(stances, present, polytopes, friction_model)
+    for number in present:
+        rows = np.flatnonzero(row_phases == number)
+        if not len(stances[number]):
+            about_com = wrench_about(w[rows], x[rows])
+            margin[rows] = -np.linalg.norm(about_com, axis=1)
+            force[rows] = -np.linalg.norm(about_com[:, :3], axis=1)
+            continue
+        polytope = known[number]
+        found = stability_margins(polytope, wrench_about(w[rows], polytope.reference), x[rows])
+        margin[rows], force[rows] = found.wrench_about_com, found.force
+        zmp[rows] = _zmp_distances(stances[number], w[rows])
+    for values in (margin, force, zmp):
+        values.setflags(write=False)
+    return MotionMargin(margin, force, zmp)
+
+
+def _zmp_distances(stance: Stance, wrench: FloatArray) -> FloatArray:
+    plane = support_plane(stance)
+    if plane is None or len(plane.polygon) < 3:
+        return np.full(len(wrench), np.nan)
+    pressing = wrench[:, :3] @ plane.rotation_plane_to_world[:, 2]
+    return np.where(pressing < LEAST_LOAD, np.nan, plane.zmp_distance(wrench))
+
+
+def wrench_about(wrench: FloatArray, point: FloatArray) -> FloatArray:
+    """(..., 6) wrenches about the world origin with moments about another point (..., 3) [N, N.m]."""
+    force = wrench[..., :3]
+    return np.concatenate([force, wrench[..., 3:] - cross(point, force)], axis=-1)
+
+
+def _series(
+    wrench: ArrayLike, com: ArrayLike, phases: ArrayLike, count: int
+) -> tuple[FloatArray, FloatArray, np.ndarray]:
+    w, x = np.asarray(wrench, dtype=np.float64), np.asarray(com, dtype=np.float64)
+    index = np.asarray(phases, dtype=np.int64)
+    if w.ndim != 2 or w.shape[1] != 6 or x.shape != (len(w), 3) or index.shape != (len(w),):
+        raise InputError(
+            f"wrench has shape {w.shape}, com {x.shape} and phases {index.shape}; valid: (n, 6), (n, 3), (n,)"
+        )
+    if len(index) and not (index.min() >= 0 and index.max() < count):
+        raise InputError(f"phases go from {index.min()} to {index.max()}; valid: 0 to {count - 1}")
+    return w, x, index
+
+
+def _polytopes(
+    stances: Sequence[Stance],
+    present: Sequence[int],
+    given: Sequence[WrenchPolytope | None] | None,
+    friction_model: FrictionModel,
+) -> dict[int, WrenchPolytope]:
+    """Polytopes of the phases that have samples and contacts, by number."""
+    held = [number for number in present if len(stances[number])]
+    known = {} if given is None else {number: given[number] for number in held}
+    missing = [number for number in held if known.get(number) is None]
+    computed = wrench_polytopes([stances[number] for number in missing], friction_model=friction_model)
+    found = {number: polytope for number, polytope in known.items() if polytope is not None}
+    return found | dict(zip(missing, computed, strict=True))
