@@ -18,6 +18,7 @@ from manikin.balance.motion_margin import MotionMargin, motion_margin, wrench_ab
 from manikin.balance.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
 from manikin.balance.support_plane import SupportPlane, least_zmp_distance, support_plane
 from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytope, wrench_polytopes
+from manikin.callable_package import make_callable
 
 __all__ = [
     "BalanceReport",
@@ -54,3 +55,5 @@ __all__ = [
     "wrench_polytopes",
     "zero_moment_point",
 ]
+
+make_callable(__name__)
