@@ -194,7 +194,7 @@ class Recorder:
         return carrying.stance(
             sample.carried, lambda name: (frames[name].position, frames[name].rotation), planned,
             [name for name in self.effectors if name in sample.sensed.grips],
-            self._schedule.stance_at(sample.plan_time).normal_force_cap,
+            self._schedule.stance_at(sample.plan_time).model,
         )  # fmt: skip
 
     def motion(self, joint_names: Sequence[str], mass: float) -> Motion:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from manikin.balance.motion_margin import motion_margin
 from manikin.body import BodyModel
 from manikin.body.limb import end_segments
-from manikin.contact import Stance
+from manikin.contact import Stance, default_normal_force_cap
 from manikin.control.balance_recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
 from manikin.motion import Motion
-from manikin.simulation.carrying import BODY_WEIGHTS, CarriedPoints, CarryingContacts
+from manikin.simulation.carrying import CarriedPoints, CarryingContacts
 from manikin.simulation.world import Sensed
-from manikin.spatial import GRAVITY, FloatArray, skew
+from manikin.spatial import FloatArray, skew
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class RecoveryRecorder:
             held: Whether the feet are held, which is not felt as a touch.
         """
         self._stances.append(
-            Stance(output.standing.soles, BODY_WEIGHTS * self._body.mass * GRAVITY)
+            Stance(output.standing.soles, default_normal_force_cap(self._body.mass))
             if held
             else self._carrying_stance(output, carried)
         )
