@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull
 
 from manikin.contact import Contact, ContactKind, SolePart, Stance
 from manikin.spatial import GRAVITY, FloatArray, rotation_from_normal
@@ -126,11 +126,32 @@ class CarryingContacts:
 
 
 def _same_place(first: Contact, second: Contact) -> bool:
-    if first.points.shape != second.points.shape or first.friction != second.friction:
+    """Whether two contacts of an effector are the same but for less than :data:`TOUCHING`."""
+    alike = first.kind is second.kind and first.part is second.part and first.friction == second.friction
+    if not alike or first.normal @ second.normal < 1.0 - 1e-6:
         return False
-    if first.part is not second.part or first.normal @ second.normal < 1.0 - 1e-6:
+    if first.torsion_limit != second.torsion_limit:
         return False
-    return bool(np.abs(first.points_in_world - second.points_in_world).max() <= TOUCHING)
+    one, other = ((c.points_in_world - first.position) @ first.rotation_contact_to_world
+                  for c in (first, second))  # fmt: skip
+    if np.abs(np.concatenate([one[:, 2], other[:, 2]])).max() > TOUCHING:
+        return False
+    return max(_outside(other[:, :2], one[:, :2]), _outside(one[:, :2], other[:, :2])) <= TOUCHING
+
+
+def _outside(points: FloatArray, corners: FloatArray) -> float:
+    """Farthest that any of (k, 2) points is outside the hull of (m, 2) corners [m]."""
+    ends = np.roll(corners, -1, axis=0)
+    along = ends - corners
+    length = np.maximum(np.sum(along**2, axis=1), 1e-18)
+    offset = points[:, None] - corners
+    share = np.clip(np.sum(offset * along, axis=2) / length, 0.0, 1.0)
+    apart = np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1)
+    if len(corners) > 2:
+        turn = along[:, 0] * offset[..., 1] - along[:, 1] * offset[..., 0]
+        inside = np.all(turn >= 0.0, axis=1) | np.all(turn <= 0.0, axis=1)
+        apart = np.where(inside, 0.0, apart)
+    return float(apart.max(initial=0.0))
 
 
 def _touched(contact: Contact, pose: Pose, points: CarriedPoints, chosen: NDArray[np.bool_]) -> Contact:
@@ -156,23 +177,37 @@ def _touched(contact: Contact, pose: Pose, points: CarriedPoints, chosen: NDArra
 
 
 def _beyond(contact: Contact, positions: FloatArray) -> FloatArray:
-    """(k,) how far points lie outside the rectangle of a full sole, along its axes [m]."""
-    local = (positions - contact.position) @ contact.rotation_contact_to_world
+    """(k,) how far points lie outside the rectangle of a sole, along its axes [m]."""
+    local = (positions - contact.position) @ contact.rotation_contact_to_world - contact.centre
     return (np.abs(local[:, :2]) - 0.5 * np.array([contact.length, contact.width])).max(axis=1)
 
 
 def _hull(points: FloatArray) -> FloatArray:
-    """Corners of the hull of points in a plane, or the ends of a line, or one point."""
-    spread = np.ptp(points[:, :2], axis=0)
-    if spread.max() <= TOUCHING:
+    """Corners of the hull of points in a plane, or the ends of a line, or one point.
+
+    Corners that stand out by less than a tenth of :data:`TOUCHING` are left out.
+    """
+    flat = points[:, :2] - points[:, :2].mean(axis=0)
+    extent, axes = np.linalg.svd(flat, full_matrices=False)[1:]
+    if np.abs(flat).max() <= 0.5 * TOUCHING:
         return points.mean(axis=0, keepdims=True)
-    try:
-        if spread.min() > 1e-6:
-            return points[ConvexHull(points[:, :2]).vertices]
-    except QhullError:
-        pass
-    along = points[:, :2] @ np.linalg.svd(points[:, :2] - points[:, :2].mean(axis=0))[2][0]
-    return points[[int(np.argmin(along)), int(np.argmax(along))]]
+    if len(points) < 3 or extent[-1] <= 0.1 * TOUCHING:
+        along = flat @ axes[0]
+        return points[[int(np.argmin(along)), int(np.argmax(along))]]
+    corners = list(ConvexHull(points[:, :2]).vertices)
+    while len(corners) > 3:
+        room = [_height(points, corners, number) for number in range(len(corners))]
+        if min(room) > 0.1 * TOUCHING:
+            break
+        corners.pop(int(np.argmin(room)))
+    return points[corners]
+
+
+def _height(points: FloatArray, corners: list[int], number: int) -> float:
+    """How far a corner of a polygon stands out from the line of its neighbours [m]."""
+    before, corner, after = (points[corners[(number + k) % len(corners)], :2] for k in (-1, 0, 1))
+    along, arm = after - before, corner - before
+    return abs(along[0] * arm[1] - along[1] * arm[0]) / max(float(np.linalg.norm(along)), 1e-12)
 
 
 def _unplanned(name: str, points: CarriedPoints, chosen: NDArray[np.bool_]) -> Contact:
