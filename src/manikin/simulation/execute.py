@@ -178,8 +178,9 @@ class _Run:
             self.world.advance(output.tau, 1)
             sensed = self.world.sense()
             self.world.advance(output.tau, self.substeps - 1)
+            carried = self.world.carried()
             if number >= 0:
-                self.recorder.record(sensed, output, self.world.mean_wrench())
+                self.recorder.record(sensed, output, self.world.mean_wrench(), carried)
             if number >= 0 and self._failed(output):
                 break
             number += 1

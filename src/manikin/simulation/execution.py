@@ -20,8 +20,8 @@ class Execution(Displayed):
             held from the sample on, ``a`` and ``contact_force`` what the engine measured in
             the step's first millisecond, moments about the *planned* contact frame's origin,
             ``support`` where it presses, ``margin`` that of the measured wrench of all
-            contacts, averaged over the control step, in the polytope of the stance planned
-            for its beginning.
+            contacts, averaged over the control step, about the centre of mass, in the polytope
+            of the contacts that really carried it.
         fell: Whether the body fell.
         failure: Why the run is no success, in one line; empty for a success.
         failure_time_s: When it failed [s], or None.
