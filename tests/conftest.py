@@ -1,7 +1,10 @@
 """Values that the tests of several rooms share."""
 
+import fcntl
 import gc
+import hashlib
 import os
+import pickle
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, before numpy is loaded
 
@@ -75,6 +78,49 @@ def pytest_xdist_make_scheduler(config, log):
 
     config.option.loadscopereorder = False
     return UnitScheduling(config, log)
+
+
+class Runs:
+    """Whole runs of scenarios, each made once for all tests and all workers of a session.
+
+    A run is known by its scenario, variant, overrides, body and seed. Its directory belongs to all tests:
+    they read it and copy what they change.
+    """
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.read = {}
+
+    def __call__(self, name, variant=None, overrides=(), seed=None, body=()):
+        """Result of a run, with its directory (``body``: stature [m], mass [kg], sex)."""
+        from manikin.scenarios import load_scenario
+
+        seed = load_scenario(name, variant, overrides).seed if seed is None else seed
+        key = f"{name}@{variant}|{'|'.join(overrides)}|{seed}|{body}"
+        if key not in self.read:
+            place = self.folder / hashlib.sha256(key.encode()).hexdigest()[:16]
+            place.mkdir(parents=True, exist_ok=True)
+            with (place / "lock").open("w") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)  # another worker may be making it
+                result = place / "result.pickle"
+                if not result.exists():
+                    result.write_bytes(pickle.dumps(self._made(name, variant, overrides, seed, body, place)))
+                self.read[key] = pickle.loads(result.read_bytes())
+        return self.read[key]
+
+    def _made(self, name, variant, overrides, seed, body, place):
+        from manikin.pipeline import run
+        from manikin.scenarios import load_scenario
+
+        scenario = load_scenario(name, variant, overrides)
+        return run(scenario.with_body(*body) if body else scenario, seed=seed, out=place / "run")
+
+
+@pytest.fixture(scope="session")
+def runs(tmp_path_factory) -> Runs:
+    """Runs of scenarios that tests share: ``runs("platform")``."""
+    base = tmp_path_factory.getbasetemp()
+    return Runs((base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "runs-of-all")
 
 
 def carried(scenario, body, schedule, time, offset=0.0):

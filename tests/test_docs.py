@@ -95,7 +95,9 @@ def test_every_generated_block_was_found(generated):
 
 
 @pytest.mark.parametrize("source", PYTHON)
-def test_python_examples_run(source, tmp_path, monkeypatch, finished_run):
+def test_python_examples_run(source, tmp_path, monkeypatch, finished_run, runs):
+    """Whole runs of built-in scenarios are those that the tests of the pipeline look at."""
+    monkeypatch.setattr(manikin, "run", runs)
     run = tmp_path / "runs/platform"
     run.mkdir(parents=True)
     write_motions(run / "motion.h5", finished_run)

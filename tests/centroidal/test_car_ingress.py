@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from manikin.balance import pseudo_wrench
-from manikin.centroidal import CentroidalProblem, plan_com
+from manikin.centroidal import CentroidalTrajectory, plan_com
 from manikin.centroidal.feasibility import assess_feasibility, intersection_radii, polytopes_of
-from manikin.contact import StanceSequence
+from manikin.contact import ContactSchedule, StanceSequence
 from manikin.scenarios import load_scenario
 from manikin.spline import BSpline
 
@@ -63,10 +63,10 @@ def test_the_plan_reaches_the_published_margin_in_the_published_time(planned):
     assert np.all(planned.trajectory.schedule.durations >= [0.15, 0.4, 0.1, 0.5, 0.6, 0.6])
 
 
-def test_a_joined_trajectory_is_both_of_its_parts(problem, planned):
+def test_a_joined_trajectory_is_both_of_its_parts(planned):
     first = planned.trajectory
     end = first.duration
-    second = plan_com(_problem_onward(problem, first)).trajectory
+    second = _onward(first)
     joined = first.followed_by(second)
     time = np.linspace(0.0, end, 301)
     assert joined.position(time) == pytest.approx(first.position(time), abs=1e-9)
@@ -78,11 +78,13 @@ def test_a_joined_trajectory_is_both_of_its_parts(problem, planned):
     assert joined.schedule.instants[len(first.schedule.instants) - 1] == pytest.approx(end)
 
 
-def _problem_onward(problem, first):
-    """From the end of the first part to rest on the stance of its last phase and a seat."""
-    sequence = load_scenario("car-ingress").build_sequence()
-    end = first.duration
-    return CentroidalProblem(
-        problem.mass, StanceSequence(sequence.phases[6:]), first.position(end), (-0.05, -0.02, 0.22),
-        start_velocity=first.velocity(end), start_acceleration=first.acceleration(end), degree=5,
-    )  # fmt: skip
+def _onward(first):
+    """One quintic from the end of the first part to rest, in a second for each phase that is left."""
+    phases = load_scenario("car-ingress").build_sequence().phases[6:]
+    end, total = first.duration, float(len(phases))
+    start, rest = first.position(end), np.array([-0.05, -0.02, 0.22])
+    second = start + first.velocity(end) * total / 5.0
+    third = 2.0 * second - start + first.acceleration(end) * total**2 / 20.0
+    spline = BSpline(5, np.repeat([0.0, 1.0], 6), np.array([start, second, third, rest, rest, rest]))
+    schedule = ContactSchedule(StanceSequence(phases), np.arange(total + 1.0))
+    return CentroidalTrajectory(first.mass, spline, schedule)

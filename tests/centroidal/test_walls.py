@@ -78,7 +78,8 @@ def test_the_margin_is_a_force_that_can_be_applied(planned, problem):
 
 
 def test_a_stance_moved_elsewhere_has_the_polytope_it_would_have(problem):
-    for phase, polytope in zip(problem.sequence, polytopes_of(problem), strict=True):
+    # Five of the nineteen phases: four and two contacts, at the start, on the way and at the end.
+    for phase, polytope in [*zip(problem.sequence, polytopes_of(problem), strict=True)][::4]:
         direct = wrench_polytope(phase.stance, reference=problem.reference)
         assert len(direct) == len(polytope)
         # The same set: every row of the one is a row of the other (newtons, rounding of the hull).
@@ -114,10 +115,9 @@ def test_a_body_that_may_end_falling_needs_no_lift():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("variant", ["trial-4", "trial-5"])
-def test_the_last_trials_keep_more_than_250_newtons_within_6_seconds(variant):
-    """Table 5.1: 280.55 N and 280.60 N, in 5.29 s and 5.28 s."""
-    result = plan_com(load_scenario("walls", variant).build_centroidal_problem())
+def test_the_last_trial_keeps_more_than_250_newtons_within_6_seconds():
+    """Table 5.1: 280.60 N in 5.28 s."""
+    result = plan_com(load_scenario("walls", "trial-5").build_centroidal_problem())
     assert result.succeeded
     assert result.d_min >= 250.0
     assert result.trajectory.duration <= 6.0 + 1e-6

@@ -6,7 +6,6 @@ import json
 import numpy as np
 import pytest
 
-from manikin import pipeline
 from manikin.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
 from manikin.simulation import HeldImpulse
 from manikin.simulation.push_search import DirectionSearch
@@ -93,11 +92,11 @@ def untimed(block):
     return {key: value for key, value in block.items() if key not in ("wall_s", "control_step_ms")}
 
 
-def test_a_push_is_the_run_of_the_scenario_with_the_same_numbers(capfd):
+def test_a_push_is_the_run_of_the_scenario_with_the_same_numbers(capfd, runs):
     """The experiment of the thesis from the side: the same summary, but for its name and wall times."""
     assert main(["push", "--force", "200", "--direction", "90", "--duration", "0.1", "--json"]) == DONE
     found = json.loads(capfd.readouterr().out)
-    wanted = pipeline.run("push-right-200").summary
+    wanted = runs("push-right-200").summary
     assert found.keys() == wanted.keys()
     assert found["succeeded"]
     assert untimed(found["push"]) == untimed(json.loads(json.dumps(wanted["push"])))
@@ -288,9 +287,9 @@ def test_maps_with_and_without_a_step_and_stiff_ankles(capfd, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_real_map_of_four_directions(capfd, tmp_path):
+def test_a_real_map_of_two_directions(capfd, tmp_path):
     """Each border was tried: what is held stands again when pushed once more, what is beyond falls."""
-    arguments = ["push", "--map", "--directions", "4", "--tolerance", "20", "--feet", "free", "--json"]
+    arguments = ["push", "--map", "--directions", "2", "--tolerance", "20", "--feet", "free", "--json"]
     assert main([*arguments, "--out", str(tmp_path / "map")]) == DONE
     found = json.loads(capfd.readouterr().out)
     held, beyond = np.array(found["impulse_Ns"]), np.array(found["beyond_Ns"])

@@ -1,11 +1,11 @@
 """The figure of the ways of all who walk: drawn from a run's own files."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
 
-from manikin import run
 from manikin.errors import FigureError, MotionFileError
 from manikin.figures.walk_paths import walk_paths_figure
 from manikin.figures.walking import KINDS
@@ -13,10 +13,8 @@ from manikin.record import RunRecord, read_run
 
 
 @pytest.fixture(scope="module")
-def caught(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("runs") / "catch"
-    assert run("catch", out=folder).succeeded
-    return folder
+def caught(runs, tmp_path_factory):
+    return shutil.copytree(runs("catch").directory, tmp_path_factory.mktemp("runs") / "catch")
 
 
 def test_everybody_is_drawn_where_the_run_says(caught):

@@ -82,7 +82,6 @@ def test_walker_is_three_discs_across():
 @pytest.mark.parametrize(
     "obstacle",
     [
-        WalkObstacle.disc("pillar", (0.0, 1.5), 0.3),
         WalkObstacle.disc("pillar aside", (0.1, 1.2), 0.4),
         WalkObstacle("box", [(-0.4, 1.0), (0.2, 1.0), (0.2, 1.6), (-0.4, 1.6)]),
         WalkObstacle.moving_disc("crossing", (0.0, 4.0), [(-1.5, 1.5), (1.5, 1.5)], 0.3),

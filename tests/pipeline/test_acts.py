@@ -57,9 +57,9 @@ def test_an_act_that_makes_no_sense_is_refused(override, words):
 
 
 @pytest.mark.slow
-def test_the_force_is_held_in_the_physics_engine(tmp_path):
+def test_the_force_is_held_in_the_physics_engine(runs):
     """200 N within 5 % for two seconds, without falling, sliding palms or an unplanned touch."""
-    result = pipeline.run("push-cupboard", out=tmp_path / "push")
+    result = runs("push-cupboard")
     assert result.summary["failure"] is None
     act = result.summary["act"]
     assert act["mean_force_N"] == pytest.approx(200.0, rel=0.05)
@@ -71,6 +71,6 @@ def test_the_force_is_held_in_the_physics_engine(tmp_path):
     assert act["equilibrium_residual"] < 1e-6
     assert not result.summary["execution"]["fell"]
     # The run directory holds the scenario with its supports and the act, ready to run again.
-    again = load_scenario(tmp_path / "push/scenario.yaml")
+    again = load_scenario(result.directory / "scenario.yaml")
     assert again.act.force_N == 200.0
     assert "left_hand" in again.build_sequence()[-1].stance

@@ -9,8 +9,8 @@ from manikin.scenarios import load_scenario
 
 
 @pytest.mark.slow
-def test_getting_into_a_car_is_planned_and_executed_to_the_last_column(tmp_path):
-    result = manikin.run("car-ingress", out=tmp_path / "car")
+def test_getting_into_a_car_is_planned_and_executed_to_the_last_column(runs):
+    result = runs("car-ingress")
     summary = result.summary
     assert result.succeeded, summary["failure"]
     # Qiu (2012), 7.2.2 and Table 7.6.
@@ -22,7 +22,7 @@ def test_getting_into_a_car_is_planned_and_executed_to_the_last_column(tmp_path)
     assert execution["min_margin"] > 0.0
     assert execution["max_penetration_m"] < 0.01
     assert result.execution.touches == ()
-    schedule = read_motions(tmp_path / "car" / "motion.h5").schedule
+    schedule = read_motions(result.directory / "motion.h5").schedule
     assert len(schedule.sequence) == 12
     last = schedule.sequence[11].stance
     assert set(last.effectors) == {"left_foot", "right_foot", "left_hand", "right_hand", "buttocks"}

@@ -47,8 +47,8 @@ def test_a_push_after_the_end_is_refused():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "waits"), [("platform@pushed", True), ("walk@pushed", False)])
-def test_a_pushed_body_goes_on_to_its_goal(name, waits):
-    result = pipeline.run(name)
+def test_a_pushed_body_goes_on_to_its_goal(runs, name, waits):
+    result = runs(name)
     scenario, push = load_scenario(name), result.summary["execution"]["push"]
     assert result.succeeded
     assert push["recovered"]

@@ -12,17 +12,9 @@ BEAMS = ("H1C1", "H2C1", "H3C1", "H2C2", "H2C3")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("stature", "mass", "sex"),
-    [
-        (1.60, 58.0, "male"),
-        (1.90, 95.0, "male"),
-        # Here the first fit leaves a shank 7 mm from the threshold; the second one makes room.
-        (1.60, 55.0, "female"),
-    ],
-)
-def test_other_bodies_run_the_same_scenario(stature, mass, sex):
-    result = manikin.run(load_scenario("platform").with_body(stature, mass, sex), seed=3)
+def test_another_body_runs_the_same_scenario():
+    """The first fit leaves a shank 7 mm from the threshold; the second one makes room."""
+    result = manikin.run(load_scenario("platform").with_body(1.60, 55.0, "female"), seed=3)
     assert result.succeeded, result.summary["failure"]
     assert result.summary["wholebody"]["min_clearance_m"] >= 0.01
     assert result.summary["execution"]["min_margin"] > 0.0
@@ -44,8 +36,10 @@ def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_pat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["walk", "walk@flat", "ramp", "ramp-down"])
-@pytest.mark.parametrize(("stature", "mass"), [(1.75, 70.0), (1.65, 62.0), (1.85, 78.0)])
+@pytest.mark.parametrize(
+    ("name", "stature", "mass"),
+    [("walk", 1.65, 62.0), ("walk@flat", 1.75, 70.0), ("ramp", 1.85, 78.0), ("ramp-down", 1.65, 62.0)],
+)
 def test_walks_succeed_for_every_stature(name, stature, mass):
     """[Qiu2012]_ 5.4.4: the ZMP stays inside the support polygon, of the point mass and the body."""
     scenario = load_scenario(name).with_body(stature_m=stature, mass_kg=mass)
@@ -59,19 +53,9 @@ def test_walks_succeed_for_every_stature(name, stature, mass):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "stature"),
-    [
-        ("car-ingress", 1.65),
-        ("car-ingress", 1.85),
-        ("beam-H2C2", 1.65),
-        ("beam-H2C2", 1.85),
-        ("beam-H3C1", 1.85),
-    ],
-)
-def test_cluttered_tasks_succeed_for_short_and_tall_people(name, stature):
-    """What stands in the scene does not grow with the body; these are the narrowest of them."""
-    result = manikin.run(load_scenario(name).with_body(stature_m=stature))
+def test_a_cluttered_task_succeeds_for_a_tall_person():
+    """What stands in the scene does not grow with the body; this is the lowest beam."""
+    result = manikin.run(load_scenario("beam-H3C1").with_body(stature_m=1.85))
     assert result.succeeded, result.summary["failure"]
     assert not result.execution.fell
     assert result.execution.min_margin > 0.0

@@ -4,7 +4,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from manikin import run
 from manikin.errors import ScenarioError
 from manikin.scenarios import load_scenario
 from manikin.stages.context import RunContext
@@ -48,9 +47,9 @@ def test_footprints_lead_from_start_to_goal(variant, way):
 
 
 @pytest.mark.slow
-def test_the_walk_to_the_platform_goes_on_without_a_seam():
+def test_the_walk_to_the_platform_goes_on_without_a_seam(runs):
     """No planned sample is farther from the one before than its velocities and accelerations explain."""
-    result = run("walk-and-platform")
+    result = runs("walk-and-platform")
     assert result.succeeded
     assert result.planned is not None
     assert not result.summary["execution"]["fell"]

@@ -1,6 +1,7 @@
 """Arithmetic expressions: exact values, CasADi, and nothing but arithmetic."""
 
 import math
+import pickle
 
 import casadi
 import numpy as np
@@ -18,6 +19,11 @@ def test_height_band_has_the_published_values():
     """[Qiu2012]_ 5.4.4 prints 0.938 m at x = 0 and 0.876 m at x = 0.6 (three digits)."""
     band = Expression(BAND)
     np.testing.assert_allclose(band(np.array([0.0, 0.6]), 0.0, 0.0), [0.938, 0.876], atol=5e-4)
+
+
+def test_a_copy_for_another_process_has_the_same_values():
+    copy = pickle.loads(pickle.dumps(Expression(BAND)))
+    assert copy(0.3, 0.0, 0.0) == Expression(BAND)(0.3, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -26,15 +26,13 @@ TRIALS = PushTrials(
     begins=0.0,
 )
 AT_REST = 0.2
-PUSHES, CHUNK = 200, 25
-CHUNKS = pytest.mark.parametrize("first", range(0, PUSHES, CHUNK))
-"""Parts of the pushes, for several processes of the tests."""
+PUSHES = 20
 
 
-def random_pushes(first, shares, border, seed):
-    """Direction, impulse and outcome of a chunk of pushes; impulses are shares of those at the border."""
-    rng = np.random.default_rng([seed, first])
-    for _ in range(CHUNK):
+def random_pushes(shares, border, seed):
+    """Direction, impulse and outcome of pushes; impulses are shares of those at the border."""
+    rng = np.random.default_rng(seed)
+    for _ in range(PUSHES):
         direction = rng.uniform(0.0, 360.0)
         impulse = rng.uniform(*shares) * border(direction)
         yield direction, impulse, TRIALS.push(direction, impulse, until_at_rest=AT_REST)
@@ -58,10 +56,9 @@ def test_nothing_is_held_beyond_the_bound_without_a_step():
 
 
 @pytest.mark.slow
-@CHUNKS
-def test_pushes_of_at_most_four_fifths_of_the_map_are_held(first):
+def test_pushes_of_at_most_four_fifths_of_the_map_are_held():
     """Between two directions of the map, of the smaller impulse. Who stands, stands upright on both feet."""
-    pushes = list(random_pushes(first, (0.0, 0.8), MAP.surely_held, 1))
+    pushes = list(random_pushes((0.0, 0.8), MAP.surely_held, 1))
     assert [
         (direction, impulse, found.failure) for direction, impulse, found in pushes if found.failure
     ] == []
@@ -72,9 +69,8 @@ def test_pushes_of_at_most_four_fifths_of_the_map_are_held(first):
 
 
 @pytest.mark.slow
-@CHUNKS
-def test_nothing_beyond_thirteen_tenths_of_the_map_is_called_a_recovery(first):
+def test_nothing_beyond_thirteen_tenths_of_the_map_is_called_a_recovery():
     """Between two directions of the map, of the larger impulse. Each fall is explained."""
-    pushes = list(random_pushes(first, (1.3, 2.5), MAP.surely_beyond, 2))
+    pushes = list(random_pushes((1.3, 2.5), MAP.surely_beyond, 2))
     assert [push for *push, found in pushes if found.recovered] == []
     assert all(found.failure and found.time_to_rest is None for *_, found in pushes)

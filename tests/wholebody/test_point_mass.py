@@ -13,9 +13,8 @@ from manikin.scenarios import load_scenario
 
 
 @pytest.fixture(scope="module")
-def climbed(tmp_path_factory):
-    directory = tmp_path_factory.mktemp("walls") / "run"
-    return run("walls", variant="trial-2", out=directory)
+def climbed(runs):
+    return runs("walls@trial-2")
 
 
 def test_the_run_ends_with_its_certificate(climbed):

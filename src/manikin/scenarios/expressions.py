@@ -72,6 +72,10 @@ class Expression:
         environment = dict(zip(self.variables, values, strict=True))
         return self._evaluate(environment, functions_for(*values))
 
+    def __reduce__(self) -> "tuple[type[Expression], tuple[str, tuple[str, ...]]]":
+        """Copies and other processes parse the text again."""
+        return Expression, (self.text, self.variables)
+
     def __repr__(self) -> str:
         return f"Expression({self.text!r})"
 

@@ -1,0 +1,154 @@
+"""Long plans, impossible ones and walks over the whole floor: `pytest benchmarks/sweep_plans.py -n 2`.
+
+A quarter of an hour on two cores. The tests have one case of each kind.
+"""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manikin.balance import wrench_polytope
+from manikin.body import human
+from manikin.centroidal import CentroidalProblem, plan_com
+from manikin.centroidal.feasibility import polytopes_of
+from manikin.contact import Phase, Stance, StanceSequence, sole
+from manikin.locomotion import START, place_footprints, walking_path
+from manikin.locomotion.words import residuals, word_paths
+from manikin.pipeline import run
+from manikin.scenarios import load_scenario
+from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
+from manikin.scenarios.walked import walk_before, walking_supports
+from manikin.scene import Box, Obstacle, Scene
+from manikin.spatial import GRAVITY
+from manikin.stages.contacts import find_supports
+from manikin.stages.keyed_contacts import KeyedContacts
+from manikin.wholebody import WholeBodySettings, plan_whole_body, refine_motion
+from manikin.wholebody.manner import CLOSE
+
+CASES = Path(__file__).parents[1] / "tests/wholebody/refine_cases.py"
+
+
+# --- centre of mass -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("variant", "force"), [("trial-2", 150.0), ("trial-4", 250.0), ("trial-5", 250.0)])
+def test_trials_between_the_walls_keep_their_margins(variant, force):
+    """Table 5.1: 196, 280.55 and 280.60 N, in less than 6 s ([Qiu2012]_ 5.4.4)."""
+    result = plan_com(load_scenario("walls", variant).build_centroidal_problem())
+    assert result.succeeded
+    assert result.d_min >= force
+    assert result.trajectory.duration <= 6.0 + 1e-6
+
+
+def test_a_stance_moved_elsewhere_has_the_polytope_it_would_have():
+    """Row by row, in all nineteen phases between the walls [N]."""
+    problem = load_scenario("walls", "trial-2").build_centroidal_problem()
+    for phase, polytope in zip(problem.sequence, polytopes_of(problem), strict=True):
+        direct = wrench_polytope(phase.stance, reference=polytope.reference)
+        gaps = np.abs(
+            np.column_stack([polytope.H, polytope.h / 1000.0])[:, None]
+            - np.column_stack([direct.H, direct.h / 1000.0])[None]
+        ).max(axis=2)
+        assert gaps.min(axis=1).max() < 1e-7
+        assert gaps.min(axis=0).max() < 1e-7
+
+
+# --- whole body -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def cases():
+    spec = importlib.util.spec_from_file_location("refine_cases", CASES)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["refine_cases"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(("name", "length"), [("climb", 8), ("crouch", 5)])
+def test_a_long_climb_and_a_long_crouch_are_refined(cases, name, length):
+    """Eight moves on the wall, six steps under the slab."""
+    result = refine_motion(*getattr(cases, name)(length))
+    assert result.succeeded, result.failure
+    assert result.after.squared_accelerations <= result.before.squared_accelerations / 5.0
+    assert result.after.physics_violation <= result.before.physics_violation / 10.0
+    assert result.after.min_margin > 0.0
+
+
+@pytest.mark.parametrize("name", ["climb-wall", "insect-books", "climb@aslant"])
+def test_limbs_go_all_the_way_and_are_refined(name):
+    """Margin at every sample of 5 ms, no penetration, contacts kept."""
+    scenario = load_scenario(name)
+    body, scene = scenario.build_body(), scenario.build_scene()
+    found = find_supports(scenario, body, scene, np.random.default_rng(scenario.seed))
+    assert found.failure is None
+    keyed = KeyedContacts.of_plan(found.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    keyed = keyed.with_lifted_feet(body, scene, ())
+    refined = refine_motion(body, scene, keyed.time, keyed.q, keyed.schedule)
+    assert refined.failure is None, refined.failure
+    assert refined.certificate.min_margin > 0.0
+    assert refined.certificate.max_penetration_m < 1e-3
+
+
+@pytest.mark.parametrize("height", [1.1, 1.2, 1.3])
+def test_a_ceiling_below_the_head_is_reported_with_its_pair(height):
+    """No person of 1.75 m keeps the centre of mass at 0.93 m below it."""
+    size = {"length": 0.28, "width": 0.12, "friction": 0.7}
+    right = sole("right_foot", (0.0, -0.1, 0.0), **size)
+    behind, ahead = (sole("left_foot", (x, 0.1, 0.0), **size) for x in (0.0, 0.25))
+    stances = ([behind, right], [right], [ahead, right])
+    person = human(1.75, 79.0, "male", sole_length=0.28, sole_width=0.12)
+    com = plan_com(
+        CentroidalProblem(
+            person.mass, StanceSequence([Phase(Stance(held, 1500.0), 0.5, 1.2) for held in stances]),
+            (-0.02, 0.0, 0.93), (0.1, 0.0, 0.93), required_margin=10.0, max_duration=3.5,
+        )
+    ).trajectory  # fmt: skip
+    scene = Scene([Obstacle("ceiling", Box((4.0, 4.0, 0.1)), translation=(0.0, 0.0, height + 0.05))])
+    # Coarse: what is impossible is tried in every way there is.
+    coarse = WholeBodySettings(guide_spacing=0.5, knot_spacing=0.15, manner=CLOSE)
+    result = plan_whole_body(person, scene, com, rng=np.random.default_rng(0), settings=coarse)
+    assert not result.succeeded
+    assert result.certificate.min_clearance_m < 0.01
+    assert "ceiling" in str(result.certificate.closest_pair) or "error" in result.failure.reason
+
+
+# --- walks ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "goal", [(3.0, 0.0, 0.0), (2.0, 2.0, np.pi / 2), (1.5, -1.5, 0.0), (0.0, 2.0, np.pi)]
+)
+def test_walks_are_executed(goal):
+    path = walking_path((0, 0, 0), goal, max_speed=0.6)
+    result = run(walking_supports(place_footprints(path), load_scenario("walk")))
+    assert result.succeeded, result.summary["failure"]
+    assert result.summary["execution"]["min_margin"] > 0.0
+    np.testing.assert_allclose(result.executed.com[-1, :2], goal[:2], atol=0.01)
+
+
+def test_a_walk_to_the_platform_goes_on_with_its_plan():
+    path = walking_path((0, -4, np.pi / 2), (0, 0, np.pi / 2), max_speed=0.6)
+    scenario = walk_before(place_footprints(path, first="right_foot"), load_scenario("platform"))
+    result = run(scenario)
+    assert result.succeeded, result.summary["failure"]
+    np.testing.assert_allclose(result.executed.com[-1], scenario.goal_com, atol=0.01)
+
+
+@pytest.mark.parametrize("heading", range(0, 360, 10))
+def test_every_goal_of_a_slice_satisfies_the_maximum_principle(heading):
+    """Goals of the thesis' grid every 0.4 m: met to 1e-9, u2 as the adjoint says, the Hamiltonian zero."""
+    x, y = np.meshgrid(np.arange(-2.0, 2.01, 0.4), np.arange(3.0, 9.01, 0.4))
+    goals = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, np.radians(heading))])
+    paths = word_paths(goals)
+    found = residuals(
+        np.array(START), np.array([path.goal for path in paths]), np.array([path.shape for path in paths]),
+        np.array([path.length for path in paths]),
+    )  # fmt: skip
+    assert found.position.max() < 1e-9
+    assert found.heading.max() < 1e-9
+    assert found.adjoint.max() < 1e-3
+    assert found.hamiltonian.max() < 1e-3

@@ -1,0 +1,102 @@
+"""Every built-in scenario, variant, body and seed: `pytest benchmarks/sweep_scenarios.py -n 2`.
+
+An hour on two cores. The tests run one scenario of each kind; this runs all. ``-k`` chooses: ``-k beam``,
+``-k "bodies and walk"``.
+"""
+
+import numpy as np
+import pytest
+
+import manikin
+from manikin.contact_planning import certify_plan
+from manikin.scenarios import list_scenarios, list_variants, load_scenario
+from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
+from manikin.scene import Proximity, Scene
+from manikin.spatial import GRAVITY
+from manikin.stages.contacts import find_supports
+
+EVERY = [
+    name if variant is None else f"{name}@{variant}"
+    for name in list_scenarios()
+    for variant in (None, *list_variants(name))
+]
+LOWEST_COM = {
+    "beam-H1C1": 0.85, "beam-H2C1": 0.80, "beam-H3C1": 0.65, "beam-H1C1@S2": 0.85, "beam-H2C1@S2": 0.80,
+    "beam-H3C1@S2": 0.65, "beam-H2C2": 0.80, "beam-H2C3": 0.80,
+}  # fmt: skip
+"""Lowest CoM heights of people under a beam [m] ([Qiu2012]_ 3.2.3, "about")."""
+
+BODIES = [
+    *[("platform", *body) for body in ((1.60, 58.0, "male"), (1.90, 95.0, "male"), (1.60, 55.0, "female"))],
+    *[
+        (name, stature, mass, "male")
+        for name in ("walk", "walk@flat", "ramp", "ramp-down")
+        for stature, mass in ((1.65, 62.0), (1.75, 70.0), (1.85, 78.0))
+    ],
+    *[
+        (name, stature, None, None)
+        for name in ("car-ingress", "beam-H2C2", "beam-H3C1")
+        for stature in (1.65, 1.85)
+    ],
+]
+"""Scenario, stature [m], mass [kg] and sex; those of the scenario where None."""
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_every_scenario_ends_as_its_file_says(name):
+    """A success stands on its feet in the physics engine; a failure names its stage and its reason."""
+    result = manikin.run(name)
+    if load_scenario(name).file.expect == "failure":
+        assert not result.succeeded
+        assert result.summary["failure"]["stage"]
+        assert result.summary["failure"]["reason"]
+        return
+    assert result.succeeded, result.summary["failure"]
+    if result.execution is not None:
+        assert not result.execution.fell
+        assert result.execution.min_margin > 0.0
+
+
+@pytest.mark.parametrize("name", [name for name in EVERY if name in LOWEST_COM or name.endswith("@S2")])
+def test_the_head_passes_under_the_beam(name):
+    """2 cm clear of it; the CoM comes as low as people's within 7 cm, or lower with a hand on a post."""
+    result = manikin.run(name)
+    assert result.succeeded, result.summary["failure"]
+    scenario = load_scenario(name)
+    body = scenario.build_body()
+    beam = Scene([item for item in scenario.build_scene() if item.name == "beam"], floor_height=None)
+    proximity = Proximity(body, beam, self_collision=False)
+    others = frozenset((segment.name, "beam") for segment in body.segments if segment.name != "head")
+    assert min(proximity.minimum(q, others).distance for q in result.executed.q[::4]) >= 0.02
+    if name in LOWEST_COM:
+        assert result.summary["execution"]["lowest_com_m"] == pytest.approx(LOWEST_COM[name], abs=0.07)
+
+
+def test_a_knee_high_beam_ends_in_its_true_cause():
+    """0.4 m is less than the body folds to; the failure says so."""
+    failure = manikin.run("beam-H1C1@knee-high").summary["failure"]
+    assert "'beam' leaves 0.40 m above the supports; this body folds to no less than" in failure["reason"]
+
+
+@pytest.mark.parametrize(("name", "stature", "mass", "sex"), BODIES)
+def test_other_bodies_do_the_same(name, stature, mass, sex):
+    """The scene does not grow with the body; margins of the scenario are kept by each ([Qiu2012]_ 5.4.4)."""
+    scenario = load_scenario(name).with_body(stature, mass, sex)
+    result = manikin.run(scenario)
+    assert result.succeeded, result.summary["failure"]
+    assert result.execution.min_margin > 0.0
+    assert result.summary["centroidal"]["min_margin"] >= scenario.required_margin - 1e-6
+
+
+@pytest.mark.parametrize(
+    "name", ["crouch", "stairs", "stand-up-chair", "stand-up-sofa", "platform@found", "climb"]
+)
+@pytest.mark.parametrize("seed", range(20))
+def test_contacts_are_found_with_every_seed(name, seed):
+    scenario = load_scenario(name)
+    body, scene = scenario.build_body(), scenario.build_scene()
+    found = find_supports(scenario, body, scene, np.random.default_rng(seed))
+    assert found.failure is None
+    certificate = certify_plan(body, scene, found.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    assert certificate.changes == 1
+    assert certificate.max_torque_share < 1.0

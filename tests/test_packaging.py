@@ -1,0 +1,51 @@
+"""Every package that is imported is declared, where it is needed."""
+
+import ast
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+EXTRAS = PROJECT["optional-dependencies"]
+DISTRIBUTION = {
+    "PIL": "pillow",
+    "yaml": "pyyaml",
+    "pinocchio": "pin",
+    "mpl_toolkits": "matplotlib",
+    "xdist": "pytest-xdist",
+}
+"""Names of distributions that differ from those of their packages."""
+
+
+def imported(folder):
+    """Distributions imported anywhere in a folder, with one file each."""
+    found = {}
+    for path in sorted((ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names = [node.module]
+            else:
+                continue
+            for package in {name.partition(".")[0] for name in names} - sys.stdlib_module_names:
+                found[DISTRIBUTION.get(package, package.replace("_", "-"))] = path
+    return found
+
+
+def declared(*extras):
+    """Distributions that the package and these extras name."""
+    lines = [*PROJECT["dependencies"], *(line for extra in extras for line in EXTRAS[extra])]
+    return {re.match(r"[\w-]+", line)[0].lower() for line in lines}
+
+
+@pytest.mark.parametrize(
+    ("folder", "extras"), [("src", ("viewer", "mocap")), ("tests", ("test", "viewer", "mocap"))]
+)
+def test_every_import_is_declared(folder, extras):
+    known = {*declared(*extras), "manikin", "tests"}
+    assert {name: str(path) for name, path in imported(folder).items() if name not in known} == {}
