@@ -10,8 +10,8 @@ from scipy.special import expit
 
 from manikin.balance import wrench_polytope
 from manikin.contact import Stance
-from manikin.spatial import FloatArray
-from manikin.wholebody.refine_physics import WrenchCost, about, centre_of
+from manikin.spatial import FloatArray, wrench_map
+from manikin.wholebody.refine_physics import WrenchCost, centre_of
 
 FLAT = 1.0
 """Radius of the largest ball in a polytope below which it is flat: it has no inside to stay in [N.m]."""
@@ -32,7 +32,7 @@ class BalanceRoom:
     """
 
     def __init__(self, stance: Stance) -> None:
-        self._to_local = about(centre_of(stance))
+        self._to_local = wrench_map(centre_of(stance))
         self.polytope = wrench_polytope(stance, reference=centre_of(stance))
         self.radius = self.polytope.inscribed_ball()[1]
 
