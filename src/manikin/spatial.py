@@ -133,6 +133,22 @@ def skew(vector: ArrayLike) -> FloatArray:
     return matrix
 
 
+def wrench_about(wrench: FloatArray, point: FloatArray) -> FloatArray:
+    """(..., 6) wrenches about the world origin with moments about another point (..., 3) [N, N.m].
+
+    The negative point takes moments about it to moments about the origin.
+    """
+    force = wrench[..., :3]
+    return np.concatenate([force, wrench[..., 3:] - cross(point, force)], axis=-1)
+
+
+def wrench_map(point: FloatArray) -> FloatArray:
+    """(..., 6, 6) matrices of :func:`wrench_about` for points (..., 3)."""
+    moved = np.broadcast_to(np.eye(6), (*np.shape(point)[:-1], 6, 6)).copy()
+    moved[..., 3:, :3] = -skew(point)
+    return moved
+
+
 def rotation_from_yaw(yaw: float) -> FloatArray:
     """Rotation by ``yaw`` [rad] about the vertical."""
     c, s = np.cos(yaw), np.sin(yaw)

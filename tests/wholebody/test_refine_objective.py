@@ -12,6 +12,7 @@ from manikin.contact import FRICTION_MODELS, ContactSchedule, Phase, Stance, Sta
 from manikin.contact_planning import Task
 from manikin.contact_planning.efort import efort
 from manikin.scene import Box, Obstacle, Proximity, Scene
+from manikin.spatial import wrench_map
 from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
 from manikin.wholebody.knots import phase_knots, sample_times
 from manikin.wholebody.refine_balance import BalanceRoom
@@ -19,7 +20,7 @@ from manikin.wholebody.refine_efort import LimbDirections, efort_with_derivative
 from manikin.wholebody.refine_input import KeyPath
 from manikin.wholebody.refine_measures import physics_violation
 from manikin.wholebody.refine_objective import RefineObjective, refine_targets
-from manikin.wholebody.refine_physics import ContactForces, about, centre_of
+from manikin.wholebody.refine_physics import ContactForces, centre_of
 from manikin.wholebody.refine_scales import RefineScales
 
 SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
@@ -161,7 +162,7 @@ def test_margin_is_that_of_the_wrench_polytope(stance):
     wrench = np.array([0.0, 0.0, 775.0, 0.0, 0.0, 0.0]) + 50.0 * rng.normal(size=(8, 6))
     com = np.array([0.02, -0.03, 0.9]) + 0.1 * rng.normal(size=(8, 3))
     expected = [
-        float(wrench_polytope(stance, reference=x).margin(about(x) @ w))
+        float(wrench_polytope(stance, reference=x).margin(wrench_map(x) @ w))
         for w, x in zip(wrench, com, strict=True)
     ]
     np.testing.assert_allclose(room.margin(wrench, com), expected, rtol=1e-9)

@@ -32,10 +32,9 @@ from scipy.sparse.linalg import splu
 
 from manikin.balance.contact_forces import ContactGenerators, share
 from manikin.balance.limits import contact_limits
-from manikin.balance.motion_margin import wrench_about
 from manikin.contact import Stance
 from manikin.mocap.runs import runs
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, wrench_about, wrench_map
 
 SOFTNESS = 1e-6
 """``e``, per mean eigenvalue of ``G G^T``: so small that little of an admissible wrench is left."""
@@ -199,11 +198,7 @@ def _sums(frame: NDArray[np.int64], arm: FloatArray, frames: int) -> sparse.csr_
 
 def _carried(arm: FloatArray) -> FloatArray:
     """(k, 6, 6) which carry wrenches, moments per lever, from points (k, 3) away."""
-    x, y, z = (arm / LEVER).T
-    carried = np.tile(np.eye(6), (len(arm), 1, 1))
-    zero = np.zeros_like(x)
-    carried[:, 3:, :3] = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    return carried
+    return wrench_map(-arm / LEVER)
 
 
 def _about(wrench: FloatArray, point: FloatArray) -> FloatArray:

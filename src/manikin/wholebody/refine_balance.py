@@ -12,8 +12,8 @@ from manikin.balance import stability_margins, wrench_polytope
 from manikin.balance.friction import cross
 from manikin.balance.margin import wrench_levers
 from manikin.contact import Stance
-from manikin.spatial import FloatArray
-from manikin.wholebody.refine_physics import WrenchCost, about, centre_of
+from manikin.spatial import FloatArray, wrench_map
+from manikin.wholebody.refine_physics import WrenchCost, centre_of
 
 FLAT = 1.0
 """Radius of the largest ball in a polytope below which it is flat: it has no inside to stay in [N.m]."""
@@ -34,7 +34,7 @@ class BalanceRoom:
     """
 
     def __init__(self, stance: Stance) -> None:
-        self._to_local = about(centre_of(stance))
+        self._to_local = wrench_map(centre_of(stance))
         self.polytope = wrench_polytope(stance, reference=centre_of(stance))
         self.is_flat = self.polytope.inscribed_ball()[1] < FLAT
 

@@ -18,13 +18,13 @@ from manikin.contact_planning.efort import Task
 from manikin.motion.dynamics import centroidal_motion
 from manikin.scene import Proximity
 from manikin.scene.distance import moves_by_joint
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, wrench_map
 from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_contacts import contact_variables
 from manikin.wholebody.refine_efort import LEAST, efort_with_derivative, limb_directions
 from manikin.wholebody.refine_input import KeyPath
 from manikin.wholebody.refine_obstacles import RefineObstacles
-from manikin.wholebody.refine_physics import about, centre_of
+from manikin.wholebody.refine_physics import centre_of
 
 STEP = 0.01
 """Spacing of the samples that are measured [s]."""
@@ -143,7 +143,7 @@ def balance_of(
     for number, (phase, room) in enumerate(zip(schedule.sequence, rooms, strict=True)):
         rows = phases == number
         if np.any(rows):
-            violation[rows] = physics_violation(room, wrench[rows] @ about(centre_of(phase.stance)).T)
+            violation[rows] = physics_violation(room, wrench[rows] @ wrench_map(centre_of(phase.stance)).T)
     polytopes = [room.polytope for room in rooms]
     found = motion_margin([one.stance for one in polytopes], phases, wrench, com, polytopes=polytopes)
     return found.margin, violation

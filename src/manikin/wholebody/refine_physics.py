@@ -17,7 +17,7 @@ import numpy as np
 
 from manikin.balance.contact_forces import ContactGenerators, share
 from manikin.contact import Stance
-from manikin.spatial import GRAVITY_VECTOR, FloatArray, skew
+from manikin.spatial import GRAVITY_VECTOR, FloatArray, skew, wrench_map
 from manikin.wholebody.motion_samples import MotionSamples
 
 ARM = 0.25
@@ -57,13 +57,6 @@ class WrenchSamples:
         )
         jacobians[0][:, 3:] -= skew(force) @ by_com
         return cls(np.hstack([force, moment]), (jacobians[0], jacobians[1], jacobians[2]), by_com)
-
-
-def about(point: FloatArray) -> FloatArray:
-    """(6, 6) map of wrenches about the world origin to such about a point (3,)."""
-    moved = np.eye(6)
-    moved[3:, :3] = -skew(point)
-    return moved
 
 
 def centre_of(stance: Stance) -> FloatArray:
@@ -125,7 +118,7 @@ class ContactForces:
         generators = ContactGenerators.of(stance)
         columns = [names.index(contact.effector) for contact in stance]
         scale = np.repeat([1.0, 1.0 / ARM], 3)
-        self._to_local = scale[:, None] * about(self.centre)
+        self._to_local = scale[:, None] * wrench_map(self.centre)
         self._matrix = scale[:, None] * generators.about(self.centre)
         self._limit = generators.upper
         self.columns = np.array(columns, dtype=np.int64)[generators.contact]
