@@ -47,7 +47,7 @@ def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSe
     cap = supports.normal_force_cap_N
     if planning:
         cap = supports.planning_normal_force_cap_N or cap
-    cap = cap or BODY_WEIGHTS_CAP * values.mass * GRAVITY
+    cap = cap or BODY_WEIGHTS_CAP * values.moved_mass * GRAVITY
     try:
         return StanceSequence(
             [

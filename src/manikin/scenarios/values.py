@@ -66,12 +66,18 @@ class ScenarioValues:
 
     @property
     def mass(self) -> float:
-        """Body mass [kg]."""
+        """Body mass, without a load [kg]."""
         if self.file.body.model in ("urdf", "kudoh"):
             from manikin.scenarios.world import build_body
 
-            return build_body(self).mass
+            return build_body(self).own_mass
         return self.file.body.mass_kg
+
+    @property
+    def moved_mass(self) -> float:
+        """Body mass with the load in the hands [kg]."""
+        load = self.file.body.load
+        return self.mass if load is None else self.mass + load.mass_kg
 
     @property
     def is_point_mass(self) -> bool:
