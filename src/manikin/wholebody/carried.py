@@ -39,7 +39,7 @@ def carried_motion(
     time, q, v, a = motion.time, motion.q, motion.v, motion.a
     com, momentum, wrench = centroidal_state(loaded, q, v, a)
     forces = plan_forces(loaded, schedule, time, q, v, a)
-    stances = [phase.stance for phase in schedule.sequence]
+    stances = [phase.stance.bounded(loaded.mass) for phase in schedule.sequence]
     names = schedule.sequence.effectors
     return loaded, Motion(
         time=time, q=q, v=v, a=a, tau=forces.tau, com=com, angular_momentum=momentum,
