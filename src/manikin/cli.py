@@ -142,6 +142,12 @@ def run(
             metavar="X", help="Torque limits relative to a healthy adult of that sex, size and age."
         ),
     ] = None,
+    load_kg: Annotated[
+        float | None, typer.Option(metavar="KG", help="Load in the hands during the whole motion.")
+    ] = None,
+    load_hand: Annotated[
+        str | None, typer.Option(metavar="left|right|both", help="Hand that carries it. Default: both.")
+    ] = None,
     variant: Annotated[
         str | None, typer.Option(metavar="V", help="One of the scenario's variants; also NAME@V.")
     ] = None,
@@ -170,6 +176,7 @@ def run(
         refuse(variant is not None, "--variant", "every variant is run")
         refuse(bool(overrides), "--set", "it belongs to one scenario")
         refuse(moved is not None, "--moved", "it belongs to one scenario")
+        refuse(load_kg is not None or load_hand is not None, "--load-kg", "it belongs to one scenario")
         body = {"--stature": stature, "--mass": mass, "--sex": sex, "--age": age, "--strength": strength}
         given = {"--seed": seed} | body
         words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
@@ -178,10 +185,12 @@ def run(
         asked = {"stature_m": stature, "seed": seed}
         return _run_all(directory, asked, tuple(words), context.obj, draw=figures, workers=jobs, json=json)
     refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
+    refuse(load_hand is not None and load_kg is None, "--load-hand", "it needs --load-kg")
+    load = None if load_kg is None else {"mass_kg": load_kg, "hand": load_hand or "both"}
     from manikin.scenarios import load_scenario
 
     job = load_scenario(scenario, variant, overrides or ())
-    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex, age=age, strength=strength)
+    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex, age=age, strength=strength, load=load)
     if seed is not None:
         job = job.with_seed(seed)
     if moved is not None:

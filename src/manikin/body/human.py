@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,7 @@ from manikin.body.anthropometry import (
     TOES_MASS_SHARE,
     Anthropometry,
 )
+from manikin.body.load import HANDS, carrying
 from manikin.body.model import OFF_AXIS, BodyModel
 from manikin.body.off_axis import off_axis
 from manikin.body.parts import (
@@ -158,7 +159,12 @@ def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
     if masses not in (None, OFF_AXIS):
         raise BodyError(f"body masses are {masses!r}; valid: {OFF_AXIS}, or none")
     values |= {key: signature[key] for key in ("age", "strength") if key in signature}
-    return human(**values, lengths=measured, off_axis_masses=masses == OFF_AXIS)
+    body = human(**values, lengths=measured, off_axis_masses=masses == OFF_AXIS)
+    for hand, effectors in HANDS.items():
+        load = signature.get(f"{effectors[0]}_load")
+        if len(effectors) == 1 and load is not None:
+            body = carrying(body, cast("float", load), hand)
+    return body
 
 
 def standing_angles() -> dict[str, float]:

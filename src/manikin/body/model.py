@@ -59,6 +59,8 @@ class BodyModel(Displayed):
         strength: Torque limits relative to those of a healthy human of that sex, size and age.
         lengths: Lengths of a human that were measured instead of scaled [m].
         off_axis_masses: Whether a human's centres of mass lie off the lines between joints.
+        loads: What each hand carries [kg], by the name of its effector; the masses are part of the hands'
+            segments, see :func:`manikin.body.load.carrying`.
     """
 
     name: str
@@ -76,6 +78,7 @@ class BodyModel(Displayed):
     strength: float = 1.0
     lengths: Mapping[str, float] = field(default_factory=dict)
     off_axis_masses: bool = False
+    loads: Mapping[str, float] = field(default_factory=dict)
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
@@ -102,21 +105,27 @@ class BodyModel(Displayed):
         object.__setattr__(self, "effectors", MappingProxyType(dict(self.effectors)))
         object.__setattr__(self, "standing_angles", MappingProxyType(dict(self.standing_angles)))
         object.__setattr__(self, "lengths", MappingProxyType(dict(self.lengths)))
+        object.__setattr__(self, "loads", MappingProxyType(dict(self.loads)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what describes the body, for other processes; what was computed from it is left out."""
         given = {each.name: getattr(self, each.name) for each in fields(self)}
-        plain = {name: dict(given[name]) for name in ("effectors", "standing_angles", "lengths")}
+        plain = {name: dict(given[name]) for name in ("effectors", "standing_angles", "lengths", "loads")}
         return partial(BodyModel, **(given | plain)), ()
 
     # --- description ---------------------------------------------------------------------
 
     @cached_property
     def mass(self) -> float:
-        """Total mass [kg]."""
+        """Total mass, with what the hands carry [kg]."""
         if self.nominal_mass is not None:
             return self.nominal_mass
         return fsum(segment.mass for segment in self.segments)
+
+    @property
+    def own_mass(self) -> float:
+        """Mass without what the hands carry [kg]."""
+        return self.mass - fsum(self.loads.values())
 
     @cached_property
     def hinges(self) -> tuple[Hinge, ...]:
@@ -318,11 +327,12 @@ class BodyModel(Displayed):
     def signature(self) -> dict[str, str | float]:
         """What a file must keep to build this body again: its name and the arguments of its maker."""
         values = {
-            "model": self.name, "stature": self.stature, "mass": self.mass, "sex": self.sex,
+            "model": self.name, "stature": self.stature, "mass": self.own_mass, "sex": self.sex,
             "sole_length": self.sole_length, "sole_width": self.sole_width,
         }  # fmt: skip
         values |= {"age": self.age} | ({} if self.strength == 1.0 else {"strength": self.strength})
         values |= {f"{name}_length": value for name, value in self.lengths.items()}
+        values |= {f"{name}_load": value for name, value in self.loads.items()}
         if self.off_axis_masses:
             values["masses"] = OFF_AXIS
         return {key: value for key, value in values.items() if value is not None}

@@ -10,9 +10,9 @@ from manikin.scenarios.sections.contact import SoleSection
 from manikin.scenarios.validation import Number, Positive, Section, Text, Vector3, refuse
 
 _KEYS = {
-    "human": ("stature_m", "mass_kg", "sex", "age", "strength", "further_contacts"),
+    "human": ("stature_m", "mass_kg", "sex", "age", "strength", "load", "further_contacts"),
     "point_mass": ("mass_kg",),
-    "kudoh": (),
+    "kudoh": ("load",),
     "insect": ("length_m", "mass_kg"),
     "urdf": ("urdf", "limbs", "standing_deg", "sole"),
 }
@@ -47,6 +47,15 @@ class LimbSection(Section):
     )  # fmt: skip
 
 
+class LoadSection(Section):
+    """What the hands carry during the whole motion."""
+
+    mass_kg: Positive = Field(description="mass of the load [kg], a point at the middle of the palms")
+    hand: Literal["left", "right", "both"] = Field(
+        default="both", description="which hand carries it; both carry half each"
+    )
+
+
 class BodySection(Section):
     """Whose motion it is."""
 
@@ -70,6 +79,9 @@ class BodySection(Section):
     strength: Positive = Field(
         default=1.0,
         description="torque limits relative to a healthy adult of that sex, size and age, of a human only",
+    )
+    load: LoadSection | None = Field(
+        default=None, description="load in the hands during the whole motion, of a human or kudoh"
     )
     further_contacts: list[Literal["knees", "elbows", "pelvis"]] | None = Field(
         default=None,
