@@ -142,7 +142,8 @@ def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
     if free.succeeded and np.all(short <= 0.0):
         return kept
     # Ways over a grid depend on its axes: with those of the start, a scene elsewhere has the same ones.
-    transform_start_to_world = PlanarTransform(*task.start[:2].tolist(), math.degrees(task.start[2]))
+    x, y, heading = task.start.tolist()
+    transform_start_to_world = PlanarTransform(x, y, math.degrees(heading))
     transform_world_to_start = transform_start_to_world.inverse
     from_start = _from_start(task, transform_world_to_start)
     blocking = [one for one, lack in zip(from_start.obstacles, short, strict=False) if lack > 0.0]

@@ -16,6 +16,7 @@ from manikin.motion import Motion
 from manikin.scenarios import Scenario
 from manikin.scene import Scene
 from manikin.spatial import FloatArray, PlanarTransform
+from manikin.stages.world_frame import reason_in_world
 from manikin.wholebody import Passage, WholeBodySettings, measure_passage
 from manikin.wholebody.manner import manner_of
 
@@ -108,8 +109,11 @@ class RunContext:
         return None if self.plan is None else self.plan.postures
 
     def _posed(self, scenario: Scenario) -> "RunContext":
-        problem = scenario.build_centroidal_problem()
-        return replace(self, scenario=scenario, problem=scenario.build_keyframe_problem() or problem)
+        try:
+            problem = scenario.build_keyframe_problem() or scenario.build_centroidal_problem()
+        except ScenarioError as error:
+            raise ScenarioError(reason_in_world(str(error), self.transform_task_to_world)) from None
+        return replace(self, scenario=scenario, problem=problem)
 
     def passage(self, schedule: ContactSchedule, motion: Motion) -> Passage:
         """How low the body comes, and how near its head to the scene."""

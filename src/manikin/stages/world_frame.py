@@ -39,7 +39,7 @@ def schedule_in_world(schedule: ContactSchedule, transform_task_to_world: Planar
         for contact in phase.stance:
             if id(contact) not in moved:
                 moved[id(contact)] = contact_in_world(contact, transform_task_to_world)
-        stance = Stance([moved[id(contact)] for contact in phase.stance], phase.stance.normal_force_cap)
+        stance = Stance([moved[id(contact)] for contact in phase.stance], model=phase.stance.model)
         phases.append(replace(phase, stance=stance))
     return ContactSchedule(StanceSequence(phases), schedule.instants)
 
