@@ -14,8 +14,6 @@ from threadpoolctl import threadpool_limits
 
 from manikin.errors import ScenarioError
 from manikin.scenarios import Scenario, load_scenario
-from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
-from manikin.spatial import GRAVITY
 from manikin.stages import ExecutionRequirements, Progress, Report, RunContext, RunResult
 from manikin.stages.act import append_act
 from manikin.stages.centroidal import plan_centre_of_mass
@@ -133,8 +131,7 @@ def _refined(context: RunContext, report: Report, requirements: ExecutionRequire
     """Key postures of the contact plan, or of the centre of mass on given supports, then the refinement."""
     centroidal, keyed = None, None
     if context.plan is not None:
-        cap = BODY_WEIGHTS_CAP * context.scenario.mass * GRAVITY
-        keyed = KeyedContacts.of_plan(context.plan, cap)
+        keyed = KeyedContacts.of_plan(context.plan, context.scenario.contact_model)
     else:
         plan = with_key_postures(context, report, plan_centre_of_mass(context, report))
         centroidal = plan.centroidal

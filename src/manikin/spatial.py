@@ -96,6 +96,20 @@ def _shape_text(shape: Sequence[int | None] | None) -> str:
     return "(" + ", ".join("n" if size is None else str(size) for size in shape) + ")"
 
 
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross product along the last axis; several times faster than numpy's on small arrays."""
+    if a.ndim == b.ndim == 1:
+        (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+        return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product[..., 0] = ay * bz - az * by
+    product[..., 1] = az * bx - ax * bz
+    product[..., 2] = ax * by - ay * bx
+    return product
+
+
 def skew(vector: ArrayLike) -> FloatArray:
     """Matrix of the cross product, ``skew(a) @ b == cross(a, b)`` ([Qiu2012]_ 2.10).
 

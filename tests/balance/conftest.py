@@ -18,10 +18,11 @@ KILO = 1e3
 class ContactProgram:
     """``w = grasp_matrix @ x`` with ``A x <= b`` and ``E x = 0`` for one stance."""
 
-    def __init__(self, stance, friction_model="pyramid", reference=(0.0, 0.0, 0.0)):
+    def __init__(self, stance, friction_model="outer", reference=(0.0, 0.0, 0.0)):
         self.columns, self.A, self.b, self.E = [], [], [], []
         self.total = []
-        scale = 1.0 if friction_model == "pyramid" else 1.0 / np.sqrt(2.0)
+        self.friction_model = friction_model
+        scale = 1.0 / np.sqrt(2.0) if friction_model == "inner" else 1.0
         reference = np.asarray(reference)
         for contact in stance:
             if contact.kind is ContactKind.GRASP:
@@ -57,7 +58,7 @@ class ContactProgram:
         for p in contact.points_in_world:
             at = self._start()
             self.columns.append(np.vstack([np.eye(3), skew(p - reference)]))
-            for row in (s - mu * n, -s - mu * n, t - mu * n, -t - mu * n):
+            for row in self._sides(s, t, n, mu):
                 self.A.append((row, at))
                 self.b.append(0.0)
             cap.append(n)
@@ -67,6 +68,13 @@ class ContactProgram:
             self.A.append((cap, first))
             self.b.append(contact.normal_force_cap)
 
+    def _sides(self, s, t, n, mu):
+        """Sides of the pyramid; an octagon with its corners at ``mu`` is the cone that is asked for."""
+        if self.friction_model != "cone":
+            return (s - mu * n, -s - mu * n, t - mu * n, -t - mu * n)
+        angles = np.deg2rad(np.arange(22.5, 360.0, 45.0))
+        return [np.cos(a) * s + np.sin(a) * t - mu * np.cos(np.pi / 8) * n for a in angles]
+
     def _sole_with_torsion(self, contact, reference, mu):
         s, t, n = contact.rotation_contact_to_world.T
         x, y, z = contact.length / 2, contact.width / 2, np.zeros(3)
@@ -74,7 +82,7 @@ class ContactProgram:
         self.columns.append(
             np.block([[np.eye(3), np.zeros((3, 3))], [skew(contact.position - reference), np.eye(3)]])
         )
-        rows = [np.r_[a * d - mu * n, z] for d in (s, t) for a in (1, -1)]
+        rows = [np.r_[side, z] for side in self._sides(s, t, n, mu)]
         rows += [np.r_[-x * n, a * t] for a in (1, -1)] + [np.r_[-y * n, a * s] for a in (1, -1)]
         for row in rows:
             self.A.append((row, at))

@@ -18,13 +18,14 @@ def limiting(stance, com, acceleration=CALM):
     return W.limiting(pseudo_wrench(79.0, com, acceleration))
 
 
-def test_closed_form_rows_of_a_sole_are_the_facets_of_its_corner_forces():
+@pytest.mark.parametrize(("model", "count"), [("outer", 16), ("inner", 16), ("cone", 132)])
+def test_rows_of_a_sole_are_the_facets_of_its_corner_forces(model, count):
     foot = sole("left_foot", (0, 0, 0), length=0.28, width=0.12, friction=0.7)
-    limits = contact_limits(foot)
-    H, h = convex_hull(np.vstack([np.zeros(6), edge_wrenches(foot)]))
+    limits = contact_limits(foot, model)
+    H, h = convex_hull(np.vstack([np.zeros(6), edge_wrenches(foot, model)]))
     cone = H[np.abs(h) < 1e-9]
     apart = np.abs(cone[:, None] - limits.A[None]).max(axis=-1)
-    assert cone.shape == limits.A.shape == (16, 6)
+    assert cone.shape == limits.A.shape == (count, 6)
     assert apart.min(axis=0).max() < 1e-12
     assert apart.min(axis=1).max() < 1e-12
 

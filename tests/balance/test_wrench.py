@@ -57,14 +57,16 @@ def test_soles_with_a_torsion_limit_equal_the_program(random_stance, contact_pro
 
 @settings(max_examples=10)
 @given(seeds)
-def test_the_inner_pyramid_equals_its_program_and_lies_in_the_outer(random_stance, contact_program, seed):
+def test_the_inner_models_equal_their_program_and_lie_in_the_outer(random_stance, contact_program, seed):
+    """The stance says which one; the octagon has the outer square's sides touched at its corners."""
     rng = np.random.default_rng(seed)
     stance = random_stance(rng, most=2)
-    inner = wrench_polytope(stance, friction_model="inner")
-    program = contact_program(stance, "inner")
-    assert_same_set(inner, program, rng)
-    corners = [program.support(rng.normal(size=6))[1] for _ in range(5)]
-    assert wrench_polytope(stance).margin(np.array(corners)).min() > -SOLVER
+    for model in ("inner", "cone"):
+        asked = stance.with_friction_model(model)
+        program = contact_program(asked, model)
+        assert_same_set(wrench_polytope(asked), program, rng)
+        corners = [program.support(rng.normal(size=6))[1] for _ in range(5)]
+        assert wrench_polytope(stance).margin(np.array(corners)).min() > -SOLVER
 
 
 @given(seeds)
@@ -210,8 +212,8 @@ def test_an_uncapped_stance_is_refused_with_the_remedy(contacts):
 
 
 def test_unknown_friction_models_and_references_are_refused(two_soles):
-    with pytest.raises(ContactError, match="'pyramid', 'inner'"):
-        wrench_polytope(two_soles, friction_model="cone")
+    with pytest.raises(ContactError, match="'outer', 'inner', 'cone'"):
+        wrench_polytope(two_soles, friction_model="circle")
     with pytest.raises(ContactError, match="reference"):
         wrench_polytope(two_soles, reference=(0, 0))
 

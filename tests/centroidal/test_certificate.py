@@ -28,7 +28,7 @@ def replace_problem(problem, **changes):
     names = (
         "mass", "sequence", "start_com", "goal_com", "start_velocity", "goal_velocity", "start_acceleration",
         "goal_acceleration", "degree", "margin_space", "required_margin", "support_distance", "geometric",
-        "max_duration", "weights", "samples", "friction_model",
+        "max_duration", "weights", "samples",
     )  # fmt: skip
     return type(problem)(**({name: getattr(problem, name) for name in names} | changes))
 

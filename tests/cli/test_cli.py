@@ -377,7 +377,7 @@ def test_balance_agrees_with_the_library(capfd, tmp_path):
         ({"contacts": [{"effector": "left_hand", "position": [0, 0, 1]}]}, "max_force_N is missing"),
         ({"contacts": [{"effector": "left_foot", "position": [0, 0]}]}, "contacts[0].position is [0, 0]"),
         ({"acceleration": "up"}, "acceleration is 'up'"),
-        ({"friction_model": "cone"}, "friction_model is 'cone'"),
+        ({"friction_model": "circle"}, "friction_model is 'circle'"),
         ({"masss_kg": 3}, "did you mean 'mass_kg'"),
     ],
 )  # fmt: skip

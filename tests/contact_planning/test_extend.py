@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, human
-from manikin.contact import sole, soles_overlap
+from manikin.contact import Stance, sole, soles_overlap
 from manikin.contact_planning import (
     Endpoints,
     ExtendSettings,
@@ -142,7 +142,7 @@ def test_footholds_carry_the_whole_sole_and_leave_the_foot_free(x, y, yaw, heigh
 def test_the_region_of_a_sole_is_the_sole():
     """Flat ground, friction that does not matter: the whole sole ([Qiu2012] 4.2.8)."""
     contact = sole("left_foot", (0.3, 0.1, 0.0), 0.4, length=0.28, width=0.12, friction=0.7)
-    region = StaticRegion.of([contact], 75.0)
+    region = StaticRegion.of(Stance([contact]), 75.0)
     turn = rotation_from_yaw(0.4)[:2, :2]
     own = (region.polygon - [0.3, 0.1]) @ turn
     np.testing.assert_allclose(np.abs(own).max(axis=0), [0.14, 0.06], atol=1e-6)
@@ -150,14 +150,16 @@ def test_the_region_of_a_sole_is_the_sole():
     np.testing.assert_allclose(region.nearest(np.array([0.31, 0.1]), 0.03), [0.31, 0.1])
     far = (region.nearest(np.array([2.0, 0.8]), 0.03) - [0.3, 0.1]) @ turn
     assert np.all(np.abs(far) <= np.array([0.11, 0.03]) + 1e-9)
-    assert StaticRegion.of([contact], 75.0).nearest(np.zeros(2), 0.2) is not None  # as much as is possible
+    assert (
+        StaticRegion.of(Stance([contact]), 75.0).nearest(np.zeros(2), 0.2) is not None
+    )  # as much as is possible
 
 
 def test_a_steep_sole_carries_nobody():
     high = np.sqrt(0.75)
     slope = np.array([[0.5, 0.0, high], [0.0, 1.0, 0.0], [-high, 0.0, 0.5]])
     contact = sole("left_foot", (0.0, 0.0, 0.0), length=0.28, width=0.12, friction=0.3, rotation=slope)
-    region = StaticRegion.of([contact], 75.0)
+    region = StaticRegion.of(Stance([contact]), 75.0)
     assert region.is_empty
     assert region.nearest(np.zeros(2), 0.03) is None
 

@@ -146,24 +146,59 @@ def test_noise_of_the_markers_below_and_above_what_matters():
     assert shares[0.006][1] < 0.5 * shares[0.006][0]
 
 
-def rest_to_rest(aside, turned=0.0):
-    """Standing, a walk of 1.5 m at an angle to the first heading, and standing [rad]."""
-    share = np.clip((np.arange(300) - 50) / 200, 0.0, 1.0)
+def rest_to_rest(aside, turned=0.0, length=0.45, half=0.18):
+    """Standing, a way at an angle to the first heading, and standing [rad]; 1 s for each step of 0.6 m."""
+    n = 100 + max(100, round(length / 0.6 * RATE))
+    share = np.clip((np.arange(n) - 50) / (n - 100), 0.0, 1.0)
     share = share**2 * (3 - 2 * share)
-    place = 1.5 * share[:, None] * [np.cos(aside), np.sin(aside)]
-    return shoulders(place, turned * share)
+    place = length * share[:, None] * [np.cos(aside), np.sin(aside)]
+    return shoulders(place, turned * share, half)
 
 
 @pytest.mark.parametrize(
     ("aside", "turned", "kind"),
     [(0.0, 0.0, NONHOLONOMIC), (10.0, 0.0, HOLONOMIC), (-10.0, 0.5, HOLONOMIC), (10.0, 12.0, NONHOLONOMIC)],
 )
-def test_flat_diagonal_steps_are_told_from_straight_walks(aside, turned, kind):
+def test_flat_diagonal_steps_are_told_from_straight_steps(aside, turned, kind):
     """Same heading at both ends but a way oblique to it ([Truong2010]_ 4.2.2.2, figure 4.8)."""
     walk = rest_to_rest(np.radians(aside), np.radians(turned))
     assert [s.kind for s in segment_path(walk).segments] == [STANDING, kind, STANDING]
     plain = segment_path(walk, SegmentationRule(boundary=None))
     assert [s.kind for s in plain.segments] == [STANDING, NONHOLONOMIC, STANDING]
+
+
+@pytest.mark.parametrize("length", [1.5, 8.5])
+@pytest.mark.parametrize(
+    ("aside", "kind"),
+    [(0.0, NONHOLONOMIC), (2.0, NONHOLONOMIC), (-9.0, NONHOLONOMIC), (13.0, NONHOLONOMIC),
+     (17.0, HOLONOMIC), (-45.0, HOLONOMIC), (90.0, HOLONOMIC)],
+)  # fmt: skip
+def test_a_walk_of_several_steps_is_what_it_is_on_the_way(length, aside, kind):
+    """Straight, drifting, diagonal and sidewards, one heading throughout: Function 1 and its 15 degrees."""
+    found = segment_path(rest_to_rest(np.radians(aside), length=length))
+    assert [s.kind for s in found.segments] == [STANDING, kind, STANDING]
+
+
+def test_a_long_walk_that_ends_with_its_first_heading_is_no_diagonal_step():
+    """8.5 m to a goal 20 degrees aside: it turns there and back, and drifts by 9 degrees at most."""
+    walk = shoulders(*turned_there_and_back(np.radians(20.0), np.radians(9.0)))
+    found = segment_path(walk)
+    moving = found.labels != STANDING
+    assert np.degrees(np.nanmax(np.abs(found.deviations[moving]))) < 9.5
+    assert found.share(HOLONOMIC) == 0.0
+    assert found.pattern == "N"
+
+
+def turned_there_and_back(bearing, drift):
+    """(n, 2) places and (n,) headings of a straight walk at a bearing whose heading lags by the drift."""
+    n = 1000
+    share = np.clip((np.arange(n) - 50) / (n - 100), 0.0, 1.0)
+    share = share**2 * (3 - 2 * share)
+    heading = (bearing - drift * np.cos(2.0 * np.pi * share)) * np.sin(np.pi * np.clip(share, 0.0, 1.0))
+    course = heading + drift * np.cos(2.0 * np.pi * share)
+    step = np.gradient(8.5 * share)
+    place = np.cumsum(step[:, None] * np.column_stack([np.cos(course), np.sin(course)]), axis=0)
+    return place, heading
 
 
 def test_patterns_name_the_moving_parts():

@@ -10,12 +10,10 @@ import trimesh
 import yaml
 
 from manikin import pipeline
-from manikin.contact import ContactKind
+from manikin.contact import ContactKind, ContactModel
 from manikin.contact_planning import certify_plan
 from manikin.errors import ScenarioError
 from manikin.scenarios import load_scenario
-from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
-from manikin.spatial import GRAVITY
 from manikin.stages.contacts import find_supports
 
 DOG = Path(__file__).parents[1] / "body" / "data" / "dog.urdf"
@@ -45,7 +43,7 @@ def test_every_posture_is_free_balanced_and_on_its_contacts(found):
     """Measured afresh, balance by a linear program on contact forces; one contact changes at a time."""
     result, body, scene = found
     assert result.failure is None
-    certificate = certify_plan(body, scene, result.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    certificate = certify_plan(body, scene, result.plan, ContactModel.of_body(body.mass))
     assert certificate.changes == 1
     assert certificate.max_contact_error_m < 3e-4
     assert certificate.max_sole_turn_rad < 3e-4
@@ -87,7 +85,7 @@ def test_a_flight_passes_a_posture_off_its_contacts(found):
     for before, after in pairwise(result.plan.stages):
         left = set(before.contacts) - set(after.contacts)
         assert (after.via is not None) == bool(left)
-    schedule = result.plan.schedule(1000.0)
+    schedule = result.plan.schedule(ContactModel(normal_force_cap=1000.0))
     times, keys = result.plan.keys(schedule.instants)
     flights = sum(stage.via is not None for stage in result.plan.stages)
     assert len(keys) == len(times) == len(result.plan.stages) + 1 + flights
@@ -138,7 +136,7 @@ def test_a_creature_from_a_robot_description_walks_up_a_step(tmp_path):
     path.write_text(yaml.safe_dump(content))
     result, body, scene = search(path)
     assert result.failure is None
-    certificate = certify_plan(body, scene, result.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    certificate = certify_plan(body, scene, result.plan, ContactModel.of_body(body.mass))
     assert certificate.changes == 1
     assert certificate.min_room_m > 0.005
     last = result.plan.stages[-1].contacts.values()

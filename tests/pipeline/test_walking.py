@@ -132,6 +132,28 @@ def test_the_one_who_is_caught_turns_round_on_the_spot(planned):
     assert route.length == pytest.approx(8.07, abs=1e-3)
 
 
+def test_the_catcher_runs_up_from_behind_and_arrives(ran, planned):
+    """Nobody passes: the distance falls to an arm's length as the first one arrives, and both stand there."""
+    result, _ = ran("catch")
+    _, plan = planned("catch")
+    route, catcher = plan.route, plan.others["catcher"]
+    end = max(route.duration, catcher.duration)
+    time = np.arange(0.0, end, 0.01)
+    first, second = route.place_at(time), catcher.place_at(time)
+    away = np.linalg.norm((first - second)[:, :2], axis=1)
+    told = result.summary["walk"]["others"]["catcher"]
+    assert told["closest_m"] == pytest.approx(away.min(), abs=1e-6)
+    assert told["closest_at_s"] == pytest.approx(time[np.argmin(away)], abs=0.02)
+    # An arm is 0.77 m long (44 % of 1.75 m); the room of 0.1 m is kept.
+    assert 0.5 < away.min() < away[-1] < 0.7
+    assert told["closest_at_s"] > route.begins[2] + 0.5 * (end - route.begins[2])
+    assert (second[:, 0] > first[:, 0]).all()
+    # It begins to run when the first one begins to turn.
+    speed = np.hypot(*np.gradient(second[:, :2], time, axis=0).T)
+    turning = time > route.begins[1]
+    assert speed[~turning].max() < 1.7 < 2.2 < speed[turning].max()
+
+
 def test_a_walk_is_as_high_as_its_floor():
     low, high = (run("goal-left", overrides=[f"floor_height_m={height}"]).planned for height in (0.0, 0.4))
     assert np.allclose(high.q[:, 2], low.q[:, 2] + 0.4, atol=1e-12)

@@ -5,13 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from manikin.balance import pseudo_wrench, wrench_polytope
-from manikin.contact import Contact, Stance
+from manikin.contact import Contact, Stance, default_normal_force_cap
 from manikin.contact_planning import Candidates, ContactRules, Situation
 from manikin.contact_planning.by_place import contact_at, score_by_place
 from manikin.spatial import GRAVITY, FloatArray
-
-BODY_WEIGHTS_CAP = 3.0
-"""Cap on the sum of the normal forces [body weights]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +27,7 @@ class Loads:
         """(n,) least margin of all loads at each place (n, 3) of the centre of mass [N.m]."""
         if any(self._slides(feet, load) for load in self.wrenches):
             return np.full(len(places), -np.inf)
-        polytope = wrench_polytope(Stance(feet, BODY_WEIGHTS_CAP * self.mass * GRAVITY))
+        polytope = wrench_polytope(Stance(feet, default_normal_force_cap(self.mass)))
         weight = pseudo_wrench(self.mass, places, np.zeros(3))
         return np.min([polytope.margin(weight - load) for load in self.wrenches], axis=0)
 

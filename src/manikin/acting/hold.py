@@ -12,16 +12,13 @@ from manikin.balance import wrench_polytope
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.control import ForceWish
 from manikin.motion import Motion
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.spatial import FloatArray
 
 SAMPLING = 1.0e-3
 """Time between two samples of the held posture [s]."""
 
 SETTLED = 0.3
 """Time after the force has risen from which on it counts as held [s]."""
-
-BODY_WEIGHTS_CAP = 3.0
-"""Cap on the sum of the normal forces of the feet [body weights]."""
 
 
 @dataclass(frozen=True)
@@ -192,4 +189,4 @@ def _feet_margin(motion: Motion, stance: Stance, rows: NDArray[np.bool_], mass: 
         wrench = motion.contact_force[rows][:, motion.contact_names.index(contact.effector)]
         total += wrench
         total[:, 3:] += np.cross(contact.position, wrench[:, :3])
-    return wrench_polytope(Stance(feet, BODY_WEIGHTS_CAP * mass * GRAVITY)).margin(total)
+    return wrench_polytope(stance.with_contacts(feet).bounded(mass)).margin(total)

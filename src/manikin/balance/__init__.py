@@ -11,7 +11,6 @@ from manikin.balance.criteria import (
     zero_moment_point,
 )
 from manikin.balance.evaluate import BalanceReport, GroundPoint, evaluate_balance
-from manikin.balance.friction import FrictionModel
 from manikin.balance.limiting import LimitingConstraint, LimitShare
 from manikin.balance.limits import ContactLimits, LimitKind, contact_limits
 from manikin.balance.margin import StabilityMargins, force_space, moment_space, stability_margins
@@ -23,7 +22,6 @@ from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytop
 __all__ = [
     "BalanceReport",
     "ContactLimits",
-    "FrictionModel",
     "GroundPoint",
     "LimitKind",
     "LimitShare",

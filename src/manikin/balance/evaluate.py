@@ -14,12 +14,11 @@ from manikin.balance.criteria import (
     support_polygon,
     zero_moment_point,
 )
-from manikin.balance.friction import FrictionModel
 from manikin.balance.limiting import LimitingConstraint
 from manikin.balance.margin import force_space, moment_space, stability_margins
 from manikin.balance.polygon import signed_distance
 from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytope
-from manikin.contact import ContactKind, Stance
+from manikin.contact import ContactKind, FrictionModel, Stance
 from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.polytope import Polytope
@@ -130,7 +129,7 @@ def evaluate_balance(
     acceleration: ArrayLike = (0.0, 0.0, 0.0),
     angular_momentum_rate: ArrayLike = (0.0, 0.0, 0.0),
     *,
-    friction_model: FrictionModel = "pyramid",
+    friction_model: FrictionModel | None = None,
     reference: ArrayLike = (0.0, 0.0, 0.0),
     plane_height: float | None = None,
 ) -> BalanceReport:
@@ -142,7 +141,7 @@ def evaluate_balance(
         com: (3,) [m].
         acceleration: (3,) of the CoM [m/s^2].
         angular_momentum_rate: (3,) about the CoM [N.m].
-        friction_model: ``"pyramid"`` or ``"inner"``.
+        friction_model: Replaces that of the stance.
         reference: (3,) point of the moments [m].
         plane_height: Of ZMP, FRI and CMP [m]; the mean height of the supports when omitted.
 

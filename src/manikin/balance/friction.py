@@ -1,45 +1,76 @@
-"""Friction pyramids: their edges, and the wrenches a frictional contact generates."""
-
-from typing import Literal
+"""Friction cones: their edges and sides, and the wrenches a frictional contact generates."""
 
 import numpy as np
 
-from manikin.contact import Contact
-from manikin.errors import ContactError
-from manikin.spatial import FloatArray
+from manikin.contact import Contact, FrictionModel
+from manikin.contact.model import friction_model as checked
+from manikin.spatial import FloatArray, cross
 
-FrictionModel = Literal["pyramid", "inner"]
-"""``pyramid`` bounds each tangential component by mu ([Qiu2012]_ 4.18-4.19), outside the
-cone by up to sqrt 2; ``inner`` uses mu / sqrt 2 and stays inside the cone."""
+_CORNERS: FloatArray = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 
-EDGE_SIGNS: FloatArray = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-EDGE_SIGNS.setflags(write=False)
+_CONE_SIDES = 8
+"""Edges along x and y, where no friction is lost, and between them."""
+
+_CONE_ANGLES: FloatArray = 2.0 * np.pi * np.arange(_CONE_SIDES) / _CONE_SIDES
+_CONE_EDGES: FloatArray = np.column_stack([np.cos(_CONE_ANGLES), np.sin(_CONE_ANGLES)])
+for _table in (_CORNERS, _CONE_EDGES):
+    _table.setflags(write=False)
 
 
 def pyramid_friction(contact: Contact, friction_model: FrictionModel) -> float:
-    """Slope of the friction pyramid's sides.
+    """Largest tangential force along the contact's x or y axis per unit normal force.
 
     Raises:
         ContactError: If the model is unknown.
     """
-    if friction_model == "pyramid":
-        return contact.friction
-    if friction_model == "inner":
-        return contact.friction / np.sqrt(2.0)
-    raise ContactError(f"friction_model is {friction_model!r}; valid: 'pyramid', 'inner'")
+    return contact.friction / np.sqrt(2.0) if checked(friction_model) == "inner" else contact.friction
 
 
-def edge_wrenches(contact: Contact, friction_model: FrictionModel = "pyramid") -> FloatArray:
+def pyramid_edges(contact: Contact, friction_model: FrictionModel = "outer") -> FloatArray:
+    """Forces along the pyramid's edges with unit normal force, in the contact frame.
+
+    Returns:
+        (k, 3): 4 edges, 8 of the friction model ``cone``.
+
+    Raises:
+        ContactError: If the model is unknown.
+    """
+    if checked(friction_model) == "cone":
+        tangential = contact.friction * _CONE_EDGES
+    else:
+        tangential = pyramid_friction(contact, friction_model) * _CORNERS
+    return np.column_stack([tangential, np.ones(len(tangential))])
+
+
+def pyramid_sides(contact: Contact, friction_model: FrictionModel = "outer") -> FloatArray:
+    """Rows ``[n_x, n_y, -slope]`` of the pyramid's sides: a force ``f`` is inside where ``sides @ f <= 0``.
+
+    Returns:
+        (k, 3) in the contact frame; ``(n_x, n_y)`` is of unit length.
+
+    Raises:
+        ContactError: If the model is unknown.
+    """
+    if checked(friction_model) == "cone":
+        angles, slope = _CONE_ANGLES + np.pi / _CONE_SIDES, contact.friction * np.cos(np.pi / _CONE_SIDES)
+        normals = np.column_stack([np.cos(angles), np.sin(angles)])
+    else:
+        slope = pyramid_friction(contact, friction_model)
+        normals = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    return np.column_stack([normals, np.full(len(normals), -slope)])
+
+
+def edge_wrenches(contact: Contact, friction_model: FrictionModel = "outer") -> FloatArray:
     """Wrenches of the pyramid edges at the contact's points, unit normal force each.
 
     The cone over them is the set of wrenches a sole or point can apply ([Qiu2012]_ 4.25).
 
     Returns:
-        (4 k, 6) in the contact frame, moments about its origin.
+        (n, 6) in the contact frame, moments about its origin, point by point.
     """
-    mu = pyramid_friction(contact, friction_model)
-    wrenches = np.empty((len(contact.points), 4, 6))
-    wrenches[..., :2], wrenches[..., 2] = mu * EDGE_SIGNS, 1.0
+    edges = pyramid_edges(contact, friction_model)
+    wrenches = np.empty((len(contact.points), len(edges), 6))
+    wrenches[..., :3] = edges
     wrenches[..., 3:] = cross(contact.points[:, None, :], wrenches[..., :3])
     return wrenches.reshape(-1, 6)
 
@@ -56,17 +87,3 @@ def contact_to_world(contact: Contact, wrenches: FloatArray, reference: FloatArr
     force = wrenches[:, :3] @ rotation.T
     moment = wrenches[:, 3:] @ rotation.T + cross((contact.position - reference)[None], force)
     return np.hstack([force, moment])
-
-
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross product along the last axis; several times faster than numpy's on small arrays."""
-    if a.ndim == b.ndim == 1:
-        (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-        return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
-    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
-    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    product[..., 0] = ay * bz - az * by
-    product[..., 1] = az * bx - ax * bz
-    product[..., 2] = ax * by - ay * bx
-    return product

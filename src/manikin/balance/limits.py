@@ -4,13 +4,15 @@ All rows act on ``[force; moment]`` in the contact frame (x forward, y left, z t
 moments about its origin; they are of unit length, with alpha = 1 m.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
-from manikin.balance.friction import FrictionModel, pyramid_friction
-from manikin.contact import Contact, ContactKind
+from manikin.balance.friction import edge_wrenches, pyramid_friction, pyramid_sides
+from manikin.contact import Contact, ContactKind, FrictionModel
+from manikin.normal_fan import fan_of_generators
+from manikin.polytope import facet_rows
 from manikin.spatial import FloatArray
 
 
@@ -47,12 +49,14 @@ class ContactLimits:
 Row = tuple[list[float], float, LimitKind, str]
 
 
-def contact_limits(contact: Contact, friction_model: FrictionModel = "pyramid") -> ContactLimits:
+def contact_limits(contact: Contact, friction_model: FrictionModel = "outer") -> ContactLimits:
     """Limits of a sole, point or grasp.
 
     A sole without ``torsion_limit`` has the 16 rows equivalent to four corner points with
     friction pyramids: friction, CoP, and the yaw moment those forces allow (closed form of
-    the sole's wrench cone, our own derivation, checked against the corner forces). With a
+    the sole's wrench cone, our own derivation, checked against the corner forces); under the
+    friction model ``cone`` the rows of the yaw moment are those facets of the cone over the corner
+    forces that bound it. With a
     ``torsion_limit`` the yaw rows are the safe eight-row form ``|n tau| + mu |s tau| +
     mu |t tau| <= limit`` ([Qiu2012]_ 4.21 corrected), beside friction on the whole
     force (4.20) and CoP (4.14).
@@ -65,10 +69,9 @@ def contact_limits(contact: Contact, friction_model: FrictionModel = "pyramid") 
     if contact.kind is ContactKind.GRASP:
         rows = _grasp_rows(contact)
     else:
-        mu = pyramid_friction(contact, friction_model)
-        rows = _friction_rows(mu)
+        rows = _friction_rows(contact, friction_model)
         if contact.kind is ContactKind.SOLE:
-            rows += _pressure_rows(contact) + _turning_rows(contact, mu)
+            rows += _pressure_rows(contact) + _turning_rows(contact, friction_model)
         if contact.normal_force_cap is not None:
             cap = contact.normal_force_cap
             rows.append(
@@ -82,15 +85,14 @@ def contact_limits(contact: Contact, friction_model: FrictionModel = "pyramid") 
     )
 
 
-def _friction_rows(mu: float) -> list[Row]:
+def _friction_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
     """A force at its limit along +x cannot keep the contact from moving along -x."""
-    slip = LimitKind.SLIPPING
-    return [
-        ([1, 0, -mu, 0, 0, 0], 0.0, slip, "slipping along -x"),
-        ([-1, 0, -mu, 0, 0, 0], 0.0, slip, "slipping along +x"),
-        ([0, 1, -mu, 0, 0, 0], 0.0, slip, "slipping along -y"),
-        ([0, -1, -mu, 0, 0, 0], 0.0, slip, "slipping along +y"),
-    ]
+    rows: list[Row] = []
+    for side in pyramid_sides(contact, friction_model).tolist():
+        axis = int(abs(side[1]) > abs(side[0]))
+        along = ("-" if side[axis] > 0.0 else "+") + "xy"[axis]
+        rows.append(([*side, 0.0, 0.0, 0.0], 0.0, LimitKind.SLIPPING, f"slipping along {along}"))
+    return rows
 
 
 def _pressure_rows(contact: Contact) -> list[Row]:
@@ -121,8 +123,8 @@ def _side_names(effector: str) -> tuple[str, str]:
     return "left", "right"
 
 
-def _turning_rows(contact: Contact, mu: float) -> list[Row]:
-    turn = LimitKind.TURNING
+def _turning_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
+    turn, mu = LimitKind.TURNING, pyramid_friction(contact, friction_model)
     signs = [(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)]
     words = {1.0: "turning clockwise on its sole", -1.0: "turning counter-clockwise on its sole"}
     if contact.torsion_limit is not None:
@@ -131,12 +133,33 @@ def _turning_rows(contact: Contact, mu: float) -> list[Row]:
             for c in (1.0, -1.0)
             for a, b in signs
         ]
+    if friction_model == "cone":
+        return [
+            (row.tolist(), 0.0, turn, words[float(np.sign(row[5]))])
+            for row in _yaw_facets(replace(contact, points=contact.points - contact.centre))
+        ]
     x, y = contact.length / 2, contact.width / 2
     return [
         ([a * y, b * x, -mu * (x + y), c * a * mu, c * b * mu, c], 0.0, turn, words[c])
         for c in (1.0, -1.0)
         for a, b in signs
     ]
+
+
+def _yaw_facets(sole: Contact) -> FloatArray:
+    """(k, 6) facets of the cone over the corner forces that bound the yaw moment.
+
+    The other ones are those of friction and pressure: a sum of corner forces has any force in the
+    friction cone together with any centre of pressure in the rectangle.
+    """
+    edges = edge_wrenches(sole, "cone")
+    size = np.hypot(sole.length, sole.width)
+    edges[:, 3:] /= size
+    fan = fan_of_generators(edges, np.ones((len(edges), 1)), np.ones(1, dtype=np.bool_))
+    H, h, _ = facet_rows(fan, 1.0)
+    rows = H[(np.abs(h) < 1e-9) & (np.abs(H[:, 5]) > 1e-9)]
+    rows[:, 3:] /= size
+    return rows / np.abs(rows[:, 5:])
 
 
 def _grasp_rows(contact: Contact) -> list[Row]:

@@ -10,14 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.balance.friction import FrictionModel, cross
 from manikin.balance.margin import stability_margins
 from manikin.balance.support_plane import support_plane
 from manikin.balance.wrench import WrenchPolytope, wrench_polytopes
 from manikin.balance.zmp_path import LEAST_LOAD
 from manikin.contact import Stance
 from manikin.errors import InputError
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, cross
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +65,6 @@ def motion_margin(
     com: ArrayLike,
     *,
     polytopes: Sequence[WrenchPolytope | None] | None = None,
-    friction_model: FrictionModel = "pyramid",
 ) -> MotionMargin:
     """Margins of a series of pseudo-wrenches, each in the polytope of its phase.
 
@@ -80,7 +78,6 @@ def motion_margin(
         com: (n, 3) [m].
         polytopes: W_p of each phase, about any point, where it is known already; else each stance's is
             computed once, and only for phases with samples.
-        friction_model: Of the polytopes that are computed.
 
     Raises:
         InputError: If the shapes do not fit.
@@ -89,7 +86,7 @@ def motion_margin(
     w, x, row_phases = _series(wrench, com, phases, len(stances))
     margin, force, zmp = (np.full(len(w), np.nan) for _ in range(3))
     present = np.unique(row_phases).tolist()
-    known = _polytopes(stances, present, polytopes, friction_model)
+    known = _polytopes(stances, present, polytopes)
     for number in present:
         rows = np.flatnonzero(row_phases == number)
         if not len(stances[number]):
@@ -138,12 +135,11 @@ def _polytopes(
     stances: Sequence[Stance],
     present: Sequence[int],
     given: Sequence[WrenchPolytope | None] | None,
-    friction_model: FrictionModel,
 ) -> dict[int, WrenchPolytope]:
     """Polytopes of the phases that have samples and contacts, by number."""
     held = [number for number in present if len(stances[number])]
     known = {} if given is None else {number: given[number] for number in held}
     missing = [number for number in held if known.get(number) is None]
-    computed = wrench_polytopes([stances[number] for number in missing], friction_model=friction_model)
+    computed = wrench_polytopes([stances[number] for number in missing])
     found = {number: polytope for number, polytope in known.items() if polytope is not None}
     return found | dict(zip(missing, computed, strict=True))

@@ -17,21 +17,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.balance.friction import (
-    FrictionModel,
-    contact_to_world,
-    cross,
-    edge_wrenches,
-    pyramid_friction,
-)
+from manikin.balance.friction import contact_to_world, edge_wrenches, pyramid_edges, pyramid_friction
 from manikin.balance.limiting import LimitingConstraint, limiting_constraint
 from manikin.balance.limits import contact_limits
-from manikin.contact import Contact, ContactKind, Stance
+from manikin.contact import Contact, ContactKind, FrictionModel, Stance
 from manikin.display import Displayed
 from manikin.errors import ContactError
 from manikin.normal_fan import fan_of_generators
 from manikin.polytope import Polytope, facet_rows, vertices_around
-from manikin.spatial import GRAVITY_VECTOR, FloatArray, finite_number, frozen_array
+from manikin.spatial import GRAVITY_VECTOR, FloatArray, cross, finite_number, frozen_array
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,16 +35,14 @@ class WrenchPolytope(Displayed, Polytope):
     Attributes:
         H: (m, 6) unit rows over [force; moment], world axes, alpha = 1 m.
         h: (m,) offsets [N, N.m].
-        stance: The contacts.
+        stance: The contacts, with their friction model and caps.
         reference: (3,) point of the moments [m].
-        friction_model: ``"pyramid"`` or ``"inner"``.
         stance_cap_multipliers: (m,) growth of each offset per newton of the stance's
             ``normal_force_cap``; 0 where that cap does not matter.
     """
 
     stance: Stance
     reference: FloatArray
-    friction_model: FrictionModel
     stance_cap_multipliers: FloatArray
 
     def facts(self) -> dict[str, str]:
@@ -66,18 +58,21 @@ class WrenchPolytope(Displayed, Polytope):
         h: ArrayLike,
         stance: Stance,
         reference: ArrayLike,
-        friction_model: FrictionModel,
         stance_cap_multipliers: ArrayLike,
     ) -> None:
         length = np.linalg.norm(np.asarray(H, dtype=np.float64), axis=1)
         super().__init__(H, h)
         object.__setattr__(self, "stance", stance)
         object.__setattr__(self, "reference", frozen_array(reference, "reference [m]", (3,), ContactError))
-        object.__setattr__(self, "friction_model", friction_model)
         multipliers = frozen_array(
             np.asarray(stance_cap_multipliers) / length, "stance_cap_multipliers", (len(self.h),)
         )
         object.__setattr__(self, "stance_cap_multipliers", multipliers)
+
+    @property
+    def friction_model(self) -> FrictionModel:
+        """Friction model of the stance."""
+        return self.stance.friction_model
 
     def at_reference(self, reference: ArrayLike) -> "WrenchPolytope":
         """The same set with moments about another point, rows of unit length there.
@@ -86,7 +81,7 @@ class WrenchPolytope(Displayed, Polytope):
         """
         point = frozen_array(reference, "reference [m]", (3,), ContactError)
         H = _moved(self.H, self.reference, point)
-        return WrenchPolytope(H, self.h, self.stance, point, self.friction_model, self.stance_cap_multipliers)
+        return WrenchPolytope(H, self.h, self.stance, point, self.stance_cap_multipliers)
 
     def limiting(self, wrench: ArrayLike) -> LimitingConstraint:
         """Name the contact and the limit that the nearest facet of W_p stands for.
@@ -133,41 +128,41 @@ def pseudo_wrench(
 
 
 def wrench_polytope(
-    stance: Stance, *, friction_model: FrictionModel = "pyramid", reference: ArrayLike = (0.0, 0.0, 0.0)
+    stance: Stance, *, friction_model: FrictionModel | None = None, reference: ArrayLike = (0.0, 0.0, 0.0)
 ) -> WrenchPolytope:
     """Facets of W_p, each once ([Qiu2012]_ 4.36; ours are found from generators).
 
     Args:
-        stance: Contacts and caps; none at all (flight) gives the single point 0.
-        friction_model: ``"pyramid"`` (4.18-4.19) or ``"inner"`` (mu / sqrt 2).
+        stance: Contacts with their contact model; none at all (flight) gives the single point 0.
+        friction_model: Replaces that of the stance.
         reference: (3,) point of the moments [m].
 
     Raises:
         ContactError: If the normal force of a contact is bounded by no cap.
     """
+    if friction_model is not None:
+        stance = stance.with_friction_model(friction_model)
     origin = frozen_array(reference, "reference [m]", (3,), ContactError)
     local = _middle(stance) if len(stance) else origin
     caps = _Caps.of(stance)
-    generators, levels = _generators(stance, caps, friction_model, local)
+    generators, levels = _generators(stance, caps, local)
     segments = [_grasp_segments(c, local) for c in stance if c.kind is ContactKind.GRASP]
     fan = fan_of_generators(generators, levels, np.ones(levels.shape[1], dtype=np.bool_))
     fan = fan.plus_segments(np.vstack([np.zeros((0, 6)), *segments]))
     H, h, multipliers = facet_rows(fan, max(1.0, float(np.abs(generators).max(initial=0.0))))
     of_stance = np.zeros(len(h)) if caps.total is None else multipliers[:, -1] / caps.total
-    return WrenchPolytope(_moved(H, local, origin), h, stance, origin, friction_model, of_stance)
+    return WrenchPolytope(_moved(H, local, origin), h, stance, origin, of_stance)
 
 
 def wrench_polytopes(
     stances: Sequence[Stance],
     *,
-    friction_model: FrictionModel = "pyramid",
     reference: ArrayLike | None = None,
 ) -> tuple[WrenchPolytope, ...]:
     """W_p of several stances; a stance that is an earlier one moved elsewhere is not computed again.
 
     Args:
-        stances: Contacts and caps.
-        friction_model: As for :func:`wrench_polytope`.
+        stances: Contacts with their contact models.
         reference: (3,) point of all moments [m]; of each stance the middle of its own contacts when omitted.
 
     Raises:
@@ -179,11 +174,9 @@ def wrench_polytopes(
         centre = _middle(stance)
         shape = _shape_of(stance, centre)
         if shape not in known:
-            known[shape] = wrench_polytope(stance, friction_model=friction_model, reference=centre)
+            known[shape] = wrench_polytope(stance, reference=centre)
         like = known[shape]
-        local = WrenchPolytope(
-            like.H, like.h, stance, centre, like.friction_model, like.stance_cap_multipliers
-        )  # fmt: skip
+        local = WrenchPolytope(like.H, like.h, stance, centre, like.stance_cap_multipliers)
         found.append(local if reference is None else local.at_reference(reference))
     return tuple(found)
 
@@ -201,7 +194,7 @@ def _shape_of(stance: Stance, centre: FloatArray) -> tuple[Any, ...]:
         limits = (contact.friction, contact.normal_force_cap, contact.torsion_limit, contact.max_force)
         numbers = tuple((np.round(place, 9) + 0.0).ravel().tolist())
         contacts.append((str(contact.kind), numbers, *map(str, limits), contact.max_moment))
-    return (stance.normal_force_cap, *sorted(contacts))
+    return (stance.model, *sorted(contacts))
 
 
 @dataclass(frozen=True)
@@ -237,9 +230,7 @@ def _own_cap(contact: Contact, total: float | None) -> float | None:
     return own if total is None or own is None or own < total else None
 
 
-def _generators(
-    stance: Stance, caps: _Caps, friction_model: FrictionModel, reference: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _generators(stance: Stance, caps: _Caps, reference: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Generators (n, 6) and the share of each level that each one uses (n, k).
 
     The levels are one per contact with a cap or a torsion limit of its own, then the
@@ -251,7 +242,7 @@ def _generators(
     columns = sum(has_level) + (caps.total is not None)
     generators, levels = [np.zeros((0, 6))], [np.zeros((0, columns))]
     for i, (contact, own) in enumerate(pairs):
-        local, bounded = _extreme_wrenches(contact, own, caps.total, friction_model)
+        local, bounded = _extreme_wrenches(contact, own, caps.total, stance.friction_model)
         level = np.zeros((len(local), columns))
         if has_level[i]:
             level[:, sum(has_level[:i])] = bounded
@@ -282,9 +273,9 @@ def _extreme_wrenches(
     highest = contact.torsion_limit / (friction * min(contact.length, contact.width) / 2)
     vertices = _torsion_vertices(contact, 2.0 * highest, friction_model)
     vertices = vertices[vertices[:, 2] < 1.5 * highest]
-    rays = np.zeros((4, 6))
-    rays[:, :3] = (1.0 if total is None else total) * edge_wrenches(contact, friction_model)[:4, :3]
-    return np.vstack([vertices, rays]), np.append(np.ones(len(vertices)), np.zeros(4))
+    edges = pyramid_edges(contact, friction_model)
+    rays = np.hstack([(1.0 if total is None else total) * edges, np.zeros((len(edges), 3))])
+    return np.vstack([vertices, rays]), np.append(np.ones(len(vertices)), np.zeros(len(edges)))
 
 
 def _torsion_vertices(contact: Contact, cap: float, friction_model: FrictionModel) -> FloatArray:

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.balance.criteria import support_height, zero_moment_point
-from manikin.balance.friction import cross
 from manikin.balance.polygon import convex_polygon, signed_distance
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.motion import Motion
-from manikin.spatial import FloatArray, frozen_array
+from manikin.spatial import FloatArray, cross, frozen_array
 
 COPLANAR = 0.005
 """Contact points this far from a common plane still lie in it [m]."""

@@ -58,7 +58,7 @@ def low_friction(
     least = min((c.friction for s in stances for c in s if c.kind is not ContactKind.GRASP), default=np.inf)
     if least >= FIRM_FRICTION:
         return ""
-    firm = [wrench_polytope(_firm(s), friction_model=problem.friction_model) for s in stances]
+    firm = [wrench_polytope(_firm(s)) for s in stances]
     value = measure(firm)
     if value <= problem.required_margin:
         return ""
@@ -72,7 +72,7 @@ def _firm(stance: Stance) -> Stance:
         else replace(contact, friction=max(contact.friction, FIRM_FRICTION))
         for contact in stance
     ]
-    return Stance(contacts, stance.normal_force_cap)
+    return stance.with_contacts(contacts)
 
 
 def out_of_reach(problem: CentroidalProblem, phase: int) -> str | None:

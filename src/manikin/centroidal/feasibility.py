@@ -74,13 +74,12 @@ def polytopes_of(problem: CentroidalProblem) -> tuple[WrenchPolytope, ...]:
         centre = np.mean([contact.position for contact in phase.stance] or [np.zeros(3)], axis=0)
         shape = _shape_of(phase.stance, centre)
         if shape not in known:
-            polytope = wrench_polytope(phase.stance, friction_model=problem.friction_model)
+            polytope = wrench_polytope(phase.stance)
             known[shape] = centre, polytope
         else:
             before, like = known[shape]
             moved = WrenchPolytope(
-                like.H, like.h, phase.stance, like.reference + centre - before, like.friction_model,
-                like.stance_cap_multipliers,
+                like.H, like.h, phase.stance, like.reference + centre - before, like.stance_cap_multipliers,
             )  # fmt: skip
             polytope = moved.at_reference(like.reference)
         found.append(polytope)
@@ -95,7 +94,7 @@ def _shape_of(stance: Stance, centre: FloatArray) -> tuple[Any, ...]:
         limits = (contact.friction, contact.normal_force_cap, contact.torsion_limit, contact.max_force)
         numbers = tuple((np.round(place, 9) + 0.0).ravel().tolist())
         contacts.append((str(contact.kind), numbers, *map(str, limits), contact.max_moment))
-    return (stance.normal_force_cap, *sorted(contacts))
+    return (stance.model, *sorted(contacts))
 
 
 def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:

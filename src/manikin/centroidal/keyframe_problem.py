@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.balance import FrictionModel
 from manikin.centroidal.constraints import GeometricConstraint
 from manikin.centroidal.problem import CentroidalProblem, MarginSpace, Weights
 from manikin.centroidal.recording import Recording
@@ -52,7 +51,6 @@ class KeyframeProblem:
         support_distance: float | None = None,
         geometric: Sequence[GeometricConstraint] = (),
         weights: Weights | None = None,
-        friction_model: FrictionModel = "pyramid",
         frame_spacing: float = FRAME_SPACING,
     ) -> None:
         """Put the problem together.
@@ -73,7 +71,6 @@ class KeyframeProblem:
             geometric: Further constraints on the CoM position.
             weights: Qv and Qj of the objective, and a Qa that the thesis does not have; those of
                 margin and duration play no part.
-            friction_model: Passed on to :func:`manikin.balance.wrench_polytope`.
             frame_spacing: Least distance of an added key frame from the others [s].
 
         Raises:
@@ -85,7 +82,7 @@ class KeyframeProblem:
             start_acceleration=start_acceleration, goal_acceleration=goal_acceleration,
             degree=degree, margin_space=margin_space, required_margin=required_margin,
             support_distance=support_distance, geometric=geometric,
-            weights=Weights() if weights is None else weights, friction_model=friction_model,
+            weights=Weights() if weights is None else weights,
         )  # fmt: skip
         frames = len(recording.key_frames)
         if control_points is None:
@@ -116,7 +113,7 @@ class KeyframeProblem:
         """
         names = (
             "degree", "start_velocity", "goal_velocity", "start_acceleration", "goal_acceleration",
-            "required_margin", "margin_space", "support_distance", "geometric", "weights", "friction_model",
+            "required_margin", "margin_space", "support_distance", "geometric", "weights",
         )  # fmt: skip
         given = {name: getattr(problem, name) for name in names}
         return cls(problem.mass, recording, control_points=control_points, **given)

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.balance import FrictionModel
 from manikin.centroidal.constraints import GeometricConstraint
 from manikin.centroidal.key_planes import KeyPlane
 from manikin.contact import StanceSequence
@@ -78,7 +77,6 @@ class CentroidalProblem:
         max_duration: Of the whole motion [s].
         weights: Of the objectives (5.28).
         samples: n_s, balance is imposed at j = 0 ... n_s in every phase.
-        friction_model: Passed on to :func:`manikin.balance.wrench_polytope`.
     """
 
     mass: float
@@ -98,7 +96,6 @@ class CentroidalProblem:
     max_duration: float | None
     weights: Weights
     samples: int
-    friction_model: FrictionModel
 
     def __init__(
         self,
@@ -120,7 +117,6 @@ class CentroidalProblem:
         max_duration: float | None = None,
         weights: Weights | None = None,
         samples: int = 10,
-        friction_model: FrictionModel = "pyramid",
     ) -> None:
         if margin_space not in _UNITS:
             raise InputError(f"centroidal margin_space is {margin_space!r}; valid: {', '.join(_UNITS)}")
@@ -142,7 +138,6 @@ class CentroidalProblem:
             "max_duration": _optional_limit(max_duration, "max_duration [s]"),
             "weights": Weights() if weights is None else weights,
             "samples": _integer(samples, "samples", 2),
-            "friction_model": friction_model,
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)

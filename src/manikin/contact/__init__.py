@@ -10,21 +10,33 @@ from manikin.contact.contact import (
     sole_part,
     soles_overlap,
 )
+from manikin.contact.model import (
+    BODY_WEIGHTS_CAP,
+    FRICTION_MODELS,
+    ContactModel,
+    FrictionModel,
+    default_normal_force_cap,
+)
 from manikin.contact.rolling import Rolling, roll_feet
 from manikin.contact.schedule import ContactSchedule
 from manikin.contact.sequence import Phase, StanceSequence, Swing
 from manikin.contact.stance import Stance
 
 __all__ = [
+    "BODY_WEIGHTS_CAP",
+    "FRICTION_MODELS",
     "Contact",
     "ContactKind",
+    "ContactModel",
     "ContactSchedule",
+    "FrictionModel",
     "Phase",
     "Rolling",
     "SolePart",
     "Stance",
     "StanceSequence",
     "Swing",
+    "default_normal_force_cap",
     "grasp",
     "point",
     "roll_feet",

@@ -90,4 +90,4 @@ def _with_part(stance: Stance, effectors: tuple[str, ...], part: SolePart, hinge
     contacts: list[Contact] = [
         sole_part(contact, part, hinge) if contact.effector in effectors else contact for contact in stance
     ]
-    return Stance(contacts, stance.normal_force_cap)
+    return stance.with_contacts(contacts)

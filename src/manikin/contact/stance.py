@@ -1,12 +1,12 @@
 """A stance: the contacts that hold the body at one time."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
-from manikin.contact.contact import Contact
+from manikin.contact.contact import Contact, ContactKind
+from manikin.contact.model import ContactModel, FrictionModel, default_normal_force_cap
 from manikin.display import Displayed
 from manikin.errors import ContactError
-from manikin.spatial import finite_number
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -15,20 +15,39 @@ class Stance(Displayed):
 
     Attributes:
         contacts: The contacts, in a stable order.
-        normal_force_cap: Largest sum of the normal forces of all soles and points [N];
-            closes the wrench polytope ([Qiu2012]_ 4.26, summed along the normals so
-            that walls are bounded too). None leaves it to the contacts' own caps.
+        model: Friction cone and shared normal-force cap, which every stage and measurement obeys.
     """
 
     contacts: tuple[Contact, ...]
-    normal_force_cap: float | None = None
+    model: ContactModel
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
         cap = "none" if self.normal_force_cap is None else f"{self.normal_force_cap:.0f} N"
-        return {"contacts": " ".join(self.effectors), "normal_force_cap": cap}
+        return {
+            "contacts": " ".join(self.effectors), "friction_model": self.friction_model,
+            "normal_force_cap": cap,
+        }  # fmt: skip
 
-    def __init__(self, contacts: Sequence[Contact], normal_force_cap: float | None = None) -> None:
+    def __init__(
+        self,
+        contacts: Sequence[Contact],
+        normal_force_cap: float | None = None,
+        friction_model: FrictionModel = "outer",
+        *,
+        model: ContactModel | None = None,
+    ) -> None:
+        """Make a stance.
+
+        Args:
+            contacts: One per effector.
+            normal_force_cap: Of the contact model [N].
+            friction_model: Of the contact model.
+            model: The contact model as a whole; replaces the two.
+
+        Raises:
+            ContactError: If an effector is held twice or the contact model is not usable.
+        """
         for item in contacts:
             if not isinstance(item, Contact):
                 raise ContactError(f"stance contains {item!r}; valid: contacts made by sole, point or grasp")
@@ -36,12 +55,8 @@ class Stance(Displayed):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ContactError(f"stance holds effector {twice[0]!r} twice; valid: one contact per effector")
-        if normal_force_cap is not None:
-            normal_force_cap = finite_number(
-                normal_force_cap, "stance normal_force_cap [N]", above=0.0, error=ContactError
-            )
         object.__setattr__(self, "contacts", tuple(contacts))
-        object.__setattr__(self, "normal_force_cap", normal_force_cap)
+        object.__setattr__(self, "model", model or ContactModel(friction_model, normal_force_cap))
 
     def __len__(self) -> int:
         return len(self.contacts)
@@ -62,3 +77,34 @@ class Stance(Displayed):
     def effectors(self) -> tuple[str, ...]:
         """Names of the effectors in contact, in order."""
         return tuple(contact.effector for contact in self.contacts)
+
+    @property
+    def normal_force_cap(self) -> float | None:
+        """Largest sum of the normal forces of all soles and points [N]; None leaves it to the contacts."""
+        return self.model.normal_force_cap
+
+    @property
+    def friction_model(self) -> FrictionModel:
+        """Friction model of all its soles and points."""
+        return self.model.friction
+
+    def with_contacts(self, contacts: Iterable[Contact]) -> "Stance":
+        """Other contacts under the same contact model."""
+        return Stance(tuple(contacts), model=self.model)
+
+    def with_friction_model(self, friction: FrictionModel) -> "Stance":
+        """The same contacts and caps under another friction model."""
+        return Stance(self.contacts, model=replace(self.model, friction=friction))
+
+    def bounded(self, mass: float) -> "Stance":
+        """The stance itself, or with the default cap of a body where a normal force has no cap.
+
+        Args:
+            mass: Of the body [kg].
+        """
+        if self.normal_force_cap is not None or all(
+            contact.kind is ContactKind.GRASP or contact.normal_force_cap is not None for contact in self
+        ):
+            return self
+        cap = default_normal_force_cap(mass)
+        return Stance(self.contacts, model=replace(self.model, normal_force_cap=cap))

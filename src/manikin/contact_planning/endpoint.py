@@ -8,7 +8,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.contact import Contact, sole
+from manikin.contact import Contact, FrictionModel, sole
 from manikin.contact_planning.footholds import Footholds, stature_of
 from manikin.contact_planning.poser import Poser, PoserSettings
 from manikin.contact_planning.stage import Stage
@@ -60,6 +60,7 @@ class Endpoints:
         reference: FloatArray | None = None,
         *,
         natural: bool = False,
+        friction_model: FrictionModel = "outer",
     ) -> None:
         """Prepare a scene.
 
@@ -69,10 +70,12 @@ class Endpoints:
             friction: Coulomb coefficient of the soles.
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
             natural: Whether hips and shoulders keep to their learnt ranges.
+            friction_model: Of the stances.
         """
         self._body, self._scene, self._friction = body, scene, friction
         self._stature = stature_of(body)
-        self._poser = Poser(body, scene, reference, PoserSettings(natural=natural))
+        settings = PoserSettings(natural=natural, friction_model=friction_model)
+        self._poser = Poser(body, scene, reference, settings)
         self._footholds = Footholds(body, scene)
 
     def find(self, at: FloatArray, heading: float, habit: Habit, height: float | None = None) -> Endpoint:

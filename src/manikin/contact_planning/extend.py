@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact
+from manikin.contact import Contact, FrictionModel
 from manikin.contact_planning.depth_first import SearchLog, search_depth_first
 from manikin.contact_planning.extension import Extension, PartialPlan
 from manikin.contact_planning.footholds import Footholds, stature_of
@@ -47,6 +47,7 @@ class ExtendSettings:
         shift_duration: Shortest time between two flights [s].
         friction: Coulomb coefficient of the soles.
         natural: Whether hips and shoulders keep to their learnt ranges.
+        friction_model: Of the stances.
     """
 
     stride: float = 0.36
@@ -57,6 +58,7 @@ class ExtendSettings:
     shift_duration: float = 0.35
     friction: float = 0.7
     natural: bool = False
+    friction_model: FrictionModel = "outer"
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +99,8 @@ def extend(
         reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
     """
     settings = settings or ExtendSettings()
-    poser = Poser(body, scene, reference, PoserSettings(natural=settings.natural))
+    asked = PoserSettings(natural=settings.natural, friction_model=settings.friction_model)
+    poser = Poser(body, scene, reference, asked)
     log = SearchLog(poser, settings.searches)
     steps = _Steps(poser, guide, goal, settings, log)
     first = on_feet(poser, start, steps.feet, guide.at(0.0), log)

@@ -225,7 +225,7 @@ class Balance:
         body, limb = situation.state.body, situation.limb
         contact = contact_at(situation, candidates, row, self.kind or limb.kind, self.rules)
         others = [item for item in self.held if item.effector != limb.effector]
-        W = wrench_polytope(Stance([*others, contact], self.held.normal_force_cap))
+        W = wrench_polytope(self.held.with_contacts([*others, contact]))
         com = situation.state.com
         wrench = pseudo_wrench(body.mass, com, self.acceleration, np.zeros(3), W.reference)
         return float(stability_margins(W, wrench, com).wrench_about_com)

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact, ContactKind
+from manikin.contact import Contact, ContactKind, ContactModel, Stance
 from manikin.contact_planning.stage import ContactPlan
 from manikin.contact_planning.static_forces import static_room, static_torque_share
 from manikin.posture import touching_pairs
@@ -58,7 +58,7 @@ class _Held:
 
 
 def certify_plan(
-    body: BodyModel, scene: Scene, plan: ContactPlan, normal_force_cap: float
+    body: BodyModel, scene: Scene, plan: ContactPlan, model: ContactModel | None = None
 ) -> PlanCertificate:
     """Measure every posture of a plan.
 
@@ -66,8 +66,9 @@ def certify_plan(
         body: The body.
         scene: Its surroundings.
         plan: The plan.
-        normal_force_cap: On the sum of the normal forces [N].
+        model: Contact model; with the default cap of the body when omitted.
     """
+    model = model or ContactModel.of_body(body.mass)
     postures = _postures(plan)
     proximity = Proximity(body, scene)
     error = turn = beyond = share = 0.0
@@ -86,8 +87,9 @@ def certify_plan(
             nearest, pair = float(found.distance.min()), found.pairs[int(np.argmin(found.distance))]
         angles = item.q[7:]
         beyond = max(beyond, float(np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)))
-        room = min(room, static_room(item.carrying, body.mass, state.com, normal_force_cap))
-        share = max(share, static_torque_share(body, item.q, item.carrying, normal_force_cap))
+        stance = Stance(item.carrying, model=model)
+        room = min(room, static_room(stance, body.mass, state.com))
+        share = max(share, static_torque_share(body, item.q, stance))
     return PlanCertificate(
         len(postures), _changes(plan), error, turn, nearest, pair, beyond, float(room), share
     )

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel, Configuration, with_root
-from manikin.contact import Contact
+from manikin.contact import Contact, ContactModel, FrictionModel, Stance
 from manikin.contact_planning.static_region import StaticRegion
 from manikin.posture import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
 from manikin.scene import Proximity, Scene
@@ -30,6 +30,7 @@ class PoserSettings:
         turn_weight: Of the angle between the root and the guide [1/rad^2].
         tolerance: Largest residual of a contact [m, rad].
         iterations: Of each search.
+        friction_model: Of the stances on which the body has to be able to rest.
     """
 
     clearance: float = 0.014
@@ -40,6 +41,7 @@ class PoserSettings:
     turn_weight: float = 2.0
     tolerance: float = 2e-4
     iterations: int = 40
+    friction_model: FrictionModel = "outer"
 
     @property
     def learnt_margin(self) -> float | None:
@@ -94,6 +96,7 @@ class Poser:
         self.settings = settings or PoserSettings()
         self.searches = 0
         standing = np.array(body.standing_posture())
+        self._model = ContactModel.of_body(body.mass, self.settings.friction_model)
         self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
         self._proximity = Proximity(self.body, scene)
         self._regions: dict[frozenset[Contact], StaticRegion] = {}
@@ -183,5 +186,7 @@ class Poser:
         """Where the body may rest; asked again and again for the same contacts."""
         key = frozenset(carrying.values())
         if key not in self._regions:
-            self._regions[key] = StaticRegion.of(carrying.values(), self.body.mass)
+            self._regions[key] = StaticRegion.of(
+                Stance(tuple(carrying.values()), model=self._model), self.body.mass
+            )
         return self._regions[key]

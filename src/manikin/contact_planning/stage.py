@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence
+from manikin.contact import Contact, ContactModel, ContactSchedule, Phase, Stance, StanceSequence
 from manikin.spatial import FloatArray, frozen_array
 
 COM_ROOM = (0.06, 0.06, 0.03)
@@ -99,25 +99,25 @@ class ContactPlan:
         ]
         return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
 
-    def sequence(self, normal_force_cap: float | None = None) -> StanceSequence:
+    def sequence(self, model: ContactModel | None = None) -> StanceSequence:
         """The stances in order, as the stages that follow take them.
 
         Args:
-            normal_force_cap: On the sum of the normal forces of each [N]; None leaves it to the contacts.
+            model: Contact model of each; the default one without a cap when omitted.
         """
-        stances = [Stance(list(stage.contacts.values()), normal_force_cap) for stage in self.stages]
+        stances = [Stance(list(stage.contacts.values()), model=model) for stage in self.stages]
         return StanceSequence(
             [Phase(stance, stage.min_duration) for stance, stage in zip(stances, self.stages, strict=True)]
         )
 
-    def schedule(self, normal_force_cap: float) -> ContactSchedule:
+    def schedule(self, model: ContactModel) -> ContactSchedule:
         """The stances in time, each as short as it may be, from zero on.
 
         Args:
-            normal_force_cap: On the sum of the normal forces of each [N].
+            model: Contact model of each.
         """
         durations = [stage.min_duration for stage in self.stages]
-        return ContactSchedule(self.sequence(normal_force_cap), np.concatenate([[0.0], np.cumsum(durations)]))
+        return ContactSchedule(self.sequence(model), np.concatenate([[0.0], np.cumsum(durations)]))
 
     def keys(self, instants: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Key times (k,) [s] and configurations (k, nq): at every change, and in between where there is one.

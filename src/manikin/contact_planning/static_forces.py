@@ -4,7 +4,6 @@ Unlike the wrench polytope it knows the posture, and with it the torques of the 
 milliseconds and shares no code with the polytope.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,7 @@ from scipy.optimize import linprog
 
 from manikin.balance.friction import contact_to_world, edge_wrenches
 from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact, ContactKind
+from manikin.contact import ContactKind, Stance, default_normal_force_cap
 from manikin.spatial import GRAVITY, FloatArray
 
 
@@ -36,15 +35,17 @@ class Generators:
     normal: FloatArray
 
     @classmethod
-    def of(cls, contacts: Sequence[Contact]) -> "Generators":
+    def of(cls, stance: Stance) -> "Generators":
         """Edges of friction pyramids, and the axes of grasps within their limits."""
         wrenches, places, bounds, owner, normal = [], [], [], [], []
-        for number, contact in enumerate(contacts):
+        for number, contact in enumerate(stance):
             if contact.kind is ContactKind.GRASP:
                 own, limit = np.eye(6), np.repeat([contact.max_force, contact.max_moment], 3)
                 limits, pressing = np.column_stack([-limit, limit]), np.zeros(6)
             else:
-                own = contact_to_world(contact, edge_wrenches(contact), contact.position)
+                own = contact_to_world(
+                    contact, edge_wrenches(contact, stance.friction_model), contact.position
+                )
                 limits, pressing = np.tile([0.0, np.inf], (len(own), 1)), np.ones(len(own))
             wrenches.append(own)
             places.append(np.tile(contact.position, (len(own), 1)))
@@ -61,26 +62,23 @@ class Generators:
         return moved.T
 
 
-def static_room(
-    contacts: Sequence[Contact], mass: float, com: FloatArray, cap: float, directions: int = 8
-) -> float:
+def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 8) -> float:
     """How far the centre of mass may move in any direction on the ground while the contacts hold it at rest.
 
     One linear program for each direction; the room is exact in these directions.
 
     Args:
-        contacts: That carry the body.
+        stance: The contacts that carry the body; a sum of normal forces without a cap has the default one.
         mass: Of the body [kg].
         com: (3,) centre of mass [m].
-        cap: Largest sum of the normal forces [N].
         directions: Number of directions.
 
     Returns:
         Distance [m]; minus infinity where the contacts cannot hold the body as it is.
     """
-    if not contacts:
+    if not len(stance):
         return -np.inf
-    generators = Generators.of(contacts)
+    generators, cap = Generators.of(stance), _cap(stance, mass)
     weight = mass * GRAVITY
     room = np.inf
     for angle in 2.0 * np.pi * np.arange(directions) / directions:
@@ -99,7 +97,7 @@ def static_room(
     return room
 
 
-def static_torque_share(body: BodyModel, q: FloatArray, contacts: Sequence[Contact], cap: float) -> float:
+def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float:
     """Smallest share of the joints' torque limits with which a posture is held at rest.
 
     Minimises ``max_j |tau_j| / tau_max_j`` over the contact forces, with ``tau = g(q) - sum J^T w`` and the
@@ -108,18 +106,17 @@ def static_torque_share(body: BodyModel, q: FloatArray, contacts: Sequence[Conta
     Args:
         body: The body.
         q: (nq,) posture that holds the contacts.
-        contacts: That carry it.
-        cap: Largest sum of the normal forces [N].
+        stance: The contacts that carry it, with a cap as in :func:`static_room`.
 
     Returns:
         The share; infinite where the contacts cannot hold the posture.
     """
-    if not contacts:
+    if not len(stance):
         return np.inf
-    generators, state = Generators.of(contacts), Configuration(body, q)
+    generators, state = Generators.of(stance), Configuration(body, q)
     model = body.pinocchio
     gravity = pin.computeGeneralizedGravity(model, model.createData(), np.asarray(q))
-    jacobians = [state.effector_jacobian(contact.effector) for contact in contacts]
+    jacobians = [state.effector_jacobian(contact.effector) for contact in stance]
     columns = np.column_stack(
         [
             jacobians[number].T @ wrench
@@ -133,8 +130,13 @@ def static_torque_share(body: BodyModel, q: FloatArray, contacts: Sequence[Conta
     found = linprog(
         np.append(np.zeros(count), 1.0),
         A_ub=np.vstack([above, below, np.append(generators.normal, 0.0)]),
-        b_ub=np.concatenate([gravity[6:], -gravity[6:], [cap]]),
+        b_ub=np.concatenate([gravity[6:], -gravity[6:], [_cap(stance, body.mass)]]),
         A_eq=np.column_stack([columns[:6], np.zeros(6)]), b_eq=gravity[:6],
         bounds=[*generators.bounds.tolist(), (0.0, None)], method="highs",
     )  # fmt: skip
     return float(found.x[-1]) if found.success else np.inf
+
+
+def _cap(stance: Stance, mass: float) -> float:
+    """Largest sum of the normal forces [N]."""
+    return stance.normal_force_cap or default_normal_force_cap(mass)

@@ -1,16 +1,12 @@
 """Where the centre of mass may stand still on a stance."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from manikin.balance import admissible_com_polygon, polygon_of_halfplanes, signed_distance, wrench_polytope
-from manikin.contact import Contact, Stance
-from manikin.spatial import GRAVITY, FloatArray
-
-BODY_WEIGHTS_CAP = 3.0
-"""Cap on the sum of the normal forces [body weights]."""
+from manikin.contact import Stance
+from manikin.spatial import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +20,14 @@ class StaticRegion:
     polygon: FloatArray
 
     @classmethod
-    def of(cls, contacts: Iterable[Contact], mass: float) -> "StaticRegion":
-        """Region of contacts ([Qiu2012]_ 4.41): with their friction, grasps and force limits."""
-        stance = Stance(list(contacts), BODY_WEIGHTS_CAP * mass * GRAVITY)
-        return cls(admissible_com_polygon(wrench_polytope(stance), mass))
+    def of(cls, stance: Stance, mass: float) -> "StaticRegion":
+        """Region of a stance ([Qiu2012]_ 4.41); a stance without caps has the default one of the body.
+
+        Args:
+            stance: The contacts, with their contact model.
+            mass: Of the body [kg].
+        """
+        return cls(admissible_com_polygon(wrench_polytope(stance.bounded(mass)), mass))
 
     @property
     def is_empty(self) -> bool:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from manikin.contact import Contact, SolePart
+from manikin.contact import BODY_WEIGHTS_CAP, Contact, SolePart
 from manikin.errors import InputError
 from manikin.spatial import finite_number
 
@@ -104,7 +104,7 @@ class SupportSettings:
     rolling_press_speed: float = 0.04
     press_time: float = 0.03
     press_depth: float = 0.03
-    default_cap: float = 3.0
+    default_cap: float = BODY_WEIGHTS_CAP
     sole_inset: float = 0.01
     friction_share: float = 1.0
 

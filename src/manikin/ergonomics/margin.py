@@ -10,15 +10,12 @@ from manikin.balance.limiting import LimitingConstraint
 from manikin.balance.zmp_path import contact_wrench
 from manikin.body import BodyModel, Configuration
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.contact import Contact, ContactKind, ContactSchedule, Stance, point, sole
+from manikin.contact import Contact, ContactSchedule, Stance, default_normal_force_cap, point, sole
 from manikin.motion import Motion
-from manikin.spatial import GRAVITY, FloatArray, finite_number
+from manikin.spatial import FloatArray, finite_number
 
 FRICTION = 0.8
 """Coefficient of friction of contacts that only the motion tells of."""
-
-CAP = 3.0
-"""Largest sum of normal forces where nothing bounds them, in body weights, as in the simulation."""
 
 AGREES = 0.5
 """Difference up to which a margin counts as reproduced [N.m]."""
@@ -112,7 +109,7 @@ def rebuilt_stance(body: BodyModel, motion: Motion, row: int, friction: float = 
     for name, held in zip(motion.contact_names, motion.support[row], strict=True):
         if held and name in body.effectors:
             contacts.append(_contact(body, configuration, name, friction))
-    return Stance(contacts, CAP * body.mass * GRAVITY)
+    return Stance(contacts, default_normal_force_cap(body.mass))
 
 
 def _contact(body: BodyModel, configuration: Configuration, name: str, friction: float) -> Contact:
@@ -138,7 +135,7 @@ def _of_schedule(
     phase = int(schedule.phase_at(found.time))
     near = [phase, phase - 1, phase + 1]
     polytopes = [
-        wrench_polytope(_bounded(schedule.sequence[number].stance, body.mass))
+        wrench_polytope(schedule.sequence[number].stance.bounded(body.mass))
         for number in near
         if 0 <= number < len(schedule.sequence) and len(schedule.sequence[number].stance)
     ]
@@ -166,11 +163,3 @@ def _dynamic_wrench(body: BodyModel, motion: Motion, row: int) -> FloatArray:
     )
     rate = data.dhg.vector
     return pseudo_wrench(body.mass, data.com[0], rate[:3] / body.mass, rate[3:])
-
-
-def _bounded(stance: Stance, mass: float) -> Stance:
-    """The stance itself, or with a cap on its normal forces where nothing bounds them."""
-    bounded = stance.normal_force_cap is not None or all(
-        contact.kind is ContactKind.GRASP or contact.normal_force_cap is not None for contact in stance
-    )
-    return stance if bounded else Stance(stance.contacts, CAP * mass * GRAVITY)

@@ -5,8 +5,8 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.body.limbs import REFLECTION, are_mirrored, limb_named
 from manikin.errors import BodyError
-from manikin.locomotion.turns import cross, dot, matrix
-from manikin.spatial import FloatArray
+from manikin.locomotion.turns import dot, matrix
+from manikin.spatial import FloatArray, cross
 
 HINGES = (
     "hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "knee_rotation",

@@ -5,8 +5,8 @@ People mostly walk where they look: then the motion is *nonholonomic*. Steps to 
 them moves within 15 degrees of the body's heading. So the inner shoulder of a turn may stand or go back.
 
 On-line that is all, known one half step of the tangent later. Off-line, three things are added: the paths are
-low-passed, short holonomic intervals between nonholonomic ones are examined as noise, and walks that are
-straight to the eye are told apart from flat diagonal steps.
+low-passed, short holonomic intervals between nonholonomic ones are examined as noise, and single steps that
+are straight to the eye are told apart from flat diagonal steps.
 """
 
 import itertools
@@ -49,6 +49,10 @@ class SegmentationRule:
             not its cutoff or how long noise lasts. Off-line only.
         boundary: Angle below which two headings are the same [rad]; 1 degree ([Truong2010]_ 4.2.2.2), None
             without this step. Off-line only.
+        diagonal_step: Longest way from rest to rest that can be one flat diagonal step [m]: 0.5 m, the radius
+            around the start in which the thesis found single steps ([Truong2010]_ 4.5.2, Fig. 4.23). Longer
+            walks have the labels of Function 1, also where they drift aside and end with their first heading.
+            Off-line only.
         either_way: Whether a shoulder that goes straight back counts as one that goes ahead. The thesis says
             so of turns on the spot only ([Truong2010]_ Fig. 4.3 d); its constraint (1.1) and its quotient
             (4.1), which has no quadrants, say so of any motion, so that to walk backward is nonholonomic.
@@ -60,6 +64,7 @@ class SegmentationRule:
     cutoff: float | None = 0.5
     noise: float = 0.2
     boundary: float | None = float(np.radians(1.0))
+    diagonal_step: float = 0.5
     either_way: bool = False
 
     def __post_init__(self) -> None:
@@ -68,6 +73,7 @@ class SegmentationRule:
         finite_number(self.half_step, f"{where} half_step [s]", at_least=0.0)
         finite_number(self.standing_speed, f"{where} standing_speed [m/s]", at_least=0.0)
         finite_number(self.noise, f"{where} noise [s]", at_least=0.0)
+        finite_number(self.diagonal_step, f"{where} diagonal_step [m]", at_least=0.0)
         if self.cutoff is not None:
             finite_number(self.cutoff, f"{where} cutoff [-]", above=0.0, at_most=0.99)
         if self.boundary is not None:
@@ -139,9 +145,11 @@ def segment_path(
 ) -> PathSegments:
     """Cut a walk into segments ([Truong2010]_ Function 1 and 4.2.2).
 
-    The thesis wants walks that are "smaller than the tolerance" throughout split by their initial and final
-    orientation, without saying how. Here such a walk, from standing to standing, is a diagonal step if both
-    headings are the same and the way between both places is not along them; otherwise it is nonholonomic.
+    "At the boundary of forward walking and sideward step" the thesis ([Truong2010]_ 4.2.2.2) splits motions
+    that are "smaller than the tolerance" throughout by their initial and final orientation, and draws two
+    single motions. Here a motion from standing to standing is a diagonal step if it is no longer than
+    :attr:`SegmentationRule.diagonal_step`, both headings are the same and the way between both places is not
+    along them; otherwise it is nonholonomic, as any walk of several steps that keeps within the tolerance.
     Walks that are not recorded from rest to rest are left as they are.
 
     Args:
@@ -250,7 +258,7 @@ def _smoothed(angles: FloatArray, cutoff: float) -> FloatArray:
 
 
 def _with_diagonal_steps(labels: Labels, paths: ShoulderPaths, rule: SegmentationRule) -> Labels:
-    """Labels with walks made holonomic that keep the heading and go obliquely to it, below the tolerance."""
+    """Labels with single steps made holonomic that keep the heading and go obliquely to it."""
     found = labels.copy()
     runs = list(_runs(labels))
     if rule.boundary is None:
@@ -261,6 +269,8 @@ def _with_diagonal_steps(labels: Labels, paths: ShoulderPaths, rule: Segmentatio
         start, end = first - 1, stop
         turned = paths.heading[end] - paths.heading[start]
         way = paths.middle[end] - paths.middle[start]
+        if np.hypot(way[0], way[1]) > rule.diagonal_step:
+            continue
         aside = np.arctan2(way[1], way[0]) - paths.heading[start]
         if abs(turned) < rule.boundary <= abs(np.arctan2(np.sin(aside), np.cos(aside))):
             found[first:stop] = HOLONOMIC

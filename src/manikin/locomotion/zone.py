@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from manikin.errors import InputError
 from manikin.locomotion.categories import seen_from
-from manikin.locomotion.segmentation import HOLONOMIC, NONHOLONOMIC, PathSegments
+from manikin.locomotion.segmentation import HOLONOMIC, NONHOLONOMIC, THESIS_RULE, PathSegments
 from manikin.locomotion.targets import START
 from manikin.spatial import FloatArray, frozen_array
 
-THESIS_RADIUS = 0.5
+THESIS_RADIUS = THESIS_RULE.diagonal_step
 """Of the zone that the thesis proposes from its recordings [m] ([Truong2010]_ Fig. 4.23)."""
 
 STRAIGHT = float(np.radians(22.5))

@@ -30,12 +30,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from manikin.balance.friction import contact_to_world, cross, edge_wrenches
+from manikin.balance.friction import contact_to_world, edge_wrenches
 from manikin.balance.limits import contact_limits
 from manikin.balance.motion_margin import wrench_about
 from manikin.contact import Contact, ContactKind, Stance
 from manikin.mocap.runs import runs
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, cross
 
 SOFTNESS = 1e-6
 """``e``, per mean eigenvalue of ``G G^T``: so small that little of an admissible wrench is left."""
@@ -229,7 +229,7 @@ def _generators(contact: Contact, middle: FloatArray, weight: float) -> FloatArr
         axes = np.vstack([np.eye(3), -np.eye(3)]) * contact.max_force / weight
         wrenches = np.hstack([axes, cross(contact.position - middle, axes)])
     else:
-        wrenches = contact_to_world(contact, edge_wrenches(contact, "pyramid"), middle)
+        wrenches = contact_to_world(contact, edge_wrenches(contact, "outer"), middle)
     wrenches = np.array(wrenches)
     wrenches[:, 3:] /= LEVER
     return wrenches

@@ -14,7 +14,6 @@ import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from manikin.balance import pseudo_wrench, zero_moment_point
-from manikin.balance.friction import cross
 from manikin.body import BodyModel
 from manikin.body.further_contacts import with_knees_and_elbows
 from manikin.body.human import body_from_signature
@@ -22,7 +21,7 @@ from manikin.mocap.effector_places import JOINTS
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_motion import rates_of, smoothed_postures
 from manikin.mocap.recorded_supports import RecordedSupports
-from manikin.spatial import GRAVITY_VECTOR, FloatArray, frozen_array
+from manikin.spatial import GRAVITY_VECTOR, FloatArray, cross, frozen_array
 
 CUTOFF = 5.0
 """Low-pass of postures that are differentiated twice, as [Qiu2012]_ 3.2.1, one for all recordings [Hz]. With

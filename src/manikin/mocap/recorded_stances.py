@@ -49,7 +49,7 @@ STRONGEST = 4.0
 """Largest sum of normal forces, per body weight: above what walking, sitting down and running reach."""
 
 HAND_FORCE = 100.0
-"""Largest force of a hand ahead, aside and up, each ([Qiu2012]_ 7.2) [N]."""
+"""Largest force of a hand along each axis of the world ([Qiu2012]_ 7.2) [N]."""
 
 ON_GROUND = 0.2
 """Height above a surface up to which a hand, knee or elbow rests on it, and does not hold something [m]."""
@@ -172,8 +172,7 @@ def _other_contact(
     if below:
         place = np.array([place[0], place[1], below[0]])
     if stature is None or (name != SEAT and not below):
-        held = grasp(name, place, max_force=HAND_FORCE)
-        return replace(held, rotation_contact_to_world=rotation_from_yaw(level_heading(found.q[frames])))
+        return grasp(name, place, max_force=HAND_FORCE)
     if name not in (SEAT, TRUNK):
         rotation = rotation_from_yaw(level_heading(found.q[frames]))
         return point(name, place, rotation=rotation, friction=friction)

@@ -185,6 +185,7 @@ def describe_schedule(schedule: ContactSchedule) -> Json:
                 "min_duration": phase.min_duration,
                 "max_duration": phase.max_duration,
                 "normal_force_cap": phase.stance.normal_force_cap,
+                "friction_model": phase.stance.friction_model,
                 "contacts": [_describe_contact(contact) for contact in phase.stance],
             }
             for phase in schedule.sequence
@@ -201,7 +202,11 @@ def schedule_from(description: Mapping[str, Any]) -> ContactSchedule:
     """
     phases = [
         Phase(
-            Stance([_contact_from(contact) for contact in phase["contacts"]], phase["normal_force_cap"]),
+            Stance(
+                [_contact_from(contact) for contact in phase["contacts"]],
+                phase["normal_force_cap"],
+                phase.get("friction_model", "outer"),
+            ),
             phase["min_duration"],
             phase["max_duration"],
         )

@@ -170,9 +170,8 @@ def on_one_seat(schedule: ContactSchedule) -> ContactSchedule:
             changed[index] = replace(contact, position=place, rotation_contact_to_world=turn)
         seats = [one for one in seats if one[0] not in changed]
     phases = [
-        replace(phase, stance=Stance(
-            [changed[index] if contact.effector == SEAT else contact for contact in phase.stance],
-            phase.stance.normal_force_cap,
+        replace(phase, stance=phase.stance.with_contacts(
+            changed[index] if contact.effector == SEAT else contact for contact in phase.stance
         ))
         for index, phase in enumerate(schedule.sequence)
     ]  # fmt: skip
@@ -210,12 +209,12 @@ def _without_first_remnants(phases: list[Phase], durations: FloatArray) -> None:
         for index in range(count):
             stance = phases[index].stance
             contacts = [parts[count] if c.effector == name else c for c in stance]
-            phases[index] = replace(phases[index], stance=Stance(contacts, stance.normal_force_cap))
+            phases[index] = replace(phases[index], stance=stance.with_contacts(contacts))
 
 
 def _with_contacts(schedule: ContactSchedule, change: Callable[[Contact], Contact]) -> ContactSchedule:
     phases = [
-        replace(phase, stance=Stance(list(map(change, phase.stance)), phase.stance.normal_force_cap))
+        replace(phase, stance=phase.stance.with_contacts(map(change, phase.stance)))
         for phase in schedule.sequence
     ]
     return ContactSchedule(StanceSequence(phases), schedule.instants)

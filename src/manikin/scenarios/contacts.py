@@ -8,9 +8,6 @@ from manikin.contact import Contact, grasp, point, sole
 from manikin.scenarios.sections import ContactSection, SoleSection
 from manikin.spatial import rotation_from_rpy
 
-BODY_WEIGHTS_CAP = 3.0
-"""Cap on the sum of normal forces when the file gives none [body weights]."""
-
 
 def build_contact(
     effector: str,

@@ -47,7 +47,6 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
             key_planes=_key_planes(values),
             max_duration=options.max_duration_s,
             weights=Weights(**options.weights.model_dump(exclude_none=True)),
-            friction_model=options.friction_model,
             **{key: value for key, value in given.items() if value is not None},
         )
     except ScenarioError:

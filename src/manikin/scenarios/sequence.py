@@ -1,17 +1,24 @@
 """The stances that a scenario lists, and whether they fit its scene."""
 
+from dataclasses import replace
 from itertools import combinations
 
 from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.contact import Contact, Phase, Stance, StanceSequence, roll_feet, soles_overlap
+from manikin.contact import (
+    Contact,
+    Phase,
+    Stance,
+    StanceSequence,
+    roll_feet,
+    soles_overlap,
+)
 from manikin.errors import InputError
-from manikin.scenarios.contacts import BODY_WEIGHTS_CAP, build_contact
+from manikin.scenarios.contacts import build_contact
 from manikin.scenarios.sections import ContactSection, SoleSection
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.values import ScenarioValues
 from manikin.scene import Scene
-from manikin.spatial import GRAVITY
 
 
 def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
@@ -47,12 +54,14 @@ def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSe
     cap = supports.normal_force_cap_N
     if planning:
         cap = supports.planning_normal_force_cap_N or cap
-    cap = cap or BODY_WEIGHTS_CAP * values.mass * GRAVITY
+    model = values.contact_model
+    if cap is not None:
+        model = replace(model, normal_force_cap=cap)
     try:
         return StanceSequence(
             [
                 Phase(
-                    Stance([_contact(values, *item, planning) for item in contacts.items()], cap),
+                    Stance([_contact(values, *item, planning) for item in contacts.items()], model=model),
                     section.min_duration_s,
                     section.max_duration_s,
                 )

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import Field, model_validator
 
-from manikin.contact import Stance
+from manikin.contact import Stance, default_normal_force_cap
 from manikin.errors import InputError, ScenarioError
-from manikin.scenarios.contacts import BODY_WEIGHTS_CAP, build_contact
+from manikin.scenarios.contacts import build_contact
 from manikin.scenarios.sections import ContactSection, SoleSection
+from manikin.scenarios.sections.planning import FRICTION_MODEL_TEXT, FrictionModelName
 from manikin.scenarios.validation import Positive, Section, Text, Vector3, place, refuse, validate
 from manikin.scenarios.yaml_reader import read_yaml
-from manikin.spatial import GRAVITY
 
 if TYPE_CHECKING:
     from manikin.balance import BalanceReport
@@ -43,9 +43,7 @@ class StanceFile(Section):
     normal_force_cap_N: Positive | None = Field(
         default=None, description="largest sum of normal forces [N] (default: 3 body weights)"
     )
-    friction_model: Literal["pyramid", "inner"] = Field(
-        default="pyramid", description="pyramid around the friction cone, or inside it"
-    )
+    friction_model: FrictionModelName = Field(default="outer", description=FRICTION_MODEL_TEXT)
     reference: Vector3 = Field(default=(0.0, 0.0, 0.0), description="point of the moments [m]")
 
     @model_validator(mode="after")
@@ -66,7 +64,8 @@ class StanceFile(Section):
             ContactError: If a contact is not usable.
         """
         contacts = [build_contact(entry.effector, entry, self.friction, self.sole) for entry in self.contacts]
-        return Stance(contacts, self.normal_force_cap_N or BODY_WEIGHTS_CAP * self.mass_kg * GRAVITY)
+        cap = self.normal_force_cap_N or default_normal_force_cap(self.mass_kg)
+        return Stance(contacts, cap, self.friction_model)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +96,6 @@ class BalanceQuestion:
                 file.com,
                 file.acceleration,
                 file.angular_momentum_rate,
-                friction_model=file.friction_model,
                 reference=file.reference,
             )
         except InputError as error:

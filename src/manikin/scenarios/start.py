@@ -59,7 +59,9 @@ def start_posture(
         return carried_to(manner_of(CLIMBING).posture(body), spot, yaw, level)
     if name != Habit.STANDING:
         spot = np.array(values.start_com[:2] if place is None else place)
-        found = Endpoints(body, scene, friction_of(values)).find(spot, yaw, Habit(name), start.height_m)
+        found = Endpoints(
+            body, scene, friction_of(values), friction_model=values.contact_model.friction
+        ).find(spot, yaw, Habit(name), start.height_m)
         if found.stage is None:
             raise ScenarioError(f"{values.source}: {found.failure}; valid: another place or posture")
         return np.array(found.stage.q)

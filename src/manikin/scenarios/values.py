@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from manikin.contact import ContactModel
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios.expressions import Expression
 from manikin.scenarios.heights import HeightBand, SupportLevel
@@ -82,6 +83,11 @@ class ScenarioValues:
     def has_stature(self) -> bool:
         """Whether the body is a person, whose stature may be chosen."""
         return self.file.body.model == "human"
+
+    @property
+    def contact_model(self) -> ContactModel:
+        """Friction model of the file and the default cap of the body, for every stance of every stage."""
+        return ContactModel.of_body(self.mass, self.planning.friction_model)
 
     @property
     def planning(self) -> PlanningSection:

@@ -24,12 +24,11 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.balance.friction import cross
 from manikin.body import BodyModel, Hinge, Segment, Shape, ShapeKind
 from manikin.scene import Scene
 from manikin.simulation.options import PhysicsOptions
 from manikin.simulation.scene_geoms import add_scene, quaternion
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, cross
 
 _GEOM_KIND = {
     ShapeKind.SPHERE: mujoco.mjtGeom.mjGEOM_SPHERE,

@@ -13,7 +13,7 @@ from manikin.control import ControlOutput, SupportMode
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.motion import Motion
 from manikin.simulation.world import Sensed
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.spatial import FloatArray
 
 SWITCHING = 0.1
 """A support may touch its surface this long before and after its planned interval [s]."""
@@ -187,13 +187,13 @@ class Recorder:
         for index, phase in enumerate(self._schedule.sequence):
             rows = (phases == index) & ~settling
             if np.any(rows):
-                margins[rows] = wrench_polytope(_bounded(phase.stance, mass)).margin(totals[rows])
+                margins[rows] = wrench_polytope(phase.stance.bounded(mass)).margin(totals[rows])
         for row in (int(number) for number in np.flatnonzero(settling)):
             stance = self._schedule.sequence[int(phases[row])].stance
             if row in early:
-                stance = Stance((*stance, *early[row]), stance.normal_force_cap)
+                stance = stance.with_contacts((*stance, *early[row]))
             stance = self._as_measured(stance, self.samples[row])
-            margins[row] = wrench_polytope(_bounded(stance, mass)).margin(totals[row])
+            margins[row] = wrench_polytope(stance.bounded(mass)).margin(totals[row])
         return margins
 
     def _settling_rows(self) -> NDArray[np.bool_]:
@@ -226,7 +226,7 @@ class Recorder:
                 here = sample.output.state.frames[contact.effector].position
                 contact = replace(contact, position=here)
             contacts.append(contact)
-        return Stance(contacts, stance.normal_force_cap)
+        return stance.with_contacts(contacts)
 
     def motion(self, joint_names: Sequence[str], mass: float) -> Motion:
         """Turn the samples into a motion."""
@@ -256,11 +256,3 @@ def _lengths(vectors: list[FloatArray]) -> FloatArray:
 def near(interval: SupportInterval, time: float) -> bool:
     """Whether a support is planned at ``time`` [s] or has just been, or is about to be."""
     return interval.early - 1e-9 <= time <= interval.late + 1e-9
-
-
-def _bounded(stance: Stance, mass: float) -> Stance:
-    """The stance itself, or with a cap of three body weights where nothing bounds its forces."""
-    capped = stance.normal_force_cap is not None or all(
-        contact.kind is ContactKind.GRASP or contact.normal_force_cap is not None for contact in stance
-    )
-    return stance if capped else Stance(stance.contacts, 3.0 * mass * GRAVITY)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from manikin.balance import wrench_polytope
 from manikin.body import BodyModel
 from manikin.body.limb import end_segments
-from manikin.contact import Stance
+from manikin.contact import Stance, default_normal_force_cap
 from manikin.control.balance_recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
 from manikin.motion import Motion
 from manikin.simulation.world import Sensed
-from manikin.spatial import GRAVITY, FloatArray, skew
+from manikin.spatial import FloatArray, skew
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ class RecoveryRecorder:
         standings = [output.standing for _, output, *_ in self._rows]
         margins = np.empty(len(wrenches))
         for standing in dict.fromkeys(standings):
-            stance = Stance(standing.soles, 3.0 * self._body.mass * GRAVITY)
+            stance = Stance(standing.soles, default_normal_force_cap(self._body.mass))
             chosen = np.array([other is standing for other in standings])
             margins[chosen] = wrench_polytope(stance).margin(wrenches[chosen])
         return margins

@@ -8,11 +8,10 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from manikin.balance.friction import cross
 from manikin.errors import InputError
 from manikin.simulation.compile import SimulationModel, root_rotation
 from manikin.simulation.scene_geoms import obstacle_of
-from manikin.spatial import FloatArray, finite_number, frozen_array
+from manikin.spatial import FloatArray, cross, finite_number, frozen_array
 
 
 @dataclass(frozen=True)

@@ -78,8 +78,9 @@ class _FootSearch:
         self._reference = manner_of(scenario.manner).posture(body)
         self._natural = scenario.contacts.ranges == "learnt"
         self._endpoints = Endpoints(
-            body, scene, scenario.contacts.friction, self._reference, natural=self._natural
-        )
+            body, scene, scenario.contacts.friction, self._reference,
+            natural=self._natural, friction_model=scenario.contact_model.friction,
+        )  # fmt: skip
         self._brace: Brace | None = None
 
     def run(self) -> ContactSearch:
@@ -111,7 +112,10 @@ class _FootSearch:
     def _settings(self, *, again: bool) -> ExtendSettings:
         """How contacts are looked for; along another guide, which is much like the first, not as long."""
         options = self._scenario.contacts
-        settings = ExtendSettings(stride=options.stride_m, friction=options.friction, natural=self._natural)
+        settings = ExtendSettings(
+            stride=options.stride_m, friction=options.friction, natural=self._natural,
+            friction_model=self._scenario.contact_model.friction,
+        )  # fmt: skip
         return replace(settings, searches=SEARCHES_AGAIN) if again else settings
 
     def _goal(self, start: Stage) -> Stage | str:

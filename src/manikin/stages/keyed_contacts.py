@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.contact import ContactSchedule
+from manikin.contact import ContactModel, ContactSchedule
 from manikin.contact_planning import ContactPlan
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
@@ -30,14 +30,14 @@ class KeyedContacts:
     q: FloatArray
 
     @classmethod
-    def of_plan(cls, plan: ContactPlan, normal_force_cap: float) -> "KeyedContacts":
+    def of_plan(cls, plan: ContactPlan, model: ContactModel) -> "KeyedContacts":
         """A contact plan, every phase as long as it has to be at least.
 
         Args:
             plan: Found from start and goal.
-            normal_force_cap: Of every stance [N].
+            model: Contact model of every stance.
         """
-        schedule = plan.schedule(normal_force_cap)
+        schedule = plan.schedule(model)
         return cls(schedule, *plan.keys(schedule.instants))
 
     @classmethod

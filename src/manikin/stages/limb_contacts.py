@@ -89,7 +89,8 @@ class _LimbSearch:
         safe = max(self._size, SMALLEST)
         self._reference = _as_climbing(body, scenario.manner)
         self._natural = scenario.contacts.ranges == "learnt"
-        self._poser = Poser(body, scene, self._reference, PoserSettings(natural=self._natural).scaled(safe))
+        settings = PoserSettings(natural=self._natural, friction_model=scenario.contact_model.friction)
+        self._poser = Poser(body, scene, self._reference, settings.scaled(safe))
         samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
         self._places = LimbPlaces(
             body, scene, self._limbs, self._kinds, contact_rules(scenario, body), self._reference, samples
@@ -154,8 +155,10 @@ class _LimbSearch:
             yield found if found.stage is not None else LimbStart(None, where + found.reason)
 
     def _endpoints(self) -> Endpoints:
-        friction = self._scenario.contacts.friction
-        return Endpoints(self._body, self._scene, friction, natural=self._natural)
+        return Endpoints(
+            self._body, self._scene, self._scenario.contacts.friction,
+            natural=self._natural, friction_model=self._scenario.contact_model.friction,
+        )  # fmt: skip
 
     def _goal(self) -> FloatArray | str:
         """(7,) pose of the root at the goal, or why there is none."""

@@ -7,14 +7,20 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.balance import wrench_polytope
-from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence, sole
+from manikin.contact import (
+    Contact,
+    ContactSchedule,
+    Phase,
+    Stance,
+    StanceSequence,
+    default_normal_force_cap,
+    sole,
+)
 from manikin.errors import BodyError
 from manikin.locomotion import Walk
 from manikin.low_pass import low_passed
 from manikin.mocap.recorded_motion import CUTOFF
 from manikin.motion import Motion
-from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
-from manikin.spatial import GRAVITY
 from manikin.wholebody.full_motion import full_motion
 
 FRICTION = 0.8
@@ -44,7 +50,7 @@ def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
 def walked_schedule(walk: Walk, height: float) -> ContactSchedule:
     """Whole soles where the feet are in the middle of each support, level on a floor of a height [m]."""
     held = [_contacts(walk, foot, height) for foot in range(walk.support.shape[1])]
-    cap = BODY_WEIGHTS_CAP * walk.body.mass * GRAVITY
+    cap = default_normal_force_cap(walk.body.mass)
     changes = 1 + np.flatnonzero(np.any(np.diff(walk.support[:-1], axis=0), axis=1))
     rows = [0, *changes.tolist(), len(walk.time) - 1]
     phases = [

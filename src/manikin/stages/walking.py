@@ -39,6 +39,9 @@ STAGE = "walk"
 PATH_EVERY = 5
 """Instants of a route for each one that is kept."""
 
+CLOCK = 0.01
+"""Step of the common clock on which distances of walkers are measured [s]."""
+
 OBJECTIVES = {
     "prose": PROSE_ORDER, "literal": LITERAL_ORDER,
     "recorded": RECORDED_WALKS, "recorded-turns": RECORDED_TURNS,
@@ -197,11 +200,19 @@ def path_block(plan: PlannedWalks) -> dict[str, Any]:
         ],
         "min_room_m": _room(plan),
         "others": {
-            name: {"duration_s": other.duration, "path_length_m": other.length}
+            name: {"duration_s": other.duration, "path_length_m": other.length} | _closest(route, other)
             for name, other in plan.others.items()
         },
         "path_wall_ms": 1e3 * plan.wall_s,
     }
+
+
+def _closest(route: WalkRoute, other: WalkRoute) -> dict[str, float]:
+    """Least distance of two ways' middles on the common clock [m], and when it is reached first [s]."""
+    time = np.arange(0.0, max(route.duration, other.duration) + CLOCK, CLOCK)
+    away = np.linalg.norm((route.place_at(time) - other.place_at(time))[:, :2], axis=1)
+    nearest = int(np.argmin(away))
+    return {"closest_m": float(away[nearest]), "closest_at_s": float(time[nearest])}
 
 
 def _room(plan: PlannedWalks) -> float | None:

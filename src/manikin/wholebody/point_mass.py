@@ -142,6 +142,6 @@ class _Corners:
 def _edges(contact: Contact, problem: CentroidalProblem) -> FloatArray:
     if contact.kind is ContactKind.GRASP:
         return contact.max_force * np.vstack([np.eye(3), -np.eye(3)])
-    friction = pyramid_friction(contact, problem.friction_model)
+    friction = pyramid_friction(contact, problem.sequence[0].stance.friction_model)
     signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * friction
     return np.column_stack([signs, np.ones(4)]) @ contact.rotation_contact_to_world.T

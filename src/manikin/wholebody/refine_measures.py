@@ -137,7 +137,7 @@ def rooms_of(schedule: ContactSchedule, friction_share: float = 1.0) -> tuple[Ba
 def room_of(stance: Stance, friction_share: float = 1.0) -> BalanceRoom:
     """Wrench polytope of a stance, with a share of the friction."""
     contacts = [replace(contact, friction=friction_share * contact.friction) for contact in stance]
-    return BalanceRoom(Stance(contacts, stance.normal_force_cap))
+    return BalanceRoom(stance.with_contacts(contacts))
 
 
 def balance_of(

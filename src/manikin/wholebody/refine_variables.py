@@ -257,7 +257,7 @@ class _Phase:
 
 
 def _without(stance: Stance, name: str) -> Stance:
-    return Stance([contact for contact in stance if contact.effector != name], stance.normal_force_cap)
+    return stance.with_contacts(contact for contact in stance if contact.effector != name)
 
 
 def _effectors(

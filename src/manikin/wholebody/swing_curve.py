@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 from scipy.spatial.transform import Rotation
 
-from manikin.balance.friction import cross
 from manikin.errors import InputError
-from manikin.spatial import FloatArray, finite_number, frozen_array
+from manikin.spatial import FloatArray, cross, finite_number, frozen_array
 from manikin.wholebody.path import EffectorPath, Pose
 
 DEGREE = 5

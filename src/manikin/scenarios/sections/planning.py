@@ -2,9 +2,19 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from manikin.contact import FrictionModel
 from manikin.scenarios.validation import NonNegative, Positive, Section, Text, Weights3, refuse
+
+FrictionModelName = Annotated[
+    FrictionModel, BeforeValidator(lambda value: "outer" if value == "pyramid" else value)
+]
+"""Name of a friction model; ``pyramid`` is the older word for ``outer``."""
+
+FRICTION_MODEL_TEXT = (
+    "pyramid that stands for the friction cone: four sides around it, four inside it, or eight inside it"
+)
 
 
 class WeightsSection(Section):
@@ -43,9 +53,7 @@ class PlanningSection(Section):
         default=0.0, description="smallest stability margin allowed [N.m], or [N] in the force space"
     )
     margin_space: Literal["wrench", "force"] = Field(default="wrench", description="what the margin measures")
-    friction_model: Literal["pyramid", "inner"] = Field(
-        default="pyramid", description="pyramid around the friction cone, or inside it"
-    )
+    friction_model: FrictionModelName = Field(default="outer", description=FRICTION_MODEL_TEXT)
     max_duration_s: Positive | None = Field(default=None, description="longest duration of the motion [s]")
     zero_end_accelerations: Annotated[bool, Field(strict=True)] = Field(
         default=False, description="whether the CoM starts and ends without acceleration"
