@@ -14,7 +14,7 @@ from manikin.balance import wrench_polytope
 from manikin.body import human
 from manikin.centroidal import CentroidalProblem, plan_com
 from manikin.centroidal.feasibility import polytopes_of
-from manikin.contact import Phase, Stance, StanceSequence, sole
+from manikin.contact import ContactModel, Phase, Stance, StanceSequence, sole
 from manikin.locomotion import (
     START,
     Walker,
@@ -27,10 +27,8 @@ from manikin.locomotion import (
 from manikin.locomotion.words import residuals, word_paths
 from manikin.pipeline import run
 from manikin.scenarios import load_scenario
-from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
 from manikin.scenarios.walked import walk_before, walking_supports
 from manikin.scene import Box, Obstacle, Scene
-from manikin.spatial import GRAVITY
 from manikin.stages.contacts import find_supports
 from manikin.stages.keyed_contacts import KeyedContacts
 from manikin.wholebody import WholeBodySettings, plan_whole_body, refine_motion
@@ -93,7 +91,7 @@ def test_limbs_go_all_the_way_and_are_refined(name):
     body, scene = scenario.build_body(), scenario.build_scene()
     found = find_supports(scenario, body, scene, np.random.default_rng(scenario.seed))
     assert found.failure is None
-    keyed = KeyedContacts.of_plan(found.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    keyed = KeyedContacts.of_plan(found.plan, ContactModel.of_body(body.mass))
     keyed = keyed.with_lifted_feet(body, scene, ())
     refined = refine_motion(body, scene, keyed.time, keyed.q, keyed.schedule)
     assert refined.failure is None, refined.failure

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import manikin
+from manikin.contact import ContactModel
 from manikin.contact_planning import certify_plan
 from manikin.scenarios import list_scenarios, list_variants, load_scenario
-from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
 from manikin.scene import Proximity, Scene
-from manikin.spatial import GRAVITY
 from manikin.stages.contacts import find_supports
 
 EVERY = [
@@ -117,6 +116,6 @@ def test_contacts_are_found_with_every_seed(name, seed):
     body, scene = scenario.build_body(), scenario.build_scene()
     found = find_supports(scenario, body, scene, np.random.default_rng(seed))
     assert found.failure is None
-    certificate = certify_plan(body, scene, found.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    certificate = certify_plan(body, scene, found.plan, ContactModel.of_body(body.mass))
     assert certificate.changes == 1
     assert certificate.max_torque_share < 1.0
