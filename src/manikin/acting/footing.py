@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from manikin.balance import pseudo_wrench, stability_margins, wrench_about, wrench_polytopes
+from manikin.balance import pseudo_wrench, stability_margins, wrench_polytopes
 from manikin.contact import Contact, ContactModel, FrictionModel, Stance
 from manikin.contact_planning import Candidates, ContactRules, Situation
 from manikin.contact_planning.by_place import contact_at, score_by_place
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.spatial import GRAVITY, FloatArray, wrench_about
 
 
 @dataclass(frozen=True, eq=False)

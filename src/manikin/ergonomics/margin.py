@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from manikin.balance import WrenchPolytope, stability_margins, wrench_about, wrench_polytopes
+from manikin.balance import WrenchPolytope, stability_margins, wrench_polytopes
 from manikin.balance.limiting import LimitingConstraint
 from manikin.balance.zmp_path import contact_wrench
 from manikin.body import BodyModel, Configuration
@@ -12,7 +12,7 @@ from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, ContactSchedule, Stance, default_normal_force_cap, point, sole
 from manikin.motion import Motion
 from manikin.motion.dynamics import centroidal_motion
-from manikin.spatial import FloatArray, finite_number
+from manikin.spatial import FloatArray, finite_number, wrench_about
 
 FRICTION = 0.8
 """Coefficient of friction of contacts that only the motion tells of."""

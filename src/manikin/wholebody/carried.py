@@ -1,12 +1,11 @@
 """A motion that is there already, made with a load in the hands."""
 
-from manikin.balance.motion_margin import motion_margin
+from manikin.balance import wrench_polytopes
 from manikin.body import BodyModel, carrying
 from manikin.contact import ContactSchedule
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.wholebody.forces import plan_forces
-from manikin.wholebody.full_motion import centroidal_state
+from manikin.wholebody.full_motion import full_motion
 
 
 def carried_motion(
@@ -36,14 +35,7 @@ def carried_motion(
             f"the motion was made with {sum(body.loads.values()):g} kg in the hands; valid: a motion without"
         )
     loaded = carrying(body, mass, hand)
-    time, q, v, a = motion.time, motion.q, motion.v, motion.a
-    com, momentum, wrench = centroidal_state(loaded, q, v, a)
-    forces = plan_forces(loaded, schedule, time, q, v, a)
     stances = [phase.stance.bounded(loaded.mass) for phase in schedule.sequence]
-    names = schedule.sequence.effectors
-    return loaded, Motion(
-        time=time, q=q, v=v, a=a, tau=forces.tau, com=com, angular_momentum=momentum,
-        margin=motion_margin(stances, schedule.phase_at(time), wrench, com).margin,
-        support=schedule.support(time, names), contact_force=forces.contact_force, contact_names=names,
-        joint_names=loaded.joint_names,
-    )  # fmt: skip
+    states = motion.time, motion.q, motion.v, motion.a
+    measured, _ = full_motion(loaded, schedule, wrench_polytopes(stances), *states)
+    return loaded, measured
