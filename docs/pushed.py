@@ -86,7 +86,7 @@ def survives(plan: Plan, push: Push, returning: bool) -> bool:
     """Whether the body comes back on its plan and to its goal."""
     settings = ControlSettings(returning=ReturnSettings() if returning else None)
     result = execute(plan.body, plan.scene, plan.motion, plan.schedule, pushes=[push], settings=settings)
-    return result.succeeded and ExecutionRequirements().violation(result) is None
+    return result.succeeded and ExecutionRequirements().table(result).held
 
 
 def largest_impulse(plan: Plan, job: Job, guess: float) -> float:

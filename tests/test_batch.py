@@ -21,7 +21,8 @@ def says(succeeded, status, before=""):
     failure = (
         None if succeeded else {"stage": "centroidal", "reason": "no margin", "time_s": 1.0, "where": ""}
     )
-    summary = {"scenario": "fake", "succeeded": succeeded, "failure": failure, "wall_s": 0.1}
+    words = {"verdict": "proved" if succeeded else "failed", "planned": succeeded, "proved": succeeded}
+    summary = {"scenario": "fake", **words, "succeeded": succeeded, "failure": failure, "wall_s": 0.1}
     summary |= dict.fromkeys(("centroidal", "wholebody", "execution"))
     return script(f"import sys\n{before}\nprint({json.dumps(summary)!r})\nsys.exit({status})")
 
@@ -56,7 +57,24 @@ def test_an_expected_failure_is_right_when_it_is_explained():
     wanted = dict.fromkeys(["infeasible", "crashing", "refused", "good"], "failure")
     report = ran([*wanted], wanted, workers=2)
     assert [run["as_expected"] for run in report["runs"]] == [True, False, False, False]
+    assert (report["as_expected"], report["not_as_expected"]) == (1, 3)
     assert (report["succeeded"], report["failed"]) == (1, 3)
+
+
+def test_a_failure_in_another_stage_is_not_the_expected_one():
+    """The fake process fails in the centroidal stage."""
+    for stage, right in (("centroidal", True), ("execution", False), (None, True)):
+        job = Job("infeasible", None, "failure", stage, "because")
+        report = run_jobs([job], lambda job: PROCESSES[job.scenario], workers=1)
+        assert report["runs"][0]["as_expected"] is right
+        assert report["runs"][0]["expected_because"] == "because"
+
+
+def test_every_scenario_whose_execution_falls_expects_it_with_its_reason():
+    jobs = {job.name: job for job in built_in_jobs()}
+    for name in ("climb-wall", "insect-books", "truck-egress"):
+        assert (jobs[name].expected, jobs[name].stage) == ("failure", "execution")
+        assert jobs[name].because
 
 
 def test_a_run_that_does_not_end_is_ended():

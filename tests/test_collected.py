@@ -4,6 +4,7 @@ import copy
 
 import pytest
 
+from manikin.batch import counts
 from manikin.collected import beam_table, filed, seed_record, seed_table, stature_table
 
 PUBLISHED = {"lowest_com_m": {"H1": 0.85, "H2": 0.80}, "beam_height_m": {"H1": 1.45, "H2": 1.30}}
@@ -12,7 +13,8 @@ PUBLISHED = {"lowest_com_m": {"H1": 0.85, "H2": 0.80}, "beam_height_m": {"H1": 1
 def a_run(scenario, variant=None, **changes):
     run = {
         "scenario": scenario if variant is None else f"{scenario}@{variant}", "variant": variant,
-        "expected": "success", "as_expected": True, "succeeded": True, "failure": None, "wall_s": 9.0,
+        "expected": "success", "as_expected": True, "verdict": "proved", "planned": True, "proved": True,
+        "succeeded": True, "failure": None, "wall_s": 9.0,
         "stature_m": 1.75, "mass_kg": 79.0, "seed": 0,
         "centroidal": {
             "duration_s": 5.0, "min_margin": 30.123456, "margin_unit": "N.m", "feasibility_radius": 70.0,
@@ -31,10 +33,8 @@ def a_run(scenario, variant=None, **changes):
 
 
 def a_report(*runs, **asked):
-    right = sum(run["as_expected"] for run in runs)
     return {
-        "stature_m": None, "seed": None, **asked, "runs": list(runs), "succeeded": right,
-        "failed": len(runs) - right, "wall_s": 10.0,
+        "stature_m": None, "seed": None, **asked, "runs": list(runs), **counts(runs), "wall_s": 10.0,
     }  # fmt: skip
 
 
@@ -66,30 +66,28 @@ def test_statures_are_side_by_side_and_a_point_mass_has_none():
         ("beam-H1C1", "1.65"), ("beam-H1C1", "1.85"), ("platform", "1.65"), ("platform", "1.85"),
     ]  # fmt: skip
     assert table[0][3:] == ["79", "FAILED (wholebody): no posture", "-"]
-    assert table[3][3:] == ["79", "succeeded", "17.1"]
+    assert table[3][3:] == ["79", "proved", "17.1"]
 
 
-def test_seeds_are_the_same_only_to_the_last_bit():
+def test_seeds_with_the_same_bits_are_one_result():
     other = copy.deepcopy(a_run("platform"))
     other["execution"]["min_margin"] += 1e-12
     other["wholebody"]["seed_matters"] = True
     records = {"0": seed_record(a_report(a_run("platform"), a_run("walk", "slippery")))}
     same = {**records, "1": records["0"]}
-    assert [row[2:] for row in cells(seed_table(same))] == [
-        ["2 of 2", "no", "17.1", "yes, to the last bit"]
-    ] * 2
+    assert [row[2:] for row in cells(seed_table(same))] == [["2 of 2 seeds", "no", "1", "17.1"]] * 2
     records["1"] = seed_record(
         a_report(other, {**STOPPED, "scenario": "walk@slippery", "variant": "slippery"})
     )
     first, second = cells(seed_table(records))
-    assert first == ["platform", "-", "2 of 2", "yes", "17.1", "no"]
-    assert second == ["walk", "slippery", "1 of 2", "no", "17.1", "no"]
+    assert first == ["platform", "-", "2 of 2 seeds", "yes", "2", "17.1"]
+    assert second == ["walk", "slippery", "1 of 2 seeds", "no", "2", "17.1"]
 
 
 def test_a_spread_of_margins_is_shown():
     worse = a_run("platform", execution={"min_margin": 8.5})
     records = {seed: seed_record(a_report(run)) for seed, run in {"0": a_run("platform"), "1": worse}.items()}
-    assert cells(seed_table(records))[0][4] == "8.5 to 17.1"
+    assert cells(seed_table(records))[0][5] == "8.5 to 17.1"
 
 
 def test_each_report_is_filed_in_its_place_and_replaces_the_old_one_there():

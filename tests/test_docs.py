@@ -83,7 +83,7 @@ def test_several_reports_are_taken_over_at_once(generator, tmp_path, monkeypatch
     assert [*found["statures"]] == ["1.65", "1.85"]
     assert "3" in found["seeds"]
     assert "| beam-H1C1 | - | 1.65 |" in generator.statures_table()
-    assert "of 1 |" in generator.seeds_table() or "of 2 |" in generator.seeds_table()
+    assert "of 1 seeds |" in generator.seeds_table() or "of 2 seeds |" in generator.seeds_table()
     for wrong in (["--stature", report], [report, "--seed", "3"]):
         with pytest.raises(SystemExit, match="valid: "):
             generator.take_over_results(wrong)

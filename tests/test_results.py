@@ -3,11 +3,22 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manikin.results import HEADER, _rounded, markdown_table, reduced, result_rows, text_table
+from manikin.batch import counts
+from manikin.results import (
+    HEADER,
+    _rounded,
+    counts_line,
+    markdown_table,
+    reduced,
+    result_rows,
+    text_table,
+    verdict_line,
+)
 
 GOOD = {
-    "scenario": "platform", "variant": None, "expected": "success", "as_expected": True, "succeeded": True,
-    "failure": None, "wall_s": 9.04321,
+    "scenario": "platform", "variant": None, "expected": "success", "as_expected": True,
+    "verdict": "proved", "planned": True, "proved": True, "succeeded": True, "failure": None,
+    "wall_s": 9.04321,
     "centroidal": {
         "method": "timing-free", "duration_s": 4.99999988, "min_margin": 24.334567, "margin_unit": "N.m",
         "feasibility_radius": 69.34321, "wall_s": 0.71234,
@@ -17,21 +28,23 @@ GOOD = {
 }  # fmt: skip
 POINT_MASS = {
     **GOOD, "scenario": "walls@trial-4", "variant": "trial-4", "wholebody": None, "execution": None,
+    "verdict": "planned", "proved": False,
     "centroidal": {**GOOD["centroidal"], "min_margin": 280.6, "margin_unit": "N"},
 }  # fmt: skip
 BAD = {
     **POINT_MASS, "scenario": "platform@slippery", "variant": "slippery", "succeeded": False,
+    "verdict": "failed", "planned": False,
     "expected": "failure", "as_expected": True,
     "failure": {"stage": "centroidal", "reason": "no | margin\nat all", "time_s": 0.0, "where": "phase 1"},
     "centroidal": {**GOOD["centroidal"], "duration_s": None, "min_margin": None, "feasibility_radius": None},
 }  # fmt: skip
-REPORT = {"runs": [GOOD, POINT_MASS, BAD], "succeeded": 3, "failed": 0, "wall_s": 12.345678}
+REPORT = {"runs": [GOOD, POINT_MASS, BAD], "wall_s": 12.345678, **counts([GOOD, POINT_MASS, BAD])}
 
 
 def test_a_row_says_what_the_run_measured():
     assert result_rows(REPORT)[0] == (
         "platform", "-", "5.00", "24.3 N.m", "69.3", "24.2", "20.6", "0.07", "no", "0.7 + 3.3 + 1.3",
-        "succeeded",
+        "yes", "yes", "proved",
     )  # fmt: skip
 
 
@@ -48,7 +61,35 @@ def test_failures_say_whether_they_were_expected():
     assert rows[0][-1].startswith("failed as expected (centroidal): ")
     assert rows[1][-1].startswith("FAILED (centroidal): ")
     late = {**GOOD, "as_expected": False}
-    assert result_rows({"runs": [late]})[0][-1] == "succeeded although a failure was expected"
+    assert result_rows({"runs": [late]})[0][-1] == "proved although a failure was expected"
+
+
+FALLEN = {
+    **GOOD, "verdict": "failed", "proved": False, "succeeded": False,
+    "failure": {"stage": "execution", "reason": "fell at 27.6 s", "time_s": 27.6, "where": "phase 1"},
+    "execution": {**GOOD["execution"], "fell": True},
+}  # fmt: skip
+"""Its plan keeps every requirement, its execution falls."""
+
+
+def test_planned_and_proved_are_counted_apart_and_a_fall_is_no_success():
+    runs = [GOOD, POINT_MASS, BAD, {**FALLEN, "expected": "failure"}]
+    found = {"runs": runs, "wall_s": 1.0, **counts(runs)}
+    assert counts(runs) == {
+        "planned": 3, "proved": 1, "succeeded": 2, "failed": 2, "fell": 1, "as_expected": 4,
+        "not_as_expected": 0,
+    }  # fmt: skip
+    assert counts_line(found).startswith("4 runs: 3 planned, 1 proved; 2 succeeded, 2 failed (1 fell); ")
+    row = dict(zip(HEADER, result_rows({"runs": [FALLEN]})[0], strict=True))
+    assert (row["planned"], row["proved"], row["fell"]) == ("yes", "no", "yes")
+    assert row["result"] == "failed as expected (execution): fell at 27.6 s"
+
+
+def test_the_verdict_says_first_what_failed():
+    assert verdict_line(FALLEN).startswith("failed: fell at 27.6 s (platform, execution, after a plan")
+    assert verdict_line(GOOD).startswith("proved: platform, ")
+    assert verdict_line(POINT_MASS).startswith("planned: walls@trial-4, not executed")
+    assert verdict_line(BAD).startswith("failed: no | margin")
 
 
 def test_markdown_rows_have_as_many_cells_as_the_header():

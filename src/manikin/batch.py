@@ -9,14 +9,14 @@ import os
 import subprocess
 import sys
 import time as clock
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any
 
-from manikin.scenarios import list_scenarios, list_variants, load_scenario
+from manikin.scenarios import Scenario, list_scenarios, list_variants, load_scenario
 
 TIME_LIMIT = 1800.0
 """Wall time after which a run is ended [s]."""
@@ -34,11 +34,21 @@ class Job:
         scenario: Name of a built-in scenario, or a scenario file.
         variant: Name of one of its variants, or None.
         expected: ``"success"`` or ``"failure"``, see the key ``expect`` of a scenario.
+        stage: Stage that is expected to fail, or None for any.
+        because: Why a failure is expected; empty if the scenario does not say.
     """
 
     scenario: str
     variant: str | None = None
     expected: str = "success"
+    stage: str | None = None
+    because: str = ""
+
+    @classmethod
+    def of(cls, name: str, variant: str | None, scenario: Scenario) -> "Job":
+        """The run of a scenario that was loaded by this name and variant."""
+        wanted = scenario.file.expect
+        return cls(name, variant, wanted.outcome, wanted.stage, wanted.because or "")
 
     @property
     def name(self) -> str:
@@ -84,7 +94,7 @@ def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
         ScenarioError: If one of the files is not valid.
     """
     return tuple(
-        Job(name, variant, load_scenario(name, variant).file.expect)
+        Job.of(name, variant, load_scenario(name, variant))
         for name in list_scenarios()
         for variant in (None, *list_variants(name))
         if load_scenario(name, variant).has_stature or not statures
@@ -110,8 +120,10 @@ def run_jobs(
 
     Returns:
         ``runs`` in the order of the jobs, each the summary of the run with ``variant``,
-        ``expected`` and ``as_expected``; ``succeeded`` and ``failed``, the numbers of runs that
-        did and did not end as expected; ``wall_s``.
+        ``expected``, ``expected_because`` and ``as_expected``; the numbers of runs that were
+        ``planned``, ``proved`` and that ``fell``; ``as_expected`` and ``not_as_expected``, the numbers of
+        runs that did and did not end as their scenario says; ``succeeded`` and ``failed``, the numbers of
+        runs that did and did not succeed; ``wall_s``.
     """
     began = clock.perf_counter()
     found: dict[int, dict[str, Any]] = {}
@@ -121,9 +133,22 @@ def run_jobs(
             if report is not None:
                 report(entry, len(found))
     runs = [found[index] for index in range(len(jobs))]
-    right = sum(entry["as_expected"] for entry in runs)
-    wall = clock.perf_counter() - began
-    return {"runs": runs, "succeeded": right, "failed": len(runs) - right, "wall_s": wall}
+    return {"runs": runs, **counts(runs), "wall_s": clock.perf_counter() - began}
+
+
+def counts(runs: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    """Number of runs that were planned, proved, fell, succeeded, and ended as their scenario says.
+
+    Args:
+        runs: Entries of a report of :func:`run_jobs`.
+    """
+    number = {key: sum(bool(run[key]) for run in runs) for key in ("planned", "proved", "succeeded")}
+    fell = sum(bool((run["execution"] or {}).get("fell")) for run in runs)
+    right = sum(bool(run["as_expected"]) for run in runs)
+    return {
+        **number, "failed": len(runs) - number["succeeded"], "fell": fell,
+        "as_expected": right, "not_as_expected": len(runs) - right,
+    }  # fmt: skip
 
 
 def usable_cores() -> int:
@@ -198,9 +223,11 @@ def _entry(run: _Run, time_limit: float | None) -> dict[str, Any]:
     if summary is None:
         summary = _broken_off(run, time_limit)
     ended = "success" if summary["succeeded"] else "failure" if explained else "broken off"
+    right_stage = run.job.stage in (None, (summary["failure"] or {}).get("stage"))
     return {
         **summary, "variant": run.job.variant, "expected": run.job.expected,
-        "as_expected": ended == run.job.expected,
+        "expected_because": run.job.because or None,
+        "as_expected": ended == run.job.expected and right_stage,
     }  # fmt: skip
 
 
@@ -224,6 +251,7 @@ def _broken_off(run: _Run, time_limit: float | None) -> dict[str, Any]:
     stages = dict.fromkeys(("centroidal", "wholebody", "execution"))
     unknown = dict.fromkeys(("stature_m", "mass_kg", "seed"))
     return {
-        "scenario": run.job.folder, **unknown, "succeeded": False, "failure": failure, **stages,
+        "scenario": run.job.folder, **unknown, "verdict": "failed", "planned": False, "proved": False,
+        "succeeded": False, "failure": failure, "requirements": [], **stages,
         "wall_s": run.seconds,
     }  # fmt: skip

@@ -28,7 +28,7 @@ from manikin.commands.console import (
     stdout_kept_clean,
 )
 from manikin.commands.ergonomics import ergonomics
-from manikin.commands.job import print_summary, run_job
+from manikin.commands.job import run_job
 from manikin.commands.library import library
 from manikin.commands.push import push
 from manikin.commands.statistics import statistics
@@ -135,6 +135,19 @@ def run(
         float | None, typer.Option(metavar="KG", min=35.0, max=160.0, help="Other mass, 35 to 160 kg.")
     ] = None,
     sex: Annotated[str | None, typer.Option(metavar="male|female", help="Other sex.")] = None,
+    age: Annotated[float | None, typer.Option(metavar="YEARS", help="Other age, 18 to 90 years.")] = None,
+    strength: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X", help="Torque limits relative to a healthy adult of that sex, size and age."
+        ),
+    ] = None,
+    load_kg: Annotated[
+        float | None, typer.Option(metavar="KG", help="Load in the hands during the whole motion.")
+    ] = None,
+    load_hand: Annotated[
+        str | None, typer.Option(metavar="left|right|both", help="Hand that carries it. Default: both.")
+    ] = None,
     variant: Annotated[
         str | None, typer.Option(metavar="V", help="One of the scenario's variants; also NAME@V.")
     ] = None,
@@ -158,33 +171,37 @@ def run(
         int | None, typer.Option(metavar="N", min=1, help="Runs at a time with 'all'; default: one per core.")
     ] = None,
 ) -> int:
-    """Plan a scenario, execute it in the physics engine and report."""
+    """Plan a scenario, execute it in the physics engine and report: proved, planned or failed."""
     if scenario == ALL:
         refuse(variant is not None, "--variant", "every variant is run")
         refuse(bool(overrides), "--set", "it belongs to one scenario")
         refuse(moved is not None, "--moved", "it belongs to one scenario")
-        given = {"--seed": seed, "--stature": stature, "--mass": mass, "--sex": sex}
+        refuse(load_kg is not None or load_hand is not None, "--load-kg", "it belongs to one scenario")
+        body = {"--stature": stature, "--mass": mass, "--sex": sex, "--age": age, "--strength": strength}
+        given = {"--seed": seed} | body
         words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
-        _check_values(seed, stature, mass, sex)
+        _check_values(seed, stature, mass, sex, age, strength)
         directory = out if out is not None else None if json else Path("runs")
         asked = {"stature_m": stature, "seed": seed}
         return _run_all(directory, asked, tuple(words), context.obj, draw=figures, workers=jobs, json=json)
     refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
+    refuse(load_hand is not None and load_kg is None, "--load-hand", "it needs --load-kg")
+    load = None if load_kg is None else {"mass_kg": load_kg, "hand": load_hand or "both"}
     from manikin.scenarios import load_scenario
 
     job = load_scenario(scenario, variant, overrides or ())
-    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex)
+    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex, age=age, strength=strength, load=load)
     if seed is not None:
         job = job.with_seed(seed)
     if moved is not None:
         job = job.moved(*moved)
     directory = out if out is not None else None if json else Path("runs") / job.name
-    summary = run_job(job, directory, context.obj, draw=figures)
+    outcome = run_job(job, directory, context.obj, draw=figures)
     if json:
-        print_json(summary)
+        print_json(outcome.summary)
     else:
-        print_summary(summary, directory)
-    return DONE if summary["succeeded"] else FAILED
+        outcome.print()
+    return outcome.status
 
 
 app.command()(analyze)
@@ -379,11 +396,19 @@ def export(
     typer.echo(str(written))
 
 
-def _check_values(seed: int | None, stature: float | None, mass: float | None, sex: str | None) -> None:
+def _check_values(
+    seed: int | None,
+    stature: float | None,
+    mass: float | None,
+    sex: str | None,
+    age: float | None,
+    strength: float | None,
+) -> None:
     """Refuse a value once, and not once per run."""
     from manikin.scenarios import list_scenarios, load_scenario
 
-    job = load_scenario(next(iter(list_scenarios()))).with_body(stature_m=stature, mass_kg=mass, sex=sex)
+    job = load_scenario(next(iter(list_scenarios())))
+    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex, age=age, strength=strength)
     if seed is not None:
         job.with_seed(seed)
 
@@ -401,7 +426,7 @@ def _run_all(
     from manikin import batch
     from manikin.atomic import write_text
     from manikin.result_directory import make_directory, to_json
-    from manikin.results import text_table
+    from manikin.results import counts_line, text_table, verdict_line
 
     runs = batch.built_in_jobs(statures=asked["stature_m"] is not None)
     if out is not None:
@@ -410,9 +435,8 @@ def _run_all(
     def report(entry: dict[str, Any], done: int) -> None:
         interruption.check()
         word = "as expected" if entry["as_expected"] else "NOT as expected"
-        what = "succeeded" if entry["succeeded"] else "failed"
-        name = entry["scenario"]
-        typer.echo(f"[{done}/{len(runs)}] {name}: {what}, {word}, {entry['wall_s']:.1f} s", err=True)
+        line = f"{verdict_line(entry)}, {word}, {entry['wall_s']:.1f} s"
+        typer.echo(f"[{done}/{len(runs)}] {line}", err=True)
 
     options = batch.RunOptions(out, draw and out is not None, arguments)
     found = asked | batch.run_jobs(runs, options.command, workers=workers, report=report)
@@ -422,8 +446,8 @@ def _run_all(
         print_json(found)
     else:
         typer.echo(text_table(found))
-        typer.echo(f"{found['succeeded']} as expected, {found['failed']} not, {found['wall_s']:.0f} s")
-    return FAILED if found["failed"] else DONE
+        typer.echo(counts_line(found))
+    return FAILED if found["not_as_expected"] else DONE
 
 
 if __name__ == "__main__":

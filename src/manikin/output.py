@@ -7,6 +7,7 @@
     DIR/motion.h5          planned motion, then planned and executed (manikin.motion.file)
     DIR/motion-NAME.h5     planned motion of somebody else who walks there
     DIR/summary.json       written when every stage is done
+    DIR/report.html        verdict, requirements, figures and numbers in one page that needs no other file
     DIR/motion.bvh         drawn from the files above, for animation programs
     DIR/figures/*.png      drawn from the files above
 
@@ -31,6 +32,7 @@ WALK_PATHS = "walk_paths"
 BODY = "the body"
 """In it, the body that the scenario is about."""
 SUMMARY = "summary.json"
+REPORT = "report.html"
 STAGES = "stages"
 
 
@@ -58,7 +60,7 @@ class RunDirectory(ResultDirectory):
         """
         super().__init__(path)
         # The summary goes first: without it the directory is known to be incomplete.
-        self.remove(SUMMARY, MOTION, BVH, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS)
+        self.remove(SUMMARY, MOTION, BVH, REPORT, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS)
 
     def write_scenario(self, yaml_text: str) -> Path:
         """Keep the resolved scenario."""

@@ -54,7 +54,7 @@ def run(
         progress: Called with the stage and the share of it that is done.
 
     Returns:
-        The result; an infeasible task is a result with ``succeeded`` False.
+        The result; an infeasible task, or a motion that fell, is a result with ``succeeded`` False.
 
     Raises:
         InputError: If the scenario, or a file it names, is not usable.
@@ -121,7 +121,7 @@ def _followed(context: RunContext, report: Report, requirements: ExecutionRequir
         return RunResult.of(report, plan.centroidal, wholebody)
     planned = append_act(context, report, PlannedMotion(plan.trajectory.schedule, wholebody.motion))
     wholebody = replace(wholebody, motion=planned.motion)
-    if report.failure is not None:
+    if report.failure is not None or not context.scenario.execution_required:
         return RunResult.of(report, plan.centroidal, wholebody)
     execution = execute_motion(context, report, planned, requirements)
     return RunResult.of(report, plan.centroidal, wholebody, execution)
@@ -140,7 +140,7 @@ def _refined(context: RunContext, report: Report, requirements: ExecutionRequire
     if keyed is None:
         return RunResult.of(report, centroidal)
     refined, execution = refine_contacts(context, report, keyed), None
-    if refined.succeeded:
+    if refined.succeeded and context.scenario.execution_required:
         planned = PlannedMotion(refined.schedule, refined.motion)
         execution = execute_motion(context, report, planned, requirements)
     return RunResult.of(report, centroidal, refined, execution)

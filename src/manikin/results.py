@@ -6,11 +6,11 @@ from typing import Any
 
 HEADER = (
     "scenario", "variant", "duration", "planned margin", "radius", "clearance", "executed margin",
-    "CoM rms", "fell", "wall", "result",
+    "CoM rms", "fell", "wall", "planned", "proved", "result",
 )  # fmt: skip
 """Columns of the table."""
 
-UNITS = ("", "", "s", "", "N.m", "mm", "N.m", "mm", "", "s + s + s", "")
+UNITS = ("", "", "s", "", "N.m", "mm", "N.m", "mm", "", "s + s + s", "", "", "")
 """Units of the columns; the planned margin brings its own."""
 
 NOTHING = "-"
@@ -18,8 +18,13 @@ NOTHING = "-"
 ASKED = ("stature_m", "seed")
 """What a report says that its runs were asked for, None for each scenario's own."""
 
+COUNTS = ("planned", "proved", "succeeded", "failed", "fell", "as_expected", "not_as_expected")
+"""Numbers of runs in a report."""
+
 _RUN_WITH = ("stature_m", "mass_kg", "seed")
 """What a run says that it was run with."""
+
+_YES_OR_NO = {True: "yes", False: "no", None: NOTHING}
 
 _KEPT: dict[str, tuple[str, ...]] = {
     "centroidal": ("duration_s", "min_margin", "margin_unit", "feasibility_radius", "wall_s"),
@@ -37,7 +42,6 @@ _KEPT: dict[str, tuple[str, ...]] = {
         "lowest_com_m",
         "head_clearance_m",
         "fell",
-        "failure",
         "wall_s",
     ),
 }
@@ -81,12 +85,14 @@ def reduced(report: Mapping[str, Any]) -> dict[str, Any]:
     return {
         **{key: report.get(key) for key in ASKED},
         "runs": [_reduced_run(run) for run in report["runs"]],
-        "succeeded": report["succeeded"], "failed": report["failed"], "wall_s": _rounded(report["wall_s"]),
+        **{key: report[key] for key in COUNTS}, "wall_s": _rounded(report["wall_s"]),
     }  # fmt: skip
 
 
 def _reduced_run(run: Mapping[str, Any]) -> dict[str, Any]:
-    names = ("scenario", "variant", "expected", "as_expected", "succeeded")
+    names = (
+        "scenario", "variant", "expected", "as_expected", "verdict", "planned", "proved", "succeeded",
+    )  # fmt: skip
     failure = run["failure"]
     kept: dict[str, Any] = {name: run[name] for name in names} | {name: run.get(name) for name in _RUN_WITH}
     kept["failure"] = None if failure is None else {key: failure[key] for key in ("stage", "reason")}
@@ -111,8 +117,9 @@ def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
         number(body.get("min_clearance_m"), 1, scale=1000.0),
         number(executed.get("min_margin"), 1),
         number(executed.get("com_rms_error_m"), 2, scale=1000.0),
-        {True: "yes", False: "no", None: NOTHING}[executed.get("fell")],
+        _YES_OR_NO[executed.get("fell")],
         " + ".join(number(wall, 1) for wall in walls if wall is not None) or NOTHING,
+        *(_YES_OR_NO[run[key]] for key in ("planned", "proved")),
         result(run),
     )
 
@@ -120,11 +127,37 @@ def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
 def result(run: Mapping[str, Any]) -> str:
     """How a run ended, in words."""
     if run["failure"] is None:
-        word = "succeeded" if run["as_expected"] else "succeeded although a failure was expected"
-        fault = (run.get("execution") or {}).get("failure")
-        return word if fault is None else f"{word}, but for its attempted execution: {fault['reason']}"
+        return f"{run['verdict']}{'' if run['as_expected'] else ' although a failure was expected'}"
     word = "failed as expected" if run["as_expected"] else "FAILED"
     return f"{word} ({run['failure']['stage']}): {run['failure']['reason']}"
+
+
+def verdict_line(summary: Mapping[str, Any]) -> str:
+    """Verdict of a run with its scenario, and for a failure the reason first.
+
+    Args:
+        summary: Of a run.
+    """
+    failure = summary["failure"]
+    if failure is None:
+        words = {
+            "proved": "executed in the physics engine, every requirement kept",
+            "planned": "not executed, every requirement of the plan kept",
+        }
+        return f"{summary['verdict']}: {summary['scenario']}, {words[summary['verdict']]}"
+    after = ", after a plan that kept every requirement" if summary["planned"] else ""
+    return f"failed: {failure['reason']} ({summary['scenario']}, {failure['stage']}{after})"
+
+
+def counts_line(report: Mapping[str, Any]) -> str:
+    """How many of many runs were planned, proved and fell, and ended as their scenarios say."""
+    words = (
+        f"{len(report['runs'])} runs: {report['planned']} planned, {report['proved']} proved",
+        f"{report['succeeded']} succeeded, {report['failed']} failed ({report['fell']} fell)",
+        f"{report['as_expected']} as expected, {report['not_as_expected']} not",
+        f"{report['wall_s']:.0f} s",
+    )
+    return "; ".join(words)
 
 
 def number(value: float | None, digits: int, unit: str = "", scale: float = 1.0) -> str:

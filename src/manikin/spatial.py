@@ -133,10 +133,33 @@ def skew(vector: ArrayLike) -> FloatArray:
     return matrix
 
 
+def wrench_about(wrench: FloatArray, point: FloatArray) -> FloatArray:
+    """(..., 6) wrenches about the world origin with moments about another point (..., 3) [N, N.m].
+
+    The negative point takes moments about it to moments about the origin.
+    """
+    force = wrench[..., :3]
+    return np.concatenate([force, wrench[..., 3:] - cross(point, force)], axis=-1)
+
+
+def wrench_map(point: FloatArray) -> FloatArray:
+    """(..., 6, 6) matrices of :func:`wrench_about` for points (..., 3)."""
+    moved = np.broadcast_to(np.eye(6), (*np.shape(point)[:-1], 6, 6)).copy()
+    moved[..., 3:, :3] = -skew(point)
+    return moved
+
+
 def rotation_from_yaw(yaw: float) -> FloatArray:
     """Rotation by ``yaw`` [rad] about the vertical."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def rotation_from_quaternion(u: FloatArray) -> FloatArray:
+    """(n, 3, 3) rotations of unit xyzw quaternions (n, 4)."""
+    vector, scalar = u[:, :3], u[:, 3]
+    cross = skew(vector)
+    return np.eye(3) + 2.0 * scalar[:, None, None] * cross + 2.0 * cross @ cross
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> FloatArray:

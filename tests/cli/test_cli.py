@@ -19,11 +19,18 @@ from manikin.figures import FIGURES
 from manikin.motion.file import write_motions
 
 SUMMARY = {
-    "scenario": "platform", "succeeded": True, "failure": None,
+    "scenario": "platform", "stature_m": 1.75, "mass_kg": 79.0, "seed": 0,
+    "verdict": "proved", "planned": True, "proved": True, "succeeded": True, "failure": None,
+    "requirements": [
+        {
+            "stage": "execution", "key": "min_margin", "name": "executed margin", "unit": "N.m",
+            "measured": 33.0, "sense": ">", "limit": 0.0, "time_s": 1.25, "where": "", "held": True,
+        },
+    ],
     "centroidal": {"duration_s": 4.7, "phase_durations_s": [0.3, 0.4], "min_margin": 33.0},
     "wholebody": {"swings": [{"effector": "left_foot", "method": "curve"}], "closest_pair": ["head", "roof"]},
     "execution": {"fell": False, "peak_torque_Nm": {"left_knee": 120.0, "right_knee": -150.0}},
-    "wall_s": 1.0,
+    "walk": None, "wall_s": 1.0,
 }  # fmt: skip
 
 STANCE = {
@@ -60,6 +67,7 @@ def pipeline(monkeypatch, finished_run):
             summary=stand_in.summary,
             planned=finished_run.planned,
             executed=finished_run.executed,
+            motion=finished_run.executed,
             directory=out,
         )
 
@@ -182,22 +190,54 @@ def test_run_leaves_a_whole_directory(capfd, tmp_path, monkeypatch):
     folder = tmp_path / "result"
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert files == {
-        "scenario.yaml", "motion.h5", "motion.bvh", "summary.json",
+        "scenario.yaml", "motion.h5", "motion.bvh", "summary.json", "report.html",
         *(f"figures/{name}.png" for name in FIGURES if name != "walk_paths"),
     }  # fmt: skip
 
 
 @pytest.mark.usefixtures("pipeline")
-def test_run_for_people_writes_to_runs_and_prints_a_table(capfd, tmp_path, monkeypatch):
+def test_run_for_people_prints_the_verdict_first_and_the_report_last(capfd, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "platform", "--no-figures"]) == DONE
-    out, err = capfd.readouterr()
-    assert "centroidal.min_margin" in out
-    assert "largest -150 (right_knee)" in out
-    assert "[left_foot curve]" in out
-    assert "manikin view" in err
+    lines = capfd.readouterr().out.splitlines()
+    assert lines[0].startswith("proved: platform")
+    assert any(line.split()[:3] == ["ok", "executed", "margin"] and "33 N.m" in line for line in lines)
+    assert lines[-2] == "watch it with: manikin view runs/platform"
+    page = tmp_path / lines[-1].removeprefix("report: ")
+    assert page == tmp_path / "runs" / "platform" / "report.html"
+    assert "proved: platform" in page.read_text()
     assert (tmp_path / "runs" / "platform" / "summary.json").exists()
     assert not (tmp_path / "runs" / "platform" / "figures").exists()
+
+
+def test_a_run_that_fell_says_so_first_and_is_status_3(capfd, tmp_path, monkeypatch, pipeline):
+    """The plan held: it is called planned, and the run is no success all the same."""
+    failure = {"stage": "execution", "reason": "fell at 27.6 s", "time_s": 27.6, "where": "phase 3"}
+    fell = {**SUMMARY["requirements"][0], "key": "fell", "name": "falls", "unit": "", "measured": 1.0,
+            "sense": "<=", "held": False}  # fmt: skip
+    pipeline.summary = {
+        **SUMMARY, "verdict": "failed", "proved": False, "succeeded": False, "failure": failure,
+        "requirements": [*SUMMARY["requirements"], fell],
+    }  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "platform", "--no-figures"]) == FAILED
+    lines = capfd.readouterr().out.splitlines()
+    assert lines[0].startswith("failed: fell at 27.6 s (platform, execution")
+    assert [line.split()[1] for line in lines if line.startswith("  FAILED")] == ["falls"]
+    page = (tmp_path / "runs" / "platform" / "report.html").read_text()
+    assert "failed: fell at 27.6 s" in page
+    assert "NOT KEPT" in page
+
+
+def test_a_run_without_a_motion_advertises_no_view(capfd, tmp_path, monkeypatch):
+    """Nothing that cannot open: the report page is written, and no motion is there to watch."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "platform@slippery", "--no-figures"]) == FAILED
+    lines = capfd.readouterr().out.splitlines()
+    assert lines[0].startswith("failed: the margin between phases 0 and 1")
+    assert not any("manikin view" in line for line in lines)
+    assert (tmp_path / lines[-1].removeprefix("report: ")).is_file()
+    assert not list(tmp_path.rglob("motion.h5"))
 
 
 def test_options_reach_the_pipeline_and_the_resolved_scenario(pipeline, tmp_path):
@@ -231,7 +271,7 @@ def test_variants_and_single_values_reach_the_pipeline(pipeline, tmp_path):
 
 def test_explained_failure_is_status_3(capfd, pipeline):
     failure = {"stage": "centroidal", "reason": "no margin in phase 4", "time_s": 1.2, "where": "left_foot"}
-    pipeline.summary = {**SUMMARY, "succeeded": False, "failure": failure}
+    pipeline.summary = {**SUMMARY, "verdict": "failed", "succeeded": False, "failure": failure}
     assert main(["run", "platform", "--json"]) == FAILED
     assert json.loads(capfd.readouterr().out)["failure"] == failure
 
@@ -244,8 +284,26 @@ def two_runs(monkeypatch):
     failure = {"stage": "centroidal", "reason": "no margin", "time_s": 0.0, "where": ""}
     stages = dict.fromkeys(("centroidal", "wholebody", "execution"))
     summaries = {
-        "one": {"scenario": "one", "succeeded": True, "failure": None, **stages, "wall_s": 1.0},
-        "two": {"scenario": "two@bad", "succeeded": False, "failure": failure, **stages, "wall_s": 1.0},
+        "one": {
+            "scenario": "one",
+            "verdict": "planned",
+            "planned": True,
+            "proved": False,
+            "succeeded": True,
+            "failure": None,
+            **stages,
+            "wall_s": 1.0,
+        },
+        "two": {
+            "scenario": "two@bad",
+            "verdict": "failed",
+            "planned": False,
+            "proved": False,
+            "succeeded": False,
+            "failure": failure,
+            **stages,
+            "wall_s": 1.0,
+        },
     }
 
     def command(_options, job):
@@ -267,7 +325,8 @@ def test_run_all_prints_one_json_object_and_status_0_when_all_is_as_expected(cap
     out, err = capfd.readouterr()
     report = json.loads(out)
     assert [run["scenario"] for run in report["runs"]] == ["one", "two@bad"]
-    assert (report["succeeded"], report["failed"]) == (2, 0)
+    assert (report["as_expected"], report["not_as_expected"]) == (2, 0)
+    assert (report["planned"], report["proved"], report["succeeded"], report["failed"]) == (1, 0, 1, 1)
     assert report["wall_s"] > 0
     assert (report["stature_m"], report["seed"]) == (None, None)
     assert "[2/2]" in err
@@ -285,7 +344,7 @@ def test_run_all_is_status_3_and_a_table_when_one_fails(capfd, two_runs, tmp_pat
     assert main(["run", "all", "--out", str(tmp_path / "runs"), "--jobs", "1"]) == FAILED
     out = capfd.readouterr().out
     assert "FAILED (centroidal): no margin" in out
-    assert "1 as expected, 1 not" in out
+    assert "2 runs: 1 planned, 0 proved; 1 succeeded, 1 failed (0 fell); 1 as expected, 1 not" in out
     assert json.loads((tmp_path / "runs" / "results.json").read_text())["failed"] == 1
 
 

@@ -93,15 +93,6 @@ def test_a_goal_beyond_the_legs_is_named_without_planning_again(tmp_path):
     assert block["key_postures"]["failed"][-1]["key"] == 5
 
 
-def test_a_place_where_nobody_fits_is_named_without_planning_again(tmp_path):
-    """A slab 0.45 m above the floor over the goal: no posture with any CoM, but one through the slab."""
-    result = run(stride(tmp_path, length=0.4, lamp_m=1.0, lamp_height=0.5))
-    failure = result.summary["failure"]
-    assert failure["stage"] == "wholebody"
-    assert "'lamp'" in failure["reason"] or "clearances" in failure["reason"]
-    assert result.summary["centroidal"]["replans"] == 0
-
-
 def test_constraints_that_forbid_the_postures_are_named(tmp_path):
     """A stride of 1 m with the CoM above 0.94 m: legs of 0.9 m would need it far before the standing foot."""
     band = '[{height_band: {lower: "0.94", upper: "1.0"}}]'

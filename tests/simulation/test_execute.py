@@ -4,12 +4,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from manikin.body import human
+from manikin.balance.motion_margin import motion_margin
+from manikin.body import carrying, human
+from manikin.contact import Stance
 from manikin.control import ControlSettings
 from manikin.errors import ContactError, InputError
 from manikin.scene import Box, Obstacle, Scene
 from manikin.simulation import PhysicsOptions, Push, execute
-from manikin.spatial import GRAVITY_VECTOR
+from manikin.spatial import GRAVITY, GRAVITY_VECTOR
 
 
 def smooth(share):
@@ -101,7 +103,7 @@ def test_summary_has_the_agreed_keys(body, stepped):
     assert list(result.summary()) == [
         "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m",
         "min_margin", "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm",
-        "realtime_factor", "wall_s", "push",
+        "realtime_factor", "wall_s", "unplanned_touches", "push",
     ]  # fmt: skip
     assert set(result.peak_torque_Nm) == set(body.joint_names)
     assert result.max_limit_use <= 1 + 1e-6
@@ -163,6 +165,32 @@ def test_floor_lower_than_planned_is_found(body, step):
     assert result.com_max_error_m < 0.02
 
 
+def test_the_margin_of_a_foot_that_lands_late_is_that_of_the_other_one(body, step):
+    """Planned on both feet, standing on one: the margin is that of the one that carries.
+
+    The wrench of a sample is compared with that of the engine's first millisecond, hence the 3 N.m.
+    """
+    plan = step(shift=1.0, swing=0.6, stride=(0.1, 0.0, 0.0))
+    result = execute(body, Scene(floor_height=-0.004), plan.motion, plan.schedule, hold=0.2)
+    motion, names = result.motion, plan.schedule.sequence.effectors
+    planned = plan.schedule.support(motion.time, names).all(axis=1)
+    late = np.flatnonzero(planned & ~motion.support[:, names.index("right_foot")] & (motion.time > 1.0))
+    late = late[:-1]  # In the last of these steps the foot may touch after the first millisecond.
+    assert len(late) >= 2
+    force = motion.contact_force[late, names.index("left_foot")]
+    stance = plan.schedule.sequence[-1].stance
+    left, cap = stance["left_foot"], 3.0 * body.mass * GRAVITY
+    wrench = np.concatenate(
+        [force[:, :3], force[:, 3:] + np.cross(left.position, force[:, :3])], axis=1
+    )  # contact forces are about the planned contact's origin
+    one, both = (
+        motion_margin([Stance(contacts, cap)], np.zeros(len(late)), wrench, motion.com[late]).margin
+        for contacts in ([left], list(stance))
+    )
+    assert both[0] > one[0] + 8.0
+    assert np.abs(motion.margin[late] - one).max() < 3.0, np.abs(motion.margin[late] - one)
+
+
 def test_obstacle_in_the_way_is_an_unplanned_touch(body, step):
     """A block under the flying foot is touched, named and timed."""
     plan = step(shift=1.0, swing=0.6, stride=(0.2, 0.0, 0.0))
@@ -171,6 +199,10 @@ def test_obstacle_in_the_way_is_an_unplanned_touch(body, step):
     assert not result.succeeded
     assert any(touch.other == "block" and "right" in touch.segment for touch in result.touches)
     assert 1.0 < result.touches[0].time < 1.6
+    largest = max(result.touches, key=lambda touch: touch.force)
+    assert largest.force > 5.0
+    told = {(one["segment"], one["other"]): one for one in result.summary()["unplanned_touches"]}
+    assert told[largest.segment, largest.other]["max_force_N"] == largest.force
 
 
 def test_controller_works_with_any_period_of_whole_steps(body, stand):
@@ -195,3 +227,17 @@ def test_motion_of_another_body_is_refused(body, stand):
     wrong = replace(plan.motion, joint_names=tuple(reversed(plan.motion.joint_names)))
     with pytest.raises(InputError, match="a motion planned for this body"):
         execute(body, Scene(), wrong, plan.schedule)
+
+
+def test_a_body_stands_with_a_load_in_its_hand(stand):
+    """12 kg in the right hand: the feet carry the weight of both, and the margin stays."""
+    person = carrying(human(), 12.0, "right")
+    plan = stand(0.5, person=person)
+    result = execute(person, Scene(), plan.motion, plan.schedule, hold=0.5)
+    assert result.succeeded
+    assert result.com_max_error_m < 1e-3
+    assert result.min_margin > 20
+    force = result.motion.contact_force[-1, :, 2]
+    assert force.sum() == pytest.approx(9.81 * (human().mass + 12.0), rel=1e-3)
+    names = list(result.motion.contact_names)
+    assert force[names.index("right_foot")] > force[names.index("left_foot")] + 20.0

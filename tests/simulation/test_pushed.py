@@ -69,7 +69,7 @@ def test_a_short_push_changes_the_momentum_by_its_impulse(stepping, undisturbed)
 def test_the_plan_waits_and_the_body_comes_back_on_it(stepping, undisturbed, waiting):
     outcome = waiting.push
     assert waiting.succeeded, waiting.failure
-    assert ExecutionRequirements().violation(waiting) is None
+    assert ExecutionRequirements().table(waiting).held
     assert outcome.recovered
     assert outcome.impulse_Ns == pytest.approx(20.0)
     assert 0.1 < outcome.waited_s < 2.0

@@ -172,3 +172,29 @@ def test_what_the_body_leans_on_counts_as_a_push(body):
     assert world.touches == ()
     assert world.penetration == pytest.approx(deepest["block"], abs=1e-12)
     assert world.padding_compression == pytest.approx(deepest["cushion"], abs=1e-12)
+
+
+def test_carried_points_are_the_mean_of_all_steps_without_what_is_leant_on(body):
+    """Normal forces times normals are those of the engine; a cushion that is leant on has none."""
+    blocks = [
+        Obstacle("block", Box((0.4, 0.3, 0.2)), translation=(0.1, 0.15, -0.1)),
+        Obstacle("cushion", Box((0.4, 0.3, 0.2)), translation=(0.1, -0.15, -0.1)),
+    ]
+    world = World(compile_model(body, Scene(blocks, floor_height=None)), padded=("cushion",))
+    everything = tuple(segment.name for segment in body.segments)
+    world.plan_touches([(everything, "block")], leaning=[(everything, "cushion")])
+    world.reset(body.standing_posture())
+    world.carried()
+    wanted = np.zeros(3)
+    for _ in range(8):
+        world.advance(np.zeros(body.nv - 6), 1)
+        sensed = world.sense()
+        on_block = np.array([other == "block" for other in sensed.others])
+        normal = np.einsum("ki,ki->k", sensed.forces, sensed.normals)
+        wanted += (normal[:, None] * sensed.normals)[on_block].sum(axis=0) / 8
+    found = world.carried()
+    assert set(found.others) == {"block"}
+    assert all(name.startswith("left_") for name in found.segments)
+    assert found.forces @ found.normals == pytest.approx(wanted, abs=1e-9)
+    assert wanted[2] > 100.0
+    assert len(world.carried()) == 0

@@ -210,12 +210,12 @@ def test_a_step_found_by_the_bi_rrt_is_followed_like_any_other(person, flat_grou
 )
 def test_the_certificate_refuses_forces_beyond_the_body_or_its_contacts(step_motion, name, what):
     residuals = step_motion.certificate
-    assert residuals.violation(WholeBodyRequirements()) is None
+    assert residuals.table(WholeBodyRequirements()).held
     excess = replace(residuals, **{f"max_{name}": 1.01})
-    found = excess.violation(WholeBodyRequirements())
+    found = excess.table(WholeBodyRequirements()).first_broken
     assert found is not None
-    assert found[0].startswith(what)
-    assert found[1] == residuals.worst_times_s[f"max_{name}"]
+    assert found.name.startswith(what)
+    assert found.time_s == residuals.worst_times_s[f"max_{name}"]
 
 
 @given(

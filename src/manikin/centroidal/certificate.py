@@ -9,6 +9,7 @@ from manikin.balance import WrenchPolytope, least_zmp_distance
 from manikin.centroidal.feasibility import row_slopes
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.centroidal.trajectory import CentroidalTrajectory
+from manikin.requirement import Requirement, RequirementTable, requirement_table
 from manikin.spatial import FloatArray
 
 STEP = 1e-3
@@ -88,6 +89,28 @@ class Residuals:
         """Whether every requirement is met."""
         return all(item.value <= tolerance for item in self.items)
 
+    def table(self, problem: CentroidalProblem) -> RequirementTable:
+        """The margin, the total duration, and the most violated of the other requirements.
+
+        Args:
+            problem: Whose requirements were measured.
+        """
+        others = [item for item in self.items if item.requirement not in ("balance margin", "total duration")]
+        worst = max(others, key=lambda item: item.severity, default=None)
+        duration = next((item for item in self.items if item.requirement == "total duration"), None)
+        longest = problem.max_duration
+        return requirement_table([
+            Requirement("min_margin", "margin of the centre of mass", problem.margin_unit, self.min_margin,
+                        ">=", problem.required_margin, self.limiting_time, f"phase {self.limiting_phase}",
+                        TOLERANCE),
+            None if duration is None or longest is None
+            else Requirement("duration_s", "duration", "s", duration.value + longest, "<=", longest,
+                             tolerance=TOLERANCE),
+            None if worst is None
+            else Requirement("max_violation", "violation of a constraint", worst.unit, max(worst.value, 0.0),
+                             "<=", TOLERANCE, worst.time, worst.requirement),
+        ])  # fmt: skip
+
     @property
     def rank(self) -> tuple[float, float]:
         """Order of quality, the smaller the better: worst of the other violations, then the margin.
@@ -127,10 +150,8 @@ def facet_margins(
     """(up to 1024, facets) distances to every facet at the given times, in blocks [N.m] or [N]."""
     for start in range(0, len(times), _BLOCK):
         part = times[start : start + _BLOCK]
-        distances = polytope.distances(trajectory.pseudo_wrench(part))
-        if problem.margin_space == "force":
-            distances = distances / row_slopes(polytope, problem, trajectory.position(part))
-        yield distances
+        distances = polytope.distances(trajectory.pseudo_wrench(part, problem.reference))
+        yield distances / row_slopes(polytope, problem, trajectory.position(part))
 
 
 def measure(
@@ -141,7 +162,7 @@ def measure(
     Args:
         problem: The requirements.
         trajectory: Any trajectory through the same number of phases.
-        polytopes: W_i of the phases about the world origin.
+        polytopes: W_i of the phases about ``problem.reference``.
     """
     times = phase_times(trajectory)
     margins = phase_margins(problem, trajectory, polytopes)

@@ -1,21 +1,56 @@
 """One job through the pipeline, with bars and a report for people."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from manikin.commands.console import flattened, print_table, stdout_kept_clean
+from manikin.commands.console import DONE, FAILED, print_table, stdout_kept_clean
+from manikin.commands.verdict import print_verdict
 from manikin.interruption import Interruption
 
 if TYPE_CHECKING:
     from manikin.scenarios import Scenario
 
 
-def run_job(
-    job: "Scenario", directory: Path | None, interruption: Interruption, *, draw: bool
-) -> dict[str, Any]:
-    """Run a scenario with bars on standard error; returns its summary.
+@dataclass(frozen=True, eq=False)
+class JobOutcome:
+    """What a job left behind.
+
+    Attributes:
+        summary: Of the run.
+        page: The report page, or None if nothing was written.
+        viewable: Directory of the run if it holds a motion to watch, else None.
+    """
+
+    summary: dict[str, Any]
+    page: Path | None
+    viewable: Path | None
+
+    @property
+    def status(self) -> int:
+        """Exit status: done only for a run that succeeded."""
+        return DONE if self.summary["succeeded"] else FAILED
+
+    def print(self, shown: Mapping[str, Any] | None = None) -> None:
+        """Print the verdict, the requirements, further values, and last the path of the report page.
+
+        Args:
+            shown: Values to print below the requirements.
+        """
+        print_verdict(self.summary)
+        if shown:
+            print_table(dict(shown))
+        if self.viewable is not None:
+            typer.echo(f"watch it with: manikin view {self.viewable}")
+        if self.page is not None:
+            typer.echo(f"report: {self.page}")
+
+
+def run_job(job: "Scenario", directory: Path | None, interruption: Interruption, *, draw: bool) -> JobOutcome:
+    """Run a scenario with bars on standard error.
 
     Args:
         job: The scenario.
@@ -34,26 +69,13 @@ def run_job(
 
         result = pipeline.run(job, out=directory, seed=job.seed, progress=progress)
         interruption.check()
-        if directory is not None and draw:
-            from manikin.products import write_products
+        if directory is None:
+            return JobOutcome(dict(result.summary), None, None)
+        from manikin.products import write_products
+        from manikin.run_page import write_run_page
 
+        if draw:
             write_products(directory, progress)
-        return dict(result.summary)
-
-
-def print_summary(summary: dict[str, Any], directory: Path | None) -> None:
-    """Print the whole summary of a run, and how it ended."""
-    print_table(flattened({key: value for key, value in summary.items() if key != "failure"}))
-    print_ending(summary, directory)
-
-
-def print_ending(summary: dict[str, Any], directory: Path | None) -> None:
-    """Say on standard error why a run failed, if it did, and where its files are."""
-    failure = summary.get("failure")
-    if failure:
-        typer.echo(f"failed in {failure['stage']}: {failure['reason']}", err=True)
-    fault = (summary.get("execution") or {}).get("failure")
-    if fault and not failure:
-        typer.echo(f"its execution, an attempt, failed: {fault['reason']}", err=True)
-    if directory is not None:
-        typer.echo(f"files in {directory}; see them with: manikin view {directory}", err=True)
+        page = write_run_page(directory)
+        viewable = directory if result.motion is not None else None
+        return JobOutcome(dict(result.summary), page, viewable)

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from manikin.commands.console import DONE, FAILED, JsonOption, print_json, print_table, refuse
-from manikin.commands.job import print_ending, run_job
+from manikin.commands.console import JsonOption, print_json, refuse
+from manikin.commands.job import run_job
 from manikin.commands.push_map import MapRequest, search_map
 from manikin.commands.push_options import PushOptions
 from manikin.errors import InputError
@@ -129,10 +129,9 @@ def push(
     name = f"push-{force:g}N-{direction:g}deg"
     job = options.scenario(name, force, direction)
     directory = out if out is not None else None if json else Path("runs") / name
-    summary = run_job(job, directory, context.obj, draw=figures)
+    outcome = run_job(job, directory, context.obj, draw=figures)
     if json:
-        print_json(summary)
+        print_json(outcome.summary)
     else:
-        print_table({key: summary["push"][key] for key in SHOWN})
-        print_ending(summary, directory)
-    return DONE if summary["succeeded"] else FAILED
+        outcome.print({key: outcome.summary["push"][key] for key in SHOWN})
+    return outcome.status

@@ -34,7 +34,7 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
     given = {"degree": options.degree, "samples": options.samples}
     try:
         return CentroidalProblem(
-            values.mass,
+            values.moved_mass,
             _standing(values, planning=True),
             values.start_com,
             values.goal_com,

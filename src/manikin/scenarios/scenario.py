@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -38,14 +38,27 @@ class Scenario(Displayed, ScenarioValues):
         }
 
     def with_body(
-        self, stature_m: float | None = None, mass_kg: float | None = None, sex: str | None = None
+        self,
+        stature_m: float | None = None,
+        mass_kg: float | None = None,
+        sex: str | None = None,
+        age: float | None = None,
+        strength: float | None = None,
+        load: Mapping[str, float | str] | None = None,
     ) -> Scenario:
         """Return the same scenario for another body; what is None stays.
 
         Raises:
             ScenarioError: If a value is out of its range.
         """
-        given = {"stature_m": stature_m, "mass_kg": mass_kg, "sex": sex}
+        given = {
+            "stature_m": stature_m,
+            "mass_kg": mass_kg,
+            "sex": sex,
+            "age": age,
+            "strength": strength,
+            "load": load,
+        }
         return self._changed(body={k: v for k, v in given.items() if v is not None})
 
     def with_seed(self, seed: int) -> Scenario:

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from manikin.scenarios.sections.body import WORDS, BodySection
 from manikin.scenarios.sections.com_constraint import ComConstraintSection
 from manikin.scenarios.sections.contacts import ContactsSection
+from manikin.scenarios.sections.expect import Expectation, ExpectSection
 from manikin.scenarios.sections.obstacle import ObstacleSection
 from manikin.scenarios.sections.phase import EFFECTORS, MASSLESS_FEET
 from manikin.scenarios.sections.planning import PlanningSection
@@ -61,10 +62,11 @@ class ScenarioFile(Section):
     wholebody: WholebodySection = Field(
         default=WholebodySection(), description="how the whole body's motion is found"
     )
-    execution: Literal["required", "attempted"] = Field(
+    execution: Literal["required", "none"] = Field(
         default="required",
-        description="whether a run succeeds only when the motion is executed without a fault, or the "
-        "execution is an attempt whose fault is reported and leaves the plan a success",
+        description="required: a run succeeds only if the planned motion is also executed and keeps every "
+        "requirement (proved); none: it is not executed, and succeeds if its plan keeps every requirement "
+        "(planned), the default of a point mass and of a recorded walk, which cannot be executed",
     )
     manner: Literal["ready", "walking", "close", "hanging", "climbing"] = Field(
         default="ready",
@@ -85,10 +87,10 @@ class ScenarioFile(Section):
     seed: Annotated[int, Field(strict=True, ge=0)] = Field(
         default=0, description="seed of every random choice"
     )
-    expect: Literal["success", "failure"] = Field(
-        default="success",
-        description="how a run should end; 'manikin run all' counts an explained failure as right where one "
-        "is expected",
+    expect: Expectation = Field(
+        default=ExpectSection(outcome="success"),
+        description="how a run should end, success or failure, or a mapping with the stage and the reason of "
+        "an expected failure; 'manikin run all' counts an explained failure as right where one is expected",
     )
     variants: dict[str, dict[str, Any]] | None = Field(
         default=None, exclude=True, description="named changes of this scenario: what each lays over it"
@@ -100,6 +102,14 @@ class ScenarioFile(Section):
         """A body that recovers from a push ends where it starts."""
         if isinstance(data, dict) and data.get("recovery") is not None and "task" not in data:
             return {**data, "task": {"start": {"at": [0.0, 0.0]}, "goal": {"at": [0.0, 0.0]}}}
+        return data
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_planned(cls, data: Any) -> Any:
+        """What cannot be executed is planned only, where the file says nothing else."""
+        if isinstance(data, dict) and "execution" not in data and _cannot_be_executed(data):
+            return {**data, "execution": "none"}
         return data
 
     @model_validator(mode="after")
@@ -124,6 +134,7 @@ class ScenarioFile(Section):
             )  # fmt: skip
         if self.task.act is not None and self.contacts is not None and self.contacts.limbs:
             raise refuse("contacts.limbs", "are given beside task.act; valid: one of them")
+        self._check_execution()
         self._check_recovery()
         self._check_walking()
         self._check_body()
@@ -148,6 +159,19 @@ class ScenarioFile(Section):
                         "has no meaning beside explicit supports; valid: only com, [x, y, z]",
                     )
         return self
+
+    def _check_execution(self) -> None:
+        """Refuse an execution of what cannot be executed, and none of what is nothing else."""
+        if self.execution == "required":
+            if self.body.model == "point_mass":
+                raise refuse("execution", "is required; valid: none for a point mass, which has no joints")
+            if self.walking is not None and not self.walking.is_planned(self.supports):
+                raise refuse(
+                    "execution",
+                    "is required; valid: none for a recorded walk, or walking.whole_body: planned",
+                )
+        elif self.recovery is not None:
+            raise refuse("execution", "is none; valid: required beside recovery, which is an execution")
 
     def _check_recovery(self) -> None:
         """Refuse a recovery without a push, or with what belongs to a way."""
@@ -270,6 +294,15 @@ class ScenarioFile(Section):
                 raise refuse(key, f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
         if self.body.model != "point_mass" and self.supports is not None:
             raise refuse("supports", f"do not apply to {WORDS[self.body.model]} yet; valid: leave them out")
+
+
+def _cannot_be_executed(data: dict[str, Any]) -> bool:
+    """Whether an unchecked file has a point mass, or a recorded walk."""
+    body, walking = data.get("body"), data.get("walking")
+    if isinstance(body, dict) and body.get("model") == "point_mass":
+        return True
+    recorded = isinstance(walking, dict) and walking.get("whole_body", "recorded") == "recorded"
+    return recorded and data.get("supports") is None
 
 
 def json_schema() -> dict[str, Any]:

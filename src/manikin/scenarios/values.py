@@ -68,12 +68,18 @@ class ScenarioValues:
 
     @property
     def mass(self) -> float:
-        """Body mass [kg]."""
+        """Body mass, without a load [kg]."""
         if self.file.body.model in ("urdf", "kudoh"):
             from manikin.scenarios.world import build_body
 
-            return build_body(self).mass
+            return build_body(self).own_mass
         return self.file.body.mass_kg
+
+    @property
+    def moved_mass(self) -> float:
+        """Body mass with the load in the hands [kg]."""
+        load = self.file.body.load
+        return self.mass if load is None else self.mass + load.mass_kg
 
     @property
     def is_point_mass(self) -> bool:
@@ -88,7 +94,7 @@ class ScenarioValues:
     @property
     def contact_model(self) -> ContactModel:
         """Friction model of the file and the default cap of the body, for every stance of every stage."""
-        return ContactModel.of_body(self.mass, self.planning.friction_model)
+        return ContactModel.of_body(self.moved_mass, self.planning.friction_model)
 
     @property
     def planning(self) -> PlanningSection:
@@ -107,7 +113,7 @@ class ScenarioValues:
 
     @property
     def execution_required(self) -> bool:
-        """Whether a fault of the execution is one of the run."""
+        """Whether the planned motion has to be executed for the run to succeed."""
         return self.file.execution == "required"
 
     @property

@@ -178,8 +178,9 @@ class _Run:
             self.world.advance(output.tau, 1)
             sensed = self.world.sense()
             self.world.advance(output.tau, self.substeps - 1)
+            carried = self.world.carried()
             if number >= 0:
-                self.recorder.record(sensed, output, self.world.mean_wrench())
+                self.recorder.record(sensed, output, self.world.mean_wrench(), carried)
             if number >= 0 and self._failed(output):
                 break
             number += 1
@@ -269,13 +270,15 @@ class _Run:
             max_penetration_m=world.penetration,
             max_padding_compression_m=world.padding_compression,
             peak_torque_Nm=dict(zip(self.body.joint_names, peak.tolist(), strict=True)),
-            max_limit_use=float((peak / self.body.torque_limit).max()),
+            max_limit_use=float(self.body.torque_share(executed.tau[:, 6:]).max(initial=0.0)),
             realtime_factor=simulated / wall,
             wall_s=wall,
             control_ms=1e3 * control / len(recorder.samples),
             touches=world.touches,
+            counted_touches=touches,
             fallbacks=tuple(recorder.fallbacks),
             max_slip_m=recorder.max_slip,
+            friction=recorder.friction_use(),
             push=push_outcome(self.pushes, recorder, self.failure),
             schedule=recorder.delayed_schedule(),
         )

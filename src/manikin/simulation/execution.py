@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from manikin.balance.contact_forces import FrictionUse
 from manikin.contact import ContactSchedule
 from manikin.display import Displayed
 from manikin.motion import Motion
@@ -19,8 +20,8 @@ class Execution(Displayed):
             held from the sample on, ``a`` and ``contact_force`` what the engine measured in
             the step's first millisecond, moments about the *planned* contact frame's origin,
             ``support`` where it presses, ``margin`` that of the measured wrench of all
-            contacts, averaged over the control step, in the polytope of the stance planned
-            for its beginning.
+            contacts, averaged over the control step, about the centre of mass, in the polytope
+            of the contacts that really carried it.
         fell: Whether the body fell.
         failure: Why the run is no success, in one line; empty for a success.
         failure_time_s: When it failed [s], or None.
@@ -41,9 +42,11 @@ class Execution(Displayed):
         wall_s: Wall time [s].
         control_ms: Mean wall time of a control step [ms].
         touches: Touches that were not planned.
+        counted_touches: Those among them that are a failure: all but those of a pushed body with itself.
         fallbacks: Time [s] and reason of every control step whose program was not solved.
         max_slip_m: Farthest that an effector moved along its surface while in contact [m].
         push: What became of the pushes; None without one.
+        friction: Largest use of friction by the forces that control counted on; None without control.
         schedule: When the planned contacts were due, later where the plan waited; None where it did not.
     """
 
@@ -66,10 +69,12 @@ class Execution(Displayed):
     wall_s: float
     control_ms: float
     touches: tuple[Touch, ...]
+    counted_touches: tuple[Touch, ...]
     fallbacks: tuple[tuple[float, str], ...]
     max_slip_m: float
     push: PushOutcome | None = None
     schedule: ContactSchedule | None = None
+    friction: FrictionUse | None = None
 
     @property
     def succeeded(self) -> bool:
@@ -84,5 +89,7 @@ class Execution(Displayed):
             "realtime_factor", "wall_s",
         )  # fmt: skip
         block = {name: getattr(self, name) for name in names}
+        block["friction"] = None if self.friction is None else self.friction.summary()
+        block["unplanned_touches"] = [touch.as_dict() for touch in self.touches]
         block["push"] = None if self.push is None else self.push.as_dict()
         return block

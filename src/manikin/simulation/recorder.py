@@ -1,29 +1,22 @@
 """Collects what happens during an execution and turns it into a motion and its measures."""
 
-import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from manikin.balance import wrench_polytope
+from manikin.balance.contact_forces import FrictionUse, friction_share
+from manikin.balance.motion_margin import MotionMargin, motion_margin
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.control import ControlOutput, SupportMode
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.motion import Motion
+from manikin.simulation.carrying import PRESSES, CarriedPoints, CarryingContacts
 from manikin.simulation.world import Sensed
 from manikin.spatial import FloatArray
 
 SWITCHING = 0.1
 """A support may touch its surface this long before and after its planned interval [s]."""
-
-EARLY_SEAT = 0.03
-"""What is made at speed may press this long before its time: a soft seat gives way, and its surface is
-met where it is [s]."""
-
-_PRESSES = 1.0
-"""Force from which an effector counts as a support of the executed motion [N]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +28,14 @@ class Sample:
         output: What the controller decided there.
         wrenches: (effectors, 6) measured force and moment about the planned contact's origin.
         total: (6,) mean over the step of the wrench of all contacts about the world origin.
+        carried: Contact points that carried it.
     """
 
     sensed: Sensed
     output: ControlOutput
     wrenches: FloatArray
     total: FloatArray
+    carried: CarriedPoints
 
     @property
     def plan_time(self) -> float:
@@ -67,17 +62,20 @@ class Recorder:
         self._landings: dict[str, FloatArray | None] = dict.fromkeys(self.effectors)
         self.max_slip = 0.0
 
-    def record(self, sensed: Sensed, output: ControlOutput, total: FloatArray) -> None:
+    def record(
+        self, sensed: Sensed, output: ControlOutput, total: FloatArray, carried: CarriedPoints
+    ) -> None:
         """Add one control step.
 
         Args:
             sensed: What was felt in its first engine step.
             output: What the controller decided.
             total: (6,) mean wrench of all contacts over the whole step.
+            carried: Contact points that carried it.
         """
         plan_time = sensed.time - output.waited
         wrenches = np.array([self._wrench(name, sensed, plan_time) for name in self.effectors])
-        self.samples.append(Sample(sensed, output, wrenches, total))
+        self.samples.append(Sample(sensed, output, wrenches, total, carried))
         if output.fallback:
             self.fallbacks.append((sensed.time, output.fallback))
         for name in self.effectors:
@@ -110,6 +108,26 @@ class Recorder:
         moved = position - landing
         along = moved - (moved @ support.contact.normal) * support.contact.normal
         self.max_slip = max(self.max_slip, float(np.linalg.norm(along)))
+
+    def friction_use(self) -> FrictionUse:
+        """Largest use of friction by the forces that control counted on, in the model of the plan.
+
+        What slides to its place is left out: it has kinetic friction only, which is on the friction cone.
+        """
+        model = self._schedule.sequence[0].stance.friction_model
+        most = FrictionUse(model, 0.0, 0.0, "")
+        for sample in self.samples:
+            for name, support in sample.output.supports.items():
+                contact = support.contact
+                wrench = sample.output.wrenches.get(name)
+                if contact is None or wrench is None:
+                    continue
+                if contact.kind is ContactKind.GRASP or support.settling:
+                    continue
+                share = float(friction_share(contact, wrench[None, :3], model)[0])
+                if share > most.share:
+                    most = FrictionUse(model, share, sample.sensed.time, name)
+        return most
 
     # --- measures --------------------------------------------------------------------------
 
@@ -168,65 +186,37 @@ class Recorder:
             if all(item.contact.settle == 0.0 for item in self._intervals[name])
         ]
 
-    def margins(self, mass: float) -> FloatArray:
-        """(n,) wrench margin of the mean measured wrenches [N.m].
+    def margins(self, mass: float) -> MotionMargin:
+        """Margins of the mean measured wrenches, about the centre of mass.
 
-        The stance is the one planned for the beginning of the step, at its planned placements; what
-        slides to its place on a seat is taken where it is, and from when it presses, up to
-        ``EARLY_SEAT`` before it should. A foot that presses before its time or after it is no support.
+        The stance is that of the contacts that really carry, see :mod:`manikin.simulation.carrying`, and
+        not the one that was planned: a foot that is late does not count, and one that is early does.
 
         Args:
             mass: Mass of the body [kg]; closes the polytope of a stance without force limits.
         """
-        totals = np.array([sample.total for sample in self.samples])
-        phases = self._schedule.phase_at([sample.plan_time for sample in self.samples])
-        margins = np.empty(len(self.samples))
-        settling = self._settling_rows()
-        early = self._early_seats()
-        settling[list(early)] = True
-        for index, phase in enumerate(self._schedule.sequence):
-            rows = (phases == index) & ~settling
-            if np.any(rows):
-                margins[rows] = wrench_polytope(phase.stance.bounded(mass)).margin(totals[rows])
-        for row in (int(number) for number in np.flatnonzero(settling)):
-            stance = self._schedule.sequence[int(phases[row])].stance
-            if row in early:
-                stance = stance.with_contacts((*stance, *early[row]))
-            stance = self._as_measured(stance, self.samples[row])
-            margins[row] = wrench_polytope(stance.bounded(mass)).margin(totals[row])
-        return margins
+        carrying = CarryingContacts(self._segments, mass)
+        stances, numbers = list[Stance](), dict[tuple[int, ...], int]()
+        rows = np.empty(len(self.samples), dtype=np.int64)
+        for row, sample in enumerate(self.samples):
+            stance = self._carrying_stance(carrying, sample)
+            key = tuple(id(contact) for contact in stance)
+            if key not in numbers:
+                numbers[key] = len(stances)
+                stances.append(stance)
+            rows[row] = numbers[key]
+        totals = np.array([sample.total for sample in self.samples]).reshape(-1, 6)
+        com = np.array([sample.output.state.com for sample in self.samples]).reshape(-1, 3)
+        return motion_margin(stances, rows, totals, com)
 
-    def _settling_rows(self) -> NDArray[np.bool_]:
-        """(n,) whether a contact is still on its way to its place."""
-        times = np.array([sample.plan_time for sample in self.samples])
-        rows = np.zeros(len(times), dtype=bool)
-        for name in self.effectors:
-            rows |= self._schedule.settling(times, name)
-        return rows
-
-    def _early_seats(self) -> dict[int, list[Contact]]:
-        """Contacts made at speed that press a little before their time, by sample."""
-        found: dict[int, list[Contact]] = {}
-        for column, name in enumerate(self.effectors):
-            for interval in self._intervals[name]:
-                if interval.contact.settle == 0.0:
-                    continue
-                for row, (sample, after) in enumerate(itertools.pairwise(self.samples)):
-                    force = np.maximum(*(np.abs(s.wrenches[column, :3]).max() for s in (sample, after)))
-                    if 0.0 < interval.start - sample.plan_time <= EARLY_SEAT and force > _PRESSES:
-                        found.setdefault(row, []).append(interval.contact)
-        return found
-
-    def _as_measured(self, stance: Stance, sample: Sample) -> Stance:
-        """The stance with what is settling where it is now."""
-        contacts = []
-        for contact in stance:
-            early = contact.effector not in self._schedule.stance_at(sample.plan_time)
-            if early or self._schedule.settling(sample.plan_time, contact.effector)[0]:
-                here = sample.output.state.frames[contact.effector].position
-                contact = replace(contact, position=here)
-            contacts.append(contact)
-        return stance.with_contacts(contacts)
+    def _carrying_stance(self, carrying: CarryingContacts, sample: Sample) -> Stance:
+        frames = sample.output.state.frames
+        planned = {name: self._nearest_contact(name, sample.plan_time) for name in self.effectors}
+        return carrying.stance(
+            sample.carried, lambda name: (frames[name].position, frames[name].rotation), planned,
+            [name for name in self.effectors if name in sample.sensed.grips],
+            self._schedule.stance_at(sample.plan_time).model,
+        )  # fmt: skip
 
     def motion(self, joint_names: Sequence[str], mass: float) -> Motion:
         """Turn the samples into a motion."""
@@ -241,8 +231,8 @@ class Recorder:
             tau=np.concatenate((np.zeros((len(tau), 6)), tau), axis=1),
             com=np.array([state.com for state in states]),
             angular_momentum=np.array([state.momentum[3:] for state in states]),
-            margin=self.margins(mass),
-            support=np.linalg.norm(wrenches[..., :3], axis=-1) > _PRESSES,
+            margin=self.margins(mass).margin,
+            support=np.linalg.norm(wrenches[..., :3], axis=-1) > PRESSES,
             contact_force=wrenches,
             contact_names=tuple(self.effectors),
             joint_names=tuple(joint_names),

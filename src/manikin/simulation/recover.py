@@ -218,9 +218,9 @@ class _Run:
             self.world.advance(output.tau, 1)
             sensed = self.world.sense()
             self.world.advance(output.tau, self.substeps - 1)
-            wrench = self.world.mean_wrench()
+            wrench, carried = self.world.mean_wrench(), self.world.carried()
             if number >= 0:
-                self.recorder.add(time, output, sensed, wrench, held=self.task.feet is Feet.HELD)
+                self.recorder.add(time, output, sensed, wrench, carried, held=self.task.feet is Feet.HELD)
             fallen = self._fallen(output.state, lowest, time)
             if fallen or self._stands_for_good(output.state, time):
                 break

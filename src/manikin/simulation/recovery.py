@@ -17,6 +17,7 @@ from manikin.control.balance_recovery import (
 from manikin.control.stepping import StepTaken
 from manikin.display import Displayed
 from manikin.motion import Motion
+from manikin.requirement import Requirement, RequirementTable
 from manikin.simulation.recovery_record import RecoveryTrace
 from manikin.simulation.world import Push, Touch
 from manikin.spatial import FloatArray
@@ -57,6 +58,7 @@ class Recovery(Displayed):
         soles: Where the feet that carry stand in the end.
         steps: Steps that were taken.
         wall: Wall time [s].
+        requirements: What a body that stands in the end keeps.
     """
 
     trace: RecoveryTrace
@@ -73,6 +75,7 @@ class Recovery(Displayed):
     soles: tuple[Contact, ...]
     steps: tuple[StepTaken, ...]
     wall: float
+    requirements: RequirementTable
 
     @property
     def recovered(self) -> bool:
@@ -178,7 +181,29 @@ def judge(
         soles=controller.soles,
         steps=steps,
         wall=wall,
+        requirements=_requirements(motion, fallen, propped, rests_from, moved, bool(steps)),
     )
+
+
+def _requirements(
+    motion: Motion,
+    fallen: str,
+    propped: Sequence[Touch],
+    rests_from: float | None,
+    moved: float,
+    stepped: bool,
+) -> RequirementTable:
+    end, first = float(motion.time[-1]), propped[0] if propped else None
+    return RequirementTable((
+        Requirement("fell", "falls", "", float(bool(fallen)), "<=", 0.0, end if fallen else None),
+        Requirement("unplanned_touches", "unplanned touches", "", float(len(propped)), "<=", 0.0,
+                    None if first is None else first.time,
+                    "" if first is None else f"{first.segment} on {first.other}"),
+        Requirement("at_rest", "stands at rest and upright at the end", "", float(rests_from is not None),
+                    ">=", 1.0, end),
+        Requirement("max_foot_motion_m", "a foot has moved by", "m", moved, "<=",
+                    FOOT_SLID if stepped else FOOT_MOVED, end),
+    ))  # fmt: skip
 
 
 def trunk_lean(state: Configuration, groups: JointGroups) -> float:

@@ -7,12 +7,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from manikin.balance import wrench_polytope
+from manikin.balance.motion_margin import motion_margin
 from manikin.body import BodyModel
 from manikin.body.limb import end_segments
 from manikin.contact import Stance, default_normal_force_cap
 from manikin.control.balance_recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
 from manikin.motion import Motion
+from manikin.simulation.carrying import CarriedPoints, CarryingContacts
 from manikin.simulation.world import Sensed
 from manikin.spatial import FloatArray, skew
 
@@ -24,7 +25,7 @@ class RecoveryTrace:
     Attributes:
         motion: What happened; ``contact_force`` is what the ground did to each foot, measured on free feet
             and, on held ones, the measured whole in equal shares, and ``margin`` that of the measured wrench
-            of the ground in the polytope of the soles that carry.
+            of the ground about the centre of mass, in the polytope of the contacts that carry.
         zmp: (n, 2) of the measured force of the ground over the step, NaN where nothing carries [m].
         zmp_inside: (n,) distance of the ZMP to the edge of the soles that carry, negative outside [m].
         standings: n ways to stand about which the balance was kept.
@@ -77,10 +78,13 @@ class RecoveryRecorder:
         self._ends = {foot: end_segments(body, foot) for foot in controller.groups.feet}
         self._rows: list[tuple[float, RecoveryOutput, FloatArray, FloatArray]] = []
         self._forces: list[FloatArray] = []
+        self._stances: list[Stance] = []
+        self._carrying = CarryingContacts(self._ends, body.mass)
 
     def add(
-        self, time: float, output: RecoveryOutput, sensed: Sensed, wrench: FloatArray, *, held: bool = False
-    ) -> None:
+        self, time: float, output: RecoveryOutput, sensed: Sensed, wrench: FloatArray, carried: CarriedPoints,
+        *, held: bool = False,
+    ) -> None:  # fmt: skip
         """Add a step.
 
         Args:
@@ -88,8 +92,14 @@ class RecoveryRecorder:
             output: What the controller decided then.
             sensed: What was felt in the first engine step after it.
             wrench: (6,) mean force and moment of the ground about the world's origin.
+            carried: Contact points of the scene that carried that wrench.
             held: Whether the feet are held, which is not felt as a touch.
         """
+        self._stances.append(
+            Stance(output.standing.soles, default_normal_force_cap(self._body.mass))
+            if held
+            else self._carrying_stance(output, carried)
+        )
         self._rows.append((time, output, sensed.a, wrench))
         self._forces.append(np.array([
             self._shared(wrench, output.state.frames[foot].position, foot in output.standing.feet) if held
@@ -154,16 +164,30 @@ class RecoveryRecorder:
             joint_names=self._body.joint_names,
         )
 
+    def _carrying_stance(self, output: RecoveryOutput, carried: CarriedPoints) -> Stance:
+        """Stance of the contacts that really carry: soles as far as they touch, and anything else."""
+        frames = output.state.frames
+        soles = {sole.effector: sole for sole in (*self._controller.soles, *output.standing.soles)}
+        return self._carrying.stance(
+            carried, lambda name: (frames[name].position, frames[name].rotation), soles
+        )
+
     def _margins(self) -> FloatArray:
-        """(n,) margins of the measured wrenches, each in the polytope of the soles that carried."""
-        wrenches = np.array([wrench for *_, wrench in self._rows])
-        standings = [output.standing for _, output, *_ in self._rows]
-        margins = np.empty(len(wrenches))
-        for standing in dict.fromkeys(standings):
-            stance = Stance(standing.soles, default_normal_force_cap(self._body.mass))
-            chosen = np.array([other is standing for other in standings])
-            margins[chosen] = wrench_polytope(stance).margin(wrenches[chosen])
-        return margins
+        """(n,) margins of the measured wrenches about the centre of mass, in the contacts that carried.
+
+        Held feet are welded to the ground; they are judged by the soles on which the body stands.
+        """
+        numbers, stances = dict[tuple[int, ...], int](), list[Stance]()
+        rows = np.empty(len(self._stances), dtype=np.int64)
+        for row, stance in enumerate(self._stances):
+            key = tuple(id(contact) for contact in stance)
+            if key not in numbers:
+                numbers[key] = len(stances)
+                stances.append(stance)
+            rows[row] = numbers[key]
+        wrenches = np.array([wrench for *_, wrench in self._rows]).reshape(-1, 6)
+        com = np.array([output.state.com for _, output, *_ in self._rows]).reshape(-1, 3)
+        return motion_margin(stances, rows, wrenches, com).margin
 
 
 class SegmentMomenta:

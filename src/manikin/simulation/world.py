@@ -2,13 +2,15 @@
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.errors import InputError
+from manikin.simulation.carrying import CarriedPoints
 from manikin.simulation.compile import SimulationModel, root_rotation
 from manikin.simulation.scene_geoms import obstacle_of
 from manikin.spatial import FloatArray, cross, finite_number, frozen_array
@@ -22,11 +24,17 @@ class Touch:
         time: [s].
         segment: Segment of the body.
         other: Obstacle or other segment.
+        force: Largest normal force of any instant, of all its points together [N].
     """
 
     time: float
     segment: str
     other: str
+    force: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for the run's summary."""
+        return {"segment": self.segment, "other": self.other, "time_s": self.time, "max_force_N": self.force}
 
     def __str__(self) -> str:
         return f"{self.segment} touches {self.other} at {self.time:.3f} s"
@@ -135,6 +143,21 @@ class Sensed:
         return np.concatenate((force, cross(position - about, force)))
 
 
+@dataclass(frozen=True, eq=False)
+class _Pressed:
+    """Contacts of one engine step that carry: geometries, points, engine's normals, forces, friction."""
+
+    geoms: NDArray[np.int_]
+    positions: FloatArray
+    normals: FloatArray
+    forces: FloatArray
+    friction: FloatArray
+
+    @classmethod
+    def nothing(cls) -> "_Pressed":
+        return cls(np.zeros((0, 2), dtype=int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+
+
 class World:
     """Steps the physics engine and tells what it feels.
 
@@ -166,6 +189,9 @@ class World:
         self._touches: dict[tuple[str, str], Touch] = {}
         self._depth, self._padded_depth = 0.0, 0.0
         self._total, self._steps = np.zeros(6), 0
+        self._carried: list[_Pressed] = []
+        self._elliptic = self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        self._is_segment = np.array([segment for _, segment in self._owners], dtype=bool)
 
     # --- state -----------------------------------------------------------------------------
 
@@ -204,6 +230,7 @@ class World:
         self._touches.clear()
         self._depth, self._padded_depth = 0.0, 0.0
         self._total[:], self._steps = 0.0, 0
+        self._carried.clear()
 
     # --- what acts -------------------------------------------------------------------------
 
@@ -339,6 +366,36 @@ class World:
         self._total[:], self._steps = 0.0, 0
         return mean
 
+    def carried(self) -> CarriedPoints:
+        """Contact points of body and scene that carried force since the last call.
+
+        A point counts as often as it was met, each time with its force over the number of engine steps.
+        Where the body only leans, nothing counts, as in :meth:`mean_wrench`.
+        """
+        steps, self._carried = self._carried or [_Pressed.nothing()], []
+        geoms = np.concatenate([step.geoms for step in steps])
+        second = self._is_segment[geoms[:, 1]]
+        return CarriedPoints(
+            tuple(self._owners[geom][0] for geom in np.where(second, geoms[:, 1], geoms[:, 0]).tolist()),
+            tuple(self._owners[geom][0] for geom in np.where(second, geoms[:, 0], geoms[:, 1]).tolist()),
+            np.concatenate([step.positions for step in steps]),
+            # The engine's normal goes from the first geometry to the second.
+            np.where(second, 1.0, -1.0)[:, None] * np.concatenate([step.normals for step in steps]),
+            np.concatenate([step.forces for step in steps]) / len(steps),
+            np.concatenate([step.friction for step in steps]),
+        )
+
+    def _normal_forces(self) -> FloatArray:
+        """(ncon,) normal force of each contact of the last step [N]."""
+        address = self._data.contact.efc_address
+        if self._elliptic:
+            return np.where(address >= 0, self._data.efc_force[np.maximum(address, 0)], 0.0)
+        local, found = np.zeros(6), np.zeros(self._data.ncon)
+        for number in range(self._data.ncon):
+            mujoco.mj_contactForce(self._model, self._data, number, local)
+            found[number] = local[0]
+        return found
+
     def _constraint_wrench(self) -> FloatArray:
         """Wrench of all contacts and grips in the last step; inner forces cancel in the root."""
         qpos, _, _ = self._before
@@ -392,9 +449,17 @@ class World:
 
     def _note_contacts(self) -> None:
         if self._data.ncon == 0:
+            self._carried.append(_Pressed.nothing())
             return
         contact = self._data.contact
         geoms, depths = contact.geom, -contact.dist
+        forces = self._normal_forces() if self._data.nefc else np.zeros(self._data.ncon)
+        carries = (self._is_segment[geoms[:, 0]] != self._is_segment[geoms[:, 1]]) & (forces > 0.0)
+        carries &= ~self._leaning[geoms[:, 0], geoms[:, 1]]
+        self._carried.append(_Pressed(
+            geoms[carries], contact.pos[carries], contact.frame[carries, :3], forces[carries],
+            contact.friction[carries, 0],
+        ))  # fmt: skip
         if self._pads:
             padded = self._padded[geoms[:, 0]] | self._padded[geoms[:, 1]]
             self._padded_depth = max(self._padded_depth, float(depths[padded].max(initial=0.0)))
@@ -403,9 +468,13 @@ class World:
         planned = self._planned[geoms[:, 0], geoms[:, 1]]
         if planned.all():
             return
-        for first, second in geoms[~planned]:
+        pressed: dict[tuple[str, str], float] = {}
+        for (first, second), force in zip(geoms[~planned], forces[~planned], strict=True):
             segment, other, _ = self._parties(int(first), int(second))
-            self._touches.setdefault((segment, other), Touch(self._before[2], segment, other))
+            pressed[segment, other] = pressed.get((segment, other), 0.0) + float(force)
+        for pair, force in pressed.items():
+            known = self._touches.get(pair, Touch(self._before[2], *pair))
+            self._touches[pair] = replace(known, force=max(known.force, force))
 
     # --- what is felt ----------------------------------------------------------------------
 

@@ -11,7 +11,10 @@ from manikin.acting import (
     plan_act,
     share_force,
 )
+from manikin.balance.contact_forces import FrictionUse, friction_share
+from manikin.contact import ContactKind, FrictionModel
 from manikin.motion import Motion
+from manikin.requirement import Requirement, RequirementTable
 from manikin.scenarios import Scenario
 from manikin.stages.context import RunContext
 from manikin.stages.planned_motion import PlannedMotion
@@ -43,13 +46,20 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
     if act is None or section is None:
         return planned
     q, contacts = planned.motion.q[-1], list(planned.schedule.sequence[-1].stance)
-    friction = context.scenario.explicit_supports().friction
-    largest = largest_force(context.body, q, contacts, act, friction)
-    forces = share_force(context.body, q, contacts, act, friction)
-    report.finish("act", _summary(act, largest, forces))
+    rub = context.scenario.explicit_supports().friction, context.scenario.contact_model.friction
+    largest = largest_force(context.body, q, contacts, act, *rub)
+    forces = share_force(context.body, q, contacts, act, *rub)
+    used = _used_friction(planned, forces, context.scenario.contact_model.friction)
+    report.finish("act", _summary(act, largest, forces) | {"friction": used})
+    if forces is not None:
+        report.require("act", RequirementTable((
+            Requirement("max_torque_share", "share of a torque limit in the act", "", forces.torque_share,
+                        "<=", 1.0, planned.end, forces.tightest),
+        )))  # fmt: skip
     if forces is None or forces.torque_share > 1.0:
         weak = "friction and balance allow" if forces is None else f"{forces.tightest} allows"
         reason = f"the last posture cannot {act.kind} with {act.force:g} N: {weak} less"
+        report.planned = False
         report.fail("wholebody", reason, planned.end, act.obstacle)
         return planned
     acting = plan_act(planned.motion, planned.schedule, forces, section.ramp_s, section.hold_s)
@@ -60,9 +70,7 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
 def measured_act_failure(
     context: RunContext, report: Report, planned: PlannedMotion, executed: Motion
 ) -> Failure | None:
-    """Add what was exerted to the report; a failure where it is too little or too much.
-
-    Where the motion did not come to its act, nothing is added.
+    """Add what was exerted to the report; a failure where it is too little or too much, or nothing.
 
     Args:
         context: Of the run.
@@ -76,12 +84,30 @@ def measured_act_failure(
     friction = context.scenario.explicit_supports().friction
     found = measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
     if found is None:
-        return None
+        return Failure("execution", "the motion did not come to its act", acting.timing.end, act.obstacle)
     report.finish("act", report.summary["act"] | found.summary())
-    if abs(found.mean_force - act.force) > FORCE_ERROR * act.force:
+    row = Requirement("mean_force_error_N", "error of the mean force", "N", abs(found.mean_force - act.force),
+                      "<=", FORCE_ERROR * act.force, acting.timing.end, act.obstacle)  # fmt: skip
+    report.require("act execution", RequirementTable((row,)))
+    if not row.held:
         reason = f"the mean force was {found.mean_force:.0f} N; wanted {act.force:g} N"
         return Failure("execution", reason, acting.timing.end, act.obstacle)
     return None
+
+
+def _used_friction(
+    planned: PlannedMotion, forces: BracedForces | None, model: FrictionModel
+) -> dict[str, float | str] | None:
+    """Largest share of the friction that the feet use while they act."""
+    if forces is None:
+        return None
+    feet = [
+        (float(friction_share(contact, force[None, :3], model)[0]), contact.effector)
+        for contact, force in zip(planned.schedule.sequence[-1].stance, forces.contact_force, strict=True)
+        if contact.kind is not ContactKind.GRASP
+    ]
+    share, effector = max(feet)
+    return FrictionUse(model, share, planned.end, effector).summary()
 
 
 def _summary(act: Act, largest: BracedForces | None, forces: BracedForces | None) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from typing import Any
 from manikin.contact import ContactSchedule
 from manikin.control import ControlSettings, ReturnSettings, SupportSettings
 from manikin.motion import Motion
+from manikin.requirement import RequirementTable
 from manikin.scenarios import Scenario
 from manikin.simulation import Execution, Push, execute, push_on_the_way
 from manikin.stages.act import measured_act_failure
@@ -24,7 +25,7 @@ def execute_motion(
 
     Args:
         context: Of the run.
-        report: Takes the ``execution`` block, and the failure where the scenario requires a success.
+        report: Takes the ``execution`` block, and the failure of a motion that broke a requirement.
         planned: What is executed.
         requirements: What the execution must keep.
     """
@@ -40,17 +41,20 @@ def execute_motion(
         wishes=() if act is None else act.wishes,
         progress=lambda share: report.progress("execution", share),
     )  # fmt: skip
-    fallen = _failure(scenario, planned.schedule, result, requirements)
+    table = requirements.table(result, scenario.seated_from is not None)
+    report.require("execution", table)
+    fallen = _failure(planned.schedule, result, table)
     exerted = measured_act_failure(context, report, planned, result.motion)
     failure = exerted if fallen is None else fallen
     block = {
-        "required": scenario.execution_required,
+        "required": True,
         "failure": None if failure is None else failure.as_dict(),
         **_summary_in_world(result, report),
         **context.passage(result.schedule or planned.schedule, result.motion).summary(),
     }
     report.finish("execution", block)
-    if failure is not None and scenario.execution_required:
+    report.proved = failure is None
+    if failure is not None:
         report.fail(failure.stage, failure.reason, failure.time_s, failure.where)
     report.keep_motions(planned.schedule, planned.motion, result.motion)
     return result
@@ -63,16 +67,15 @@ def _summary_in_world(result: Execution, report: Report) -> dict[str, Any]:
     return block
 
 
-def _failure(
-    scenario: Scenario, schedule: ContactSchedule, result: Execution, requirements: ExecutionRequirements
-) -> Failure | None:
+def _failure(schedule: ContactSchedule, result: Execution, table: RequirementTable) -> Failure | None:
     """What the execution itself did not keep, or None."""
-    broken = requirements.violation(result, scenario.seated_from is not None)
+    broken = table.first_broken
     if result.failure:
-        broken = result.failure, float(result.failure_time_s or 0.0)
-    if broken is None:
+        reason, time = result.failure, float(result.failure_time_s or 0.0)
+    elif broken is not None:
+        reason, time = broken.reason, broken.time_s or 0.0
+    else:
         return None
-    reason, time = broken
     phase = int((result.schedule or schedule).phase_at(time))
     held = ", ".join(schedule.sequence[phase].stance.effectors)
     return Failure("execution", reason, time, place(phase, held))

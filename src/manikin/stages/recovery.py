@@ -52,6 +52,8 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
         body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
     )
     report.finish(STAGE, found.summary() | _bound(body, task, settings, found))
+    report.require(STAGE, found.requirements)
+    report.planned, report.proved = None, found.recovered
     if found.failure:
         report.fail(STAGE, found.failure, float(found.trace.motion.time[-1]), f"feet {section.feet}")
     report.keep_motions(_schedule(found), None, found.trace.motion)

@@ -1,4 +1,4 @@
-"""What a run tells as it goes: its summary, the files of its directory, its progress.
+"""What a run reports: its summary and verdict, the files of its directory, its progress.
 
 The stages work in the frame of the task; what leaves through here is in the world.
 """
@@ -13,6 +13,7 @@ from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
 from manikin.output import MOTION, RunDirectory, other_motion
+from manikin.requirement import RequirementTable
 from manikin.scenarios import Scenario
 from manikin.spatial import PlanarTransform
 from manikin.stages.context import RunContext
@@ -50,6 +51,8 @@ class Report:
         summary: As printed by ``manikin run --json``.
         progress: Called with the stage and the share of it that is done.
         failure: Why the run is no success so far, or None.
+        planned: Whether a plan keeps every requirement of its certificate; None for a run without a plan.
+        proved: Whether the body moved in the physics engine and kept every requirement.
     """
 
     def __init__(
@@ -69,13 +72,17 @@ class Report:
         self._context, self._began = context, began
         self.progress = progress or _silent
         self.failure: Failure | None = None
+        self.planned: bool | None = False
+        self.proved = False
+        self._tables: dict[str, RequirementTable] = {}
         self._directory = None if out is None else RunDirectory(out)
         scenario = context.given
         self._keep_scenario(scenario)
         stature = None if scenario.is_point_mass else context.body.stature
         self.summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
-            "succeeded": False, "failure": None,
+            "verdict": "failed", "planned": False, "proved": False, "succeeded": False, "failure": None,
+            "requirements": [],
             "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None,
             "push": None, "walk": None,
             "wall_s": 0.0,
@@ -101,6 +108,15 @@ class Report:
             where: Phase, contact, limb or pair.
         """
         self.failure = Failure(stage, reason_in_world(reason, self.transform), float(time), where)
+
+    def require(self, stage: str, table: RequirementTable) -> None:
+        """Take the requirements of a stage's result into the summary, in place of earlier ones.
+
+        Args:
+            stage: Stage whose result was measured.
+            table: Its requirements.
+        """
+        self._tables[stage] = table
 
     def finish(self, stage: str, block: Mapping[str, Any]) -> None:
         """Take a stage's block into the summary, and keep it."""
@@ -128,13 +144,30 @@ class Report:
 
     def close(self) -> dict[str, Any]:
         """Complete the summary, write it and return it."""
-        failure = self.failure
-        self.summary["succeeded"] = failure is None
-        self.summary["failure"] = None if failure is None else failure.as_dict()
+        self._judge()
+        failure, required = self.failure, self._context.scenario.execution_required
+        word = "failed" if failure is not None else "proved" if required else "planned"
+        self.summary |= {
+            "verdict": word, "planned": self.planned, "proved": self.proved, "succeeded": failure is None,
+            "failure": None if failure is None else failure.as_dict(),
+            "requirements": [
+                row.as_dict(stage) for stage, table in self._tables.items() for row in table
+            ],
+        }  # fmt: skip
         self.summary["wall_s"] = clock.perf_counter() - self._began
         if self._directory is not None:
             self._directory.write_summary(self.summary)
         return self.summary
+
+    def _judge(self) -> None:
+        """A run that broke a requirement, or did not come to what was asked for, has failed."""
+        for stage, table in self._tables.items():
+            if self.failure is None and (broken := table.first_broken) is not None:
+                self.fail(stage, broken.reason, broken.time_s or 0.0, broken.where)
+        required = self._context.scenario.execution_required
+        if self.failure is None and not (self.proved if required else self.planned):
+            stage = "execution" if required else "wholebody"
+            self.fail(stage, "the motion was not executed" if required else "there is no plan")
 
     def _keep_scenario(self, scenario: Scenario) -> None:
         if self._directory is not None:

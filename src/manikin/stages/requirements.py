@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from manikin.requirement import Requirement, RequirementTable, requirement_table
 from manikin.simulation import Execution
-from manikin.simulation.pushed import BACK, PushOutcome
+from manikin.simulation.pushed import BACK
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,8 @@ class ExecutionRequirements:
     penetration: float = 0.005
     padding_compression: float = 0.01
 
-    def violation(self, execution: Execution, seated: bool = False) -> tuple[str, float] | None:
-        """Explain the first requirement that is not kept, with a time [s], or None.
+    def table(self, execution: Execution, seated: bool = False) -> RequirementTable:
+        """Every requirement with its measured value.
 
         Where what was measured does not say when, the time is that of the least margin. A body that was
         pushed is out of balance and off its plan for a while; it has to be back on it at the end.
@@ -37,38 +38,49 @@ class ExecutionRequirements:
             execution: What happened.
             seated: Whether the motion ends on a seat.
         """
-        if execution.push is not None:
-            return self._not_returned(execution, execution.push)
-        penetration = self.padding_compression if seated else self.penetration
-        thinnest = float(execution.motion.time[int(np.argmin(execution.motion.margin))])
-        if execution.min_margin <= self.margin:
-            return (
-                f"executed margin falls to {execution.min_margin:.2f} N.m; allowed > {self.margin:g}",
-                thinnest,
-            )
-        effector = f"error of {execution.worst_effector}"
-        for value, limit, what, time in (
-            (execution.com_rms_error_m, self.com_rms_error, "RMS error of the centre of mass", thinnest),
-            (execution.max_foot_error_m, self.foot_error, effector, execution.worst_effector_time_s),
-            (execution.max_penetration_m, penetration, "penetration", thinnest),
-            (
-                execution.max_padding_compression_m,
-                self.padding_compression,
-                "compression of padding",
-                thinnest,
-            ),
-        ):
-            if value > limit:
-                return f"{what} is {value:.4f} m; allowed {limit:g} m", time
-        return None
+        rest = self._followed(execution, seated) if execution.push is None else self._returned(execution)
+        return requirement_table([*_kept_standing(execution), *rest])
 
-    def _not_returned(self, execution: Execution, push: PushOutcome) -> tuple[str, float] | None:
-        """What a body that was pushed has not come back to, or None."""
-        end = float(execution.motion.time[-1])
-        if push.return_s is None and not execution.failure:
-            error = execution.final_com_error_m
-            return f"not back on its plan: the CoM ends {error:.3f} m from it; allowed {BACK:g} m", end
-        if push.max_foot_deviation_m > self.foot_error:
-            error = push.max_foot_deviation_m
-            return f"an effector ends {error:.3f} m from its plan; allowed {self.foot_error:g} m", end
-        return None
+    def _followed(self, execution: Execution, seated: bool) -> list[Requirement | None]:
+        """Of a body that nothing disturbs."""
+        deepest = self.padding_compression if seated else self.penetration
+        thinnest = float(execution.motion.time[int(np.argmin(execution.motion.margin))])
+        pressed = execution.max_padding_compression_m > 0.0
+        return [
+            Requirement("min_margin", "executed margin", execution.motion.margin_unit, execution.min_margin,
+                        ">", self.margin, thinnest),
+            Requirement("com_rms_error_m", "RMS error of the centre of mass", "m",
+                        execution.com_rms_error_m, "<=", self.com_rms_error, thinnest),
+            Requirement("max_foot_error_m", "error", "m", execution.max_foot_error_m, "<=", self.foot_error,
+                        execution.worst_effector_time_s, execution.worst_effector),
+            Requirement("max_penetration_m", "penetration", "m", execution.max_penetration_m, "<=", deepest,
+                        thinnest),
+            Requirement("max_padding_compression_m", "compression of padding", "m",
+                        execution.max_padding_compression_m, "<=", self.padding_compression, thinnest)
+            if pressed else None,
+        ]  # fmt: skip
+
+    def _returned(self, execution: Execution) -> list[Requirement | None]:
+        """Of a body that was pushed: what it has to come back to."""
+        push, end = execution.push, float(execution.motion.time[-1])
+        if push is None:
+            return []
+        return [
+            Requirement("final_com_error_m", "distance of the centre of mass from its plan at the end", "m",
+                        execution.final_com_error_m, "<=", BACK, end),
+            Requirement("max_foot_deviation_m", "distance of an effector from its plan at the end", "m",
+                        push.max_foot_deviation_m, "<=", self.foot_error, end),
+        ]  # fmt: skip
+
+
+def _kept_standing(execution: Execution) -> list[Requirement]:
+    """The body does not fall, and nothing touches that should not."""
+    touches = execution.counted_touches
+    first = touches[0] if touches else None
+    return [
+        Requirement("fell", "falls", "", float(execution.fell), "<=", 0.0,
+                    execution.failure_time_s if execution.fell else None),
+        Requirement("unplanned_touches", "unplanned touches", "", float(len(touches)), "<=", 0.0,
+                    None if first is None else first.time,
+                    "" if first is None else f"{first.segment} on {first.other}"),
+    ]  # fmt: skip

@@ -80,8 +80,13 @@ class RunResult:
 
     @property
     def succeeded(self) -> bool:
-        """Whether every stage met its requirements; an execution only where the scenario requires it."""
+        """Whether what the scenario asks for is proved, or for ``execution: none`` planned."""
         return bool(self.summary["succeeded"])
+
+    @property
+    def verdict(self) -> str:
+        """``"proved"``, ``"planned"`` (a planned-only job that succeeded) or ``"failed"``."""
+        return str(self.summary["verdict"])
 
     @property
     def motion(self) -> Motion | None:

@@ -24,8 +24,10 @@ from manikin.locomotion import (
     walking_route,
 )
 from manikin.locomotion.obstacles import clearance
+from manikin.locomotion.path import TOLERANCE
 from manikin.motion import Motion
 from manikin.output import BODY, WALK_PATHS
+from manikin.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections import StandSection, WalkingSection, WaypointSection
 from manikin.scenarios.validation import Path as KeyPath
@@ -41,6 +43,12 @@ PATH_EVERY = 5
 
 CLOCK = 0.01
 """Step of the common clock on which distances of walkers are measured [s]."""
+
+ROOM_TOLERANCE = 1e-3
+"""The path keeps its room at the instants of its optimisation; between them it may miss this much [m]."""
+
+STANCE_SLIDE = 1e-3
+"""A foot on the ground moves by at most this, as a planned support does [m]."""
 
 OBJECTIVES = {
     "prose": PROSE_ORDER, "literal": LITERAL_ORDER,
@@ -89,6 +97,8 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
     block |= _walk_block(walk, clock.perf_counter() - began)
     schedule, motion = walked_motion(walk, height)
     report.finish(STAGE, block | _balance_block(motion))
+    report.require(STAGE, _requirements(context, plan, walk))
+    report.planned = True
     report.keep_motions(schedule, motion)
     for number, (name, route) in enumerate(plan.others.items()):
         report.keep_other(name, *walked_motion(walk_along(route, context.body, height=height), height))
@@ -227,6 +237,26 @@ def _room(plan: PlannedWalks) -> float | None:
     """Least distance of the walker's discs from anything [m], measured densely; None where nothing is."""
     room = clearance(plan.obstacles, Walker(), plan.route.place, plan.route.time)
     return float(room.min()) if room.size else None
+
+
+def _requirements(context: RunContext, plan: PlannedWalks, walk: Walk) -> RequirementTable:
+    """What a walk that is not executed keeps: its ends, its speed, its room, and feet that stand still."""
+    section, route = _section(context.scenario), plan.route
+    ends = np.abs(route.place[[0, -1]] - [end_of(context.scenario, end) for end in ("start", "goal")])
+    ends[:, 2] = np.abs(np.angle(np.exp(1j * ends[:, 2])))
+    speed = np.hypot(*route.velocity[:, :2].T)
+    fastest, room = int(np.argmax(speed)), _room(plan)
+    return requirement_table([
+        Requirement("end_error", "distance of the path from start and goal", "m, rad", float(ends.max()),
+                    "<=", 0.0, tolerance=TOLERANCE),
+        Requirement("max_speed_mps", "speed of the path", "m/s", float(speed[fastest]), "<=",
+                    section.max_speed_m_s, float(route.time[fastest]), tolerance=TOLERANCE),
+        None if room is None
+        else Requirement("min_room_m", "room to obstacles and others", "m", room, ">=", section.room_m,
+                         tolerance=ROOM_TOLERANCE),
+        Requirement("max_stance_slide_m", "slide of a foot on the ground", "m",
+                    float(walk.slides.max(initial=0.0)), "<=", STANCE_SLIDE),
+    ])  # fmt: skip
 
 
 def _walk_block(walk: Walk, wall: float) -> dict[str, Any]:

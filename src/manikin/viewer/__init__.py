@@ -1,12 +1,9 @@
-"""The viewer in the browser; needs the extra ``viewer``."""
+"""The viewer in the browser."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
-
-from manikin.errors import InputError
 
 if TYPE_CHECKING:
     from manikin.contact_planning.live_contacts import LiveContacts
@@ -33,10 +30,10 @@ def serve(
         others: Motions of others who are there, by name.
 
     Raises:
-        InputError: If the viewer is not installed, the file holds no body or the port is taken.
+        InputError: If the file holds no body or the port is taken.
     """
-    with _installed():
-        from manikin.viewer.session import ViewerSession
+    from manikin.viewer.session import ViewerSession
+
     session = ViewerSession(content, port, others)
     if announce is not None:
         announce(session.url)
@@ -54,10 +51,10 @@ def serve_contacts(
         announce: Told the page's address when it can be opened.
 
     Raises:
-        InputError: If the viewer is not installed or the port is taken.
+        InputError: If the port is taken.
     """
-    with _installed():
-        from manikin.viewer.contacts import ContactViewer
+    from manikin.viewer.contacts import ContactViewer
+
     session = ContactViewer(live, port)
     if announce is not None:
         announce(session.url)
@@ -79,23 +76,11 @@ def serve_drive(
         announce: Told the page's address when it can be opened.
 
     Raises:
-        InputError: If the viewer is not installed or the port is taken.
+        InputError: If the port is taken.
     """
-    with _installed():
-        from manikin.viewer.drive import WalkViewer
+    from manikin.viewer.drive import WalkViewer
+
     session = WalkViewer(controller, scene, port)
     if announce is not None:
         announce(session.url)
     session.run()
-
-
-@contextmanager
-def _installed() -> Iterator[None]:
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if error.name != "viser":
-            raise
-        raise InputError(
-            "the viewer is not installed; install it with: pip install 'manikin[viewer]'"
-        ) from None

@@ -12,11 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
-from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytope
+from manikin.balance import WrenchPolytope, motion_margin, pseudo_wrench, wrench_polytopes
 from manikin.body import BodyModel
 from manikin.centroidal import CentroidalTrajectory
 from manikin.display import Displayed
 from manikin.motion import Motion
+from manikin.requirement import RequirementTable
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.certificate import WholeBodyRequirements, WholeBodyResiduals, certify
@@ -25,7 +26,7 @@ from manikin.wholebody.failure import WholeBodyFailure
 from manikin.wholebody.fit import FitResult, MotionFit
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
-from manikin.wholebody.full_motion import full_motion, margins
+from manikin.wholebody.full_motion import full_motion
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
 from manikin.wholebody.key_postures import KeyPostures
 from manikin.wholebody.knots import phase_knots, refined, sample_times, touch_downs_at_speed
@@ -105,6 +106,7 @@ class WholeBodyResult(Displayed):
         motion: Sampled at 1 kHz; of the best attempt when it failed.
         spline: The motion in closed form.
         certificate: Measured on the samples of the motion.
+        requirements: What the certificate was held against.
         swings: The flights.
         guide: The guide postures.
         failure: Why it is no success, or None.
@@ -115,6 +117,7 @@ class WholeBodyResult(Displayed):
     motion: Motion
     spline: ConfigurationSpline
     certificate: WholeBodyResiduals
+    requirements: RequirementTable
     swings: tuple[PlannedSwing, ...]
     guide: Guide
     failure: WholeBodyFailure | None
@@ -213,7 +216,7 @@ class _Planner:
         result = self._attempt(swings, began)
         if not result.succeeded and self.settings.manner is READY:
             result = _better(result, self._attempt_close(swings, began))
-        if "min_clearance_m" in result.certificate.broken(self.settings.requirements):
+        if "min_clearance_m" in result.requirements.broken:
             result = _better(result, self._attempt_with_loose_toes(swings, began))
         searched = self._search_again(swings, result)
         if searched is not None:
@@ -260,7 +263,7 @@ class _Planner:
         for number in range(REPAIRS):
             if result.succeeded:
                 break
-            broken = last.certificate.broken(self.settings.requirements)
+            broken = last.requirements.broken
             if _is_caught(last):
                 scales = reweighed(scales, broken & {"min_clearance_m"})
                 fit, start = self._prepare(swings, guide, self._knots(), scales)
@@ -319,9 +322,12 @@ class _Planner:
             ignored = tuple(pairs | self.leaning for pairs in ignored)
         meeting = meeting_at(self.body, self.scene, self.trajectory.schedule, motion.time)
         certificate = certify(self.body, self.proximity, self.trajectory, motion, ignored, wrench, meeting)
-        failure = self._failure(swings, guide, certificate)
+        table = certificate.table(self.settings.requirements)
+        failure = self._failure(swings, guide, table)
         wall = clock.perf_counter() - began
-        return WholeBodyResult(motion, fit.spline, certificate, swings, guide, failure, fit.iterations, wall)
+        return WholeBodyResult(
+            motion, fit.spline, certificate, table, swings, guide, failure, fit.iterations, wall
+        )
 
     def _scales(self) -> FitScales:
         share = self.settings.manner.moment_factor * self.settings.fit.moment_share
@@ -383,7 +389,7 @@ class _Planner:
             com=self.trajectory.position(time),
             com_weight=np.where(self.trajectory.binds(time), 1.0, LOOSE_COM),
             com_acceleration=self.trajectory.acceleration(time),
-            margin=margins(schedule, self._polytopes, time, self._point_mass_wrench(time)),
+            margin=self._planned_margins(time),
             reference=_with_joints(reference, toes),
             reference_scale=scale,
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
@@ -399,20 +405,23 @@ class _Planner:
 
     @cached_property
     def _polytopes(self) -> list[WrenchPolytope]:
-        """Of each phase, about the world origin."""
-        return [wrench_polytope(phase.stance) for phase in self.trajectory.schedule.sequence]
+        """Of each phase, about the middle of its contacts."""
+        return list(wrench_polytopes([phase.stance for phase in self.trajectory.schedule.sequence]))
 
-    def _point_mass_wrench(self, time: FloatArray) -> FloatArray:
-        trajectory = self.trajectory
-        return pseudo_wrench(self.body.mass, trajectory.position(time), trajectory.acceleration(time))
+    def _planned_margins(self, time: FloatArray) -> FloatArray:
+        """(n,) margins of the planned centre of mass [N.m]."""
+        schedule, com = self.trajectory.schedule, self.trajectory.position(time)
+        wrench = pseudo_wrench(self.body.mass, com, self.trajectory.acceleration(time))
+        stances = [phase.stance for phase in schedule.sequence]
+        return motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=self._polytopes).margin
 
     def _failure(
-        self, swings: tuple[PlannedSwing, ...], guide: Guide, certificate: WholeBodyResiduals
+        self, swings: tuple[PlannedSwing, ...], guide: Guide, table: RequirementTable
     ) -> WholeBodyFailure | None:
-        violation = certificate.violation(self.settings.requirements)
-        if violation is None:
+        broken = table.first_broken
+        if broken is None:
             return None
-        reason, time = violation
+        reason, time = broken.reason, broken.time_s or 0.0
         for item in swings:
             start, end = item.interval
             if item.failure is not None and start <= time <= end:

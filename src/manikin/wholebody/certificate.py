@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from manikin.balance import least_zmp_distance
 from manikin.body import BodyModel
@@ -16,6 +15,7 @@ from manikin.body.limb import hanging_segment
 from manikin.centroidal import CentroidalTrajectory
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.motion import Motion
+from manikin.requirement import Requirement, RequirementTable, Sense, requirement_table
 from manikin.scene import Proximity
 from manikin.spatial import FloatArray
 from manikin.wholebody.meeting import Ignored, Meeting, meeting_errors
@@ -50,6 +50,25 @@ class WholeBodyRequirements:
 
 
 @dataclass(frozen=True)
+class Impact:
+    """A contact that is made at speed.
+
+    Attributes:
+        effector: What touches down.
+        time_s: When [s].
+        torque_share: Largest share of a joint's torque limit in the :data:`IMPACT` after it.
+        joint: Name of that joint.
+        at_s: When that share is reached [s].
+    """
+
+    effector: str
+    time_s: float
+    torque_share: float
+    joint: str
+    at_s: float
+
+
+@dataclass(frozen=True)
 class WholeBodyResiduals:
     """Largest violations of a planned motion.
 
@@ -67,9 +86,12 @@ class WholeBodyResiduals:
         max_velocity_share: Largest share of a joint's velocity limit.
         max_missing_wrench: Part of the dynamics that no admissible contact force supplies [N, N.m].
         max_torque_share: Largest share of a joint's torque limit.
+        tightest_joint: Name of that joint.
         min_zmp_distance_m: Least distance of the ZMP to the edge of the support polygon, negative
             outside; of the phases whose contacts lie in one plane, None without any [m].
         worst_times_s: When each of the errors is largest [s], by field name.
+        impacts: Largest share of a torque limit just after each contact that is made at speed; they count in
+            ``max_torque_share`` like any other instant.
     """
 
     max_support_error_m: float
@@ -83,37 +105,34 @@ class WholeBodyResiduals:
     max_velocity_share: float
     max_missing_wrench: float
     max_torque_share: float
+    tightest_joint: str
     min_zmp_distance_m: float | None
     worst_times_s: dict[str, float]
+    impacts: tuple[Impact, ...] = ()
 
-    def violation(self, requirements: WholeBodyRequirements) -> tuple[str, float] | None:
-        """Explain the first requirement that is not kept, with its time [s]; None when all are."""
-        for name, value, limit, what in self._checks(requirements):
-            if value > limit:
-                return f"{what} is {value:.4g}; allowed {limit:.4g}", self.worst_times_s[name]
-        return None
+    def table(self, requirements: WholeBodyRequirements) -> RequirementTable:
+        """Every requirement with its measured value; keys are the names of the fields."""
+        r, pair = requirements, " and ".join(self.closest_pair)
+        return requirement_table([
+            self._row("max_support_error_m", "support error", "m", r.support_error),
+            self._row("max_support_turn_rad", "support turn", "rad", r.support_turn),
+            None if self.max_meeting_error_m == 0.0  # nothing was met at speed
+            else self._row("max_meeting_error_m", "distance of a sliding contact from its surface", "m",
+                      r.meeting_error),
+            self._row("max_com_error_m", "centre-of-mass error", "m", r.com_error),
+            self._row("min_clearance_m", "clearance", "m", r.clearance, ">=", pair),
+            self._row("max_joint_limit_violation_rad", "joint range violation", "rad", r.joint_limit),
+            self._row("max_velocity_share", "share of a velocity limit", "", r.velocity_share),
+            self._row("max_missing_wrench", "missing wrench", "N, N.m", r.missing_wrench),
+            self._row("max_torque_share", "share of a torque limit", "", r.torque_share,
+                      where=self.tightest_joint),
+        ])  # fmt: skip
 
-    def broken(self, requirements: WholeBodyRequirements) -> frozenset[str]:
-        """Names of the fields that are not kept."""
-        return frozenset(name for name, value, limit, _ in self._checks(requirements) if value > limit)
-
-    def _checks(self, requirements: WholeBodyRequirements) -> list[tuple[str, float, float, str]]:
-        """Field, value, limit and wording of every requirement."""
-        r = requirements
-        pair = " and ".join(self.closest_pair)
-        return [
-            ("max_support_error_m", self.max_support_error_m, r.support_error, "support error [m]"),
-            ("max_support_turn_rad", self.max_support_turn_rad, r.support_turn, "support turn [rad]"),
-            ("max_meeting_error_m", self.max_meeting_error_m, r.meeting_error,
-             "distance of what slides from its surface [m]"),
-            ("max_com_error_m", self.max_com_error_m, r.com_error, "centre-of-mass error [m]"),
-            ("min_clearance_m", -self.min_clearance_m, -r.clearance, f"clearance [m] of {pair}, negated,"),
-            ("max_joint_limit_violation_rad", self.max_joint_limit_violation_rad, r.joint_limit,
-             "joint range violation [rad]"),
-            ("max_velocity_share", self.max_velocity_share, r.velocity_share, "share of a velocity limit"),
-            ("max_missing_wrench", self.max_missing_wrench, r.missing_wrench, "missing wrench [N, N.m]"),
-            ("max_torque_share", self.max_torque_share, r.torque_share, "share of a torque limit"),
-        ]  # fmt: skip
+    def _row(
+        self, key: str, name: str, unit: str, limit: float, sense: Sense = "<=", where: str = ""
+    ) -> Requirement:
+        time = self.worst_times_s.get(key)
+        return Requirement(key, name, unit, float(getattr(self, key)), sense, limit, time, where)
 
 
 def certify(
@@ -142,8 +161,8 @@ def certify(
     angles = motion.q[:, 7:]
     limit = np.maximum(body.lower - angles, angles - body.upper).max(axis=1)
     speed = (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1)
-    torque = (np.abs(motion.tau[:, 6:]) / body.torque_limit).max(axis=1)
-    torque = np.where(_impact(trajectory.schedule, motion.time), 0.0, torque)
+    share = body.torque_share(motion.tau[:, 6:])
+    torque = share.max(axis=1, initial=0.0)
     missing = np.linalg.norm(motion.tau[:, :6], axis=1)
     clearance = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
     series = {
@@ -161,8 +180,10 @@ def certify(
         min_clearance_m=float(clearance.distance),
         closest_pair=clearance.pair or ("", ""),
         max_scuff_m=scuff,
+        tightest_joint=body.joint_names[int(np.argmax(share.max(axis=0)))],
         min_zmp_distance_m=_least_zmp_distance(trajectory.schedule, motion.time, wrench),
         worst_times_s=times,
+        impacts=_impacts(body, trajectory.schedule, motion.time, share),
     )
 
 
@@ -174,17 +195,30 @@ def _least_zmp_distance(schedule: ContactSchedule, time: FloatArray, wrench: Flo
 
 
 IMPACT = 0.03
-"""Time after a touch-down at speed in which torques are not counted [s]: the smooth plan has no
-impact, and what the joints really give there is bounded, and measured, in the execution."""
+"""Time after a touch-down at speed whose torques are listed as those of the impact [s]."""
 
 
-def _impact(schedule: ContactSchedule, time: FloatArray) -> NDArray[np.bool_]:
-    """(n,) whether a contact was made at speed just before each time."""
-    found = np.zeros(len(time), dtype=bool)
+def _impacts(
+    body: BodyModel, schedule: ContactSchedule, time: FloatArray, share: FloatArray
+) -> tuple[Impact, ...]:
+    """Torques just after each contact that is made at speed, in time.
+
+    Args:
+        body: The body.
+        schedule: Its contacts in time.
+        time: (n,) [s].
+        share: (n, nv - 6) shares of the torque limits.
+    """
+    found = []
     for name in schedule.sequence.effectors:
         settling = schedule.settling(time, name)
-        found |= settling & ~schedule.settling(time - IMPACT, name)
-    return found
+        for first in np.flatnonzero(settling & ~np.append(False, settling[:-1])):
+            rows = np.arange(first, int(np.searchsorted(time, time[first] + IMPACT)))
+            sample, joint = np.unravel_index(int(np.argmax(share[rows])), share[rows].shape)
+            largest = float(share[rows][sample, joint])
+            at = float(time[rows[sample]])
+            found.append(Impact(name, float(time[first]), largest, body.joint_names[joint], at))
+    return tuple(sorted(found, key=lambda impact: impact.time_s))
 
 
 def support_errors(

@@ -2,13 +2,11 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-import pinocchio as pin
-
-from manikin.balance import WrenchPolytope, pseudo_wrench
+from manikin.balance import WrenchPolytope, motion_margin
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
+from manikin.motion.dynamics import centroidal_motion
 from manikin.spatial import FloatArray
 from manikin.wholebody.forces import plan_forces
 
@@ -27,7 +25,7 @@ def full_motion(
     Args:
         body: The body.
         schedule: Its contacts in time.
-        polytopes: Of each phase, about the world origin.
+        polytopes: Of each phase.
         time: (n,) [s].
         q: (n, nq) configurations.
         v: (n, nv) velocities.
@@ -36,36 +34,14 @@ def full_motion(
     Returns:
         The motion, and (n, 6) its whole-body pseudo-wrench about the world origin.
     """
-    com, momentum, wrench = centroidal_state(body, q, v, a)
+    found = centroidal_motion(body, q, v, a)
     forces = plan_forces(body, schedule, time, q, v, a)
+    stances = [phase.stance for phase in schedule.sequence]
+    margin = motion_margin(stances, schedule.phase_at(time), found.wrench, found.com, polytopes=polytopes)
     names = schedule.sequence.effectors
     motion = Motion(
-        time=time, q=q, v=v, a=a, tau=forces.tau, com=com, angular_momentum=momentum,
-        margin=margins(schedule, polytopes, time, wrench), support=schedule.support(time, names),
+        time=time, q=q, v=v, a=a, tau=forces.tau, com=found.com, angular_momentum=found.angular_momentum,
+        margin=margin.margin, support=schedule.support(time, names),
         contact_force=forces.contact_force, contact_names=names, joint_names=body.joint_names,
     )  # fmt: skip
-    return motion, wrench
-
-
-def centroidal_state(
-    body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centre of mass (n, 3) [m], angular momentum (n, 3) and whole-body pseudo-wrench (n, 6)."""
-    model, data = body.pinocchio, body.pinocchio.createData()
-    com, momentum, rate = np.zeros((len(q), 3)), np.zeros((len(q), 3)), np.zeros((len(q), 6))
-    for k in range(len(q)):
-        pin.computeCentroidalMomentumTimeVariation(model, data, q[k], v[k], a[k])
-        com[k], momentum[k], rate[k] = data.com[0], data.hg.angular, data.dhg.vector
-    return com, momentum, pseudo_wrench(body.mass, com, rate[:, :3] / body.mass, rate[:, 3:])
-
-
-def margins(
-    schedule: ContactSchedule, polytopes: Sequence[WrenchPolytope], time: FloatArray, wrench: FloatArray
-) -> FloatArray:
-    """(n,) margin of wrenches (n, 6) at instants (n,), each in the polytope of its phase [N.m]."""
-    phases = schedule.phase_at(time)
-    margin = np.zeros(len(time))
-    for number, polytope in enumerate(polytopes):
-        rows = phases == number
-        margin[rows] = polytope.margin(wrench[rows])
-    return margin
+    return motion, found.wrench

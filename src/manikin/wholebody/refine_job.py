@@ -12,6 +12,7 @@ from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.contact_planning.efort import Task
 from manikin.motion import Motion
+from manikin.requirement import Requirement, RequirementTable
 from manikin.scene import Proximity, Scene
 from manikin.wholebody.banded import SampledBasis
 from manikin.wholebody.configuration_spline import ConfigurationSpline
@@ -20,7 +21,7 @@ from manikin.wholebody.fit import FitResult, MotionFit, spline_through
 from manikin.wholebody.knots import phase_knots, refined, sample_times
 from manikin.wholebody.objective import MotionObjective
 from manikin.wholebody.refine_balance import BalanceRoom
-from manikin.wholebody.refine_certificate import RefineRequirements, RefineResiduals
+from manikin.wholebody.refine_certificate import RefineResiduals
 from manikin.wholebody.refine_input import KeyPath, stretched_around, stretched_for_speed
 from manikin.wholebody.refine_measures import (
     STEP,
@@ -64,7 +65,7 @@ NEARLY = 0.02
 PATIENT = 0.004
 """Relative decrease of the objective below which a repair stops."""
 
-_SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin"})
+_SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin", "max_torque_share"})
 """Broken requirements that a slower motion may keep."""
 
 _EXACT = frozenset({"max_support_error_m", "max_support_turn_rad"})
@@ -80,6 +81,7 @@ _SCALES = MappingProxyType(
         "max_velocity_share": ("joint_velocity",),
         "max_physics_violation": ("missing_wrench", "margin_violation"),
         "min_margin": ("margin_violation", "missing_wrench"),
+        "max_torque_share": ("force",),
     }
 )
 """Scales that decide each field of the certificate."""
@@ -145,7 +147,7 @@ class Refinement:
         best = last = self._attempt(scales, fine)
         for number in range(REPAIRS):
             progress((number + 1) / (REPAIRS + 1))
-            broken = last.certificate.broken(self.settings.requirements)
+            broken = last.certificate.table(self.settings.requirements).broken
             if not broken:
                 break
             if self.settings.contact_variables and self._choose(self._moving(last), self._at_rest()):
@@ -169,7 +171,10 @@ class Refinement:
             best = self._better(best, last)
             if best is not last and best.schedule.sequence is last.schedule.sequence:
                 last, self.path, self.schedule = best, best.path, best.schedule
-        if self.settings.speed_share is not None and not best.certificate.broken(self.settings.requirements):
+        if (
+            self.settings.speed_share is not None
+            and not best.certificate.table(self.settings.requirements).broken
+        ):
             best = self._hurried(best, scales, fine, self.settings.speed_share)
         progress(1.0)
         return self._result(best, given, began)
@@ -183,8 +188,7 @@ class Refinement:
                 break
             self.path, self.schedule = shortened(best.path, best.schedule, factors)
             trial = self._attempt(scales, fine, self._retimed(best.spline, best.schedule))
-            required = self._strong(best)
-            broken = trial.certificate.broken(required)
+            broken = trial.certificate.table(self.settings.requirements).broken
             if broken:
                 blamed = (around(trial.schedule, trial.certificate.worst_times_s[name]) for name in broken)
                 settled = settled.union(*blamed)
@@ -192,12 +196,6 @@ class Refinement:
             else:
                 best = trial
         return best
-
-    def _strong(self, attempt: _Attempt) -> RefineRequirements:
-        """The requirements, with no more of the joints' strength than an attempt needs, or all of it."""
-        required = self.settings.requirements
-        share = max(1.0, attempt.certificate.max_torque_share)
-        return replace(required, torque_share=min(share, required.torque_share or share))
 
     def _retimed(self, spline: ConfigurationSpline, before: ContactSchedule) -> ConfigurationSpline:
         """A spline in the time of the present schedule."""
@@ -300,7 +298,7 @@ class Refinement:
     def _better(self, first: _Attempt, second: _Attempt) -> _Attempt:
         """The one that breaks fewer requirements; of two alike, the later one."""
         required = self.settings.requirements
-        fewer = len(first.certificate.broken(required)) < len(second.certificate.broken(required))
+        fewer = len(first.certificate.table(required).broken) < len(second.certificate.table(required).broken)
         return first if fewer else second
 
     def _result(self, found: _Attempt, given: float, began: float) -> RefineResult:
@@ -317,17 +315,18 @@ class Refinement:
             for samples in (input_samples, smoothed, found.spline.evaluate(time).q)
         )
         slack, when = least_slack(self.body, schedule, found.spline, time)
-        violation = found.certificate.violation(self.settings.requirements)
-        if violation is None and slack < LEAST_SLACK:
-            violation = f"least slack of the contacts' limits is {slack:.4g}; allowed 0", when
-        failure = None
-        if violation is not None:
-            reason, when = violation
-            failure = WholeBodyFailure.at(schedule, when, reason)
+        table = RequirementTable((
+            *found.certificate.table(self.settings.requirements),
+            Requirement("min_contact_slack", "least slack of the contacts' limits", "N, N.m", slack, ">=",
+                        0.0, when, tolerance=-LEAST_SLACK),
+        ))  # fmt: skip
+        broken, failure = table.first_broken, None
+        if broken is not None:
+            failure = WholeBodyFailure.at(schedule, broken.time_s or 0.0, broken.reason)
         return RefineResult(
-            found.motion, found.spline, schedule, before, start, after, found.certificate, slack, failure,
-            self.variables, tuple(released(self.given, schedule)), path.duration / given, self.iterations,
-            clock.perf_counter() - began,
+            found.motion, found.spline, schedule, before, start, after, found.certificate, table, slack,
+            failure, self.variables, tuple(released(self.given, schedule)), path.duration / given,
+            self.iterations, clock.perf_counter() - began,
         )  # fmt: skip
 
 

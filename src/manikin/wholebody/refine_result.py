@@ -7,6 +7,7 @@ from manikin.contact import ContactSchedule
 from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.motion import Motion
+from manikin.requirement import RequirementTable
 from manikin.spatial import finite_number
 from manikin.wholebody.configuration_spline import ConfigurationSpline
 from manikin.wholebody.failure import WholeBodyFailure
@@ -34,8 +35,7 @@ class RefineSettings:
         contact_variables: Whether contacts that the motion does not need, and whose effectors are not there,
             are let go; else all contacts of the sequence are held.
         speed_share: Share of the velocity limits up to which phases are shortened, as far as every
-            requirement is kept and no joint needs more than its strength, or than before; None leaves them as
-            they are.
+            requirement is kept; None leaves them as they are.
     """
 
     knot_spacing: float = 0.1
@@ -67,6 +67,7 @@ class RefineResult(Displayed):
         smoothed: The spline through the input from which the optimisation begins.
         after: The refined motion.
         certificate: Measured on the samples of the motion.
+        requirements: What the certificate and the contacts' limits were held against.
         contact_slack: Room that all limits of the contacts have in common, the least at samples 10 ms
             apart, by linear programs, see :mod:`manikin.wholebody.contact_slack` [N, N.m].
         failure: Why it is no success, or None.
@@ -84,6 +85,7 @@ class RefineResult(Displayed):
     smoothed: RefineMeasures
     after: RefineMeasures
     certificate: RefineResiduals
+    requirements: RequirementTable
     contact_slack: float
     failure: WholeBodyFailure | None
     variables: Variables

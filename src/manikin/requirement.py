@@ -1,0 +1,115 @@
+"""Requirements of a result: what was measured, what is allowed, and whether it holds.
+
+One table of them is shared by certificates, executions, ``summary.json``, the screen and the
+report page.
+"""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Sense = Literal["<=", ">=", ">"]
+"""How a measured value compares with its limit."""
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """One measured value with its limit.
+
+    Attributes:
+        key: Name of the measured quantity in results, such as ``"min_clearance_m"``.
+        name: The quantity in words, such as ``"clearance"``.
+        unit: Of ``measured`` and ``limit``; empty for a count or a share.
+        measured: The worst value of all instants; NaN, which breaks any limit, if it could not be measured.
+        sense: What ``measured`` has to be relative to ``limit``.
+        limit: The value allowed.
+        time_s: When the worst value was measured [s]; None if it belongs to no instant.
+        where: Phase, contact, joint or pair of the worst value; empty if there is none.
+        tolerance: Rounding up to which the limit counts as kept [unit of ``measured``].
+    """
+
+    key: str
+    name: str
+    unit: str
+    measured: float
+    sense: Sense
+    limit: float
+    time_s: float | None = None
+    where: str = ""
+    tolerance: float = 0.0
+
+    @property
+    def held(self) -> bool:
+        """Whether the measured value is within its limit."""
+        if self.sense == "<=":
+            return self.measured <= self.limit + self.tolerance
+        if self.sense == ">=":
+            return self.measured >= self.limit - self.tolerance
+        return self.measured > self.limit
+
+    @property
+    def reason(self) -> str:
+        """The measured value beside its limit, in one line."""
+        what = f"{self.name} of {self.where}" if self.where else self.name
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{what} is {self.measured:.4g}{unit}; allowed {self.sense} {self.limit:.4g}{unit}"
+
+    def as_dict(self, stage: str) -> dict[str, Any]:
+        """Plain values for ``summary.json``.
+
+        Args:
+            stage: Stage whose result was measured, such as ``"wholebody"``.
+        """
+        return {
+            "stage": stage, "key": self.key, "name": self.name, "unit": self.unit,
+            "measured": self.measured, "sense": self.sense, "limit": self.limit,
+            "time_s": self.time_s, "where": self.where, "held": self.held,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RequirementTable:
+    """All requirements of one result, in the order in which they are reported.
+
+    Attributes:
+        rows: The requirements.
+    """
+
+    rows: tuple[Requirement, ...]
+
+    def __iter__(self) -> Iterator[Requirement]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, key: str) -> Requirement:
+        for row in self.rows:
+            if row.key == key:
+                return row
+        raise KeyError(f"no requirement {key!r}; valid: {[row.key for row in self.rows]}")
+
+    @property
+    def held(self) -> bool:
+        """Whether every requirement holds."""
+        return all(row.held for row in self.rows)
+
+    @property
+    def broken(self) -> frozenset[str]:
+        """Keys of the requirements that do not hold."""
+        return frozenset(row.key for row in self.rows if not row.held)
+
+    @property
+    def first_broken(self) -> Requirement | None:
+        """The first requirement that does not hold; None if all do."""
+        return next((row for row in self.rows if not row.held), None)
+
+
+def requirement_table(rows: Iterable[Requirement | None]) -> RequirementTable:
+    """Make a table, without the entries that are None or have an infinite limit.
+
+    Args:
+        rows: Requirements; None for a quantity that the result does not have.
+    """
+    return RequirementTable(tuple(row for row in rows if row is not None and math.isfinite(row.limit)))
