@@ -63,7 +63,7 @@ class ContactSection(Section):
     )
     max_force_N: Positive | None = Field(
         default=None,
-        description="grasp: largest force along each axis, of the task frame in a scenario, else of the world [N]",
+        description="grasp: largest force along each axis of the world, in a scenario of the task frame [N]",
     )
     planning_max_force_N: Positive | None = Field(
         default=None, description="grasp: smaller limit that planning balances with (default: max_force_N)"
