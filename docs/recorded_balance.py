@@ -127,7 +127,7 @@ while unloaded taken off.
   the walk.
 * *Timing*: median of the absolute error of touch-downs and lift-offs.
 * *Plates' margin*: share of the compared frames in which the plates' own wrench, with moments, is within the
-  polytope of our stances; *apart*: median difference between both margins.
+  polytope of our stances; *apart*: median difference between both margins, about the centre of mass.
 * *CoM, laboratory's*: root mean square distance of our centre of mass from the file's, where it has one.
 
 """
@@ -142,16 +142,18 @@ Torques of the legs by inverse dynamics from the motion alone, beside those with
 feet, both sides, while a foot is on a plate of its own: root mean square of the difference (*least, smooth,
 shifted*), and the largest magnitudes of the shifted motion and by plates [N.m]. Two feet that carry together
 can share the wrench in many ways. *Least*: forces of least squares; *smooth*: each foot is loaded and
-unloaded bit by bit (`manikin.mocap.force_sharing`); *shifted*: the same of the shifted motion, which
-`manikin analyze` measures.
+unloaded bit by bit (`manikin.mocap.force_sharing`), as `manikin analyze` measures; *shifted*: the same of
+the shifted motion.
 
 """
 SHARES = """
 ## Margins
 
 Share of the frames with a positive margin of the whole body (4.55), as recorded and shifted, and of a point
-mass as recorded (4.54); *median* of the whole body's as recorded; how far the body was shifted. Columns at
-the right: the frames whose margin is not positive although shifted, by what they are put down to.
+mass as recorded (4.54); *median* of the whole body's as recorded, about the centre of mass; how far the body
+was shifted. A shifted motion has a positive margin because it is made to: results are the share of frames in
+which that is possible and how long the shift has to be; no margin of it is given. Columns at the right: the
+frames whose margin is not positive although shifted, by what they are put down to.
 
 * *Change*: the stance before or after a touch-down or lift-off within a quarter of the cutoff's period admits
   the wrench; the low-pass spreads the impact over that time.

@@ -136,6 +136,13 @@ def rotation_from_yaw(yaw: float) -> FloatArray:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def rotation_from_quaternion(u: FloatArray) -> FloatArray:
+    """(n, 3, 3) rotations of unit xyzw quaternions (n, 4)."""
+    vector, scalar = u[:, :3], u[:, 3]
+    cross = skew(vector)
+    return np.eye(3) + 2.0 * scalar[:, None, None] * cross + 2.0 * cross @ cross
+
+
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> FloatArray:
     """Rotation ``Rz(yaw) Ry(pitch) Rx(roll)`` of fixed-axis angles [rad] (URDF convention)."""
     cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)

@@ -8,13 +8,13 @@ import pytest
 from manikin import pipeline
 from manikin.errors import ScenarioError
 from manikin.figures.flights import flights_figure
+from manikin.motion.dynamics import centroidal_motion
 from manikin.motion.file import read_motions
 from manikin.record import read_run
 from manikin.results import verdict_line
 from manikin.scenarios import load_scenario
 from manikin.stages import ExecutionRequirements
 from manikin.wholebody.contact_slack import contact_slack
-from manikin.wholebody.refine_measures import whole_body_wrench
 
 REFINED = ("wholebody.method=refine",)
 
@@ -50,7 +50,7 @@ def test_the_balance_of_the_motion_file_is_that_of_linear_programs(risen):
     content = read_motions(risen.directory)
     motion = content.planned
     every = slice(None, None, 2)
-    wrench = whole_body_wrench(content.body, motion.q[every], motion.v[every], motion.a[every])
+    wrench = centroidal_motion(content.body, motion.q[every], motion.v[every], motion.a[every]).wrench
     slack = contact_slack(content.schedule, motion.time[every], wrench)
     assert slack.min() > 0.0
     assert slack.min() == pytest.approx(

@@ -8,13 +8,13 @@ import pytest
 from manikin.errors import ScenarioError
 from manikin.locomotion import Walker, walk_along
 from manikin.locomotion.obstacles import clearance
+from manikin.motion.dynamics import centroidal_motion
 from manikin.motion.file import read_motions
 from manikin.pipeline import run
 from manikin.scenarios import load_scenario
 from manikin.stages.context import RunContext
 from manikin.stages.walked_motion import walked_motion
 from manikin.stages.walking import plan_walks
-from manikin.wholebody.full_motion import centroidal_state
 
 WALKING = ("goal-left", "goal-right", "corridor", "catch", "narrow")
 
@@ -186,7 +186,7 @@ def test_supports_of_a_walk_are_soles_on_the_floor(planned):
             assert contact.position[2] == 0.0
             assert np.allclose(contact.normal, [0.0, 0.0, 1.0])
     # Where nothing is left for the pelvis, the soles carry what the motion needs.
-    _, _, wrench = centroidal_state(context.body, motion.q, motion.v, motion.a)
+    wrench = centroidal_motion(context.body, motion.q, motion.v, motion.a).wrench
     carried = np.abs(motion.tau[:, :6]).max(axis=1) < 0.1
     assert np.mean(carried) > 0.2
     supplied = motion.contact_force[carried, :, :3].sum(axis=1)

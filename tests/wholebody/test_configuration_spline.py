@@ -5,10 +5,10 @@ import pinocchio as pin
 import pytest
 
 from manikin.errors import SplineError
+from manikin.spatial import rotation_from_quaternion
 from manikin.wholebody.configuration_spline import (
     ConfigurationSpline,
     align_quaternions,
-    rotation_from_quaternion,
     states_from_raw,
     tangent_map,
     turn_derivatives,

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import ContactError, InputError
+from manikin.motion.dynamics import centroidal_motion
 from manikin.posture import PostureProblem, generate_posture
 from manikin.scene import Proximity, Scene
 from manikin.spatial import GRAVITY_VECTOR
@@ -18,7 +19,7 @@ from manikin.wholebody import refine_motion
 from manikin.wholebody.refine_certificate import RefineRequirements, certify_refined
 from manikin.wholebody.refine_contacts import contact_variables
 from manikin.wholebody.refine_input import KeyPath, stretched_around, stretched_for_speed
-from manikin.wholebody.refine_measures import balance_of, differences, rooms_of, whole_body_wrench
+from manikin.wholebody.refine_measures import balance_of, differences, rooms_of
 from manikin.wholebody.refine_obstacles import RefineObstacles
 
 FEET = [
@@ -78,7 +79,7 @@ def test_margin_is_positive_every_10_ms(name, request):
     q = result.spline.evaluate(time).q
     v, a = differences(body, time, q)
     margin, violation = balance_of(
-        result.schedule, rooms_of(result.schedule), time[1:-1], whole_body_wrench(body, q, v, a)[1:-1]
+        result.schedule, rooms_of(result.schedule), time[1:-1], centroidal_motion(body, q, v, a).wrench[1:-1]
     )
     assert margin.min() > 0.0
     assert violation.max() == 0.0

@@ -3,15 +3,15 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 
-from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytope
+from manikin.balance import WrenchPolytope, wrench_polytope
 from manikin.balance.limiting import LimitingConstraint
 from manikin.balance.zmp_path import contact_wrench
 from manikin.body import BodyModel, Configuration
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, ContactSchedule, Stance, default_normal_force_cap, point, sole
 from manikin.motion import Motion
+from manikin.motion.dynamics import centroidal_motion
 from manikin.spatial import FloatArray, finite_number
 
 FRICTION = 0.8
@@ -157,9 +157,5 @@ def _one_frame(motion: Motion, row: int) -> Motion:
 
 def _dynamic_wrench(body: BodyModel, motion: Motion, row: int) -> FloatArray:
     """(6,) wrench about the world's origin that the motion needs of its contacts [N, N.m]."""
-    data = body.pinocchio.createData()
-    pin.computeCentroidalMomentumTimeVariation(
-        body.pinocchio, data, motion.q[row], motion.v[row], motion.a[row]
-    )
-    rate = data.dhg.vector
-    return pseudo_wrench(body.mass, data.com[0], rate[:3] / body.mass, rate[3:])
+    rows = slice(row, row + 1)
+    return centroidal_motion(body, motion.q[rows], motion.v[rows], motion.a[rows]).wrench[0]

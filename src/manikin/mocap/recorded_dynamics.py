@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from manikin.balance import pseudo_wrench, zero_moment_point
 from manikin.body import BodyModel
@@ -21,6 +20,7 @@ from manikin.mocap.effector_places import JOINTS
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_motion import rates_of, smoothed_postures
 from manikin.mocap.recorded_supports import RecordedSupports
+from manikin.motion.dynamics import FreeDynamics
 from manikin.spatial import GRAVITY_VECTOR, FloatArray, cross, frozen_array
 
 CUTOFF = 5.0
@@ -118,16 +118,13 @@ def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynami
     v, a = rates_of(found, q)
     model, data, n = found.body.pinocchio, found.body.pinocchio.createData(), len(q)
     com, spin = np.empty((n, 3)), np.empty((n, 3))
-    torque, jacobians = np.empty_like(v), np.empty((n, 6, model.nv))
     for frame in range(n):
-        torque[frame] = pin.rnea(model, data, q[frame], v[frame], a[frame])
         spin[frame] = pin.computeCentroidalMomentum(model, data, q[frame], v[frame]).angular
         com[frame] = data.com[0]
-        jacobians[frame] = pin.computeJointJacobians(model, data, q[frame])
-    turn = Rotation.from_quat(q[:, 3:7])
-    force, moment = turn.apply(torque[:, :3]), turn.apply(torque[:, 3:6])
-    wrench = np.hstack([force, moment + cross(q[:, :3], force)])
-    return RecordedDynamics(found.body, found.time, q, v, a, com, spin, torque, wrench, jacobians)
+    free = FreeDynamics.of(found.body, q, v, a)
+    return RecordedDynamics(
+        found.body, found.time, q, v, a, com, spin, free.needed, free.wrench, free.jacobians
+    )
 
 
 def with_mass(found: Reconstruction, mass: float) -> Reconstruction:

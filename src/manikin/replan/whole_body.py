@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 
 from manikin.balance import WrenchPolytope
 from manikin.body import BodyModel
@@ -11,6 +10,7 @@ from manikin.centroidal import CentroidalTrajectory, Recording
 from manikin.contact import ContactSchedule
 from manikin.locomotion.stance_foot import smooth_step
 from manikin.motion import Motion
+from manikin.motion.dynamics import centroidal_motion
 from manikin.replan.effectors import effector_paths
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
@@ -163,12 +163,7 @@ def rate_on_plan(
 
 def _turning(body: BodyModel, spline: ConfigurationSpline, time: FloatArray) -> FloatArray:
     """(n, 3) rate of the angular momentum of a motion [N.m]."""
-    states = spline.evaluate(time)
-    data, model = body.pinocchio.createData(), body.pinocchio
-    return np.array([
-        pin.computeCentroidalMomentumTimeVariation(model, data, q, v, a).angular
-        for q, v, a in zip(*states, strict=True)
-    ])  # fmt: skip
+    return centroidal_motion(body, *spline.evaluate(time)).angular_momentum_rate
 
 
 @dataclass(frozen=True, eq=False)

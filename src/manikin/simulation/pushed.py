@@ -9,8 +9,7 @@ import numpy as np
 from manikin.motion import Motion
 from manikin.simulation.recorder import Recorder
 from manikin.simulation.world import Push
-from manikin.spatial import FloatArray, rotation_from_yaw
-from manikin.wholebody.configuration_spline import rotation_from_quaternion
+from manikin.spatial import FloatArray, rotation_from_quaternion, rotation_from_yaw
 
 BACK = 0.02
 """A body whose centre of mass stays within this of its plan, to the end, is back on it [m]."""

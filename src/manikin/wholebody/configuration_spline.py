@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline
 
 from manikin.errors import SplineError
-from manikin.spatial import FloatArray, frozen_array, skew
+from manikin.spatial import FloatArray, frozen_array, rotation_from_quaternion, skew
 
 
 class StateSamples(NamedTuple):
@@ -160,13 +160,6 @@ def align_quaternions(configurations: FloatArray) -> FloatArray:
         if before[3:7] @ row[3:7] < 0.0:
             row[3:7] *= -1.0
     return aligned
-
-
-def rotation_from_quaternion(u: FloatArray) -> FloatArray:
-    """(n, 3, 3) rotations of unit xyzw quaternions (n, 4)."""
-    vector, scalar = u[:, :3], u[:, 3]
-    cross = skew(vector)
-    return np.eye(3) + 2.0 * scalar[:, None, None] * cross + 2.0 * cross @ cross
 
 
 def _quaternion_left_vector(u: FloatArray) -> FloatArray:

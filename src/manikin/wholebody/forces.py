@@ -19,9 +19,9 @@ from scipy.optimize import lsq_linear, nnls
 from manikin.body import BodyModel
 from manikin.body.limb import carrying_segment, hinge_line
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
+from manikin.motion.dynamics import FreeDynamics
 from manikin.scene.distance import moves_by_joint
 from manikin.spatial import FloatArray
-from manikin.wholebody.configuration_spline import rotation_from_quaternion
 
 _RAMP = 0.08
 """Time over which a contact takes or loses its share of the load [s]."""
@@ -153,7 +153,7 @@ def plan_forces(
         v: (n, nv) velocities.
         a: (n, nv) accelerations.
     """
-    dynamics = _Dynamics.of(body, q, v, a)
+    dynamics = FreeDynamics.of(body, q, v, a)
     names = schedule.sequence.effectors
     shares = load_shares(schedule, time, names)
     tau = np.zeros((len(time), body.nv))
@@ -180,36 +180,6 @@ def plan_forces(
                 tau[rows[k]] = part.needed[k] - joint_map @ other
         forces[rows] = _by_contact(generators, magnitude, stance, names)
     return ContactForces(tau, forces, np.linalg.norm(tau[:, :6], axis=1))
-
-
-@dataclass(frozen=True, eq=False)
-class _Dynamics:
-    """Inverse dynamics of samples of a motion, without contacts.
-
-    Attributes:
-        needed: (n, nv) generalised forces [N, N.m].
-        wrench: (n, 6) their part on the pelvis as a wrench about the world origin.
-        jacobians: (n, 6, nv) joint Jacobians in the world.
-    """
-
-    needed: FloatArray
-    wrench: FloatArray
-    jacobians: FloatArray
-
-    @classmethod
-    def of(cls, body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray) -> "_Dynamics":
-        model, data = body.pinocchio, body.pinocchio.createData()
-        needed, jacobians = np.empty((len(q), model.nv)), np.empty((len(q), 6, model.nv))
-        for k in range(len(q)):
-            needed[k] = pin.rnea(model, data, q[k], v[k], a[k])
-            jacobians[k] = pin.computeJointJacobians(model, data, q[k])
-        rotation = rotation_from_quaternion(q[:, 3:7])
-        force = np.einsum("nij,nj->ni", rotation, needed[:, :3])
-        moment = np.einsum("nij,nj->ni", rotation, needed[:, 3:6]) + np.cross(q[:, :3], force)
-        return cls(needed, np.hstack([force, moment]), jacobians)
-
-    def part(self, rows: NDArray[np.int64]) -> "_Dynamics":
-        return _Dynamics(self.needed[rows], self.wrench[rows], self.jacobians[rows])
 
 
 def _alike(

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 
-from manikin.balance import WrenchPolytope, pseudo_wrench
+from manikin.balance import WrenchPolytope
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
+from manikin.motion.dynamics import centroidal_motion
 from manikin.spatial import FloatArray
 from manikin.wholebody.forces import plan_forces
 
@@ -36,27 +36,16 @@ def full_motion(
     Returns:
         The motion, and (n, 6) its whole-body pseudo-wrench about the world origin.
     """
-    com, momentum, wrench = centroidal_state(body, q, v, a)
+    found = centroidal_motion(body, q, v, a)
     forces = plan_forces(body, schedule, time, q, v, a)
     names = schedule.sequence.effectors
     motion = Motion(
-        time=time, q=q, v=v, a=a, tau=forces.tau, com=com, angular_momentum=momentum,
-        margin=margins(schedule, polytopes, time, wrench), support=schedule.support(time, names),
+        time=time, q=q, v=v, a=a, tau=forces.tau, com=found.com,
+        angular_momentum=found.angular_momentum,
+        margin=margins(schedule, polytopes, time, found.wrench), support=schedule.support(time, names),
         contact_force=forces.contact_force, contact_names=names, joint_names=body.joint_names,
     )  # fmt: skip
-    return motion, wrench
-
-
-def centroidal_state(
-    body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Centre of mass (n, 3) [m], angular momentum (n, 3) and whole-body pseudo-wrench (n, 6)."""
-    model, data = body.pinocchio, body.pinocchio.createData()
-    com, momentum, rate = np.zeros((len(q), 3)), np.zeros((len(q), 3)), np.zeros((len(q), 6))
-    for k in range(len(q)):
-        pin.computeCentroidalMomentumTimeVariation(model, data, q[k], v[k], a[k])
-        com[k], momentum[k], rate[k] = data.com[0], data.hg.angular, data.dhg.vector
-    return com, momentum, pseudo_wrench(body.mass, com, rate[:, :3] / body.mass, rate[:, 3:])
+    return motion, found.wrench
 
 
 def margins(

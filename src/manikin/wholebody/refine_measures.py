@@ -11,10 +11,10 @@ import daqp
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance import pseudo_wrench
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Stance
 from manikin.contact_planning.efort import Task
+from manikin.motion.dynamics import centroidal_motion
 from manikin.scene import Proximity
 from manikin.scene.distance import moves_by_joint
 from manikin.spatial import FloatArray
@@ -99,16 +99,6 @@ def differences(body: BodyModel, time: FloatArray, q: FloatArray) -> tuple[Float
     return 0.5 * (rate[1:] + rate[:-1]), (rate[1:] - rate[:-1]) / step
 
 
-def whole_body_wrench(body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray) -> FloatArray:
-    """(n, 6) wrench that the scene must apply, about the world origin [N, N.m]."""
-    model, data = body.pinocchio, body.pinocchio.createData()
-    com, rate = np.zeros((len(q), 3)), np.zeros((len(q), 6))
-    for k in range(len(q)):
-        pin.computeCentroidalMomentumTimeVariation(model, data, q[k], v[k], a[k])
-        com[k], rate[k] = data.com[0], data.dhg.vector
-    return pseudo_wrench(body.mass, com, rate[:, :3] / body.mass, rate[:, 3:])
-
-
 def physics_violation(room: BalanceRoom, stance_wrench: FloatArray) -> FloatArray:
     """(n,) distance of wrenches (n, 6) about the mean contact point to the polytope of a stance [N].
 
@@ -181,7 +171,7 @@ def measure(
     """
     v, a = differences(body, time, q)
     step = float(time[1] - time[0])
-    margin, violation = balance_of(schedule, rooms, time, whole_body_wrench(body, q, v, a))
+    margin, violation = balance_of(schedule, rooms, time, centroidal_motion(body, q, v, a).wrench)
     error, slide, cost = _contact_terms(body, path, schedule, time, q, v, task)
     outside = np.maximum(body.lower - q[:, 7:], q[:, 7:] - body.upper).max()
     clearance = proximity.minimum_over(q, obstacles.during_flights(), tolerance=1e-5)

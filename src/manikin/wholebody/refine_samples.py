@@ -7,6 +7,7 @@ import numpy as np
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
+from manikin.motion.dynamics import centroidal_motion
 from manikin.scene import Proximity, Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.configuration_spline import ConfigurationSpline
@@ -14,7 +15,7 @@ from manikin.wholebody.contact_slack import contact_slack
 from manikin.wholebody.full_motion import full_motion
 from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_certificate import RefineResiduals, certify_refined
-from manikin.wholebody.refine_measures import balance_of, sample_uniformly, whole_body_wrench
+from manikin.wholebody.refine_measures import balance_of, sample_uniformly
 from manikin.wholebody.refine_obstacles import RefineObstacles
 
 
@@ -76,7 +77,7 @@ def least_slack(
     body: BodyModel, schedule: ContactSchedule, spline: ConfigurationSpline, time: FloatArray
 ) -> tuple[float, float]:
     """Least slack of the contacts' limits at samples (n,) [s] of a motion, and when [s]."""
-    wrench = whole_body_wrench(body, *spline.evaluate(time))
+    wrench = centroidal_motion(body, *spline.evaluate(time)).wrench
     slack = contact_slack(schedule, time, wrench)
     worst = int(np.argmin(slack))
     return float(slack[worst]), float(time[worst])

@@ -26,10 +26,11 @@ from scipy.optimize import minimize
 from manikin.body import BodyModel
 from manikin.contact import Contact, ContactSchedule, Phase, Stance, StanceSequence
 from manikin.errors import ContactError
+from manikin.motion.dynamics import centroidal_motion
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
 from manikin.wholebody.refine_balance import SHARE, BalanceRoom
-from manikin.wholebody.refine_measures import room_of, whole_body_wrench
+from manikin.wholebody.refine_measures import room_of
 from manikin.wholebody.refine_physics import LEAST_VARIABLE, ContactForces
 from manikin.wholebody.refine_scales import RefineScales
 
@@ -85,7 +86,7 @@ class VariableSamples:
         still = np.zeros((len(q), body.nv))
         place, _ = _effectors(body, names, keys[1], np.zeros((len(keys[1]), body.nv)))
         speed = {name: np.zeros(len(keys[0])) for name in names}
-        return cls(time, whole_body_wrench(body, q, still, still), keys[0], place, speed)
+        return cls(time, centroidal_motion(body, q, still, still).wrench, keys[0], place, speed)
 
     @classmethod
     def of_motion(
@@ -94,7 +95,7 @@ class VariableSamples:
     ) -> "VariableSamples":  # fmt: skip
         """A motion at ``time`` (n,) with configurations, velocities and accelerations."""
         place, speed = _effectors(body, names, states[0], states[1])
-        return cls(time, whole_body_wrench(body, *states), time, place, speed)
+        return cls(time, centroidal_motion(body, *states).wrench, time, place, speed)
 
 
 class VariableChoice:
