@@ -109,7 +109,8 @@ def plane(body: BodyModel) -> Plane:
     sides = np.array([len(hinges) for hinges in columns(body)])
     return Plane(
         ca.Function("ground", [y, yd, ydd], [moment, vertical, forward, torque]),
-        body.lower[first], body.upper[first], body.velocity_limit[first], sides * body.torque_limit[first],
+        body.lower[first], body.upper[first], body.velocity_limit[first],
+        sides * np.minimum(-body.torque_lower, body.torque_upper)[first],
         float(corners.min()), float(corners.max()), float(mass) * GRAVITY,
     )  # fmt: skip
 

@@ -14,15 +14,21 @@ from manikin.balance import wrench_polytope
 from manikin.body import human
 from manikin.centroidal import CentroidalProblem, plan_com
 from manikin.centroidal.feasibility import polytopes_of
-from manikin.contact import Phase, Stance, StanceSequence, sole
-from manikin.locomotion import START, place_footprints, walking_path
+from manikin.contact import ContactModel, Phase, Stance, StanceSequence, sole
+from manikin.locomotion import (
+    START,
+    Walker,
+    WalkObstacle,
+    experiment_targets,
+    place_footprints,
+    walking_path,
+    walking_paths,
+)
 from manikin.locomotion.words import residuals, word_paths
 from manikin.pipeline import run
 from manikin.scenarios import load_scenario
-from manikin.scenarios.contacts import BODY_WEIGHTS_CAP
 from manikin.scenarios.walked import walk_before, walking_supports
 from manikin.scene import Box, Obstacle, Scene
-from manikin.spatial import GRAVITY
 from manikin.stages.contacts import find_supports
 from manikin.stages.keyed_contacts import KeyedContacts
 from manikin.wholebody import WholeBodySettings, plan_whole_body, refine_motion
@@ -85,7 +91,7 @@ def test_limbs_go_all_the_way_and_are_refined(name):
     body, scene = scenario.build_body(), scenario.build_scene()
     found = find_supports(scenario, body, scene, np.random.default_rng(scenario.seed))
     assert found.failure is None
-    keyed = KeyedContacts.of_plan(found.plan, BODY_WEIGHTS_CAP * body.mass * GRAVITY)
+    keyed = KeyedContacts.of_plan(found.plan, ContactModel.of_body(body.mass))
     keyed = keyed.with_lifted_feet(body, scene, ())
     refined = refine_motion(body, scene, keyed.time, keyed.q, keyed.schedule)
     assert refined.failure is None, refined.failure
@@ -136,6 +142,36 @@ def test_a_walk_to_the_platform_goes_on_with_its_plan():
     result = run(scenario)
     assert result.succeeded, result.summary["failure"]
     np.testing.assert_allclose(result.executed.com[-1], scenario.goal_com, atol=0.01)
+
+
+def test_every_path_of_the_experiment_is_solved_from_both_guesses_and_certified():
+    """106 targets; the tests have 28."""
+    for path in walking_paths(START, list(experiment_targets())):
+        assert path.succeeded, path.task.goal
+        assert {"straight", "turning"} <= set(path.others), path.task.goal
+        assert path.residuals().within(1e-7), path.task.goal
+
+
+def test_a_gap_narrower_than_the_shoulders_is_passed_sideways():
+    """Beside 0.05 m of room, 0.15 m are left for the discs' centres, which are 0.25 m apart."""
+    walls = [
+        WalkObstacle(name, [(side * 6.0, 1.4), (side * 0.25, 1.4), (side * 0.25, 1.6), (side * 6.0, 1.6)])
+        for name, side in (("left wall", -1.0), ("right wall", 1.0))
+    ]
+    path = walking_path(START, (0.0, 3.0, np.pi / 2), obstacles=walls, walker=Walker(0.25, 0.5))
+    assert path.succeeded
+    inside = np.abs(path.y - 1.5) < 0.05
+    assert np.abs(np.sin(path.heading[inside])).max() < 0.15 / 0.25 + 1e-3
+    assert path.holonomic[inside].all()
+
+
+def test_a_way_is_found_among_many():
+    places = [(0.2, 0.9), (1.3, 2.2), (1.0, 2.6), (-0.7, 2.2), (-0.8, 2.4), (-0.7, 3.5), (0.0, 4.0)]
+    discs = [WalkObstacle.disc(f"disc {i}", place, 0.3) for i, place in enumerate(places)]
+    path = walking_path(START, (0.0, 5.0, np.pi / 2), obstacles=discs)
+    assert path.succeeded
+    assert path.residuals().within()
+    assert path.length < 6.5
 
 
 @pytest.mark.parametrize("heading", range(0, 360, 10))

@@ -20,6 +20,7 @@ import numpy as np
 from manikin import collected
 from manikin.body import human
 from manikin.body.range_of_motion import HUMAN_HINGES
+from manikin.body.strength import HUMAN_STRENGTH, DirectionStrength, LegStrength, hinge_strength
 from manikin.motion.file import DATASETS
 from manikin.results import counts_line, markdown_table
 from manikin.scenarios import json_schema
@@ -127,16 +128,35 @@ def segment_table() -> str:
 
 
 def hinge_table() -> str:
-    """Hinges with their ranges, speeds and torques."""
-    rows = [
-        "| hinge | axis (left side) | range [deg] | speed [rad/s] | torque [N·m] |",
-        "|---|---|---|---|---|",
-    ]
+    """Hinges with their ranges and speeds."""
+    rows = ["| hinge | axis (left side) | range [deg] | speed [rad/s] |", "|---|---|---|---|"]
     for hinge in (entry for entries in HUMAN_HINGES.values() for entry in entries):
         axis = ", ".join(f"{value:.3g}" for value in np.array(hinge.axis) + 0.0)
         span = f"{hinge.lower_deg:g} to {hinge.upper_deg:g}"
-        rows.append(f"| {hinge.name} | {axis} | {span} | {hinge.speed:g} | {hinge.torque:g} |")
+        rows.append(f"| {hinge.name} | {axis} | {span} | {hinge.speed:g} |")
     return "\n".join(rows) + "\n"
+
+
+def strength_table() -> str:
+    """Torque limits of a man and a woman in each direction of each hinge, with their sources."""
+    rows = [
+        "| hinge | − man | + man | − woman | + woman | source (−; +) |",
+        "|---|---|---|---|---|---|",
+    ]
+    people = ((79.0, 1.75, "male"), (62.0, 1.65, "female"))
+    for name, entries in HUMAN_STRENGTH.items():
+        values = [f"{torque:.0f}" for person in people for torque in hinge_strength(name, *person)]
+        sources = dict.fromkeys(_source(entry) for entry in entries)
+        rows.append(f"| {name} | {' | '.join(values)} | {'; '.join(sources)} |")
+    return "\n".join(rows) + "\n"
+
+
+def _source(entry: DirectionStrength) -> str:
+    """How large and from where."""
+    if isinstance(entry, LegStrength):
+        ages = [", ".join(f"{value:.3f}" for value in group) for group in (entry.male, entry.female)]
+        return f"{ages[0]} (women {ages[1]}) *mgh*, {entry.source} [{entry.grade}]"
+    return f"{entry.per_kg:.3g} N·m/kg, {entry.source} [{entry.grade}]"
 
 
 def dataset_table() -> str:
@@ -376,6 +396,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "stance": lambda: schema_tables(StanceFile.model_json_schema()),
     "segments": segment_table,
     "hinges": hinge_table,
+    "strength": strength_table,
     "datasets": dataset_table,
     "results": results_table,
     "beams": beams_table,

@@ -83,20 +83,23 @@ def pytest_xdist_make_scheduler(config, log):
 class Runs:
     """Whole runs of scenarios, each made once for all tests and all workers of a session.
 
-    A run is known by its scenario, variant, overrides, body and seed. Its directory belongs to all tests:
-    they read it and copy what they change.
+    A run is known by its scenario, variant, overrides, body, seed and place. Its directory belongs to all
+    tests: they read it and copy what they change.
     """
 
     def __init__(self, folder):
         self.folder = folder
         self.read = {}
 
-    def __call__(self, name, variant=None, overrides=(), seed=None, body=()):
-        """Result of a run, with its directory (``body``: stature [m], mass [kg], sex)."""
+    def __call__(self, name, variant=None, overrides=(), seed=None, body=(), moved=()):
+        """Result of a run, with its directory.
+
+        ``body`` is stature [m], mass [kg], sex; ``moved`` is x, y [m], yaw [deg].
+        """
         from manikin.scenarios import load_scenario
 
         seed = load_scenario(name, variant, overrides).seed if seed is None else seed
-        key = f"{name}@{variant}|{'|'.join(overrides)}|{seed}|{body}"
+        key = f"{name}@{variant}|{'|'.join(overrides)}|{seed}|{body}|{moved}"
         if key not in self.read:
             place = self.folder / hashlib.sha256(key.encode()).hexdigest()[:16]
             place.mkdir(parents=True, exist_ok=True)
@@ -104,16 +107,19 @@ class Runs:
                 fcntl.flock(lock, fcntl.LOCK_EX)  # another worker may be making it
                 result = place / "result.pickle"
                 if not result.exists():
-                    result.write_bytes(pickle.dumps(self._made(name, variant, overrides, seed, body, place)))
+                    result.write_bytes(
+                        pickle.dumps(self._made(name, variant, overrides, seed, body, moved, place))
+                    )
                 self.read[key] = pickle.loads(result.read_bytes())
         return self.read[key]
 
-    def _made(self, name, variant, overrides, seed, body, place):
+    def _made(self, name, variant, overrides, seed, body, moved, place):
         from manikin.pipeline import run
         from manikin.scenarios import load_scenario
 
         scenario = load_scenario(name, variant, overrides)
-        return run(scenario.with_body(*body) if body else scenario, seed=seed, out=place / "run")
+        scenario = scenario.with_body(*body) if body else scenario
+        return run(scenario.moved(*moved) if moved else scenario, seed=seed, out=place / "run")
 
 
 @pytest.fixture(scope="session")

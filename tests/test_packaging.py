@@ -1,6 +1,7 @@
 """Every package that is imported is declared, where it is needed."""
 
 import ast
+import importlib.util
 import re
 import sys
 import tomllib
@@ -49,3 +50,11 @@ def declared(*extras):
 def test_every_import_is_declared(folder, extras):
     known = {*declared(*extras), "manikin", "tests"}
     assert {name: str(path) for name, path in imported(folder).items() if name not in known} == {}
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "benchmarks").glob("*.py")), ids=lambda path: path.stem)
+def test_benchmarks_and_sweeps_know_the_package_as_it_is(path):
+    """An import fails where a name has moved; what they measure takes too long for a test."""
+    spec = importlib.util.spec_from_file_location(f"benchmark_{path.stem}", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)

@@ -1,17 +1,64 @@
-"""Plan, prove and measure how a body moves through a cluttered scene."""
+"""Plan, prove and measure how a body moves through a cluttered scene.
 
+The verbs of :mod:`manikin.api` stand under this name, ``import manikin as mk``; engines load when one is
+used.
+"""
+
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from manikin.version import __version__
 
 if TYPE_CHECKING:
-    from manikin.stages import RunResult
+    from manikin.api import (
+        analyze,
+        balance,
+        compare,
+        creature,
+        grasp,
+        human,
+        plan,
+        point,
+        push,
+        read,
+        scene,
+        simulate,
+        sole,
+        stance,
+        walk,
+    )
+    from manikin.pipeline import run
 
-__all__ = ["__version__", "run"]
+__all__ = [
+    "__version__",
+    "analyze",
+    "balance",
+    "compare",
+    "creature",
+    "grasp",
+    "human",
+    "plan",
+    "point",
+    "push",
+    "read",
+    "run",
+    "scene",
+    "simulate",
+    "sole",
+    "stance",
+    "walk",
+]
+
+_PACKAGES = ("balance", "scene")
+"""Verbs whose names are those of packages, which can be called; see :mod:`manikin.callable_package`."""
 
 
-def run(scenario: Any, **options: Any) -> "RunResult":
-    """Plan a scenario, execute it in the physics engine and report; see :func:`manikin.pipeline.run`."""
-    from manikin.pipeline import run as run_pipeline  # the engines load only when they are needed
-
-    return run_pipeline(scenario, **options)
+def __getattr__(name: str) -> Any:
+    """Load a verb when it is first used."""
+    if name not in __all__:
+        raise AttributeError(f"module 'manikin' has no attribute {name!r}; it has {', '.join(__all__)}")
+    if name in _PACKAGES:
+        return import_module(f"manikin.{name}")
+    home = import_module("manikin.pipeline" if name == "run" else "manikin.api")
+    globals()[name] = getattr(home, name)
+    return globals()[name]

@@ -135,6 +135,19 @@ def run(
         float | None, typer.Option(metavar="KG", min=35.0, max=160.0, help="Other mass, 35 to 160 kg.")
     ] = None,
     sex: Annotated[str | None, typer.Option(metavar="male|female", help="Other sex.")] = None,
+    age: Annotated[float | None, typer.Option(metavar="YEARS", help="Other age, 18 to 90 years.")] = None,
+    strength: Annotated[
+        float | None,
+        typer.Option(
+            metavar="X", help="Torque limits relative to a healthy adult of that sex, size and age."
+        ),
+    ] = None,
+    load_kg: Annotated[
+        float | None, typer.Option(metavar="KG", help="Load in the hands during the whole motion.")
+    ] = None,
+    load_hand: Annotated[
+        str | None, typer.Option(metavar="left|right|both", help="Hand that carries it. Default: both.")
+    ] = None,
     variant: Annotated[
         str | None, typer.Option(metavar="V", help="One of the scenario's variants; also NAME@V.")
     ] = None,
@@ -146,6 +159,13 @@ def run(
             help="Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable.",
         ),
     ] = None,
+    moved: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(
+            metavar="X Y YAW_DEG",
+            help="Run the scenario elsewhere: its origin at X Y [m], turned about that [deg].",
+        ),
+    ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the run directory.")] = True,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Runs at a time with 'all'; default: one per core.")
@@ -155,19 +175,26 @@ def run(
     if scenario == ALL:
         refuse(variant is not None, "--variant", "every variant is run")
         refuse(bool(overrides), "--set", "it belongs to one scenario")
-        given = {"--seed": seed, "--stature": stature, "--mass": mass, "--sex": sex}
+        refuse(moved is not None, "--moved", "it belongs to one scenario")
+        refuse(load_kg is not None or load_hand is not None, "--load-kg", "it belongs to one scenario")
+        body = {"--stature": stature, "--mass": mass, "--sex": sex, "--age": age, "--strength": strength}
+        given = {"--seed": seed} | body
         words = [word for name, value in given.items() if value is not None for word in (name, str(value))]
-        _check_values(seed, stature, mass, sex)
+        _check_values(seed, stature, mass, sex, age, strength)
         directory = out if out is not None else None if json else Path("runs")
         asked = {"stature_m": stature, "seed": seed}
         return _run_all(directory, asked, tuple(words), context.obj, draw=figures, workers=jobs, json=json)
     refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
+    refuse(load_hand is not None and load_kg is None, "--load-hand", "it needs --load-kg")
+    load = None if load_kg is None else {"mass_kg": load_kg, "hand": load_hand or "both"}
     from manikin.scenarios import load_scenario
 
     job = load_scenario(scenario, variant, overrides or ())
-    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex)
+    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex, age=age, strength=strength, load=load)
     if seed is not None:
         job = job.with_seed(seed)
+    if moved is not None:
+        job = job.moved(*moved)
     directory = out if out is not None else None if json else Path("runs") / job.name
     outcome = run_job(job, directory, context.obj, draw=figures)
     if json:
@@ -369,11 +396,19 @@ def export(
     typer.echo(str(written))
 
 
-def _check_values(seed: int | None, stature: float | None, mass: float | None, sex: str | None) -> None:
+def _check_values(
+    seed: int | None,
+    stature: float | None,
+    mass: float | None,
+    sex: str | None,
+    age: float | None,
+    strength: float | None,
+) -> None:
     """Refuse a value once, and not once per run."""
     from manikin.scenarios import list_scenarios, load_scenario
 
-    job = load_scenario(next(iter(list_scenarios()))).with_body(stature_m=stature, mass_kg=mass, sex=sex)
+    job = load_scenario(next(iter(list_scenarios())))
+    job = job.with_body(stature_m=stature, mass_kg=mass, sex=sex, age=age, strength=strength)
     if seed is not None:
         job.with_seed(seed)
 

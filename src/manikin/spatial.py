@@ -4,11 +4,14 @@ Rotations are 3x3 matrices or xyzw quaternions; ``rotation_a_to_b`` maps
 coordinates in frame *a* to coordinates in frame *b*.
 """
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
+from scipy.special import cosdg, sindg
 
 from manikin.errors import InputError
 
@@ -130,6 +133,22 @@ def skew(vector: ArrayLike) -> FloatArray:
     return matrix
 
 
+def wrench_about(wrench: FloatArray, point: FloatArray) -> FloatArray:
+    """(..., 6) wrenches about the world origin with moments about another point (..., 3) [N, N.m].
+
+    The negative point takes moments about it to moments about the origin.
+    """
+    force = wrench[..., :3]
+    return np.concatenate([force, wrench[..., 3:] - cross(point, force)], axis=-1)
+
+
+def wrench_map(point: FloatArray) -> FloatArray:
+    """(..., 6, 6) matrices of :func:`wrench_about` for points (..., 3)."""
+    moved = np.broadcast_to(np.eye(6), (*np.shape(point)[:-1], 6, 6)).copy()
+    moved[..., 3:, :3] = -skew(point)
+    return moved
+
+
 def rotation_from_yaw(yaw: float) -> FloatArray:
     """Rotation by ``yaw`` [rad] about the vertical."""
     c, s = np.cos(yaw), np.sin(yaw)
@@ -185,6 +204,89 @@ def check_rotation(rotation: ArrayLike, name: str, error: type[InputError] = Inp
     if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-6 or np.linalg.det(matrix) < 0:
         raise error(f"{name} is not a rotation matrix; valid: orthonormal rows, determinant +1")
     return matrix
+
+
+@dataclass(frozen=True)
+class PlanarTransform:
+    """Change of frame that keeps heights: a turn about the vertical, then a horizontal shift.
+
+    An instance named ``transform_a_to_b`` maps coordinates in frame *a* to coordinates in frame *b*.
+
+    Attributes:
+        x: Where the origin of *a* lies in *b* [m].
+        y: The same [m].
+        yaw_deg: Direction of the x axis of *a* in *b*, counter-clockwise from its x axis [deg].
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    yaw_deg: float = 0.0
+
+    @property
+    def yaw(self) -> float:
+        """Turn about the vertical [rad]."""
+        return math.radians(self.yaw_deg)
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether nothing moves."""
+        return self.x == 0.0 and self.y == 0.0 and self.yaw_deg == 0.0
+
+    @property
+    def rotation(self) -> FloatArray:
+        """(3, 3) rotation about the vertical, exact for quarter turns."""
+        c, s = float(cosdg(self.yaw_deg)) + 0.0, float(sindg(self.yaw_deg)) + 0.0
+        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    @property
+    def inverse(self) -> "PlanarTransform":
+        """The transform back."""
+        x, y, _ = (-(self.rotation.T @ [self.x, self.y, 0.0]) + 0.0).tolist()
+        return PlanarTransform(x, y, -self.yaw_deg + 0.0)
+
+    def after(self, other: "PlanarTransform") -> "PlanarTransform":
+        """The transform that does ``other`` first, then this one."""
+        x, y = self.points([other.x, other.y]).tolist()
+        return PlanarTransform(x, y, self.turned(other.yaw_deg))
+
+    def points(self, points: ArrayLike) -> FloatArray:
+        """(..., 2) or (..., 3) points, moved [m]; heights stay."""
+        moved = self.directions(points)
+        moved[..., 0] += self.x
+        moved[..., 1] += self.y
+        return moved
+
+    def directions(self, vectors: ArrayLike) -> FloatArray:
+        """(..., 2) or (..., 3) directions, velocities or forces, turned."""
+        given = np.asarray(vectors, dtype=np.float64)
+        size = given.shape[-1]
+        return given @ self.rotation[:size, :size].T
+
+    def rotations(self, rotations: ArrayLike) -> FloatArray:
+        """(..., 3, 3) rotations from any frame to *a*, as rotations to *b*."""
+        return np.asarray(self.rotation @ np.asarray(rotations, dtype=np.float64))
+
+    def turned(self, heading_deg: float) -> float:
+        """Heading after the turn, above -180 and up to 180 [deg]."""
+        heading = math.remainder(heading_deg + self.yaw_deg, 360.0)
+        return 180.0 if heading == -180.0 else heading
+
+    def poses(self, poses: ArrayLike) -> FloatArray:
+        """(..., k) poses that begin with a position [m] and an xyzw quaternion, moved; the rest stays.
+
+        Configurations of a body with a free root are such poses.
+        """
+        moved = np.array(poses, dtype=np.float64)
+        moved[..., :3] = self.points(moved[..., :3])
+        half = 0.5 * self.yaw_deg
+        c, s = float(cosdg(half)), float(sindg(half))
+        x, y, z, w = np.moveaxis(moved[..., 3:7].copy(), -1, 0)
+        moved[..., 3:7] = np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
+        return moved
+
+
+IDENTITY = PlanarTransform()
+"""The transform between equal frames."""
 
 
 def rotation_vector(rotations: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ from manikin.analysis import AnalysisOptions, analyze, analyze_file
 from manikin.analysis_directory import summary_of
 from manikin.analysis_report import report_page
 from manikin.balance import evaluate_balance
+from manikin.body import Configuration
 from manikin.contact import Stance, sole
 from manikin.errors import InputError
 from manikin.mocap import read_recording
@@ -55,6 +56,28 @@ def test_both_legs_carry_the_same(standing):
     mirror = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0]
     one, other = standing.motion.contact_force.swapaxes(0, 1)
     np.testing.assert_allclose(one, other * mirror, atol=0.05)
+
+
+def test_a_carried_load_is_in_forces_torques_centre_of_mass_and_margin(standing, standing_file):
+    """10 kg in the right hand: the hand's share of everything is a point mass at the palm."""
+    mass, frame = 10.0, 30
+    found = analyze_file(standing_file, AnalysisOptions(load=mass, load_hand="right"))
+    total = standing.body.mass + mass
+    assert found.body.own_mass == pytest.approx(standing.body.mass)
+    np.testing.assert_allclose(found.vertical_force, total * GRAVITY, rtol=1e-4)
+    np.testing.assert_allclose(found.motion.contact_force[frame, :, 2].sum(), total * GRAVITY, rtol=1e-4)
+    state = Configuration(standing.body, standing.motion.q[frame])
+    hand, palm = state.effector_placement("right_hand")[1], standing.body.effector("right_hand")
+    com = (standing.body.mass * standing.motion.com[frame] + mass * hand) / total
+    np.testing.assert_allclose(found.motion.com[frame], com, atol=1e-5)
+    weight = state.point_jacobian("right_hand", palm.translation).T @ [0.0, 0.0, mass * GRAVITY]
+    arm = [6 + standing.motion.joint_names.index(f"right_{n}") for n in ("elbow_flexion", "shoulder_flexion")]
+    change = (found.motion.tau - standing.motion.tau)[frame, arm]
+    np.testing.assert_allclose(change, weight[arm], atol=0.02)
+    assert np.abs(change).max() > 1.0
+    assert found.motion.margin[frame] != pytest.approx(standing.motion.margin[frame], rel=1e-3)
+    summary = found.as_dict()
+    assert (summary["mass_kg"], summary["load_kg"]) == (pytest.approx(standing.body.mass), mass)
 
 
 def test_summary_has_what_the_command_promises(standing):

@@ -40,7 +40,9 @@ def test_segments_are_the_moving_links(dog):
     assert dog.mass == pytest.approx(6.0 + 0.8 + 4 * (0.9 + 0.35 + 0.05))
     assert dog.joint_names[:3] == ("front_left_roll", "front_left_pitch", "front_left_knee")
     knee = dog.hinges[2]
-    assert (knee.lower, knee.upper, knee.torque_limit, knee.velocity_limit) == (0.05, 2.4, 40.0, 15.0)
+    assert (knee.lower, knee.upper, knee.torque_lower, knee.torque_upper, knee.velocity_limit) == (
+        0.05, 2.4, -40.0, 40.0, 15.0,
+    )  # fmt: skip
     shapes = dog.segment("front_left_shank").shapes
     assert [shape.kind for shape in shapes] == [ShapeKind.CAPSULE, ShapeKind.SPHERE]
     # A mesh of a capsule is a capsule of the same size, to its facets.

@@ -23,7 +23,13 @@ def segment(name="base", parent=None, hinges=(), **changes):
 
 
 def hinge(name="knee", axis=(0, 1, 0), **changes):
-    values = {"lower": -1.0, "upper": 1.0, "velocity_limit": 5.0, "torque_limit": 100.0}
+    values = {
+        "lower": -1.0,
+        "upper": 1.0,
+        "velocity_limit": 5.0,
+        "torque_lower": -80.0,
+        "torque_upper": 100.0,
+    }
     return Hinge(name, np.array(axis, dtype=float), **{**values, **changes})
 
 
@@ -93,7 +99,8 @@ def test_rigid_chain_keeps_every_offset():
     lambda: segment(inertia=np.array([[1.0, 0.1, 0], [0, 1, 0], [0, 0, 1]])),
     lambda: hinge(axis=(0, 0, 0)),
     lambda: hinge(lower=1.0, upper=-1.0),
-    lambda: hinge(torque_limit=0.0),
+    lambda: hinge(torque_lower=0.0),
+    lambda: hinge(torque_upper=0.0),
     lambda: hinge(velocity_limit=-1.0),
     lambda: Shape("x", "cone", (1.0,)),
     lambda: Shape("x", "box", (1.0, 2.0)),

@@ -35,7 +35,7 @@ def replace_problem(problem, **changes):
 
 def test_phase_minima_of_table_5_4_are_those_of_an_independent_check(platform, table_5_4):
     """DOUBTS Q-12: sole 0.28 x 0.12 m, mu 0.7, cap 1500 N, moments about the world origin."""
-    problem = platform()
+    problem = platform(margin_space="wrench_about_origin")
     margins = phase_margins(problem, table_5_4, polytopes_of(problem))
     published = [27.1, 24.1, 60.9, 12.1, 42.6, 29.9, 30.5]
     # The published minima are over 11-41 samples of the phase, ours over every millisecond.
@@ -44,7 +44,7 @@ def test_phase_minima_of_table_5_4_are_those_of_an_independent_check(platform, t
 
 def test_table_5_4_breaks_the_lower_surface_by_5_cm_and_no_distance(platform, table_5_4):
     """DOUBTS Q-13: the height band 5.29 is broken by up to 0.0495 m below."""
-    problem = platform(required_margin=0.0)
+    problem = platform(required_margin=0.0, margin_space="wrench_about_origin")
     residuals = measure(problem, table_5_4, polytopes_of(problem))
     assert residuals["height above the lower surface"].value == pytest.approx(0.0495, abs=5e-4)
     assert residuals["height below the upper surface"].value == pytest.approx(0.0094, abs=2e-3)
@@ -112,8 +112,10 @@ def test_margin_is_the_smallest_of_the_polytopes_at_every_instant(planned: Centr
     for phase, polytope in enumerate(planned.polytopes):
         start, end = trajectory.schedule.instants[phase : phase + 2]
         for t in np.arange(start, end, 1e-3):
-            wrench = trajectory.pseudo_wrench(float(t))
-            lowest = min(lowest, float(np.min(polytope.h - polytope.H @ wrench)))
+            com = trajectory.position(float(t))
+            wrench = trajectory.pseudo_wrench(float(t), com)
+            at_com = polytope.at_reference(com)
+            lowest = min(lowest, float(np.min(at_com.h - at_com.H @ wrench)))
     # The loop's millisecond grid starts anew in each phase; margins change by < 0.1 N.m per ms.
     assert planned.residuals().min_margin == pytest.approx(lowest, abs=0.1)
 
@@ -126,12 +128,12 @@ def test_force_margin_is_the_largest_push_at_the_com_that_stays_inside(platform,
     phase, index = 3, 100
     t = phase_times(table_5_4)[phase][index]
     W: WrenchPolytope = polytopes[phase]
-    com, wrench = table_5_4.position(t), table_5_4.pseudo_wrench(t)
+    com, wrench = table_5_4.position(t), table_5_4.pseudo_wrench(t, W.reference)
     directions = np.random.default_rng(0).normal(size=(4000, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     reach = []
     for u in directions:
-        push = np.concatenate([u, np.cross(com, u)])
+        push = np.concatenate([u, np.cross(com - W.reference, u)])
         growth = W.H @ push
         reach.append(float(np.min((W.distances(wrench) / np.maximum(growth, 1e-12))[growth > 1e-12])))
     # 4000 random directions come within a few degrees of the worst one: cos(5 deg) = 0.996.

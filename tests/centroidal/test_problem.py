@@ -18,7 +18,7 @@ from manikin.errors import InputError
         ({"degree": 2}, "degree is 2; valid: an integer >= 3"),
         ({"degree": 4.5}, "degree"),
         ({"samples": 1}, "samples"),
-        ({"margin_space": "torque"}, "valid: wrench, force"),
+        ({"margin_space": "torque"}, "valid: wrench, force, wrench_about_origin"),
         ({"required_margin": -1.0}, "required_margin"),
         ({"support_distance": 0.0}, "support_distance"),
         ({"max_duration": -1.0}, "max_duration"),

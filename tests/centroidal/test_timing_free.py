@@ -120,6 +120,7 @@ def test_car_reaches_the_published_margin_with_a_free_final_velocity(car_stances
         CentroidalProblem(
             79.0, car_stances, (0.235, -1.0112, 0.4659), (-0.045, -0.1463, 0.21),
             goal_velocity=None, support_distance=1.08, required_margin=19.4,
+            margin_space="wrench_about_origin",
         )
     )  # fmt: skip
     assert result.succeeded

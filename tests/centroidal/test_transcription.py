@@ -54,16 +54,27 @@ def programme_values(problem, bezier, durations, margin):
     programme = build_programme(problem, facets)
     from manikin.centroidal.optimise import _parameters
 
-    unknowns = programme.pack_unknowns(bezier, durations, float(durations.sum()), margin, 0.0)
+    unknowns = programme.pack_unknowns(
+        bezier - problem.reference, durations, float(durations.sum()), margin, 0.0
+    )
     values = programme.pack_parameters(_parameters(problem, polytopes, facets, Targets.of(problem)))
     oracle = programme.solver.get_function("nlp_f"), programme.solver.get_function("nlp_g")
     objective, rows = (np.asarray(function(unknowns, values)).ravel() for function in oracle)
     return programme, polytopes, float(objective[0]), rows
 
 
-def test_balance_rows_are_the_facet_distances_at_the_samples(platform):
-    """Row j of a phase is h - H w at j / n_s of the phase, j = 0 ... n_s (DOUBTS Q-8)."""
-    problem = platform()
+def _about(point, reference):
+    """(6, 6) map of wrenches about a reference to such about a point."""
+    x, y, z = reference - point
+    moved = np.eye(6)
+    moved[3:, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+    return moved
+
+
+@pytest.mark.parametrize("space", ["wrench", "wrench_about_origin"])
+def test_balance_rows_are_the_facet_distances_at_the_samples(platform, space):
+    """Row j of a phase is h - H w - d |H| about the CoM at j / n_s of the phase, j = 0 ... n_s (Q-8)."""
+    problem = platform(margin_space=space)
     bezier, durations = guess(problem, GUESS_STYLES[0], polytopes_of(problem))
     programme, polytopes, _, rows = programme_values(problem, bezier, durations, 7.0)
     trajectory = trajectory_of(problem, bezier, durations)
@@ -72,9 +83,16 @@ def test_balance_rows_are_the_facet_distances_at_the_samples(platform):
         if group == "balance":
             instants = trajectory.schedule.instants[phase : phase + 2]
             times = np.linspace(*instants, problem.samples + 1)
-            distances = polytopes[phase].distances(trajectory.pseudo_wrench(times))
-            values = rows[start : start + count].reshape(-1, problem.samples + 1).T * 10.0 + 7.0
-            assert np.allclose(values, distances, atol=1e-6)
+            values = rows[start : start + count].reshape(-1, problem.samples + 1).T * 10.0
+            for time, value in zip(times, values, strict=True):
+                com = trajectory.position(time)
+                about = np.zeros(3) if space == "wrench_about_origin" else com
+                at = polytopes[phase].at_reference(about)
+                length = 1.0 / np.linalg.norm(at.H @ _about(about, problem.reference), axis=1)
+                distances = at.distances(trajectory.pseudo_wrench(time, about))
+                # Rows of length 1 about the middle of the contacts, but about the origin of length 1 there.
+                wanted = distances - 7.0 if space == "wrench_about_origin" else length * (distances - 7.0)
+                assert np.allclose(value, wanted, atol=1e-6)
             phase += 1
         start += count
     assert phase == 7

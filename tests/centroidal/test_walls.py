@@ -73,14 +73,14 @@ def test_the_margin_is_a_force_that_can_be_applied(planned, problem):
     directions = np.random.default_rng(0).normal(size=(2000, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     pushed = force + (planned.d_min - 1e-6) * directions
-    wrenches = np.hstack([pushed, np.cross(com, pushed)])
+    wrenches = np.hstack([pushed, np.cross(com - problem.reference, pushed)])
     assert planned.polytopes[phase].distances(wrenches).min() >= -1e-6
 
 
 def test_a_stance_moved_elsewhere_has_the_polytope_it_would_have(problem):
     # Five of the nineteen phases: four and two contacts, at the start, on the way and at the end.
     for phase, polytope in [*zip(problem.sequence, polytopes_of(problem), strict=True)][::4]:
-        direct = wrench_polytope(phase.stance)
+        direct = wrench_polytope(phase.stance, reference=problem.reference)
         assert len(direct) == len(polytope)
         # The same set: every row of the one is a row of the other (newtons, rounding of the hull).
         rows = np.column_stack([polytope.H, polytope.h / 1000.0])

@@ -109,27 +109,31 @@ def test_the_exertable_force_keeps_every_limit_and_is_the_largest(seed, friction
     """Against random forces scaled to the limits; a grasp can do at least what friction can."""
     jacobian, v = jacobian_and_direction(seed)
     rng = np.random.default_rng(seed)
-    limit, normal = rng.uniform(1.0, 50.0, 7), v + 0.3 * rng.standard_normal(3)
+    lower, upper = -rng.uniform(1.0, 50.0, 7), rng.uniform(1.0, 50.0, 7)
+    normal = v + 0.3 * rng.standard_normal(3)
     normal /= np.linalg.norm(normal)
-    best = exertable_force(jacobian, limit, v, normal, friction)
-    held = exertable_force(jacobian, limit, v, None)
+    best = exertable_force(jacobian, lower, upper, v, normal, friction)
+    held = exertable_force(jacobian, lower, upper, v, None)
     assert held >= best - 1e-6 >= -2e-6
     forces = rng.standard_normal((300, 3))
     # The pyramid with eight sides is inside the cone, and holds the cone of cos(pi / 8) of the friction.
     along = forces @ normal
     across = np.linalg.norm(forces - along[:, None] * normal, axis=1)
     inner = across <= friction * np.cos(np.pi / 8) * along
-    scale = (limit / np.abs(forces @ jacobian)).min(axis=1)
+    torque = -forces @ jacobian
+    scale = 1.0 / np.maximum(torque / upper, torque / lower).max(axis=1)
     assert (scale * (forces @ v) <= held + 1e-6).all()
     assert (scale * (forces @ v))[inner].max(initial=0.0) <= best + 1e-6
 
 
 def test_the_exertable_force_of_a_lever_is_its_torque_over_its_arm():
-    """One hinge about z, the effector 0.5 m along x: 20 N.m are 40 N along y."""
+    """One hinge about z, the effector 0.5 m along x: -20 N.m bear 40 N along y, 30 N.m 60 N against it."""
     jacobian, y = np.array([[0.0], [0.5], [0.0]]), np.array([0.0, 1.0, 0.0])
-    assert exertable_force(jacobian, np.array([20.0]), y, y) == pytest.approx(40.0)
-    assert exertable_force(jacobian, np.array([20.0]), -y, y) == pytest.approx(0.0)
-    assert exertable_force(jacobian, np.array([20.0]), np.array([1.0, 0.0, 0.0]), None) == np.inf
+    limits = np.array([-20.0]), np.array([30.0])
+    assert exertable_force(jacobian, *limits, y, y) == pytest.approx(40.0)
+    assert exertable_force(jacobian, *limits, -y, -y) == pytest.approx(60.0)
+    assert exertable_force(jacobian, *limits, -y, y) == pytest.approx(0.0)
+    assert exertable_force(jacobian, *limits, np.array([1.0, 0.0, 0.0]), None) == np.inf
 
 
 def test_efort_with_strengths_is_a_force_within_them(person, person_samples):
@@ -140,10 +144,13 @@ def test_efort_with_strengths_is_a_force_within_them(person, person_samples):
     products = StrongEfort.of(person, {"left_arm": samples}).products["left_arm"][:100]
     ratio = force_transmission_ratio(products, v)
     jacobians = chain.place(samples.angles[:100]).jacobians
-    alone = (chain.torque_limit / np.abs(v @ jacobians)).min(axis=1)
+    weaker = np.minimum(-chain.torque_lower, chain.torque_upper)
+    alone = (weaker / np.abs(v @ jacobians)).min(axis=1)
     assert (alone >= ratio * (1 - 1e-9)).all()
     assert (alone <= ratio * np.sqrt(len(chain)) * (1 + 1e-9)).all()
-    best = np.array([exertable_force(each, chain.torque_limit, v, None) for each in jacobians])
+    best = np.array(
+        [exertable_force(each, chain.torque_lower, chain.torque_upper, v, None) for each in jacobians]
+    )
     assert (best >= alone * (1 - 1e-9)).all()
 
 
@@ -159,7 +166,9 @@ def test_efort_orders_postures_like_the_force_they_can_exert(person, person_samp
     v = np.array([1.0, 0.0, 0.0]) if name == "left_leg" else np.array([-1.0, 0.0, 0.0])
     rows = np.arange(300)
     jacobians = chain.place(samples.angles[rows]).jacobians
-    force = np.array([exertable_force(each, chain.torque_limit, v, v, 0.7) for each in jacobians])
+    force = np.array(
+        [exertable_force(each, chain.torque_lower, chain.torque_upper, v, v, 0.7) for each in jacobians]
+    )
     alpha = efort(samples.products[rows], v, np.tile(v, (300, 1)))
     assert spearmanr(alpha, force).statistic > 0.5
     best = np.argsort(-alpha)[:30]
@@ -176,6 +185,9 @@ def test_efort_prefers_the_face_that_can_carry_the_force(person, person_samples)
     jacobian = chain.place(samples.angles[:1]).jacobians[0]
     alpha = efort(np.repeat(samples.products[:1], 4, axis=0), v, normals)
     assert (np.diff(alpha) < 0.0).all()
-    force = [exertable_force(jacobian, chain.torque_limit, v, normal, 0.3) for normal in normals]
+    force = [
+        exertable_force(jacobian, chain.torque_lower, chain.torque_upper, v, normal, 0.3)
+        for normal in normals
+    ]
     assert force[0] > force[2] > force[3] - 1e-9
     assert force[3] <= 1e-6

@@ -30,10 +30,14 @@ from manikin.contact_planning.alignment_step import DAMPING, LARGEST_STEP, LEVER
 from manikin.contact_planning.collisions import TOUCH, yielding
 from manikin.contact_planning.deep_samples import DeepSamples
 from manikin.contact_planning.generator import NATURAL_SLACK, _order
+from manikin.contact_planning.single_contact import ContactQuestion, find_contact
 from manikin.errors import BodyError, ContactError
+from manikin.scenarios import load_scenario
+from manikin.scenarios.contact_rules import contact_rules
+from manikin.scenarios.start import start_posture
 from manikin.scene import Box, Capsule, Mesh, Obstacle, Proximity, Scene, Sphere, Surface
 from manikin.scene.pair import pair_meter
-from manikin.spatial import rotation_from_rpy
+from manikin.spatial import PlanarTransform, rotation_from_rpy
 
 UP = Task((0.0, 0.0, 1.0))
 PUSH = Task((1.0, 0.0, 0.0), {"left_arm", "right_arm"})
@@ -491,3 +495,29 @@ def test_leaving_deep_samples_out_changes_no_answer(person, person_samples, monk
         assert a.score == b.score
         assert np.array_equal(a.q, b.q)
     assert np.mean([a.tried for a, _ in both]) < 0.5 * np.mean([b.tried for _, b in both])
+
+
+@pytest.mark.parametrize(
+    ("name", "limb", "task"), [("climb-wall", "left_arm", UP), ("stairs", "right_leg", PUSH)]
+)
+@pytest.mark.parametrize("heuristic", ["efort", "distance", "random"])
+def test_the_answer_for_a_moved_scenario_is_the_moved_answer(name, limb, task, heuristic):
+    """Places to rounding of coordinates of 10 m; efforts in 1/N.m of any size to 1e-9 of theirs."""
+    transform, answers = PlanarTransform(10.0, -7.0, 37.0), []
+    for scenario, turn in (
+        (load_scenario(name), PlanarTransform()),
+        (load_scenario(name).moved(10.0, -7.0, 37.0), transform),
+    ):
+        body, scene = scenario.build_body(), scenario.build_scene()
+        question = ContactQuestion.of(
+            limb, tuple(turn.directions(task.direction)), heuristic=heuristic, samples=1000
+        )
+        q = start_posture(scenario, body, scene)
+        answers.append(find_contact(body, scene, q, question, contact_rules(scenario, body)).as_dict())
+    here, there = answers
+    assert here["found"]
+    assert there["found"]
+    assert there["candidates"] == here["candidates"]
+    np.testing.assert_allclose(there["position"], transform.points(here["position"]), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(there["normal"], transform.directions(here["normal"]), rtol=0.0, atol=1e-12)
+    assert there["efort"] == pytest.approx(here["efort"], rel=1e-9)

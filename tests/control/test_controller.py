@@ -67,7 +67,8 @@ def test_forces_stay_in_friction_cones_and_torques_within_limits(body, still, sc
     controller = Controller(body, still, schedule)
     q, v = disturbed(body, seed, speed=speed)
     output, x = solve(controller, q, v)
-    assert np.all(np.abs(output.tau) <= body.torque_limit + 1e-3)
+    assert np.all(output.tau >= body.torque_lower - 1e-3)
+    assert np.all(output.tau <= body.torque_upper + 1e-3)
     for _, _, force, contact in force_per_point(output.problem, x, controller):
         normal = force @ contact.normal
         tangent = np.linalg.norm(force - normal * contact.normal)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from manikin.balance.polygon import convex_polygon, signed_distance
-from manikin.body import human, kudoh
+from manikin.body import kudoh
 from manikin.control.balance_recovery import (
     BalanceRecovery,
     RecoverySettings,
@@ -171,10 +171,9 @@ def test_experiments_1_and_2_lie_beyond_the_bound():
     assert held_impulse(found, np.pi / 2) > 20.0
 
 
-@pytest.mark.parametrize("body", [KUDOH, human()], ids=["kudoh", "human"])
-def test_less_to_turn_and_a_later_reaction_hold_less(body):
-    free, late = limits(body, delay=0.0), limits(body)
-    arms, hips = limits(body, locked=("arms",)), limits(body, locked=("hips",))
+def test_less_to_turn_and_a_later_reaction_hold_less():
+    free, late = limits(delay=0.0), limits()
+    arms, hips = limits(locked=("arms",)), limits(locked=("hips",))
     for direction in np.radians([0.0, 90.0, 180.0]):
         assert held_impulse(free, direction) > held_impulse(late, direction)
         assert held_impulse(late, direction) > held_impulse(arms, direction)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from manikin.contact import grasp, sole
 from manikin.control.build_qp import joint_acceleration_bounds
-from manikin.control.contact_forces import contact_force_basis, contact_geometry, pyramid_edges
+from manikin.control.contact_forces import contact_force_basis, contact_geometry, edges_in_world
 from manikin.control.dynamics import Dynamics
 from manikin.control.reference import Reference
 
@@ -57,12 +57,12 @@ def test_dynamics_matches_inverse_dynamics(body):
     assert np.allclose(frame.jacobian @ v, frame.twist, atol=1e-12)
 
 
-@given(mu=st.floats(0.05, 1.5), seed=st.integers(0, 1000))
-def test_pyramid_edges_lie_on_the_friction_cone(mu, seed):
-    """Unit normal force, tangential part mu: the inner pyramid, for any orientation."""
+@given(mu=st.floats(0.05, 1.5), seed=st.integers(0, 1000), model=st.sampled_from(["inner", "cone"]))
+def test_pyramid_edges_lie_on_the_friction_cone(mu, seed, model):
+    """Unit normal force, tangential part mu: the pyramids inside the cone, for any orientation."""
     rotation = pin.exp3(np.random.default_rng(seed).normal(size=3))
     contact = sole("left_foot", (0, 0, 0), length=0.2, width=0.1, friction=mu, rotation=rotation)
-    edges = pyramid_edges(contact)
+    edges = edges_in_world(contact, friction_model=model)
     assert np.allclose(edges @ contact.normal, 1.0)
     assert np.allclose(np.linalg.norm(edges - contact.normal, axis=1), mu)
 

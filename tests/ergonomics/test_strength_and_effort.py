@@ -28,9 +28,10 @@ def with_torque(torque, rate=None, duration=2.0, samples=401):
 
 
 def test_peak_instant_and_time_above():
-    """A triangle from 0 to the whole strength and back: above one half for half of the time."""
-    limit = BODY.torque_limit[KNEE]
+    """A triangle from 0 to the whole extension strength and back: above one half for half of the time."""
+    limit = -BODY.torque_lower[KNEE]
     found = joint_strength(BODY, with_torque(lambda t: -limit * (1.0 - np.abs(t - 1.0))))
+    assert found.limit[KNEE] == limit
     assert found.peak[KNEE] == pytest.approx(1.0)
     assert found.peak_time[KNEE] == pytest.approx(1.0)
     assert found.loaded[KNEE] == pytest.approx(0.5, abs=0.01)  # two samples of 200
@@ -39,15 +40,20 @@ def test_peak_instant_and_time_above():
 
 
 def test_work_and_squared_share_of_a_sine():
-    """Tau = L sin t, rate = cos t over a whole turn: squares give pi, the power as much taken as given."""
-    limit = BODY.torque_limit[KNEE]
+    """Tau = L sin t, rate = cos t over a whole turn: as much power is taken as given.
+
+    Each half turn gives pi / 2 of squared share, but the flexors' half counts against their own limit.
+    """
+    limit = -BODY.torque_lower[KNEE]
     motion = with_torque(lambda t: limit * np.sin(t), np.cos, duration=2.0 * np.pi)
     found = cumulative_effort(BODY, motion)
-    assert found.squared_share[KNEE] == pytest.approx(np.pi, rel=1e-6)
+    squares = 0.5 * np.pi * (1.0 + (limit / BODY.torque_upper[KNEE]) ** 2)
+    assert found.squared_share[KNEE] == pytest.approx(squares, rel=1e-6)
     assert found.positive_work[KNEE] == pytest.approx(limit, rel=1e-4)
     assert found.negative_work[KNEE] == pytest.approx(-limit, rel=1e-4)
     assert found.absolute_work.sum() == pytest.approx(2.0 * limit, rel=1e-4)
-    assert found.mean_share == pytest.approx(np.sqrt(0.5 / len(BODY.joint_names)), rel=1e-6)
+    mean = np.sqrt(squares / (2.0 * np.pi * len(BODY.joint_names)))
+    assert found.mean_share == pytest.approx(mean, rel=1e-6)
 
 
 @given(st.floats(0.1, 20.0), st.floats(0.1, 5.0))
@@ -67,7 +73,7 @@ def test_without_torques_there_is_neither():
 
 def test_frames_without_torques_are_left_out():
     """The second half is not known: the rest counts, no bridge is built over the gap."""
-    motion = with_torque(lambda t: 26.0 * np.ones_like(t))
+    motion = with_torque(lambda t: 0.1 * BODY.torque_upper[KNEE] * np.ones_like(t))
     tau = np.array(motion.tau)
     tau[100:200] = tau[300:] = np.nan
     motion = replace(motion, tau=tau)

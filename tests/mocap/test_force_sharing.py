@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.analysis import AnalysisOptions, analyze_file
-from manikin.balance import wrench_about
 from manikin.balance.limits import contact_limits
 from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
@@ -20,6 +19,7 @@ from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_dynamics import dynamics_of
 from manikin.mocap.recorded_forces import contact_wrenches, motion_on_contacts
 from manikin.mocap.targets import Targets
+from manikin.spatial import wrench_about
 
 STEP = 0.01
 PLACES = np.array([(0.0, 0.1, 0.0), (0.6, -0.1, 0.0), (0.3, 0.5, 0.9)])

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from manikin.errors import InputError
 from manikin.mocap import Event, ForcePlate, MarkerRecording, read_c3d
 from manikin.mocap.axes import UP_TO_Z, metres_per, rotation_to_z_up
-from manikin.mocap.force_plate import wrench_at_world_origin
 from manikin.mocap.markers import unique_names
+from manikin.spatial import wrench_about
 
 RATE = 100.0
 
@@ -100,7 +100,7 @@ def test_centre_of_pressure_of_any_surface(seed):
     side = np.cross(normal, [1.0, 0.0, 0.0])
     point = origin + a * side + b * np.cross(normal, side)
     force = rng.uniform([-50, -50, 600], [50, 50, 800], (1, 3))
-    wrench = wrench_at_world_origin(force, rng.uniform(-20, 20) * normal[None], point)
+    wrench = wrench_about(np.hstack([force, rng.uniform(-20, 20) * normal[None]]), -point)
     plate = ForcePlate("plate", np.vstack([wrench, np.zeros((1, 6))]), origin, 1000.0, normal=normal)
     np.testing.assert_allclose(plate.cop[0], point, atol=1e-9)
     assert np.all(np.isnan(plate.cop[1]))  # nobody stands there

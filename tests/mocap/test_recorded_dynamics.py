@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from manikin.balance import contact_limits, stability_margins, wrench_about, wrench_polytope
+from manikin.balance import contact_limits, stability_margins, wrench_polytope
 from manikin.balance.friction import contact_to_world, edge_wrenches
 from manikin.body import human
 from manikin.body.configuration import Configuration
@@ -41,7 +41,7 @@ from manikin.mocap.force_sharing import shared_wrenches
 from manikin.mocap.recorded_forces import contact_wrenches, torques_of
 from manikin.mocap.recorded_supports import Support
 from manikin.mocap.untold_segments import untold_upright
-from manikin.spatial import GRAVITY
+from manikin.spatial import GRAVITY, wrench_about
 
 RATE, FRAMES = 100.0, 301
 TIME = np.arange(FRAMES) / RATE

@@ -15,8 +15,6 @@ from manikin.contact_planning import certify_plan
 from manikin.errors import ScenarioError
 from manikin.scenarios import load_scenario
 from manikin.stages.contacts import find_supports
-from manikin.stages.keyed_contacts import KeyedContacts
-from manikin.wholebody import refine_motion
 
 DOG = Path(__file__).parents[1] / "body" / "data" / "dog.urdf"
 
@@ -112,19 +110,6 @@ def test_what_no_limb_can_reach_is_explained(name, where, reason):
     assert result.plan is None
     assert result.where == where
     assert reason in result.failure
-
-
-@pytest.mark.slow
-def test_a_climber_gets_all_the_way_and_is_refined():
-    """Margin at every sample of 5 ms, no penetration, contacts kept: the refinement's own certificate."""
-    result, body, scene = search("climb@aslant", seed=load_scenario("climb@aslant").seed)
-    assert result.failure is None
-    keyed = KeyedContacts.of_plan(result.plan, ContactModel.of_body(body.mass))
-    keyed = keyed.with_lifted_feet(body, scene, ())
-    refined = refine_motion(body, scene, keyed.time, keyed.q, keyed.schedule)
-    assert refined.failure is None, refined.failure
-    assert refined.certificate.min_margin > 0.0
-    assert refined.certificate.max_penetration_m < 1e-3
 
 
 def test_a_creature_from_a_robot_description_walks_up_a_step(tmp_path):

@@ -46,16 +46,15 @@ def test_a_push_after_the_end_is_refused():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "waits"), [("platform@pushed", True), ("walk@pushed", False)])
-def test_a_pushed_body_goes_on_to_its_goal(runs, name, waits):
-    result = runs(name)
-    scenario, push = load_scenario(name), result.summary["execution"]["push"]
+def test_a_pushed_body_goes_on_to_its_goal(runs):
+    result = runs("platform@pushed")
+    scenario, push = load_scenario("platform@pushed"), result.summary["execution"]["push"]
     assert result.succeeded
     assert push["recovered"]
     assert push["impulse_Ns"] == pytest.approx(scenario.push.force_N * scenario.push.duration_s)
     assert push["max_deviation_m"] > 0.005
     assert push["return_s"] < 2.0
-    assert (push["waited_s"] > 0.1) == waits
+    assert push["waited_s"] > 0.1
     assert result.summary["execution"]["final_com_error_m"] < 1e-3
 
 

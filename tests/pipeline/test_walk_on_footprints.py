@@ -21,7 +21,7 @@ def on_footprints(name: str, *overrides: str) -> RunContext:
 def test_a_walk_before_a_plan_ends_on_its_first_feet():
     """Its last phases are those of the plan; the foot that flies first is not the one that just landed."""
     whole = on_footprints("walk-and-platform").scenario.explicit_supports().resolved_phases()
-    plan = load_scenario("platform").explicit_supports().resolved_phases()
+    plan = load_scenario("platform").in_task_frame().explicit_supports().resolved_phases()
     seam = len(whole) - len(plan)
     assert seam > 10
     for mine, theirs in zip(whole[seam:], plan, strict=True):

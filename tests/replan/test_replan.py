@@ -320,7 +320,7 @@ def test_toes_carry_only_what_they_are_strong_enough_for(walk):
     found, supports = walk
     body = found.body
     schedule = landing_flat(recorded_schedule(smoothed(found), supports, rolling=True), body)
-    lever = body.torque_limit[body.joint_index("left_toe_extension")] / (1.4 * body.mass * GRAVITY)
+    lever = -body.torque_lower[body.joint_index("left_toe_extension")] / (1.4 * body.mass * GRAVITY)
     for phase in within_toe_strength(schedule, body).sequence:
         for contact in phase.stance:
             ahead = contact.points[:, 0].max() - toe_hinge(body, contact.effector)[0]

@@ -79,8 +79,8 @@ def test_hinges_and_motors_have_the_order_and_limits_of_the_body(model):
     assert tuple(compiled.joint(1 + k).name for k in range(39)) == body.joint_names
     assert tuple(compiled.actuator(k).name for k in range(compiled.nu)) == body.joint_names
     np.testing.assert_allclose(compiled.jnt_range[1:], np.column_stack([body.lower, body.upper]), atol=1e-12)
-    np.testing.assert_allclose(compiled.actuator_ctrlrange[:, 1], body.torque_limit, rtol=1e-12)
-    np.testing.assert_allclose(compiled.actuator_ctrlrange[:, 0], -body.torque_limit, rtol=1e-12)
+    np.testing.assert_array_equal(compiled.actuator_ctrlrange[:, 0], body.torque_lower)
+    np.testing.assert_array_equal(compiled.actuator_ctrlrange[:, 1], body.torque_upper)
 
 
 def test_motors_are_torques(model):

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from manikin.balance.motion_margin import motion_margin
-from manikin.body import human
+from manikin.body import carrying, human
 from manikin.contact import Stance
 from manikin.control import ControlSettings
 from manikin.errors import ContactError, InputError
@@ -227,3 +227,17 @@ def test_motion_of_another_body_is_refused(body, stand):
     wrong = replace(plan.motion, joint_names=tuple(reversed(plan.motion.joint_names)))
     with pytest.raises(InputError, match="a motion planned for this body"):
         execute(body, Scene(), wrong, plan.schedule)
+
+
+def test_a_body_stands_with_a_load_in_its_hand(stand):
+    """12 kg in the right hand: the feet carry the weight of both, and the margin stays."""
+    person = carrying(human(), 12.0, "right")
+    plan = stand(0.5, person=person)
+    result = execute(person, Scene(), plan.motion, plan.schedule, hold=0.5)
+    assert result.succeeded
+    assert result.com_max_error_m < 1e-3
+    assert result.min_margin > 20
+    force = result.motion.contact_force[-1, :, 2]
+    assert force.sum() == pytest.approx(9.81 * (human().mass + 12.0), rel=1e-3)
+    names = list(result.motion.contact_names)
+    assert force[names.index("right_foot")] > force[names.index("left_foot")] + 20.0

@@ -77,7 +77,8 @@ class KeyMaker:
 def crouch(steps: int, duration: float = 0.6, height: float = 1.25) -> Case:
     """Walk under a floating slab, ``steps`` steps of 0.3 m and one to close up."""
     slab = Obstacle("slab", Box((0.5, 1.6, 0.1)), translation=(0.75, 0.0, height + 0.05))
-    maker = KeyMaker(human(1.75, 79.0, "male"), Scene([slab]), None, duration)
+    body = human(1.75, 79.0, "male", strength=2.0)  # steps of 0.6 s in a deep crouch are beyond the mean man
+    maker = KeyMaker(body, Scene([slab]), None, duration)
     at = {"left_foot": 0.0, "right_foot": 0.0}
 
     def foot(name: str, x: float) -> Contact:
@@ -128,7 +129,7 @@ def on_wall(effector: str, number: int) -> Contact:
 
 def climb(moves: int, duration: float = 0.8) -> Case:
     """Climb the wall: left hand, right foot, right hand, left foot, again and again."""
-    body = human(1.75, 79.0, "male")
+    body = human(1.75, 79.0, "male", strength=2.0)  # 0.8 s a move is beyond the mean man
     bent = {"hip_flexion": 0.3, "knee_flexion": 0.4, "elbow_flexion": 1.2, "shoulder_flexion": 2.0}
     reference = body.posture({f"{side}_{name}": bent[name] for side in ("left", "right") for name in bent})
     maker = KeyMaker(body, wall(), reference, duration)

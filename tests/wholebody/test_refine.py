@@ -78,8 +78,9 @@ def test_margin_is_positive_every_10_ms(name, request):
     time = np.arange(0.0, result.motion.time[-1], 0.01)
     q = result.spline.evaluate(time).q
     v, a = differences(body, time, q)
+    found = centroidal_motion(body, q, v, a)
     margin, violation = balance_of(
-        result.schedule, rooms_of(result.schedule), time[1:-1], centroidal_motion(body, q, v, a).wrench[1:-1]
+        result.schedule, rooms_of(result.schedule), time[1:-1], found.wrench[1:-1], found.com[1:-1]
     )
     assert margin.min() > 0.0
     assert violation.max() == 0.0
@@ -268,13 +269,3 @@ def test_clearance_of_a_flight_rises_and_falls(person):
     assert by_sample[1] == pytest.approx(-0.01)
     assert by_sample[2] == pytest.approx(0.02)
     assert by_sample[3] < 0.0
-
-
-@pytest.mark.slow
-def test_a_long_crouch(cases):
-    """Six steps under the slab."""
-    result = refine_motion(*cases.crouch(5))
-    assert result.succeeded, result.failure
-    assert result.after.squared_accelerations <= result.before.squared_accelerations / 5.0
-    assert result.after.physics_violation <= result.before.physics_violation / 10.0
-    assert result.after.min_margin > 0.0

@@ -7,10 +7,12 @@ import pytest
 from scipy.optimize import lsq_linear, minimize
 
 from manikin.balance import wrench_polytope
-from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, grasp, sole
+from manikin.balance.contact_forces import ContactGenerators, friction_share
+from manikin.contact import FRICTION_MODELS, ContactSchedule, Phase, Stance, StanceSequence, grasp, sole
 from manikin.contact_planning import Task
 from manikin.contact_planning.efort import efort
 from manikin.scene import Box, Obstacle, Proximity, Scene
+from manikin.spatial import wrench_map
 from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
 from manikin.wholebody.knots import phase_knots, sample_times
 from manikin.wholebody.refine_balance import BalanceRoom
@@ -18,7 +20,7 @@ from manikin.wholebody.refine_efort import LimbDirections, efort_with_derivative
 from manikin.wholebody.refine_input import KeyPath
 from manikin.wholebody.refine_measures import physics_violation
 from manikin.wholebody.refine_objective import RefineObjective, refine_targets
-from manikin.wholebody.refine_physics import ContactForces, about, centre_of
+from manikin.wholebody.refine_physics import ContactForces, centre_of
 from manikin.wholebody.refine_scales import RefineScales
 
 SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
@@ -158,9 +160,12 @@ def test_violation_is_the_distance_to_what_forces_can_supply(stance):
 def test_margin_is_that_of_the_wrench_polytope(stance):
     room, rng = BalanceRoom(stance), np.random.default_rng(2)
     wrench = np.array([0.0, 0.0, 775.0, 0.0, 0.0, 0.0]) + 50.0 * rng.normal(size=(8, 6))
-    local = wrench @ about(centre_of(stance)).T
-    expected = wrench_polytope(stance, reference=centre_of(stance)).margin(local)
-    np.testing.assert_allclose(room.margin(wrench), expected, rtol=1e-9)
+    com = np.array([0.02, -0.03, 0.9]) + 0.1 * rng.normal(size=(8, 3))
+    expected = [
+        float(wrench_polytope(stance, reference=x).margin(wrench_map(x) @ w))
+        for w, x in zip(wrench, com, strict=True)
+    ]
+    np.testing.assert_allclose(room.margin(wrench, com), expected, rtol=1e-9)
 
 
 def test_efort_is_that_of_the_contact_planner(person):
@@ -174,3 +179,24 @@ def test_efort_is_that_of_the_contact_planner(person):
     own = jacobian[:, :3, joints]
     expected = efort(own @ own.transpose(0, 2, 1), direction, np.tile(normal, (3, 1)))
     np.testing.assert_allclose(alpha, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("model", FRICTION_MODELS)
+def test_forces_of_the_refinement_keep_to_the_friction_model_of_the_stance(model):
+    """Wrenches with more tangential force than any pyramid holds: every contact is on the side of its own."""
+    feet = [
+        sole("left_foot", (0.0, 0.1, 0.0), length=0.28, width=0.12, friction=0.3),
+        sole("right_foot", (0.3, -0.1, 0.0), 0.4, length=0.28, width=0.12, friction=0.3),
+    ]
+    stance = Stance(feet, 1500.0, model)
+    rng = np.random.default_rng(0)
+    force = np.array([0.0, 0.0, 700.0]) + rng.normal(scale=400.0, size=(50, 3)) * [1.0, 1.0, 0.1]
+    wrench = np.hstack([force, np.cross([0.15, 0.0, 0.9], force)])
+    forces = ContactForces(stance, stance.effectors)
+    magnitude = forces.share(wrench, np.ones((50, 2)), tolerance=2.0, force=700.0).magnitude
+    generators = ContactGenerators.of(stance)
+    shares = []
+    for number, contact in enumerate(feet):
+        own = generators.contact == number
+        shares.append(friction_share(contact, magnitude[:, own] @ generators.force[own], model))
+    assert np.max(shares) == pytest.approx(1.0, abs=1e-9)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from manikin.contact import ContactSchedule, Stance, StanceSequence, grasp, sole
 from manikin.contact.sequence import Phase
-from manikin.control.contact_forces import SLIDING_SPEED, pyramid_edges, sliding_edges
+from manikin.control.contact_forces import SLIDING_SPEED, edges_in_world, sliding_edges
 from manikin.wholebody.knots import phase_knots, touch_downs_at_speed
 from manikin.wholebody.targets import settled_share, settling_map
 
@@ -49,9 +49,9 @@ def test_knots_lie_closer_around_a_touch_down_at_speed():
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.0))
 def test_kinetic_friction_opposes_the_sliding_and_is_mu_times_the_normal_force(x, y, z):
     velocity = np.array([x, y, z])
-    edges = sliding_edges(SEAT, velocity, pyramid_edges(SEAT))
+    edges = sliding_edges(SEAT, velocity, edges_in_world(SEAT))
     if np.hypot(x, y) < SLIDING_SPEED:
-        assert edges is pyramid_edges(SEAT)
+        assert edges is edges_in_world(SEAT)
         return
     assert edges @ SEAT.normal == pytest.approx(np.ones(4))
     tangential = edges - SEAT.normal

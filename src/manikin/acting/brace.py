@@ -13,7 +13,7 @@ from manikin.acting.capacity import BracedForces, largest_force, share_force
 from manikin.acting.footing import Footing, Loads, Mirrored, Natural
 from manikin.body import BodyModel, Configuration
 from manikin.body.root import PELVIS as ROOT
-from manikin.contact import Contact, grasp
+from manikin.contact import Contact, FrictionModel, grasp
 from manikin.contact_planning import (
     ContactGenerator,
     ContactRules,
@@ -71,6 +71,7 @@ class BraceSettings:
         palm_room: Distance of the palms to the face [m]: the wrist of our shapes is thicker than the hand.
         samples: Of each limb.
         friction: Coulomb coefficient.
+        friction_model: Of feet and palms.
     """
 
     distances: tuple[float, ...] = (0.60, 0.52, 0.68, 0.44, 0.76, 0.36, 0.30)
@@ -82,6 +83,7 @@ class BraceSettings:
     palm_room: float = 0.02
     samples: int = 10_000
     friction: float = 0.7
+    friction_model: FrictionModel = "outer"
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +230,8 @@ class _Search:
         if hands is None:
             return None
         held = tuple(hands.values())
-        loads = Loads(self._body.mass, np.array([np.zeros(6), self._act.load(held)]))
+        both = np.array([np.zeros(6), self._act.load(held)])
+        loads = Loads(self._body.mass, both, self._settings.friction_model)
         posture, feet = self._feet(posture, loads, feet_by)
         if feet is None:
             return None
@@ -273,9 +276,10 @@ class _Search:
     ) -> Brace | None:
         """The posture, if it can exert the force, or None."""
         contacts = [*feet.values(), *hands.values()]
-        largest = largest_force(self._body, q, contacts, self._act, self._settings.friction)
+        rub = self._settings.friction, self._settings.friction_model
+        largest = largest_force(self._body, q, contacts, self._act, *rub)
         self._strongest = max(self._strongest, 0.0 if largest is None else largest.force)
-        forces = share_force(self._body, q, contacts, self._act, self._settings.friction)
+        forces = share_force(self._body, q, contacts, self._act, *rub)
         if largest is None or forces is None or forces.torque_share > self._settings.torque_share:
             joint = "friction" if forces is None else forces.tightest
             self._reasons[_STRENGTH][f"{joint} is too weak"] += 1

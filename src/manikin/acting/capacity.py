@@ -1,28 +1,28 @@
 """What a posture can exert on an object: linear programs of the whole body at rest.
 
     max F   over the forces of feet and hands and F
-    s.t.    g(q) = tau + sum J^T f,   |tau| <= tau_max,   feet and pressing hands inside their friction
-            pyramids,   sum of the forces on the hands = -F d
+    s.t.    g(q) = tau + sum J^T f,   tau_min <= tau <= tau_max,   feet and pressing hands inside their
+            friction pyramids,   sum of the forces on the hands = -F d
 
 This knows nothing of how the posture was found; its points are those of the contacts, each on the
-segment that carries it, so that a load on the tip of a sole is paid for by the toes.
+segment that carries it, so that a load on the tip of a sole is paid for by the toes. The pyramids are those
+of the friction model that is asked for, and never hold more than the circular cone: with ``outer`` they
+are those of ``cone``.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linprog
 
 from manikin.acting.act import HANDS, Act, ActKind
+from manikin.balance.friction import pyramid_edges
 from manikin.body import BodyModel, Configuration
 from manikin.body.limb import carrying_segment
-from manikin.contact import Contact, ContactKind
+from manikin.contact import Contact, ContactKind, FrictionModel
 from manikin.errors import InputError
 from manikin.spatial import FloatArray
-
-SIDES = 8
-"""Of the pyramid inside the friction cone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,12 @@ PALM_RESERVE = 0.75
 
 
 def largest_force(
-    body: BodyModel, q: FloatArray, contacts: Sequence[Contact], act: Act, friction: float = 0.7
+    body: BodyModel,
+    q: FloatArray,
+    contacts: Sequence[Contact],
+    act: Act,
+    friction: float = 0.7,
+    friction_model: FrictionModel = "outer",
 ) -> BracedForces | None:
     """The largest force that a posture can exert, or None where it cannot even stand.
 
@@ -62,12 +67,18 @@ def largest_force(
         contacts: Of feet and hands.
         act: Where to; its force does not count.
         friction: Coulomb coefficient of pressing palms.
+        friction_model: Of feet and palms.
     """
-    return _Program(body, q, contacts, act, friction).largest()
+    return _Program(body, q, contacts, act, friction, friction_model).largest()
 
 
 def share_force(
-    body: BodyModel, q: FloatArray, contacts: Sequence[Contact], act: Act, friction: float = 0.7
+    body: BodyModel,
+    q: FloatArray,
+    contacts: Sequence[Contact],
+    act: Act,
+    friction: float = 0.7,
+    friction_model: FrictionModel = "outer",
 ) -> BracedForces | None:
     """The act's force with the smallest share of any joint's strength, or None where friction forbids it.
 
@@ -79,19 +90,27 @@ def share_force(
         contacts: Of feet and hands.
         act: Where to and how hard.
         friction: Coulomb coefficient of pressing palms.
+        friction_model: Of feet and palms.
     """
-    return _Program(body, q, contacts, act, PALM_RESERVE * friction).shared()
+    return _Program(body, q, contacts, act, PALM_RESERVE * friction, friction_model).shared()
 
 
 class _Program:
     """Variables: multipliers of the contacts' force directions, then ``F``, then the torque share."""
 
     def __init__(
-        self, body: BodyModel, q: FloatArray, contacts: Sequence[Contact], act: Act, friction: float
+        self,
+        body: BodyModel,
+        q: FloatArray,
+        contacts: Sequence[Contact],
+        act: Act,
+        friction: float,
+        friction_model: FrictionModel,
     ) -> None:
         self._body, self._act = body, act
         state = Configuration(body, q)
-        parts = [_generators(state, contact, act, friction) for contact in contacts]
+        inside: FrictionModel = "cone" if friction_model == "outer" else friction_model
+        parts = [_generators(state, contact, act, friction, inside) for contact in contacts]
         self._wrenches = np.hstack([wrenches for _, wrenches, _ in parts])
         self._maps = np.hstack([maps for maps, _, _ in parts])
         self._limits = [limit for _, _, limits in parts for limit in limits]
@@ -108,15 +127,16 @@ class _Program:
     def _solve(
         self, cost: FloatArray, force: tuple[float, float | None], share: tuple[float, float | None]
     ) -> BracedForces | None:
-        count, limit = self._maps.shape[1], self._body.torque_limit
+        count, body = self._maps.shape[1], self._body
         zeros = np.zeros((6, 2))
         on_hands = self._wrenches[:3] * self._on_hands
         equal = np.vstack([
             np.hstack([self._maps[:6], zeros]),
             np.hstack([on_hands, self._act.direction[:, None], np.zeros((3, 1))]),
         ])  # fmt: skip
-        joints = np.hstack([self._maps[6:], np.zeros((len(limit), 1))])
-        below = np.vstack([np.hstack([-joints, -limit[:, None]]), np.hstack([joints, -limit[:, None]])])
+        joints = np.hstack([self._maps[6:], np.zeros((len(body.torque_upper), 1))])
+        most, least = body.torque_upper[:, None], body.torque_lower[:, None]
+        below = np.vstack([np.hstack([-joints, -most]), np.hstack([joints, least])])
         found = linprog(
             np.concatenate([np.zeros(count), cost]),
             A_ub=below, b_ub=np.concatenate([-self._bias[6:], self._bias[6:]]),
@@ -134,7 +154,7 @@ class _Program:
     def _forces(self, x: FloatArray) -> BracedForces:
         multipliers = x[:-2]
         needed = self._bias - self._maps @ multipliers
-        shares = np.abs(needed[6:]) / self._body.torque_limit
+        shares = self._body.torque_share(needed[6:])
         worst = int(np.argmax(shares))
         forces = [
             self._wrenches[:, self._owner == k] @ multipliers[self._owner == k]
@@ -147,13 +167,15 @@ class _Program:
 
 
 def _generators(
-    state: Configuration, contact: Contact, act: Act, friction: float
+    state: Configuration, contact: Contact, act: Act, friction: float, model: FrictionModel
 ) -> tuple[FloatArray, FloatArray, list[tuple[float | None, float | None]]]:
     """Generalised forces (nv, g), wrenches about the contact (6, g) and bounds of what a contact can do."""
     body = state.body
     hand = contact.effector in HANDS
     free = contact.kind is ContactKind.GRASP and not (hand and act.kind is ActKind.PUSH)
-    directions = np.eye(3) if free else _edges(contact, friction if hand else contact.friction)
+    rubbing = replace(contact, friction=friction) if hand else contact
+    edges = pyramid_edges(rubbing, model) @ contact.rotation_contact_to_world.T
+    directions = np.eye(3) if free else edges.T
     limit = contact.max_force if contact.kind is ContactKind.GRASP else None
     maps, wrenches = [], []
     for local in np.atleast_2d(contact.points):
@@ -169,10 +191,3 @@ def _generators(
     low = None if limit is None else -limit
     bounds = [(low, limit) if free else (0.0, limit)] * count
     return np.hstack(maps), np.hstack(wrenches), bounds
-
-
-def _edges(contact: Contact, friction: float) -> FloatArray:
-    """(3, SIDES) edges of the pyramid inside the friction cone, with unit normal force."""
-    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    local = np.column_stack([friction * np.cos(turns), friction * np.sin(turns), np.ones(SIDES)])
-    return contact.rotation_contact_to_world @ local.T

@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from manikin.balance import pseudo_wrench, wrench_polytope
-from manikin.contact import Contact, Stance, default_normal_force_cap
+from manikin.balance import pseudo_wrench, stability_margins, wrench_polytopes
+from manikin.contact import Contact, ContactModel, FrictionModel, Stance
 from manikin.contact_planning import Candidates, ContactRules, Situation
 from manikin.contact_planning.by_place import contact_at, score_by_place
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.spatial import GRAVITY, FloatArray, wrench_about
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,18 +18,29 @@ class Loads:
     Attributes:
         mass: Of the body [kg].
         wrenches: (k, 6) force and moment about the world origin on the hands [N, N.m], of each load.
+        friction_model: Of the feet.
     """
 
     mass: float
     wrenches: FloatArray
+    friction_model: FrictionModel = "outer"
 
     def margins(self, feet: list[Contact], places: FloatArray) -> FloatArray:
-        """(n,) least margin of all loads at each place (n, 3) of the centre of mass [N.m]."""
+        """(n,) least margin about the CoM of all loads at each place (n, 3) of it [N.m]."""
         if any(self._slides(feet, load) for load in self.wrenches):
             return np.full(len(places), -np.inf)
-        polytope = wrench_polytope(Stance(feet, default_normal_force_cap(self.mass)))
+        model = ContactModel.of_body(self.mass, self.friction_model)
+        (polytope,) = wrench_polytopes([Stance(feet, model=model)])
         weight = pseudo_wrench(self.mass, places, np.zeros(3))
-        return np.min([polytope.margin(weight - load) for load in self.wrenches], axis=0)
+        return np.min(
+            [
+                stability_margins(
+                    polytope, wrench_about(weight - load, polytope.reference), places
+                ).wrench_about_com
+                for load in self.wrenches
+            ],
+            axis=0,
+        )
 
     def _slides(self, feet: list[Contact], load: FloatArray) -> bool:
         """Whether feet on parallel surfaces slide under a load, wherever the centre of mass is."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from manikin.acting.act import HANDS, Act, ActKind
 from manikin.acting.capacity import BracedForces
-from manikin.balance import wrench_polytope
+from manikin.balance import motion_margin
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.control import ForceWish
 from manikin.motion import Motion
@@ -182,11 +182,12 @@ def _palm_friction(
 
 
 def _feet_margin(motion: Motion, stance: Stance, rows: NDArray[np.bool_], mass: float) -> FloatArray:
-    """(n,) margin of the wrenches of the feet in the polytope of the feet alone [N.m]."""
+    """(n,) margin about the CoM of the wrenches of the feet in the polytope of the feet alone [N.m]."""
     feet = [contact for contact in stance if contact.kind is ContactKind.SOLE]
     total = np.zeros((int(np.sum(rows)), 6))
     for contact in feet:
         wrench = motion.contact_force[rows][:, motion.contact_names.index(contact.effector)]
         total += wrench
         total[:, 3:] += np.cross(contact.position, wrench[:, :3])
-    return wrench_polytope(stance.with_contacts(feet).bounded(mass)).margin(total)
+    held = stance.with_contacts(feet).bounded(mass)
+    return motion_margin([held], np.zeros(len(total)), total, motion.com[rows]).margin

@@ -69,7 +69,7 @@ class Analysis(Displayed):
         """What a reader wants to know first."""
         return {
             "name": self.name, "duration": f"{self.motion.duration:.2f} s", "rate": f"{self.rate:g} Hz",
-            "stature": f"{self.body.stature or 0.0:.2f} m", "mass": f"{self.body.mass:.1f} kg",
+            "stature": f"{self.body.stature or 0.0:.2f} m", "mass": f"{self.body.own_mass:.1f} kg",
         }  # fmt: skip
 
     @property
@@ -154,7 +154,8 @@ class Analysis(Displayed):
             "frames": len(self.time),
             "rate_hz": self.rate,
             "stature_m": self.body.stature,
-            "mass_kg": self.body.mass,
+            "mass_kg": self.body.own_mass,
+            "load_kg": sum(self.body.loads.values()),
             "sex": self.sex,
             "supports": [
                 {

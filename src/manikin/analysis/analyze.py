@@ -13,6 +13,7 @@ from manikin.analysis.remarks import remarks_on
 from manikin.analysis.walking import walked_segments
 from manikin.balance.zmp_path import LEAST_LOAD
 from manikin.body.further_contacts import with_knees_and_elbows
+from manikin.body.load import HANDS, carrying
 from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, upright_neck
 from manikin.errors import BodyError, InputError
 from manikin.mocap.markers import MarkerRecording
@@ -50,7 +51,8 @@ class AnalysisOptions:
         mass: Of the person [kg]; None for the file's, that by the plates, or a usual one.
         sex: Table of segment masses, ``"male"`` or ``"female"``.
         friction: Of soles on the ground.
-        load: Carried in the hands [kg], for RULA and REBA.
+        load: Carried in the hands [kg]: part of the masses, and of RULA and REBA.
+        load_hand: ``"left"``, ``"right"`` or ``"both"``.
         as_recorded: Whether no shifted motion is looked for, to stand beside the recorded one.
     """
 
@@ -59,6 +61,7 @@ class AnalysisOptions:
     sex: str = "male"
     friction: float = FRICTION
     load: float = 0.0
+    load_hand: str = "both"
     as_recorded: bool = False
 
     def __post_init__(self) -> None:
@@ -68,6 +71,8 @@ class AnalysisOptions:
             raise InputError(f"sex is {self.sex!r}; valid: {', '.join(SEXES)}")
         finite_number(self.friction, "friction", above=0.0)
         finite_number(self.load, "load [kg]", at_least=0.0)
+        if self.load_hand not in HANDS:
+            raise InputError(f"hand of the load is {self.load_hand!r}; valid: {', '.join(HANDS)}")
 
 
 def analyze_file(path: str | Path, options: AnalysisOptions | None = None) -> Analysis:
@@ -119,6 +124,7 @@ def analyze(
     if isinstance(recording, MarkerRecording):
         start, plates = recording.start, recording.plates
     found = reconstruct(recording, sex=given.sex, mass=given.mass)
+    found = replace(found, body=carrying(found.body, given.load, given.load_hand))
     if len(found.time) < FEWEST_FRAMES:
         raise InputError(
             f"recording {recording.name!r} shows the person in {len(found.time)} frame(s); "
@@ -132,7 +138,7 @@ def analyze(
     dynamics = dynamics_of(found, touch_downs=touch_downs)
     mass = measured_mass(plates, dynamics, schedule, supports.start)
     told = given.mass is not None or (isinstance(recording, MarkerRecording) and recording.subject.mass)
-    if mass is not None and not told and (weighed := _weighed(found, mass)) is not None:
+    if mass is not None and not told and (weighed := _weighed(found, mass - given.load)) is not None:
         found = weighed
         schedule = recorded_schedule(found, supports, friction=given.friction)
         dynamics = dynamics_of(found, touch_downs=touch_downs)

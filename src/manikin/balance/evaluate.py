@@ -46,11 +46,11 @@ class BalanceReport(Displayed):
         W: The wrench polytope.
         wrench: (6,) pseudo-wrench about ``W.reference`` [N, N.m].
         balanced: Whether the wrench is in W_p (to a rounding of 1e-9 of its size).
-        margin: Ms3 about ``W.reference``, alpha = 1 m [N.m].
-        margin_about_com: Ms3 about the CoM [N.m].
-        force_margin: Ms1 [N].
+        margin: Ms3 about the CoM, alpha = 1 m: the same wherever the scene stands [N.m].
+        margin_about_reference: Ms3 about ``W.reference``, as the tables of [Qiu2012]_ have it [N.m].
+        force_margin: Ms1, the smallest force at the CoM that ends balance [N].
         moment_margin: Ms2 [N.m].
-        limiting: The nearest facet of W_p, in words.
+        limiting: The facet of W_p that gives the margin, in words.
         force_space: F_p at the CoM.
         moment_space: T_p at the pseudo-force.
         support_polygon: (k, 2) [m].
@@ -66,7 +66,7 @@ class BalanceReport(Displayed):
     wrench: FloatArray
     balanced: bool
     margin: float
-    margin_about_com: float
+    margin_about_reference: float
     force_margin: float
     moment_margin: float
     limiting: LimitingConstraint
@@ -83,7 +83,7 @@ class BalanceReport(Displayed):
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
         return {
-            "balanced": str(self.balanced), "margin_about_com": f"{self.margin_about_com:.1f} N.m",
+            "balanced": str(self.balanced), "margin": f"{self.margin:.1f} N.m",
             "force_margin": f"{self.force_margin:.0f} N", "limiting": self.limiting.description,
         }  # fmt: skip
 
@@ -92,7 +92,8 @@ class BalanceReport(Displayed):
         report: dict[str, Any] = {
             "balanced": self.balanced,
             "margin_Nm": _number(self.margin),
-            "margin_about_com_Nm": _number(self.margin_about_com),
+            "margin_about_com_Nm": _number(self.margin),
+            "margin_about_reference_Nm": _number(self.margin_about_reference),
             "force_margin_N": _number(self.force_margin),
             "moment_margin_Nm": _number(self.moment_margin),
             "limiting": {
@@ -161,11 +162,11 @@ def evaluate_balance(
         W=W,
         wrench=wrench,
         balanced=bool(margins.wrench >= -1e-9 * max(1.0, float(np.abs(W.h).max()))),
-        margin=float(margins.wrench),
-        margin_about_com=float(margins.wrench_about_com),
+        margin=float(margins.wrench_about_com),
+        margin_about_reference=float(margins.wrench),
         force_margin=float(margins.force),
         moment_margin=float(margins.moment),
-        limiting=W.limiting(wrench),
+        limiting=W.limiting(wrench, x),
         force_space=force_space(W, x),
         moment_space=moment_space(W, wrench[:3]),
         support_polygon=polygon,

@@ -66,8 +66,10 @@ class LimitingConstraint:
     shares: tuple[LimitShare, ...]
 
 
-def limiting_constraint(W: WrenchPolytope, wrench: ArrayLike) -> LimitingConstraint:
-    """Explain the facet of W_p with the smallest distance to a wrench.
+def limiting_constraint(
+    W: WrenchPolytope, wrench: ArrayLike, about: ArrayLike | None = None
+) -> LimitingConstraint:
+    """Explain the facet of W_p that gives the margin of a wrench.
 
     The facet's normal is a combination, with multipliers >= 0, of the limits met on it
     (linear-programming duality); the multiplier of a limit is how much the margin grows
@@ -77,11 +79,16 @@ def limiting_constraint(W: WrenchPolytope, wrench: ArrayLike) -> LimitingConstra
     Args:
         W: The polytope.
         wrench: (6,) about ``W.reference``.
+        about: (3,) point of the margin's moments, in general the CoM [m]; ``W.reference`` when omitted.
 
     Raises:
         ContactError: If the wrench is not six finite numbers.
     """
     w = frozen_array(wrench, "wrench", (6,), ContactError)
+    if about is not None:
+        point = frozen_array(about, "point of the moments [m]", (3,), ContactError)
+        moment = w[3:] - np.cross(point - W.reference, w[:3])
+        return limiting_constraint(W.at_reference(point), np.concatenate([w[:3], moment]))
     distances = W.distances(w)
     row = int(np.argmin(distances))
     shares = facet_shares(W, row)

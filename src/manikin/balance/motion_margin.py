@@ -16,7 +16,7 @@ from manikin.balance.wrench import WrenchPolytope, wrench_polytopes
 from manikin.balance.zmp_path import LEAST_LOAD
 from manikin.contact import Stance
 from manikin.errors import InputError
-from manikin.spatial import FloatArray, cross
+from manikin.spatial import FloatArray, wrench_about
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +109,6 @@ def _zmp_distances(stance: Stance, wrench: FloatArray) -> FloatArray:
         return np.full(len(wrench), np.nan)
     pressing = wrench[:, :3] @ plane.rotation_plane_to_world[:, 2]
     return np.where(pressing < LEAST_LOAD, np.nan, plane.zmp_distance(wrench))
-
-
-def wrench_about(wrench: FloatArray, point: FloatArray) -> FloatArray:
-    """(..., 6) wrenches about the world origin with moments about another point (..., 3) [N, N.m]."""
-    force = wrench[..., :3]
-    return np.concatenate([force, wrench[..., 3:] - cross(point, force)], axis=-1)
 
 
 def _series(

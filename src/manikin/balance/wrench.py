@@ -83,13 +83,15 @@ class WrenchPolytope(Displayed, Polytope):
         H = _moved(self.H, self.reference, point)
         return WrenchPolytope(H, self.h, self.stance, point, self.stance_cap_multipliers)
 
-    def limiting(self, wrench: ArrayLike) -> LimitingConstraint:
-        """Name the contact and the limit that the nearest facet of W_p stands for.
+    def limiting(self, wrench: ArrayLike, about: ArrayLike | None = None) -> LimitingConstraint:
+        """Name the contact and the limit that the facet of W_p with the margin stands for.
 
         Args:
             wrench: (6,) pseudo-wrench about :attr:`reference`.
+            about: (3,) point of the margin's moments, in general the CoM [m]; :attr:`reference` when
+                omitted.
         """
-        return limiting_constraint(self, wrench)
+        return limiting_constraint(self, wrench, about)
 
 
 def pseudo_wrench(

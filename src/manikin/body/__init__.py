@@ -17,6 +17,7 @@ from manikin.body.joint_volume import JointVolume, volume_of
 from manikin.body.kudoh import kudoh
 from manikin.body.limb_kinematics import EffectorPlacements, LimbKinematics
 from manikin.body.limbs import are_mirrored, limb_named, limb_placement, limbs_of
+from manikin.body.load import carrying
 from manikin.body.model import BodyModel
 from manikin.body.natural_range import NaturalRange
 from manikin.body.point_mass import point_mass
@@ -43,6 +44,7 @@ __all__ = [
     "ShapeKind",
     "are_mirrored",
     "body_from_signature",
+    "carrying",
     "creature_from_urdf",
     "difference",
     "human",

@@ -185,7 +185,9 @@ class _Tree:
         if joint is None:
             return ()
         axis = _tidy(self.members[name].rotation @ joint.axis)
-        return (Hinge(joint.name, axis, joint.lower, joint.upper, joint.velocity, joint.effort),)
+        return (
+            Hinge(joint.name, axis, joint.lower, joint.upper, joint.velocity, -joint.effort, joint.effort),
+        )
 
     def _fold(self, hinges: dict[str, tuple[Hinge, ...]], parents: dict[str, str | None]) -> None:
         """Give the hinges of massless segments to their only child at the same place."""

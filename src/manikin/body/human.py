@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,7 @@ from manikin.body.anthropometry import (
     TOES_MASS_SHARE,
     Anthropometry,
 )
+from manikin.body.load import HANDS, carrying
 from manikin.body.model import OFF_AXIS, BodyModel
 from manikin.body.off_axis import off_axis
 from manikin.body.parts import (
@@ -31,6 +32,7 @@ from manikin.body.parts import (
 )
 from manikin.body.range_of_motion import HUMAN_HINGES, human_hinges
 from manikin.body.segments import Effector, Segment, Shape, ShapeKind
+from manikin.body.strength import DEFAULT_AGE, check_strength, hinge_strength
 from manikin.errors import BodyError
 from manikin.spatial import FloatArray, skew
 
@@ -63,6 +65,8 @@ def human(
     mass: float = 79.0,
     sex: str = "male",
     *,
+    age: float = DEFAULT_AGE,
+    strength: float = 1.0,
     sole_length: float | None = None,
     sole_width: float | None = None,
     lengths: Mapping[str, float] | None = None,
@@ -73,7 +77,7 @@ def human(
     The free pelvis carries the legs and the spine (lumbar, thorax, neck, 3 hinges each; the
     head is rigid on the neck). Shoulders and hips have 3 hinges, elbows, wrists, knees and
     ankles 2, toes 1. Proportions and inertias: :mod:`manikin.body.anthropometry`; axes, ranges
-    and strengths: :mod:`manikin.body.range_of_motion`.
+    and speeds: :mod:`manikin.body.range_of_motion`; strengths: :mod:`manikin.body.strength`.
 
     In the zero posture the body stands upright with hanging arms, palms inward, and all
     segment frames parallel to the world. A segment's frame lies in its proximal joint, the
@@ -97,6 +101,8 @@ def human(
         stature: Sole to vertex [m], 1.40 to 2.10.
         mass: Body mass [kg], 35 to 160, with a body mass index of 10 to 60 kg/m^2.
         sex: ``"male"`` or ``"female"``.
+        age: 18 to 90 [years]; strength depends on it, nothing else.
+        strength: Torque limits relative to those of a healthy adult of that sex, size and age.
         sole_length: Length of the sole [m], 0.15 to 0.40; None for 0.16 of the stature.
         sole_width: Width of the sole [m], 0.05 to 0.16; None for 0.12/1.75 of the stature.
         lengths: Measured lengths [m] instead of scaled ones, by the names of
@@ -111,7 +117,8 @@ def human(
     size = Anthropometry(
         stature, mass, sex, sole_length=sole_length, sole_width=sole_width, lengths=lengths
     )  # fmt: skip
-    builder = _HumanBuilder(size, off_axis_masses)
+    check_strength(age, strength)
+    builder = _HumanBuilder(size, off_axis_masses, age, strength)
     return BodyModel(
         name="human",
         segments=builder.segments(),
@@ -124,6 +131,8 @@ def human(
         sole_width=size.sole_width,
         nominal_mass=size.mass,
         limbs=arms_and_legs(("upper_arm", "forearm", "hand"), ("thigh", "leg", "foot")),
+        age=age,
+        strength=strength,
         lengths=size.lengths,
         off_axis_masses=off_axis_masses,
     )
@@ -149,7 +158,13 @@ def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
     masses = signature.get("masses")
     if masses not in (None, OFF_AXIS):
         raise BodyError(f"body masses are {masses!r}; valid: {OFF_AXIS}, or none")
-    return human(**values, lengths=measured, off_axis_masses=masses == OFF_AXIS)
+    values |= {key: signature[key] for key in ("age", "strength") if key in signature}
+    body = human(**values, lengths=measured, off_axis_masses=masses == OFF_AXIS)
+    for hand, effectors in HANDS.items():
+        load = signature.get(f"{effectors[0]}_load")
+        if len(effectors) == 1 and load is not None:
+            body = carrying(body, cast("float", load), hand)
+    return body
 
 
 def standing_angles() -> dict[str, float]:
@@ -193,10 +208,12 @@ class _Inertia:
 
 
 class _HumanBuilder:
-    """Turns dimensions into segments; the only state is the dimensions."""
+    """Turns dimensions into segments; the only state is the dimensions and the strength."""
 
-    def __init__(self, size: Anthropometry, off_axis_masses: bool) -> None:
+    def __init__(self, size: Anthropometry, off_axis_masses: bool, age: float, strength: float) -> None:
         self.size = size
+        self.age = age
+        self.strength = strength
         self.off_axis_masses = off_axis_masses
         self.stature = size.stature
         self.girth = size.girth
@@ -221,6 +238,11 @@ class _HumanBuilder:
             palm = np.array([0.0, -sign * 0.5 * self._hand_thickness, -0.8 * size.knuckle_distance])
             found.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
         return found
+
+    def _strength(self, hinge: str) -> tuple[float, float]:
+        size = self.size
+        against, along = hinge_strength(hinge, size.mass, size.stature, str(size.sex), self.age)
+        return self.strength * against, self.strength * along
 
     # --- trunk -----------------------------------------------------------------------------
 
@@ -273,7 +295,7 @@ class _HumanBuilder:
         """Trunk part whose origin is its lower border; the table measures from the upper one."""
         size = self.size
         com = self._com(row, size.length(row) - size.com_from_start(row))
-        hinges = human_hinges(name, "", size.mass * size.stature) if parent else ()
+        hinges = human_hinges(name, "", self._strength) if parent else ()
         origin = np.array([0.0, 0.0, height])
         return Segment(
             name, parent, origin, hinges, size.segment_mass(row), com, np.diag(size.moments(row)), shapes
@@ -291,7 +313,7 @@ class _HumanBuilder:
         neck_moments = cylinder_inertia(neck_mass, NECK_RADIUS * self.stature, neck_length)
         neck = _Inertia(neck_mass, self._com("head_and_neck", 0.5 * neck_length), neck_moments)
         head = both.without(neck)
-        hinges = human_hinges("neck", "", size.mass * size.stature)
+        hinges = human_hinges("neck", "", self._strength)
         base = np.array([0.0, 0.0, size.length("upper_trunk")])
         top = np.array([0.0, 0.0, neck_length])
         radius = 0.034 * self.stature
@@ -389,14 +411,13 @@ class _HumanBuilder:
         toe_centre = (0.5 * (tip - hinge_x), 0.0, 0.0)
         foot_box = np.array([hinge_x - heel, size.sole_width, foot_height])
         foot_centre = (0.5 * (heel + hinge_x), 0.0, 0.5 * foot_height - size.ankle_height)
-        strength = size.mass * size.stature
         return [
             Segment(
-                f"{side}_foot", f"{side}_leg", np.array(ankle), human_hinges("foot", side, strength),
+                f"{side}_foot", f"{side}_leg", np.array(ankle), human_hinges("foot", side, self._strength),
                 foot.mass, foot.com, foot.moments, (Shape("sole", ShapeKind.BOX, foot_box, foot_centre),),
             ),
             Segment(
-                f"{side}_toes", f"{side}_foot", hinge, human_hinges("toes", side, strength),
+                f"{side}_toes", f"{side}_foot", hinge, human_hinges("toes", side, self._strength),
                 toes.mass, toe_com - hinge, toes.moments,
                 (Shape("sole", ShapeKind.BOX, toe_box, toe_centre),),
             ),
@@ -421,7 +442,7 @@ class _HumanBuilder:
         sagittal, transverse, longitudinal = size.moments(row)
         x, y = (transverse, sagittal) if sideways else (sagittal, transverse)
         return Segment(
-            f"{side}_{name}", parent, np.array(origin), human_hinges(name, side, size.mass * size.stature),
+            f"{side}_{name}", parent, np.array(origin), human_hinges(name, side, self._strength),
             size.segment_mass(row), self._com(row, -size.com_from_start(row), side),
             np.diag([x, y, longitudinal]), shapes,
         )  # fmt: skip

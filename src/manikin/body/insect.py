@@ -103,7 +103,7 @@ def _hinges(name: str, part: str, sign: float, strength: float) -> tuple[Hinge, 
     return tuple(
         Hinge(
             f"{name}_{joint}", reflection * np.array(axis), float(np.deg2rad(lower)),
-            float(np.deg2rad(upper)), _SPEED, torque * strength,
+            float(np.deg2rad(upper)), _SPEED, -torque * strength, torque * strength,
         )
         for joint, axis, lower, upper, torque in _HINGES[part]
     )  # fmt: skip

@@ -3,9 +3,10 @@
 Masses, lengths and the widths of shoulders and hips are printed ([Kudoh2002]_ Table 3.1 and 3.2), and so
 is which joints are pins and which are balls. All else is ours: inertias are those of cylinders of the
 density of water (3.2 says "approximation cylinder" and no radius), the foot stands on a sole as long as
-itself, and axes, ranges, speeds and strengths are those of :mod:`manikin.body.range_of_motion`, carried by
-the joints that this body has: the waist bends as far as lumbar and thorax together and is as strong as the
-lumbar, the wrist turns as the forearm does, and the ankle as the shank.
+itself, and axes, ranges and speeds are those of :mod:`manikin.body.range_of_motion`, carried by
+the joints that this body has: the waist bends as far as lumbar and thorax together, the wrist turns as the
+forearm does, and the ankle as the shank. The thesis prints no torque limits (2.31-2.33 name them only);
+:data:`TORQUES` are ours, symmetric, and larger than people's, so that its printed pushes can be held.
 """
 
 from collections.abc import Mapping
@@ -86,6 +87,21 @@ _LEGS = ("thigh", "shank", "foot")
 _SIDES = (("left", 1.0), ("right", -1.0))
 
 
+TORQUES: Mapping[str, float] = MappingProxyType({
+    "lumbar_flexion": 350, "lumbar_side_bend": 250, "lumbar_rotation": 150,
+    "thorax_flexion": 250, "thorax_side_bend": 180, "thorax_rotation": 120,
+    "neck_flexion": 60, "neck_side_bend": 50, "neck_rotation": 30,
+    "shoulder_flexion": 110, "shoulder_abduction": 100, "shoulder_rotation": 60,
+    "elbow_flexion": 80, "forearm_pronation": 20, "wrist_flexion": 20, "wrist_radial_deviation": 20,
+    "hip_flexion": 260, "hip_abduction": 200, "hip_rotation": 100,
+    "knee_flexion": 260, "knee_rotation": 80, "ankle_dorsiflexion": 200, "ankle_inversion": 80,
+})  # fmt: skip
+"""Largest torque of each hinge of the human either way for :data:`TORQUES_FOR` [N.m]; ours."""
+
+TORQUES_FOR = 79.0 * 1.75
+"""Mass times stature for which :data:`TORQUES` are given; they scale with it [kg.m]."""
+
+
 def kudoh() -> BodyModel:
     """Make the body of [Kudoh2002]_: 15 segments, 34 joint angles and the free loins, 70 kg.
 
@@ -110,7 +126,12 @@ def kudoh() -> BodyModel:
 
 def _hinges(segment: str, side: str = "") -> tuple[Hinge, ...]:
     """Hinges of the human's segment at this body's strength."""
-    return human_hinges(segment, side, MASS * STATURE)
+    return human_hinges(segment, side, _torques)
+
+
+def _torques(hinge: str) -> tuple[float, float]:
+    torque = TORQUES[hinge] * MASS * STATURE / TORQUES_FOR
+    return torque, torque
 
 
 def _waist() -> tuple[Hinge, ...]:

@@ -41,7 +41,8 @@ class LimbKinematics:
         slots: (k,) places of its hinges in the configuration vector.
         lower: (k,) smallest angles [rad].
         upper: (k,) largest angles [rad].
-        torque_limit: (k,) largest torques [N.m].
+        torque_lower: (k,) most negative torques [N.m].
+        torque_upper: (k,) largest torques [N.m].
         axes: (k, 3) unit axes of the hinges, each in the axes of the one before it.
         offsets: (k, 3) translations before each hinge [m].
         tip: (3,) translation from the last hinge to the effector [m]; from the limb's origin without any.
@@ -55,7 +56,8 @@ class LimbKinematics:
         self._hinges = [(name, len(body.segment(name).hinges)) for name in limb.segments]
         self.lower = frozen_array([hinge.lower for hinge in hinges], "lower")
         self.upper = frozen_array([hinge.upper for hinge in hinges], "upper")
-        self.torque_limit = frozen_array([hinge.torque_limit for hinge in hinges], "torque_limit")
+        self.torque_lower = frozen_array([hinge.torque_lower for hinge in hinges], "torque_lower")
+        self.torque_upper = frozen_array([hinge.torque_upper for hinge in hinges], "torque_upper")
         self.axes = frozen_array(np.reshape([hinge.axis for hinge in hinges], (-1, 3)), "axes")
         offsets, tip = _offsets(body, limb)
         self.offsets, self.tip = frozen_array(offsets, "offsets"), frozen_array(tip, "tip")

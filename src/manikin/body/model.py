@@ -11,6 +11,7 @@ from typing import Any
 import coal
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 import manikin.steady_boxes  # noqa: F401  (before the first distance)
 from manikin.body.segments import (
@@ -54,8 +55,12 @@ class BodyModel(Displayed):
         sole_width: Width of the sole rectangles [m], or None.
         nominal_mass: The mass that was asked for [kg]; the segments must add up to it.
         limbs: The limbs with which it makes contacts, see :mod:`manikin.body.limbs`.
+        age: Of a human [years], or None.
+        strength: Torque limits relative to those of a healthy human of that sex, size and age.
         lengths: Lengths of a human that were measured instead of scaled [m].
         off_axis_masses: Whether a human's centres of mass lie off the lines between joints.
+        loads: What each hand carries [kg], by the name of its effector; the masses are part of the hands'
+            segments, see :func:`manikin.body.load.carrying`.
     """
 
     name: str
@@ -69,8 +74,11 @@ class BodyModel(Displayed):
     sole_width: float | None = None
     nominal_mass: float | None = None
     limbs: tuple[Limb, ...] = ()
+    age: float | None = None
+    strength: float = 1.0
     lengths: Mapping[str, float] = field(default_factory=dict)
     off_axis_masses: bool = False
+    loads: Mapping[str, float] = field(default_factory=dict)
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
@@ -97,21 +105,27 @@ class BodyModel(Displayed):
         object.__setattr__(self, "effectors", MappingProxyType(dict(self.effectors)))
         object.__setattr__(self, "standing_angles", MappingProxyType(dict(self.standing_angles)))
         object.__setattr__(self, "lengths", MappingProxyType(dict(self.lengths)))
+        object.__setattr__(self, "loads", MappingProxyType(dict(self.loads)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what describes the body, for other processes; what was computed from it is left out."""
         given = {each.name: getattr(self, each.name) for each in fields(self)}
-        plain = {name: dict(given[name]) for name in ("effectors", "standing_angles", "lengths")}
+        plain = {name: dict(given[name]) for name in ("effectors", "standing_angles", "lengths", "loads")}
         return partial(BodyModel, **(given | plain)), ()
 
     # --- description ---------------------------------------------------------------------
 
     @cached_property
     def mass(self) -> float:
-        """Total mass [kg]."""
+        """Total mass, with what the hands carry [kg]."""
         if self.nominal_mass is not None:
             return self.nominal_mass
         return fsum(segment.mass for segment in self.segments)
+
+    @property
+    def own_mass(self) -> float:
+        """Mass without what the hands carry [kg]."""
+        return self.mass - fsum(self.loads.values())
 
     @cached_property
     def hinges(self) -> tuple[Hinge, ...]:
@@ -154,9 +168,26 @@ class BodyModel(Displayed):
         return frozen_array([hinge.velocity_limit for hinge in self.hinges], "velocity_limit")
 
     @cached_property
-    def torque_limit(self) -> FloatArray:
+    def torque_lower(self) -> FloatArray:
+        """(nv - 6,) most negative hinge torques [N.m]."""
+        return frozen_array([hinge.torque_lower for hinge in self.hinges], "torque_lower")
+
+    @cached_property
+    def torque_upper(self) -> FloatArray:
         """(nv - 6,) largest hinge torques [N.m]."""
-        return frozen_array([hinge.torque_limit for hinge in self.hinges], "torque_limit")
+        return frozen_array([hinge.torque_upper for hinge in self.hinges], "torque_upper")
+
+    def torque_share(self, torque: ArrayLike) -> FloatArray:
+        """Share of the strength that torques take, each of the limit in its own direction.
+
+        Args:
+            torque: (..., nv - 6) hinge torques [N.m].
+
+        Returns:
+            (..., nv - 6), at least 0; 1 at a limit.
+        """
+        given = np.asarray(torque, dtype=np.float64)
+        return np.maximum(given / self.torque_upper, given / self.torque_lower)
 
     @cached_property
     def _segment_index(self) -> Mapping[str, Segment]:
@@ -294,12 +325,14 @@ class BodyModel(Displayed):
     # --- as plain values -------------------------------------------------------------------
 
     def signature(self) -> dict[str, str | float]:
-        """What a file must keep to build this body again: name, stature, mass, sex, sole, lengths."""
+        """What a file must keep to build this body again: its name and the arguments of its maker."""
         values = {
-            "model": self.name, "stature": self.stature, "mass": self.mass, "sex": self.sex,
+            "model": self.name, "stature": self.stature, "mass": self.own_mass, "sex": self.sex,
             "sole_length": self.sole_length, "sole_width": self.sole_width,
         }  # fmt: skip
+        values |= {"age": self.age} | ({} if self.strength == 1.0 else {"strength": self.strength})
         values |= {f"{name}_length": value for name, value in self.lengths.items()}
+        values |= {f"{name}_load": value for name, value in self.loads.items()}
         if self.off_axis_masses:
             values["masses"] = OFF_AXIS
         return {key: value for key, value in values.items() if value is not None}
@@ -360,9 +393,10 @@ def _add_joints(
     joint = joint_of[segment.parent]
     for hinge in segment.hinges:
         joint = model.addJoint(
-            joint, _revolute(hinge.axis), attachment, hinge.name, np.array([hinge.torque_limit]),
+            joint, _revolute(hinge.axis), attachment, hinge.name, np.array([hinge.torque_upper]),
             np.array([hinge.velocity_limit]), np.array([hinge.lower]), np.array([hinge.upper]),
         )  # fmt: skip
+        model.lowerEffortLimit[model.joints[joint].idx_v] = hinge.torque_lower
         attachment = pin.SE3.Identity()
     return joint, attachment
 

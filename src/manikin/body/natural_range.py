@@ -215,7 +215,7 @@ def _learnt_part(segment: Segment) -> str | None:
     for side in _SIDES:
         part = segment.name.removeprefix(f"{side}_")
         if part != segment.name and part in human_volumes():
-            human = human_hinges(part, side, 1.0)
+            human = human_hinges(part, side, lambda _: (1.0, 1.0))
             own = segment.hinges
             same = len(own) == len(human) and all(map(_same_hinge, own, human))
             return part if same else None

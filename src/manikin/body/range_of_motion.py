@@ -1,4 +1,4 @@
-"""Joint axes, ranges, speeds and strengths of the human body.
+"""Joint axes, ranges and speeds of the human body.
 
 Ranges follow the normal values of the American Academy of Orthopaedic Surgeons ("Joint Motion:
 Method of Measuring and Recording", 1965), Boone and Azen (J. Bone Joint Surg. 61-A, 1979) and,
@@ -6,11 +6,7 @@ for the spine, Kapandji ("The Physiology of the Joints", vol. 3). They were wide
 squat needs more than a clinician's passive test of a lying subject (our choice): knee flexion
 150 deg, ankle dorsiflexion 40 deg under body weight.
 
-Torque limits are our choice: one symmetric number per hinge, rounded up from the isometric
-strength of the stronger direction in young men (of the order of 0.16 m g H for knee and hip
-extension and 0.1-0.13 m g H for plantar flexion when normalised by body weight and stature as in
-Anderson, Madigan and Nussbaum, J. Biomech. 40, 2007), given for 79 kg and 1.75 m and scaled
-with mass times stature. There is no factor for sex, age or joint angle.
+Strengths: :mod:`manikin.body.strength`.
 
 Speed limits are our choice: round numbers above those of brisk everyday movement, below sprinting.
 
@@ -26,14 +22,15 @@ joint's hinges keeps the middle angle of every ball joint away from 90 degrees:
   of the reach, instead of straight to the side or forward.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from manikin.body.segments import Hinge
 
-REFERENCE_STRENGTH = 79.0 * 1.75
-"""Mass times stature for which the torques below are given [kg.m]."""
+HingeStrength = Callable[[str], tuple[float, float]]
+"""Largest torques of a hinge against and along its positive direction, as sizes [N.m]."""
 
 _SCAPULAR = np.deg2rad(30.0)
 _FORWARD_UP = (0.0, -1.0, 0.0)
@@ -48,7 +45,7 @@ _SHOULDER_SPREAD = (float(np.cos(_SCAPULAR)), float(np.sin(_SCAPULAR)), 0.0)
 
 @dataclass(frozen=True)
 class HingeRange:
-    """One hinge of the human for 79 kg and 1.75 m, in degrees as published.
+    """One hinge of the human, in degrees as published.
 
     Attributes:
         name: Name without the side.
@@ -56,7 +53,6 @@ class HingeRange:
         lower_deg: Smallest angle [deg].
         upper_deg: Largest angle [deg].
         speed: Velocity limit [rad/s].
-        torque: Torque limit [N.m].
     """
 
     name: str
@@ -64,66 +60,66 @@ class HingeRange:
     lower_deg: float
     upper_deg: float
     speed: float
-    torque: float
 
 
 HUMAN_HINGES: dict[str, tuple[HingeRange, ...]] = {
     "lumbar": (
-        HingeRange("lumbar_flexion", _FORWARD_DOWN, -25, 60, 6, 350),
-        HingeRange("lumbar_side_bend", _OUTWARD, -25, 25, 6, 250),
-        HingeRange("lumbar_rotation", _TURN_LEFT, -10, 10, 6, 150),
+        HingeRange("lumbar_flexion", _FORWARD_DOWN, -25, 60, 6),
+        HingeRange("lumbar_side_bend", _OUTWARD, -25, 25, 6),
+        HingeRange("lumbar_rotation", _TURN_LEFT, -10, 10, 6),
     ),
     "thorax": (
-        HingeRange("thorax_flexion", _FORWARD_DOWN, -20, 40, 6, 250),
-        HingeRange("thorax_side_bend", _OUTWARD, -20, 20, 6, 180),
-        HingeRange("thorax_rotation", _TURN_LEFT, -35, 35, 6, 120),
+        HingeRange("thorax_flexion", _FORWARD_DOWN, -20, 40, 6),
+        HingeRange("thorax_side_bend", _OUTWARD, -20, 20, 6),
+        HingeRange("thorax_rotation", _TURN_LEFT, -35, 35, 6),
     ),
     "neck": (
-        HingeRange("neck_flexion", _FORWARD_DOWN, -60, 50, 8, 60),
-        HingeRange("neck_side_bend", _OUTWARD, -45, 45, 8, 50),
-        HingeRange("neck_rotation", _TURN_LEFT, -75, 75, 8, 30),
+        HingeRange("neck_flexion", _FORWARD_DOWN, -60, 50, 8),
+        HingeRange("neck_side_bend", _OUTWARD, -45, 45, 8),
+        HingeRange("neck_rotation", _TURN_LEFT, -75, 75, 8),
     ),
     "upper_arm": (
-        HingeRange("shoulder_flexion", _SHOULDER_LIFT, -60, 180, 12, 110),
-        HingeRange("shoulder_abduction", _SHOULDER_SPREAD, -75, 80, 12, 100),
-        HingeRange("shoulder_rotation", _TURN_IN, -90, 80, 15, 60),
+        HingeRange("shoulder_flexion", _SHOULDER_LIFT, -60, 180, 12),
+        HingeRange("shoulder_abduction", _SHOULDER_SPREAD, -75, 80, 12),
+        HingeRange("shoulder_rotation", _TURN_IN, -90, 80, 15),
     ),
     "forearm": (
-        HingeRange("elbow_flexion", _FORWARD_UP, 0, 145, 15, 80),
-        HingeRange("forearm_pronation", _TURN_IN, -80, 80, 15, 20),
+        HingeRange("elbow_flexion", _FORWARD_UP, 0, 145, 15),
+        HingeRange("forearm_pronation", _TURN_IN, -80, 80, 15),
     ),
     "hand": (
-        HingeRange("wrist_flexion", _INWARD, -70, 80, 15, 20),
-        HingeRange("wrist_radial_deviation", _FORWARD_UP, -30, 20, 15, 20),
+        HingeRange("wrist_flexion", _INWARD, -70, 80, 15),
+        HingeRange("wrist_radial_deviation", _FORWARD_UP, -30, 20, 15),
     ),
     "thigh": (
-        HingeRange("hip_flexion", _FORWARD_UP, -25, 130, 10, 260),
-        HingeRange("hip_abduction", _OUTWARD, -30, 45, 10, 200),
-        HingeRange("hip_rotation", _TURN_IN, -45, 45, 10, 100),
+        HingeRange("hip_flexion", _FORWARD_UP, -25, 130, 10),
+        HingeRange("hip_abduction", _OUTWARD, -30, 45, 10),
+        HingeRange("hip_rotation", _TURN_IN, -45, 45, 10),
     ),
     "leg": (
-        HingeRange("knee_flexion", _FORWARD_DOWN, 0, 150, 14, 260),
-        HingeRange("knee_rotation", _TURN_IN, -30, 20, 10, 80),
+        HingeRange("knee_flexion", _FORWARD_DOWN, 0, 150, 14),
+        HingeRange("knee_rotation", _TURN_IN, -30, 20, 10),
     ),
     "foot": (
-        HingeRange("ankle_dorsiflexion", _FORWARD_UP, -50, 40, 12, 200),
-        HingeRange("ankle_inversion", _INWARD, -20, 35, 10, 80),
+        HingeRange("ankle_dorsiflexion", _FORWARD_UP, -50, 40, 12),
+        HingeRange("ankle_inversion", _INWARD, -20, 35, 10),
     ),
-    "toes": (HingeRange("toe_extension", _FORWARD_UP, -30, 70, 12, 50),),
+    "toes": (HingeRange("toe_extension", _FORWARD_UP, -30, 70, 12),),
 }
 """Hinges of each segment to its parent, in order; sides share one entry."""
 
 
-def human_hinges(segment: str, side: str, strength: float) -> tuple[Hinge, ...]:
+def human_hinges(segment: str, side: str, strength: HingeStrength) -> tuple[Hinge, ...]:
     """Hinges of one segment of the human.
 
     Args:
         segment: Key of :data:`HUMAN_HINGES`.
         side: ``"left"``, ``"right"`` or ``""`` for the trunk.
-        strength: Mass times stature [kg.m], which scales the torques.
+        strength: Largest torques against and along the positive direction of a hinge [N.m], both as sizes,
+            of its name without the side.
     """
-    scale = strength / REFERENCE_STRENGTH
     prefix = f"{side}_" if side else ""
+    torques = [strength(entry.name) for entry in HUMAN_HINGES[segment]]
     return tuple(
         Hinge(
             name=prefix + entry.name,
@@ -131,9 +127,10 @@ def human_hinges(segment: str, side: str, strength: float) -> tuple[Hinge, ...]:
             lower=float(np.deg2rad(entry.lower_deg)),
             upper=float(np.deg2rad(entry.upper_deg)),
             velocity_limit=entry.speed,
-            torque_limit=entry.torque * scale,
+            torque_lower=-against,
+            torque_upper=along,
         )
-        for entry in HUMAN_HINGES[segment]
+        for entry, (against, along) in zip(HUMAN_HINGES[segment], torques, strict=True)
     )
 
 

@@ -88,7 +88,8 @@ class Hinge:
         lower: Smallest angle [rad].
         upper: Largest angle [rad].
         velocity_limit: Largest speed in either direction [rad/s].
-        torque_limit: Largest torque in either direction [N.m].
+        torque_lower: Most negative torque, < 0 [N.m].
+        torque_upper: Largest torque, > 0 [N.m].
     """
 
     name: str
@@ -96,7 +97,8 @@ class Hinge:
     lower: float
     upper: float
     velocity_limit: float
-    torque_limit: float
+    torque_lower: float
+    torque_upper: float
 
     def __post_init__(self) -> None:
         where = f"hinge {self.name!r}"
@@ -108,7 +110,8 @@ class Hinge:
         lower = finite_number(self.lower, f"{where} lower [rad]", error=BodyError)
         finite_number(self.upper, f"{where} upper [rad]", above=lower, error=BodyError)
         finite_number(self.velocity_limit, f"{where} velocity_limit [rad/s]", above=0.0, error=BodyError)
-        finite_number(self.torque_limit, f"{where} torque_limit [N.m]", above=0.0, error=BodyError)
+        finite_number(-self.torque_lower, f"{where} negated torque_lower [N.m]", above=0.0, error=BodyError)
+        finite_number(self.torque_upper, f"{where} torque_upper [N.m]", above=0.0, error=BodyError)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from manikin.balance import WrenchPolytope, admissible_com_polygon, wrench_polytope
+from manikin.balance import WrenchPolytope, admissible_com_polygon, wrench_polytopes
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.contact import ContactKind, Stance
 from manikin.errors import InputError
@@ -46,7 +46,9 @@ def _slope(normal: FloatArray) -> float:
 
 
 def low_friction(
-    stances: Sequence[Stance], problem: CentroidalProblem, measure: Callable[[list[WrenchPolytope]], float]
+    stances: Sequence[Stance],
+    problem: CentroidalProblem,
+    measure: Callable[[Sequence[WrenchPolytope]], float],
 ) -> str:
     """Say that a quantity would suffice with firm friction; empty when friction is not the cause.
 
@@ -58,7 +60,7 @@ def low_friction(
     least = min((c.friction for s in stances for c in s if c.kind is not ContactKind.GRASP), default=np.inf)
     if least >= FIRM_FRICTION:
         return ""
-    firm = [wrench_polytope(_firm(s)) for s in stances]
+    firm = wrench_polytopes([_firm(s) for s in stances], reference=problem.reference)
     value = measure(firm)
     if value <= problem.required_margin:
         return ""

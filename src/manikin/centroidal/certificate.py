@@ -150,10 +150,8 @@ def facet_margins(
     """(up to 1024, facets) distances to every facet at the given times, in blocks [N.m] or [N]."""
     for start in range(0, len(times), _BLOCK):
         part = times[start : start + _BLOCK]
-        distances = polytope.distances(trajectory.pseudo_wrench(part))
-        if problem.margin_space == "force":
-            distances = distances / row_slopes(polytope, problem, trajectory.position(part))
-        yield distances
+        distances = polytope.distances(trajectory.pseudo_wrench(part, problem.reference))
+        yield distances / row_slopes(polytope, problem, trajectory.position(part))
 
 
 def measure(
@@ -164,7 +162,7 @@ def measure(
     Args:
         problem: The requirements.
         trajectory: Any trajectory through the same number of phases.
-        polytopes: W_i of the phases about the world origin.
+        polytopes: W_i of the phases about ``problem.reference``.
     """
     times = phase_times(trajectory)
     margins = phase_margins(problem, trajectory, polytopes)

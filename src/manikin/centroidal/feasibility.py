@@ -3,15 +3,14 @@
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
 
-from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytope
+from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytopes
+from manikin.balance.margin import force_levers, wrench_levers
 from manikin.centroidal.causes import low_friction, out_of_reach, slipping_slope
 from manikin.centroidal.problem import CentroidalProblem
-from manikin.contact import Stance
 from manikin.polytope import Polytope
 from manikin.spatial import GRAVITY, FloatArray, skew
 
@@ -48,8 +47,9 @@ class Feasibility:
     """Intersections of consecutive polytopes and the first thing that cannot work.
 
     Attributes:
-        radii: (phases - 1,) radius of the largest ball inside each intersection [N.m];
-            negative when the intersection is empty.
+        radii: (phases - 1,) upper bound of the margin at each key instant, see :func:`margin_bounds`; about
+            the world origin, the radius of the largest ball inside each intersection [N.m]. Negative
+            when the intersection is empty.
         failure: Why the problem has no solution, or None when that cannot be excluded.
     """
 
@@ -63,38 +63,8 @@ class Feasibility:
 
 
 def polytopes_of(problem: CentroidalProblem) -> tuple[WrenchPolytope, ...]:
-    """W_i of every phase about the world origin ([Qiu2012]_ 5.4.1; n_t polytopes for n_t phases).
-
-    A stance that is an earlier one moved elsewhere has that one's polytope, with moments about the
-    point moved along.
-    """
-    known: dict[tuple[Any, ...], tuple[FloatArray, WrenchPolytope]] = {}
-    found = []
-    for phase in problem.sequence:
-        centre = np.mean([contact.position for contact in phase.stance] or [np.zeros(3)], axis=0)
-        shape = _shape_of(phase.stance, centre)
-        if shape not in known:
-            polytope = wrench_polytope(phase.stance)
-            known[shape] = centre, polytope
-        else:
-            before, like = known[shape]
-            moved = WrenchPolytope(
-                like.H, like.h, phase.stance, like.reference + centre - before, like.stance_cap_multipliers,
-            )  # fmt: skip
-            polytope = moved.at_reference(like.reference)
-        found.append(polytope)
-    return tuple(found)
-
-
-def _shape_of(stance: Stance, centre: FloatArray) -> tuple[Any, ...]:
-    """What a wrench polytope depends on but for the place of the stance, lengths to a nanometre."""
-    contacts = []
-    for contact in stance:
-        place = np.concatenate([contact.points_in_world - centre, contact.normal[None]])
-        limits = (contact.friction, contact.normal_force_cap, contact.torsion_limit, contact.max_force)
-        numbers = tuple((np.round(place, 9) + 0.0).ravel().tolist())
-        contacts.append((str(contact.kind), numbers, *map(str, limits), contact.max_moment))
-    return (stance.model, *sorted(contacts))
+    """W_i of every phase about ``problem.reference`` ([Qiu2012]_ 5.4.1; n_t polytopes for n_t phases)."""
+    return wrench_polytopes([phase.stance for phase in problem.sequence], reference=problem.reference)
 
 
 def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
@@ -109,7 +79,39 @@ def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
     Returns:
         (n - 1,).
     """
-    return np.array([_signed_radius(a.intersection(b)) for a, b in itertools.pairwise(polytopes)])
+    return np.array([
+        _largest_distance(both, np.ones(len(both)))
+        for both in (a.intersection(b) for a, b in itertools.pairwise(polytopes))
+    ])  # fmt: skip
+
+
+def margin_bounds(polytopes: Sequence[Polytope]) -> FloatArray:
+    """Upper bound of the margin about the CoM at each key instant, wherever the CoM is (our own).
+
+    The margin at ``x`` is the least of ``d_i / hypot(|H1 + H2 x^|, |H2|)`` over the rows of both
+    polytopes. As a row is a screw, no ``x`` makes its force part shorter than the part along its moment,
+    ``|H1 . H2| / |H2|``: with these least lengths, which no choice of the moments' point changes, the
+    bound is a linear programme in the wrench. It takes the place of the largest ball of Proposition 2
+    ([Qiu2012]_ 5.4.3), which is about a fixed point. Like that one it is necessary, not sufficient.
+
+    Args:
+        polytopes: W_i of n phases, all about one point.
+
+    Returns:
+        (n - 1,) [N.m]; negative when no wrench is in both polytopes.
+    """
+    return np.array([
+        _largest_distance(both, _least_lengths(both.H))
+        for both in (a.intersection(b) for a, b in itertools.pairwise(polytopes))
+    ])  # fmt: skip
+
+
+def _least_lengths(H: FloatArray) -> FloatArray:
+    """(m,) least length of rows with moments about any point."""
+    force, moment = H[:, :3], np.linalg.norm(H[:, 3:], axis=1)
+    turning = moment > 1e-9
+    along = np.abs(np.einsum("ij,ij->i", force, H[:, 3:])) / np.where(turning, moment, 1.0)
+    return np.hypot(np.where(turning, along, np.linalg.norm(force, axis=1)), moment)
 
 
 def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Feasibility:
@@ -118,10 +120,14 @@ def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]
     Durations against their bounds, whether the legs reach the contacts of each phase, end points
     against their bounds, whether any phase lifts the weight,
     whether the friction holds the body at both ends, then emptiness of the
-    intersections (Proposition 1) and their radius against the required margin (Proposition 2), then whether
-    any acceleration balances the CoM at the start and at the goal.
+    intersections (Proposition 1) and the bound of the margin in them against the required one
+    (Proposition 2), then whether any acceleration balances the CoM at the start and at the goal.
+
+    Args:
+        problem: What to find.
+        polytopes: W_i of the phases about ``problem.reference``.
     """
-    radii = intersection_radii(polytopes)
+    radii = _bounds(problem, polytopes)
     failure = (
         _duration_failure(problem)
         or _reach_failure(problem)
@@ -134,14 +140,23 @@ def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]
     return Feasibility(radii, failure)
 
 
-def _common_radius(polytopes: Sequence[Polytope]) -> float:
-    return float(intersection_radii(polytopes).min())
+def _bounds(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> FloatArray:
+    """Upper bounds of the margin at the key instants; of forces only the sign counts."""
+    if problem.margin_space != "wrench_about_origin":
+        return margin_bounds(polytopes)
+    return intersection_radii([_about_origin(polytope, problem.reference) for polytope in polytopes])
 
 
-def _signed_radius(polytope: Polytope) -> float:
+def _about_origin(polytope: Polytope, reference: FloatArray) -> Polytope:
+    H = polytope.H
+    return Polytope(np.hstack([H[:, :3] - np.cross(H[:, 3:], reference), H[:, 3:]]), polytope.h)
+
+
+def _largest_distance(polytope: Polytope, lengths: FloatArray) -> float:
+    """Largest ``d`` with ``H x + lengths d <= h`` at some x; negative when the polytope is empty."""
     cost = np.zeros(polytope.dimension + 1)
     cost[-1] = -1.0
-    rows = np.column_stack([polytope.H, np.ones(len(polytope.h))])
+    rows = np.column_stack([polytope.H, lengths])
     found = linprog(cost, rows, polytope.h, bounds=(None, None), method="highs")
     return float(found.x[-1]) if found.success else np.inf
 
@@ -244,15 +259,15 @@ def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Fail
             return Failure(
                 "intersection",
                 f"no wrench is admissible in both of {where}: their polytopes do not meet (Proposition 1)"
-                f"{low_friction(stances, problem, _common_radius)}",
+                f"{low_friction(stances, problem, lambda firm: float(_bounds(problem, firm).min()))}",
                 index, where=where,
             )  # fmt: skip
-        if problem.margin_space == "wrench" and radius <= max(problem.required_margin, VANISHING_MARGIN):
+        if problem.margin_space != "force" and radius <= max(problem.required_margin, VANISHING_MARGIN):
             return Failure(
                 "intersection",
-                f"the margin between {where} is at most {radius:.2f} N.m, the radius of the largest ball "
-                f"in both polytopes (Proposition 2); required {problem.required_margin:.2f} N.m"
-                f"{low_friction(stances, problem, _common_radius)}",
+                f"the margin between {where} is at most {radius:.2f} N.m for any wrench in both polytopes "
+                f"(Proposition 2); required {problem.required_margin:.2f} N.m"
+                f"{low_friction(stances, problem, lambda firm: float(_bounds(problem, firm).min()))}",
                 index, where=where,
             )  # fmt: skip
     return None
@@ -290,11 +305,11 @@ def best_margin_at(
     programme.
     """
     slopes = row_slopes(polytope, problem, com)
-    still = polytope.distances(pseudo_wrench(problem.mass, com, np.zeros(3)))
+    arm = com - problem.reference
+    still = polytope.distances(pseudo_wrench(problem.mass, arm, np.zeros(3)))
+    gain = problem.mass * np.vstack([np.eye(3), skew(arm)])
     if acceleration is not None:
-        gain = problem.mass * np.vstack([np.eye(3), skew(com)])
         return float(np.min((still - polytope.H @ gain @ acceleration) / slopes))
-    gain = problem.mass * np.vstack([np.eye(3), skew(com)])
     found = linprog(
         [0.0, 0.0, 0.0, -1.0],
         np.column_stack([polytope.H @ gain, slopes]),
@@ -306,8 +321,17 @@ def best_margin_at(
 
 
 def row_slopes(polytope: Polytope, problem: CentroidalProblem, com: FloatArray) -> FloatArray:
-    """(..., m) change of each row per unit of margin: 1 for wrenches, ``|H1 + H2 p^|`` for forces."""
-    if problem.margin_space == "wrench":
-        return np.ones((*np.shape(com)[:-1], len(polytope.h)))
-    slope = polytope.H[:, :3] + np.cross(polytope.H[:, 3:], np.asarray(com)[..., None, :])
-    return np.maximum(np.linalg.norm(slope, axis=-1), 1e-12)
+    """(..., m) change of each row per unit of margin at CoM positions (..., 3).
+
+    Its length with moments about the CoM, or about the world origin; ``|H1 + H2 p^|`` for forces.
+
+    Args:
+        polytope: About ``problem.reference``.
+        problem: Says what the margin measures.
+        com: In the world [m].
+    """
+    place = np.asarray(com, dtype=np.float64)
+    point = np.zeros_like(place) if problem.margin_space == "wrench_about_origin" else place
+    arm = (point - problem.reference).reshape(-1, 3)
+    lengths = force_levers if problem.margin_space == "force" else wrench_levers
+    return np.maximum(lengths(polytope.H, arm), 1e-12).reshape(*place.shape[:-1], len(polytope.h))

@@ -58,7 +58,7 @@ def guess(
     Args:
         problem: What to find.
         style: How to guess.
-        polytopes: W_i of the phases about the world origin.
+        polytopes: W_i of the phases about ``problem.reference``.
     """
     durations = _guess_durations(problem, style.stretch, polytopes)
     instants = np.concatenate([[0.0], np.cumsum(durations)])

@@ -177,7 +177,7 @@ def build_keyframe_programme(
 
     Args:
         problem: Mass, degree, weights, margin and end conditions.
-        polytopes: W_i of the phases about the world origin.
+        polytopes: W_i of the phases about ``problem.reference``.
         schedule: Stances with their recorded instants [s].
         times: (f,) key frames, both ends among them [s].
         positions: (f, 3) CoM there [m].
@@ -283,7 +283,7 @@ def _balance_rows(
     for index, (time, position) in enumerate(zip(times, positions, strict=True)):
         for phase in phases_touching(schedule, float(time)):
             polytope = polytopes[phase]
-            gain = problem.mass * polytope.H @ np.vstack([np.eye(3), skew(position)])
+            gain = problem.mass * polytope.H @ np.vstack([np.eye(3), skew(position - problem.reference)])
             rows.append(np.einsum("i,rj->rij", second[index], gain).reshape(len(gain), -1))
             slopes.append(row_slopes(polytope, problem, position))
             bounds.append(polytope.h + gain @ gravity)

@@ -39,7 +39,7 @@ from manikin.centroidal.keyframe_spline import (
     spline_of,
 )
 from manikin.centroidal.problem import CentroidalProblem
-from manikin.centroidal.timing_free import CentroidalResult
+from manikin.centroidal.timing_free import CentroidalResult, limiting_at
 from manikin.centroidal.trajectory import CentroidalTrajectory
 from manikin.contact import ContactSchedule
 from manikin.spatial import FloatArray
@@ -210,7 +210,7 @@ class _Search:
         phase = int(programme.phases[row])
         time = float(self.problem.recording.time[frames[programme.frames[row]]])
         trajectory = self._trajectory(programme, points)
-        limit = self.polytopes[phase].limiting(trajectory.pseudo_wrench(time))
+        limit = limiting_at(requirements, trajectory, self.polytopes[phase], time)
         return Failure(
             "balance margin",
             f"no spline of degree {programme.degree} with {len(points)} control points through the "
@@ -228,8 +228,10 @@ class _Search:
         worst = certificate.largest
         if worst.requirement != "balance margin":
             return Failure(worst.requirement, f"{worst} {tried}", worst.phase, worst.time)
-        wrench = attempt.trajectory.pseudo_wrench(certificate.limiting_time)
-        limit = self.polytopes[certificate.limiting_phase].limiting(wrench)
+        polytope = self.polytopes[certificate.limiting_phase]
+        limit = limiting_at(
+            self.problem.requirements, attempt.trajectory, polytope, certificate.limiting_time
+        )
         reason = (
             f"the largest margin found is {certificate.min_margin:.2f} {unit}, limited in phase "
             f"{certificate.limiting_phase} at {certificate.limiting_time:.3f} s by {limit.description}, "

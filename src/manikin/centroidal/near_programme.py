@@ -3,7 +3,8 @@
 A recorded position is not exact, so that the one CoM that passes all of them may be out of balance where a
 person was not. Here the key frames pull instead, and balance is imposed every ten milliseconds: the
 pseudo-wrench ``m [a - g; p x (a - g)]`` ([Qiu2012]_ 4.6), bilinear in position and acceleration, is
-linearised about the last solution. Where the recorded rate of the angular momentum is known, the plan has
+linearised about the last solution; the rows' lengths, which make the margin one about the CoM, are
+those at the last solution. Where the recorded rate of the angular momentum is known, the plan has
 one too, near it, and both wrenches keep their balance: that of the point mass and that of the body which
 turns ([Qiu2012]_ 4.51). More margin than has to be kept is wished for, and what lacks of it is paid for.
 All this is our own.
@@ -18,6 +19,7 @@ import piqp
 from scipy import sparse
 
 from manikin.balance import WrenchPolytope
+from manikin.balance.margin import wrench_levers
 from manikin.centroidal.problem import Weights
 from manikin.centroidal.recording import Recording
 from manikin.contact import ContactSchedule
@@ -70,7 +72,8 @@ class NearProgramme:
 
     Attributes:
         mass: [kg].
-        polytopes: W_i of the phases about the world origin.
+        reference: (3,) point of the polytopes' moments [m].
+        polytopes: W_i of the phases about ``reference``.
         knots: On [0, 1].
         smoothness: (n, n) matrix of the objective of one axis, without the pull.
         turning: (n, n) and (n, 3) objective of the rate of the angular momentum, in :data:`TURN`; None for a
@@ -81,6 +84,7 @@ class NearProgramme:
     """
 
     mass: float
+    reference: FloatArray
     polytopes: tuple[WrenchPolytope, ...]
     knots: FloatArray
     smoothness: FloatArray
@@ -97,7 +101,7 @@ class NearProgramme:
 
         Args:
             mass: [kg].
-            polytopes: W_i of the phases about the world origin.
+            polytopes: W_i of the phases about one point.
             recording: Stances with their instants, from 0 on, and the rate of the angular momentum.
             weights: Of velocity, acceleration and jerk; the first entry of each counts for all three axes.
         """
@@ -108,7 +112,7 @@ class NearProgramme:
         times, phases = _instants(schedule)
         shares = np.minimum(times / duration, 1.0)
         return cls(
-            mass, tuple(polytopes), knots, _smoothness(knots, duration, weights),
+            mass, polytopes[0].reference, tuple(polytopes), knots, _smoothness(knots, duration, weights),
             _turning(knots, duration, recording), phases,
             basis_matrix(DEGREE, knots, shares), basis_matrix(DEGREE, knots, shares, 2) / duration**2,
         )  # fmt: skip
@@ -175,13 +179,16 @@ class NearProgramme:
         for row, phase in enumerate(self.phases):
             polytope = self.polytopes[phase]
             force, moment = self.mass * polytope.H[:, :3], self.mass * polytope.H[:, 3:]
-            p, b = self.position[row] @ near[:, :3], self.acceleration[row] @ near[:, :3] - gravity
+            p = self.position[row] @ near[:, :3] - self.reference
+            b = self.acceleration[row] @ near[:, :3] - gravity
+            length = wrench_levers(polytope.H, p[None])[0]
             by_acceleration, by_position = force + moment @ skew(p), -moment @ skew(b)
-            bound = polytope.h - margin[phase] + by_acceleration @ gravity + moment @ np.cross(p, b)
+            bound = polytope.h - margin[phase] * length + by_acceleration @ gravity + moment @ np.cross(p, b)
             still = bound - by_acceleration @ (b + gravity) - by_position @ p
+            bound += by_position @ self.reference
             for turn in self._turns(polytope):
                 room = still - (0.0 if turn is None else turn @ (self.position[row] @ near[:, 3:]))
-                chosen = np.argsort(room, kind="stable")[:FACETS]
+                chosen = np.argsort(room / length, kind="stable")[:FACETS]
                 block = (
                     self.acceleration[row][:, None] * by_acceleration[chosen, None]
                     + self.position[row][:, None] * by_position[chosen, None]
@@ -191,16 +198,16 @@ class NearProgramme:
                     turned = self.position[row][:, None] * by_turn[:, None]
                     block = np.concatenate([block, turned], axis=2)
                 block = block.reshape(len(chosen), -1)
-                length = np.linalg.norm(block, axis=1)
+                scale = np.linalg.norm(block, axis=1)
                 # Only the wrench that is planned for, not that of the point mass beside it, has room.
                 wished = 0.0 if turn is None and self.turning is not None else ROOM
                 lacks = sparse.csr_matrix(
-                    (-wished / length, (np.arange(len(chosen)), np.full(len(chosen), row))),
+                    (-wished * length[chosen] / scale, (np.arange(len(chosen)), np.full(len(chosen), row))),
                     shape=(len(chosen), len(self.phases)),
                 )
-                blocks.append(sparse.hstack([block / length[:, None], lacks]))
+                blocks.append(sparse.hstack([block / scale[:, None], lacks]))
                 spare = wished + (0.0 if turn is None else RESERVE)
-                bounds.append((bound[chosen] - spare) / length)
+                bounds.append((bound[chosen] - spare * length[chosen]) / scale)
         return sparse.vstack(blocks).tocsc(), np.concatenate(bounds)
 
     def _turns(self, polytope: WrenchPolytope) -> list[FloatArray | None]:

@@ -8,6 +8,7 @@ import numpy as np
 from manikin.balance import WrenchPolytope
 from manikin.centroidal.certificate import TOLERANCE, Residuals, measure
 from manikin.centroidal.facets import FacetIndices
+from manikin.centroidal.feasibility import row_slopes
 from manikin.centroidal.problem import CentroidalProblem
 from manikin.centroidal.trajectory import CentroidalTrajectory
 from manikin.centroidal.transcription import (
@@ -125,7 +126,7 @@ def optimise(
 
     Args:
         problem: What to find.
-        polytopes: W_i of the phases about the world origin.
+        polytopes: W_i of the phases about ``problem.reference``.
         facets: Indices of the facets imposed in each phase.
         targets: Bounds used at the samples.
         bezier: (phases, k + 1, 3) [m].
@@ -135,14 +136,15 @@ def optimise(
     lower, upper = _unknown_bounds(programme, problem, targets)
     row_lower, row_upper = _row_bounds(programme, problem, targets)
     unknowns = programme.pack_unknowns(
-        bezier, durations, float(durations.sum()), problem.required_margin, 10.0
+        bezier - problem.reference, durations, float(durations.sum()), problem.required_margin, 10.0
     )
     solution = programme.solver(
         x0=np.clip(unknowns, lower, upper),
         p=programme.pack_parameters(_parameters(problem, polytopes, facets, targets)),
         lbx=lower, ubx=upper, lbg=row_lower, ubg=row_upper,
     )  # fmt: skip
-    bezier, durations, margin = programme.unpack_unknowns(np.asarray(solution["x"], dtype=np.float64).ravel())
+    local, durations, margin = programme.unpack_unknowns(np.asarray(solution["x"], dtype=np.float64).ravel())
+    bezier = local + problem.reference
     trajectory = trajectory_of(problem, bezier, durations)
     stats = programme.solver.stats()
     return Attempt(
@@ -157,22 +159,32 @@ def _parameters(
     facets: FacetIndices,
     targets: Targets,
 ) -> dict[str, object]:
-    weights = problem.weights
+    weights, reference = problem.weights, problem.reference
     values: dict[str, object] = {
         "mass": problem.mass,
         "weights": (weights.margin, weights.smoothness, weights.duration, targets.shortfall_weight),
         "velocity": weights.velocity,
         "acceleration": weights.acceleration,
         "jerk": weights.jerk,
+        "reference": reference,
     }
     for name in ("start_velocity", "start_acceleration", "goal_velocity", "goal_acceleration"):
         value = getattr(problem, name)
         values[name] = np.zeros(3) if value is None else value
     for index, (phase, polytope, rows) in enumerate(zip(problem.sequence, polytopes, facets, strict=True)):
-        values[f"H{index}"], values[f"h{index}"] = polytope.H[rows], polytope.h[rows]
-        values[f"contacts{index}"] = [contact.position for contact in phase.stance]
+        # About the world origin the rows have one length all along; then they are given with length 1.
+        fixed = problem.margin_space == "wrench_about_origin"
+        length = row_slopes(polytope, problem, problem.start_com)[rows] if fixed else np.ones(len(rows))
+        values[f"H{index}"], values[f"h{index}"] = (
+            polytope.H[rows] / length[:, None],
+            polytope.h[rows] / length,
+        )
+        values[f"contacts{index}"] = [contact.position - reference for contact in phase.stance]
     for index, plane in enumerate(problem.key_planes):
-        values[f"normal{index}"], values[f"offset{index}"] = plane.normal, plane.offset
+        values[f"normal{index}"], values[f"offset{index}"] = (
+            plane.normal,
+            plane.offset - plane.normal @ reference,
+        )
     return values
 
 
@@ -183,7 +195,9 @@ def _unknown_bounds(
     points = np.full((phases, k + 1, 3), np.inf)
     low, high = -points, points.copy()
     for bound in (low, high):
-        bound[0, 0], bound[-1, -1] = problem.start_com, problem.goal_com
+        bound[0, 0], bound[-1, -1] = (
+            end - problem.reference for end in (problem.start_com, problem.goal_com)
+        )
     total = np.inf if problem.max_duration is None else problem.max_duration - targets.duration
     lower = programme.pack_unknowns(low, problem.min_durations, 0.0, -np.inf, 0.0)
     longest = np.maximum(LONGEST_PHASE, 2.0 * problem.min_durations)

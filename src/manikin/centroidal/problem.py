@@ -13,11 +13,13 @@ from manikin.contact import StanceSequence
 from manikin.errors import InputError
 from manikin.spatial import FloatArray, finite_number, frozen_array
 
-MarginSpace = Literal["wrench", "force"]
-"""``wrench``: distance to the facets of W_p in [N.m] with alpha = 1 m; ``force``: smallest force
-at the CoM that ends balance, [N] ([Qiu2012]_ 4.2.9, cases 3 and 1)."""
+MarginSpace = Literal["wrench", "force", "wrench_about_origin"]
+"""``wrench``: distance to the facets of W_p with moments about the CoM in [N.m], alpha = 1 m;
+``force``: smallest force at the CoM that ends balance, [N] ([Qiu2012]_ 4.2.9, cases 3 and 1).
+``wrench_about_origin`` has the moments about the world origin, as the tables of [Qiu2012]_ have: it
+depends on where the scene stands."""
 
-_UNITS: dict[str, str] = {"wrench": "N.m", "force": "N"}
+_UNITS: dict[str, str] = {"wrench": "N.m", "force": "N", "wrench_about_origin": "N.m"}
 
 
 @dataclass(frozen=True)
@@ -141,6 +143,15 @@ class CentroidalProblem:
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    @property
+    def reference(self) -> FloatArray:
+        """(3,) middle of all contacts, about which the programmes have positions and moments [m].
+
+        Their numbers are then the same wherever the scene stands.
+        """
+        places = [contact.position for phase in self.sequence for contact in phase.stance]
+        return np.mean(places or [self.start_com], axis=0)
 
     @property
     def margin_unit(self) -> str:

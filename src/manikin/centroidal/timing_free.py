@@ -4,6 +4,8 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from manikin.balance import LimitingConstraint, WrenchPolytope
 from manikin.centroidal.certificate import Residuals, measure
 from manikin.centroidal.facets import facet_distances, nearest_facets, with_violated
@@ -28,8 +30,8 @@ class CentroidalResult(Displayed):
 
     Attributes:
         problem: What was asked.
-        polytopes: W_i of the phases about the world origin.
-        feasibility: Radii of the consecutive intersections.
+        polytopes: W_i of the phases about ``problem.reference``.
+        feasibility: Upper bounds of the margin at the key instants.
         failure: Why it failed, or None.
         trajectory: The trajectory; None when it failed.
         certificate: Requirements measured every millisecond; of the best attempt when it
@@ -74,7 +76,9 @@ class CentroidalResult(Displayed):
         """What limits the smallest margin: contact, what gives way there and in which direction."""
         if self.trajectory is None or self.certificate is None:
             return None
-        return _limiting(self.trajectory, self.certificate, self.polytopes)
+        certificate = self.certificate
+        polytope = self.polytopes[certificate.limiting_phase]
+        return limiting_at(self.problem, self.trajectory, polytope, certificate.limiting_time)
 
     @property
     def limiting_contact(self) -> str | None:
@@ -164,11 +168,20 @@ def _hopeless(attempt: Attempt, targets: Targets) -> bool:
     return not attempt.converged or attempt.margin < targets.margin - 1e-3
 
 
-def _limiting(
-    trajectory: CentroidalTrajectory, certificate: Residuals, polytopes: Sequence[WrenchPolytope]
+def limiting_at(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytope: WrenchPolytope, time: float
 ) -> LimitingConstraint:
-    wrench = trajectory.pseudo_wrench(certificate.limiting_time)
-    return polytopes[certificate.limiting_phase].limiting(wrench)
+    """Contact and limit nearest to the wrench of a trajectory at a time.
+
+    Args:
+        problem: Says what the margin measures.
+        trajectory: The trajectory.
+        polytope: Of the phase of that time, about ``problem.reference``.
+        time: [s].
+    """
+    fixed = problem.margin_space == "wrench_about_origin"
+    about = np.zeros(3) if fixed else trajectory.position(time)
+    return polytope.limiting(trajectory.pseudo_wrench(time, problem.reference), about)
 
 
 def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], best: Attempt) -> Failure:
@@ -186,7 +199,8 @@ def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], be
         return Failure(
             worst.requirement, f"no trajectory found: {worst} in the best attempt", worst.phase, worst.time
         )
-    limit = _limiting(best.trajectory, found, polytopes)
+    polytope = polytopes[found.limiting_phase]
+    limit = limiting_at(problem, best.trajectory, polytope, found.limiting_time)
     place = f"in phase {found.limiting_phase} at {found.limiting_time:.3f} s by {limit.description}"
     reason = (
         f"the largest margin found is {found.min_margin:.2f} {problem.margin_unit}, limited {place}; "

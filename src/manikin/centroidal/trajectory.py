@@ -123,13 +123,15 @@ class CentroidalTrajectory(Displayed):
         """(..., 3) third derivative at each time [m/s^3] ([Qiu2012]_ 5.6)."""
         return self._derivative(time, 3)
 
-    def pseudo_wrench(self, time: ArrayLike) -> FloatArray:
-        """(..., 6) ``[m (a - g); p x m (a - g) + Ldot]`` about the world origin [N, N.m].
+    def pseudo_wrench(self, time: ArrayLike, reference: ArrayLike | None = None) -> FloatArray:
+        """(..., 6) ``[m (a - g); (p - o) x m (a - g) + Ldot]`` about ``reference`` o [N, N.m].
+
+        Moments are about the world origin when it is omitted.
 
         [Qiu2012]_ 4.6 for a point mass, 4.51 with the rate of its angular momentum.
         """
         rate = None if self.turning is None else self.angular_momentum_rate(time)
-        return pseudo_wrench(self.mass, self.position(time), self.acceleration(time), rate)
+        return pseudo_wrench(self.mass, self.position(time), self.acceleration(time), rate, reference)
 
     def angular_momentum_rate(self, time: ArrayLike) -> FloatArray:
         """(..., 3) rate of the angular momentum about the CoM at each time [N.m]; zero for a point mass."""

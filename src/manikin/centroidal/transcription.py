@@ -23,7 +23,7 @@ from manikin.centroidal.problem import MarginSpace
 from manikin.spatial import GRAVITY, FloatArray
 from manikin.spline import BSpline, bernstein_matrix, clamped_knots, end_control_points, start_control_points
 
-MARGIN_SCALE = {"wrench": 10.0, "force": 100.0}
+MARGIN_SCALE = {"wrench": 10.0, "force": 100.0, "wrench_about_origin": 10.0}
 """Unit of the unknown d_min and of the balance rows in the programme [N.m] or [N]."""
 
 
@@ -36,7 +36,7 @@ class Structure:
         samples: n_s.
         rows: Number of facets imposed in each phase.
         contacts: Number of contacts of each phase.
-        margin_space: ``"wrench"`` or ``"force"``.
+        margin_space: What the margin measures.
         geometric: Functions of the geometric constraints.
         limited_distance: Whether the CoM-support distance is limited.
         key_planes: Key instant of each plane.
@@ -137,6 +137,7 @@ def transcribe(structure: Structure) -> Programme:
     """
     builder = _Builder(structure)
     mass = builder.parameter("mass", 1)
+    builder.parameter("reference", 1, 3)
     for phase in range(structure.phases):
         _add_samples(builder, phase, mass)
         if phase + 1 < structure.phases:
@@ -200,7 +201,8 @@ def _add_samples(builder: _Builder, phase: int, mass: ca.SX) -> None:
             builder.add("distance", ca.sum2(offset * offset))
     inner = slice(1 if phase == 0 else 0, len(s) - 1 if phase == structure.phases - 1 else len(s))
     for index, function in enumerate(structure.geometric):
-        values = _symbolic(function, position[inner, :])
+        there = position[inner, :]
+        values = _symbolic(function, there + ca.repmat(builder.parameters["reference"], there.shape[0], 1))
         builder.add(f"geometric{index}", values)
 
 
@@ -214,7 +216,10 @@ def _symbolic(function: Callable[[Any, Any, Any], Any], position: ca.SX) -> ca.S
 
 
 def _add_balance(builder: _Builder, phase: int, mass: ca.SX, position: ca.SX, acceleration: ca.SX) -> None:
-    """Rows ``h - H w_p >= d_min`` ([Qiu2012]_ 5.4.2); in force space, each over its slope in f."""
+    """Rows ``h - H w_p >= d_min`` ([Qiu2012]_ 5.4.2), each over its length with moments about the CoM.
+
+    In force space it is over its slope in f; about the world origin its length is 1.
+    """
     structure = builder.structure
     facets, count = builder.structure.rows[phase], position.shape[0]
     H = builder.parameter(f"H{phase}", facets, 6)
@@ -224,18 +229,22 @@ def _add_balance(builder: _Builder, phase: int, mass: ca.SX, position: ca.SX, ac
     slack = ca.repmat(h.T, count, 1) - wrench @ H.T
     scale = MARGIN_SCALE[structure.margin_space]
     wanted = builder.margin * ca.SX.ones(count, facets)
-    if structure.margin_space == "force":
-        wanted = builder.margin * _force_slopes(H, position)
+    if structure.margin_space != "wrench_about_origin":
+        wanted = builder.margin * _lengths(H, position, with_moment=structure.margin_space == "wrench")
     builder.add("balance", slack / scale - wanted)
 
 
-def _force_slopes(H: ca.SX, position: ca.SX) -> ca.SX:
-    """(samples, facets) ``|H1 + H2 p^|``: change of a row per newton at the CoM in its direction."""
+def _lengths(H: ca.SX, position: ca.SX, *, with_moment: bool) -> ca.SX:
+    """(samples, facets) length of the rows with moments about the CoM, or of their force part alone.
+
+    The latter, ``|H1 + H2 p^|``, is the change of a row per newton at the CoM in its direction.
+    """
     columns = []
     for row in range(H.shape[0]):
         moment = ca.repmat(H[row, 3:], position.shape[0], 1)
         slope = ca.repmat(H[row, :3], position.shape[0], 1) + _cross(moment, position)
-        columns.append(ca.sqrt(ca.sum2(slope * slope) + 1e-12))
+        further = ca.sum2(moment * moment) if with_moment else 1e-12
+        columns.append(ca.sqrt(ca.sum2(slope * slope) + further))
     return ca.horzcat(*columns)
 
 

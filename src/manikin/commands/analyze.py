@@ -46,7 +46,12 @@ def analyze(
     ] = None,
     sex: Annotated[str, typer.Option(metavar="male|female", help="Table of segment masses.")] = "male",
     friction: Annotated[float, typer.Option(metavar="MU", help="Of soles on the ground.")] = 0.8,
-    load: Annotated[float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands.")] = 0.0,
+    load: Annotated[
+        float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands, as a mass.")
+    ] = 0.0,
+    load_hand: Annotated[
+        str, typer.Option(metavar="left|right|both", help="Hand that carries --load-kg.")
+    ] = "both",
     as_recorded: Annotated[
         bool,
         typer.Option("--as-recorded", help="Look for no shifted motion to stand beside the recorded one."),
@@ -75,7 +80,13 @@ def analyze(
     from manikin.analysis import AnalysisOptions, recordings_in
 
     options = AnalysisOptions(
-        frames=frames, mass=mass, sex=sex, friction=friction, load=load, as_recorded=as_recorded
+        frames=frames,
+        mass=mass,
+        sex=sex,
+        friction=friction,
+        load=load,
+        load_hand=load_hand,
+        as_recorded=as_recorded,
     )
     paths = recordings_in(sources)
     if single:

@@ -9,6 +9,8 @@ from manikin.commands.console import DONE, JsonOption, flattened, print_json, pr
 from manikin.errors import InputError
 
 if TYPE_CHECKING:
+    from manikin.body import BodyModel
+    from manikin.motion import Motion
     from manikin.motion.file import MotionFile
 
 SHOWN = {
@@ -34,7 +36,13 @@ def ergonomics(
     figure: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw scores and torque shares as PNG.")
     ] = None,
-    load_kg: Annotated[float, typer.Option(metavar="KG", help="Load in the hands or on the back.")] = 0.0,
+    load_kg: Annotated[
+        float | None,
+        typer.Option(metavar="KG", help="Load in the hands, as a mass. Default: that of the motion."),
+    ] = None,
+    load_hand: Annotated[
+        str, typer.Option(metavar="left|right|both", help="Hand that carries --load-kg.")
+    ] = "both",
     load_pattern: Annotated[
         str, typer.Option(metavar="intermittent|static|shock", help="How the load acts.")
     ] = "intermittent",
@@ -67,16 +75,20 @@ def ergonomics(
     from manikin.ergonomics import Circumstances, ergonomics_of
     from manikin.motion.file import read_motions
 
-    given = Circumstances(
-        load_kg, load_pattern, coupling, static, repeated, rapid, raised, supported, neck_upright_deg=neck
-    )
     content = read_motions(source)
     which = "planned" if planned else "executed" if executed else list(content.motions)[-1]
     if which not in content.motions:
         raise InputError(f"{source}: holds no {which} motion; valid: {', '.join(content.motions)}")
+    body, moved = _body(content, source), content.motions[which]
+    if load_kg:
+        body, moved = _loaded(content, source, moved, load_kg, load_hand)
+    given = Circumstances(
+        sum(body.loads.values()), load_pattern, coupling, static, repeated, rapid, raised, supported,
+        neck_upright_deg=neck,
+    )  # fmt: skip
     with stdout_kept_clean():
         found = ergonomics_of(
-            _body(content, source), content.motions[which], schedule=content.schedule, given=given,
+            body, moved, schedule=content.schedule, given=given,
             fraction=fraction,
         )  # fmt: skip
     if csv is not None or figure is not None:
@@ -103,6 +115,21 @@ def _body(content: "MotionFile", source: Path) -> Any:
     if content.body is None:
         raise InputError(f"{source}: holds no body; valid: a motion file with one, as manikin run writes it")
     return content.body
+
+
+def _loaded(
+    content: "MotionFile", source: Path, motion: "Motion", mass: float, hand: str
+) -> "tuple[BodyModel, Motion]":
+    """The motion made with a load.
+
+    Raises:
+        InputError: If the file does not hold its contacts, or the body cannot carry it.
+    """
+    from manikin.wholebody.carried import carried_motion
+
+    if content.schedule is None:
+        raise InputError(f"{source}: holds no contacts for --load-kg; valid: a motion of manikin run")
+    return carried_motion(_body(content, source), motion, content.schedule, mass, hand)
 
 
 def _print(report: dict[str, Any]) -> None:

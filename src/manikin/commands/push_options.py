@@ -1,7 +1,6 @@
 """What is pushed and how, as the options of ``manikin push`` say it, turned into a scenario."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from manikin.errors import InputError
@@ -84,10 +83,7 @@ class PushOptions:
         Raises:
             ScenarioError: If a value is not usable; the message names the option.
         """
-        from manikin.scenarios import Scenario
-        from manikin.scenarios.schema import ScenarioFile
-        from manikin.scenarios.validation import validate
-        from manikin.simulation.push_search import PUSH_BEGINS, run_duration
+        from manikin.scenarios.tasks import push_task
         from manikin.simulation.recover import STRONGEST
         from manikin.spatial import finite_number
 
@@ -100,14 +96,11 @@ class PushOptions:
             "steps": self.steps, "delay_s": self.delay,
             "ankle_stiffness": self.ankle_stiffness, "locked": list(self.locked),
             "strength": self.strength, "posture_control_only": self.posture_control_only,
-            "duration_s": run_duration(self.duration),
         }  # fmt: skip
-        data = {
-            "name": name, "body": _given(body), "recovery": _given(recovery),
-            "push": {"force_N": force, "direction_deg": direction, "duration_s": self.duration,
-                     "at_s": PUSH_BEGINS},
-        }  # fmt: skip
-        return Scenario(validate(ScenarioFile, data, "push", _OPTIONS), "push", Path.cwd(), _OPTIONS)
+        return push_task(
+            force, direction, duration=self.duration, name=name, body=_given(body),
+            recovery=_given(recovery), where=_OPTIONS,
+        )  # fmt: skip
 
     def changed(self, text: str) -> "PushOptions":
         """The same with some options set as ``KEY=VALUE,KEY=VALUE`` says; several groups are ``arms+hips``.

@@ -74,26 +74,11 @@ def walk(
     if to is None:
         raise InputError("--to is missing; valid: X Y HEADING_DEG, or --drive")
     from manikin.scenarios import load_scenario
-    from manikin.scenarios.scenario import Scenario
-    from manikin.scenarios.schema import ScenarioFile
-    from manikin.scenarios.validation import validate
+    from manikin.scenarios.tasks import walk_task
 
-    name = "walk-to-" + "-".join(f"{value:g}" for value in to)
-    section = {"max_speed_m_s": max_speed, "weights": weights}
-    data: dict[str, Any] = {
-        "name": name,
-        "body": body,
-        "walking": {key: value for key, value in section.items() if value is not None},
-        "task": {"start": _state(start), "goal": _state(to)},
-    }
-    folder = Path()
-    if scene is not None:
-        around = load_scenario(scene)
-        kept = around.file.model_dump(mode="json", exclude_none=True)
-        data |= {"scene": kept["scene"], "floor_height_m": around.file.floor_height_m}
-        folder = around.folder
-    job = Scenario(validate(ScenarioFile, data, "manikin walk"), "manikin walk", folder, {})
-    directory = out if out is not None else None if json else Path("runs") / name
+    around = None if scene is None else load_scenario(scene)
+    job = walk_task(to, start=start, body=body, max_speed=max_speed, weights=weights, around=around)
+    directory = out if out is not None else None if json else Path("runs") / job.name
     outcome = run_job(job, directory, context.obj, draw=figures)
     found = outcome.summary["walk"]
     if json:
@@ -101,10 +86,6 @@ def walk(
     else:
         outcome.print({key: found.get(key) for key in SHOWN})
     return outcome.status
-
-
-def _state(place: Place) -> dict[str, Any]:
-    return {"at": list(place[:2]), "heading_deg": place[2]}
 
 
 def _drive(body: dict[str, Any], start: Place, scene: str | None, port: int) -> int:

@@ -49,8 +49,9 @@ class Efort:
 class StrongEfort:
     """EFORT of joints of different strength; ours, the thesis lists it as open (5.4.2).
 
-    The torques of unit norm that EFORT takes are each a share of the joint's largest torque, so that the
-    force ellipsoid is ``f^T (J T^-2 J^T) f <= 1`` with ``T = diag(tau_max)``, and the ratio a force [N].
+    The torques of unit norm that EFORT takes are each a share of the joint's torque limit in its weaker
+    direction (an ellipsoid is symmetric), so that the force ellipsoid is ``f^T (J T^-2 J^T) f <= 1`` with
+    ``T = diag(tau_max)``, and the ratio a force [N].
 
     Attributes:
         products: (n, 3, 3) ``J T^-2 J^T`` of the samples of each limb, by its name [N^-2].
@@ -66,7 +67,7 @@ class StrongEfort:
         found = {}
         for name, item in samples.items():
             chain = LimbKinematics(body, item.limb)
-            scaled = chain.place(item.angles).jacobians / chain.torque_limit
+            scaled = chain.place(item.angles).jacobians / np.minimum(-chain.torque_lower, chain.torque_upper)
             found[name] = scaled @ scaled.transpose(0, 2, 1)
         return StrongEfort(found, pulling)
 

@@ -4,62 +4,14 @@ Unlike the wrench polytope it knows the posture, and with it the torques of the 
 milliseconds and shares no code with the polytope.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 import pinocchio as pin
 from scipy.optimize import linprog
 
-from manikin.balance.friction import contact_to_world, edge_wrenches
+from manikin.balance.contact_forces import ContactGenerators
 from manikin.body import BodyModel, Configuration
-from manikin.contact import ContactKind, Stance, default_normal_force_cap
+from manikin.contact import Stance, default_normal_force_cap
 from manikin.spatial import GRAVITY, FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Generators:
-    """Wrenches that contacts are sums of.
-
-    Attributes:
-        wrenches: (g, 6) in world axes about each contact's own position [N, N.m].
-        places: (g, 3) of these positions [m].
-        bounds: (g, 2) smallest and largest multiple of each.
-        contact: (g,) number of its contact.
-        normal: (g,) normal force per multiple; zero for grasps.
-    """
-
-    wrenches: FloatArray
-    places: FloatArray
-    bounds: FloatArray
-    contact: np.ndarray
-    normal: FloatArray
-
-    @classmethod
-    def of(cls, stance: Stance) -> "Generators":
-        """Edges of friction pyramids, and the axes of grasps within their limits."""
-        wrenches, places, bounds, owner, normal = [], [], [], [], []
-        for number, contact in enumerate(stance):
-            if contact.kind is ContactKind.GRASP:
-                own, limit = np.eye(6), np.repeat([contact.max_force, contact.max_moment], 3)
-                limits, pressing = np.column_stack([-limit, limit]), np.zeros(6)
-            else:
-                own = contact_to_world(
-                    contact, edge_wrenches(contact, stance.friction_model), contact.position
-                )
-                limits, pressing = np.tile([0.0, np.inf], (len(own), 1)), np.ones(len(own))
-            wrenches.append(own)
-            places.append(np.tile(contact.position, (len(own), 1)))
-            bounds.append(limits)
-            owner.append(np.full(len(own), number))
-            normal.append(pressing)
-        return cls(*(np.concatenate(part) for part in (wrenches, places, bounds, owner, normal)))
-
-    @property
-    def about_origin(self) -> FloatArray:
-        """(6, g) the wrenches about the world origin."""
-        moved = self.wrenches.copy()
-        moved[:, 3:] += np.cross(self.places, self.wrenches[:, :3])
-        return moved.T
 
 
 def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 8) -> float:
@@ -78,7 +30,9 @@ def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 
     """
     if not len(stance):
         return -np.inf
-    generators, cap = Generators.of(stance), _cap(stance, mass)
+    generators, cap = ContactGenerators.of(stance), _cap(stance, mass)
+    bounds = [(0.0, limit) for limit in generators.upper]
+    about_origin = generators.about(np.zeros(3))
     weight = mass * GRAVITY
     room = np.inf
     for angle in 2.0 * np.pi * np.arange(directions) / directions:
@@ -86,10 +40,10 @@ def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 
         column = np.concatenate([np.zeros(3), -np.cross(step, [0.0, 0.0, weight])])
         wanted = np.concatenate([[0.0, 0.0, weight], np.cross(com, [0.0, 0.0, weight])])
         found = linprog(
-            np.append(np.zeros(len(generators.bounds)), -1.0),
+            np.append(np.zeros(len(bounds)), -1.0),
             A_ub=np.append(generators.normal, 0.0)[None], b_ub=[cap],
-            A_eq=np.column_stack([generators.about_origin, column]), b_eq=wanted,
-            bounds=[*generators.bounds.tolist(), (0.0, 1e3)], method="highs",
+            A_eq=np.column_stack([about_origin, column]), b_eq=wanted,
+            bounds=[*bounds, (0.0, 1e3)], method="highs",
         )  # fmt: skip
         if not found.success:
             return -np.inf
@@ -100,8 +54,8 @@ def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 
 def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float:
     """Smallest share of the joints' torque limits with which a posture is held at rest.
 
-    Minimises ``max_j |tau_j| / tau_max_j`` over the contact forces, with ``tau = g(q) - sum J^T w`` and the
-    six rows of the root in equilibrium.
+    Minimises the largest share of a torque limit over the contact forces, with
+    ``tau = g(q) - sum J^T w`` and the six rows of the root in equilibrium.
 
     Args:
         body: The body.
@@ -113,26 +67,24 @@ def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float
     """
     if not len(stance):
         return np.inf
-    generators, state = Generators.of(stance), Configuration(body, q)
+    generators, state = ContactGenerators.of(stance), Configuration(body, q)
+    places = np.array([contact.position for contact in stance])[generators.contact]
+    wrenches = generators.about(places).T
     model = body.pinocchio
     gravity = pin.computeGeneralizedGravity(model, model.createData(), np.asarray(q))
     jacobians = [state.effector_jacobian(contact.effector) for contact in stance]
     columns = np.column_stack(
-        [
-            jacobians[number].T @ wrench
-            for number, wrench in zip(generators.contact, generators.wrenches, strict=True)
-        ]
+        [jacobians[number].T @ wrench for number, wrench in zip(generators.contact, wrenches, strict=True)]
     )
-    limit = body.torque_limit
-    count = len(generators.bounds)
-    above = np.column_stack([columns[6:], -limit])
-    below = np.column_stack([-columns[6:], -limit])
+    count = len(wrenches)
+    above = np.column_stack([columns[6:], body.torque_lower])
+    below = np.column_stack([-columns[6:], -body.torque_upper])
     found = linprog(
         np.append(np.zeros(count), 1.0),
         A_ub=np.vstack([above, below, np.append(generators.normal, 0.0)]),
         b_ub=np.concatenate([gravity[6:], -gravity[6:], [_cap(stance, body.mass)]]),
         A_eq=np.column_stack([columns[:6], np.zeros(6)]), b_eq=gravity[:6],
-        bounds=[*generators.bounds.tolist(), (0.0, None)], method="highs",
+        bounds=[*((0.0, limit) for limit in generators.upper), (0.0, None)], method="highs",
     )  # fmt: skip
     return float(found.x[-1]) if found.success else np.inf
 

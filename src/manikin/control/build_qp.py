@@ -58,13 +58,15 @@ class JointBounds:
     """Limits of the joints at one control step.
 
     Attributes:
-        torque: (nv - 6,) largest torque of the muscles either way [N.m].
+        torque_lower: (nv - 6,) most negative torque of the muscles [N.m].
+        torque_upper: (nv - 6,) largest one [N.m].
         damping: (nv - 6,) passive damping of the joints [N.m.s/rad]; the muscles overcome it.
         acceleration_lower: (nv - 6,) [rad/s^2].
         acceleration_upper: (nv - 6,) [rad/s^2].
     """
 
-    torque: FloatArray
+    torque_lower: FloatArray
+    torque_upper: FloatArray
     damping: FloatArray
     acceleration_lower: FloatArray
     acceleration_upper: FloatArray
@@ -170,8 +172,8 @@ def build_qp(
     caps, cap_limits = _normal_force_rows(contacts, nv, size, sum_cap)
     rows = np.concatenate((equation[:6], joint_map, caps))
     free = np.full(len(cap_limits), -np.inf)
-    rows_lower = np.concatenate((-state.bias[:6], -bounds.torque - joint_offset, free))
-    rows_upper = np.concatenate((-state.bias[:6], bounds.torque - joint_offset, cap_limits))
+    rows_lower = np.concatenate((-state.bias[:6], bounds.torque_lower - joint_offset, free))
+    rows_upper = np.concatenate((-state.bias[:6], bounds.torque_upper - joint_offset, cap_limits))
     lower, upper = _variable_bounds(contacts, bounds)
     hessian, gradient = _cost(tasks, nv, size, acceleration_weight, force_weight)
     _add_wishes(hessian, gradient, contacts, nv)

@@ -6,9 +6,10 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from manikin.balance.friction import pyramid_edges
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
-from manikin.contact import Contact, ContactKind, SolePart
+from manikin.contact import Contact, ContactKind, FrictionModel, SolePart
 from manikin.control.dynamics import DynamicsState
 from manikin.spatial import FloatArray, skew
 
@@ -132,9 +133,9 @@ def _rectangle(lengths: tuple[float, ...], half_width: float) -> FloatArray:
 class ContactForceBasis:
     """Linear map from the force variables of one effector to forces on the body.
 
-    A sole or a point has four variables per point, the edges of the inner friction
-    pyramid, none of which may be negative, each with unit normal force. A grasp has three
-    forces along the world axes and, where it can hold one, three moments.
+    A sole or a point has a variable for each edge of the friction pyramid at each point,
+    none of which may be negative, each with unit normal force. A grasp has three forces
+    along the world axes and, where it can hold one, three moments.
 
     Attributes:
         contact: The contact.
@@ -160,6 +161,7 @@ def contact_force_basis(
     *,
     sliding: bool = False,
     friction_share: float = 1.0,
+    friction_model: FrictionModel = "inner",
 ) -> ContactForceBasis:
     """Build the force map of a contact at the current state.
 
@@ -169,20 +171,21 @@ def contact_force_basis(
         state: Current dynamics with a frame for each segment of the geometry and the effector.
         sliding: Whether the contact may slide; where it does, friction acts against the motion.
         friction_share: Share of the friction that is made use of.
+        friction_model: Pyramid that stands for the friction cone.
     """
     if contact.kind is ContactKind.GRASP:
         return _grasp_basis(contact, state)
-    edges = pyramid_edges(contact, friction_share)
+    edges = edges_in_world(contact, friction_share, friction_model)
     if sliding:
         edges = sliding_edges(contact, state.frames[contact.effector].twist[:3], edges)
     origin = state.frames[contact.effector].position
-    count = 4 * geometry.point_count
+    count = len(edges) * geometry.point_count
     generalised = np.empty((len(state.v), count))
     wrench = np.empty((6, count))
     start = 0
     for patch in geometry.patches:
         frame = state.frames[segment_key(patch.segment)]
-        end = start + 4 * len(patch.points)
+        end = start + len(edges) * len(patch.points)
         wrench[:, start:end] = _edge_wrenches(edges, patch.points @ frame.rotation.T)
         generalised[:, start:end] = frame.jacobian.T @ wrench[:, start:end]
         wrench[3:, start:end] += skew(frame.position - origin) @ wrench[:3, start:end]
@@ -198,7 +201,7 @@ def contact_force_basis(
 
 
 def _edge_wrenches(edges: FloatArray, arms: FloatArray) -> FloatArray:
-    """(6, 4 k) force and moment of each of the edges (4, 3) at each of the arms (k, 3)."""
+    """(6, e k) force and moment of each of the edges (e, 3) at each of the arms (k, 3)."""
     wrench = np.empty((6, len(arms), len(edges)))
     force = edges.T[:, None, :]
     arm = arms.T[:, :, None]
@@ -210,14 +213,15 @@ def _edge_wrenches(edges: FloatArray, arms: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=256)
-def pyramid_edges(contact: Contact, share: float = 1.0) -> FloatArray:
-    """(4, 3) edges of the inner friction pyramid in the world, each with unit normal force.
+def edges_in_world(
+    contact: Contact, share: float = 1.0, friction_model: FrictionModel = "inner"
+) -> FloatArray:
+    """(e, 3) edges of the friction pyramid in the world, each with unit normal force.
 
-    The edges lie on the friction cone, or inside it: their tangential part is ``share mu`` long.
+    Edges of ``inner`` and ``cone`` lie on the friction cone, or inside it: their tangential part is
+    ``share mu`` long.
     """
-    slope = share * contact.friction / np.sqrt(2.0)
-    signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-    local = np.column_stack((slope * signs, np.ones(4)))
+    local = pyramid_edges(contact, friction_model) * [share, share, 1.0]
     edges = local @ contact.rotation_contact_to_world.T
     edges.setflags(write=False)
     return edges
@@ -228,18 +232,20 @@ SLIDING_SPEED = 0.03
 
 
 def sliding_edges(contact: Contact, velocity: FloatArray, edges: FloatArray) -> FloatArray:
-    """(4, 3) edges of a contact that slides: all of them the kinetic friction with unit normal force.
+    """(e, 3) edges of a contact that slides: all of them the kinetic friction with unit normal force.
+
+    That is on the friction cone, so outside the inner pyramid: what slides has no other friction.
 
     Args:
         contact: The contact.
         velocity: (3,) of the effector [m/s].
-        edges: (4, 3) what holds when it does not slide.
+        edges: (e, 3) what holds when it does not slide.
     """
     along = velocity - (velocity @ contact.normal) * contact.normal
     speed = float(np.linalg.norm(along))
     if speed < SLIDING_SPEED:
         return edges
-    return np.tile(contact.normal - contact.friction / speed * along, (4, 1))
+    return np.tile(contact.normal - contact.friction / speed * along, (len(edges), 1))
 
 
 def _grasp_basis(contact: Contact, state: DynamicsState) -> ContactForceBasis:

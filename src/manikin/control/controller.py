@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, with_root
 from manikin.body.limb import hanging_segment
-from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, SolePart
 from manikin.control.build_qp import (
     ControlProblem,
     JointBounds,
@@ -127,6 +127,7 @@ class Controller:
         body, self._root = with_root(body)
         self.body = body
         self.schedule = schedule
+        self._friction_model = _inside_the_cone(schedule.sequence[0].stance.friction_model)
         self.settings = settings or ControlSettings()
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
@@ -307,17 +308,18 @@ class Controller:
         geometry = self._geometry[support.effector, contact.part]
         basis = contact_force_basis(
             contact, geometry, state, sliding=support.settling,
-            friction_share=self.settings.supports.friction_share,
+            friction_share=self.settings.supports.friction_share, friction_model=self._friction_model,
         )  # fmt: skip
+        edges = len(basis.upper) // geometry.point_count
         cap = contact.normal_force_cap or self.settings.supports.default_cap * state.mass * GRAVITY
         cap *= support.load_share
         if support.unload_share < 1.0:
             cap = min(cap, support.unload_share * self._carried.get(support.effector, cap))
         if support.settling:
-            limits = cap * self._low_shares(geometry, contact, state)
+            limits = cap * self._low_shares(geometry, contact, state, edges)
             basis = replace(basis, upper=np.minimum(basis.upper, limits))
         if support.fades:
-            limits = state.mass * GRAVITY * self._point_shares(support, contact)
+            limits = state.mass * GRAVITY * self._point_shares(support, contact, edges)
             basis = replace(basis, upper=np.minimum(basis.upper, limits))
         return LoadedContact(basis, cap, min(support.load_share, support.unload_share))
 
@@ -329,22 +331,24 @@ class Controller:
         return replace(loaded, wished=wish.at(time), wish_weight=wish.weight)
 
     @staticmethod
-    def _low_shares(geometry: ContactGeometry, contact: Contact, state: DynamicsState) -> FloatArray:
-        """(4 k,) share of the load that each point may carry: those that a tilt has raised carry none."""
+    def _low_shares(
+        geometry: ContactGeometry, contact: Contact, state: DynamicsState, edges: int
+    ) -> FloatArray:
+        """(e k,) share of the load that each point may carry: those that a tilt has raised carry none."""
         heights = []
         for patch in geometry.patches:
             frame = state.frames[segment_key(patch.segment)]
             heights.append((frame.position + patch.points @ frame.rotation.T) @ contact.normal)
         height = np.concatenate(heights)
-        return np.repeat(np.clip(2.0 - (height - height.min()) / RAISED, 0.0, 1.0), 4)
+        return np.repeat(np.clip(2.0 - (height - height.min()) / RAISED, 0.0, 1.0), edges)
 
-    def _point_shares(self, support: SupportState, contact: Contact) -> FloatArray:
-        """(4 k,) body weights that each point's variables may carry while the touching part changes."""
+    def _point_shares(self, support: SupportState, contact: Contact, edges: int) -> FloatArray:
+        """(e k,) body weights that each point's variables may carry while the touching part changes."""
         along = self._along[contact.effector, contact.part]
         shares = np.full(len(along), np.inf)
         for part, share in support.fades:
             shares[~touches(part, along)] = np.minimum(shares[~touches(part, along)], share)
-        return np.repeat(shares, 4)
+        return np.repeat(shares, edges)
 
     def _remember_loads(self, supports: Mapping[str, SupportState], loads: Mapping[str, float]) -> None:
         """Keep what each support carries until its unloading begins."""
@@ -363,7 +367,7 @@ class Controller:
             settings.joint_limit_horizon,
             settings.max_joint_acceleration,
         )
-        return JointBounds(body.torque_limit, self._damping, lower, upper)
+        return JointBounds(body.torque_lower, body.torque_upper, self._damping, lower, upper)
 
     def _solve(self, problem: ControlProblem) -> tuple[QPSolution | None, str]:
         solution = self._solver.solve(problem.program)
@@ -373,6 +377,14 @@ class Controller:
         if relaxed.found:
             return relaxed, f"without joint bounds: {solution.status}"
         return None, f"previous torques: {solution.status}, then {relaxed.status}"
+
+
+def _inside_the_cone(friction_model: FrictionModel) -> FrictionModel:
+    """The friction model of control: what was asked for, and never more than the circular cone holds.
+
+    Where the plan has the outer pyramid control has the inner one: a foot must not slip.
+    """
+    return "cone" if friction_model == "cone" else "inner"
 
 
 def _yielding(gain: Impedance) -> Impedance:

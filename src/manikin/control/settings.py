@@ -90,7 +90,8 @@ class SupportSettings:
         default_cap: Normal force limit of a contact that states none [body weights].
         sole_inset: The controller keeps its forces this far inside the edge of the sole [m].
         friction_share: Share of the friction of soles and points that it makes use of: a foot whose
-            load dips must not slip.
+            load dips must not slip. The friction model is that of the plan, the inner pyramid where the
+            plan has the outer one.
     """
 
     unload_time: float = 0.05

@@ -63,7 +63,7 @@ def cumulative_effort(body: BodyModel, motion: Motion) -> CumulativeEffort | Non
     power = torque * rate
     return CumulativeEffort(
         joint_names=body.joint_names,
-        squared_share=weight @ (torque / body.torque_limit) ** 2,
+        squared_share=weight @ body.torque_share(torque) ** 2,
         positive_work=weight @ np.maximum(power, 0.0),
         negative_work=weight @ np.minimum(power, 0.0),
         duration=float(weight.sum()),

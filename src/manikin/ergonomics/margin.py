@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from manikin.balance import WrenchPolytope, wrench_polytope
+from manikin.balance import WrenchPolytope, stability_margins, wrench_polytopes
 from manikin.balance.limiting import LimitingConstraint
 from manikin.balance.zmp_path import contact_wrench
 from manikin.body import BodyModel, Configuration
@@ -12,7 +12,7 @@ from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import Contact, ContactSchedule, Stance, default_normal_force_cap, point, sole
 from manikin.motion import Motion
 from manikin.motion.dynamics import centroidal_motion
-from manikin.spatial import FloatArray, finite_number
+from manikin.spatial import FloatArray, finite_number, wrench_about
 
 FRICTION = 0.8
 """Coefficient of friction of contacts that only the motion tells of."""
@@ -85,12 +85,12 @@ def lowest_margin(
     stance = rebuilt_stance(body, motion, row, friction)
     if not len(stance):
         return replace(found, unknown="nothing is in contact at that instant")
-    W = wrench_polytope(stance)
-    wrench = _dynamic_wrench(body, motion, row)
+    (W,) = wrench_polytopes([stance])
+    com, wrench = _dynamic_wrench(body, motion, row)
     return replace(
         found,
-        limiting=W.limiting(wrench),
-        again=float(W.margin(wrench)),
+        limiting=W.limiting(wrench_about(wrench, W.reference), com),
+        again=_margin(W, wrench, com),
         stance="effectors in contact",
     )
 
@@ -128,25 +128,26 @@ def _contact(body: BodyModel, configuration: Configuration, name: str, friction:
 def _of_schedule(
     found: LowestMargin, body: BodyModel, motion: Motion, schedule: ContactSchedule, row: int
 ) -> LowestMargin:
-    wrenches = [_dynamic_wrench(body, motion, row)]
+    com, wrench = _dynamic_wrench(body, motion, row)
+    wrenches = [wrench]
     measured = contact_wrench(_one_frame(motion, row), schedule)[0]
     if np.isfinite(measured).all() and measured.any():
         wrenches.insert(0, measured)
     phase = int(schedule.phase_at(found.time))
     near = [phase, phase - 1, phase + 1]
-    polytopes = [
-        wrench_polytope(schedule.sequence[number].stance.bounded(body.mass))
+    polytopes = wrench_polytopes([
+        schedule.sequence[number].stance.bounded(body.mass)
         for number in near
         if 0 <= number < len(schedule.sequence) and len(schedule.sequence[number].stance)
-    ]
+    ])  # fmt: skip
     if not polytopes:
         return replace(found, unknown="nothing is planned to be in contact at that instant")
     pairs: list[tuple[WrenchPolytope, FloatArray]] = [(W, wrench) for W in polytopes for wrench in wrenches]
-    W, wrench = min(pairs, key=lambda pair: abs(float(pair[0].margin(pair[1])) - found.value))
+    W, wrench = min(pairs, key=lambda pair: abs(_margin(*pair, com) - found.value))
     return replace(
         found,
-        limiting=W.limiting(wrench),
-        again=float(W.margin(wrench)),
+        limiting=W.limiting(wrench_about(wrench, W.reference), com),
+        again=_margin(W, wrench, com),
         stance="planned contacts",
     )
 
@@ -155,7 +156,13 @@ def _one_frame(motion: Motion, row: int) -> Motion:
     return replace(motion, **{name: array[row : row + 1] for name, array in motion.arrays().items()})
 
 
-def _dynamic_wrench(body: BodyModel, motion: Motion, row: int) -> FloatArray:
-    """(6,) wrench about the world's origin that the motion needs of its contacts [N, N.m]."""
+def _margin(W: WrenchPolytope, wrench: FloatArray, com: FloatArray) -> float:
+    """Margin about the CoM of a wrench (6,) about the world's origin [N.m]."""
+    return float(stability_margins(W, wrench_about(wrench, W.reference), com).wrench_about_com)
+
+
+def _dynamic_wrench(body: BodyModel, motion: Motion, row: int) -> tuple[FloatArray, FloatArray]:
+    """CoM (3,) and (6,) wrench about the world's origin that the motion needs of its contacts [N, N.m]."""
     rows = slice(row, row + 1)
-    return centroidal_motion(body, motion.q[rows], motion.v[rows], motion.a[rows]).wrench[0]
+    found = centroidal_motion(body, motion.q[rows], motion.v[rows], motion.a[rows])
+    return found.com[0], found.wrench[0]

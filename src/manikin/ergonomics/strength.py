@@ -12,9 +12,9 @@ LOADED = 0.5
 """Share of the strength above which a joint counts as loaded."""
 
 SOURCES = {
-    "human": "one symmetric number per hinge, our choice near the isometric strength of young men "
-    "(Anderson, Madigan and Nussbaum 2007), scaled with mass times stature",
-    "kudoh": "those of our human at this body's mass and stature",
+    "human": "published isometric strength by joint and direction of a healthy adult of that sex, age and "
+    "size (Anderson et al. 2007, Harbo et al. 2012 and others); no dependence on angle or speed",
+    "kudoh": "ours, symmetric; the thesis prints none",
 }
 """Where the torque limits of a body come from, by its name."""
 
@@ -25,8 +25,8 @@ class JointStrength:
 
     Attributes:
         joint_names: j hinges.
-        limit: (j,) largest torque [N.m].
-        share: (n, j) size of the torque per limit; NaN where the torque is not known.
+        limit: (j,) size of the torque limit in the direction in which the largest share is reached [N.m].
+        share: (n, j) torque over the limit in its direction; NaN where the torque is not known.
         peak: (j,) largest share.
         peak_time: (j,) when it is reached [s].
         loaded: (j,) share of the time above ``fraction``.
@@ -75,13 +75,14 @@ def joint_strength(body: BodyModel, motion: Motion, fraction: float = LOADED) ->
     if not len(body.joint_names) or not rows.any():
         return None
     share = np.full((len(motion.time), len(body.joint_names)), np.nan)
-    share[rows] = np.abs(motion.tau[rows, 6:]) / body.torque_limit
+    share[rows] = body.torque_share(motion.tau[rows, 6:])
     known = share[rows]
     peak = known.argmax(axis=0)
+    pushed = motion.tau[rows, 6:][peak, np.arange(len(peak))] >= 0.0
     weight = durations(motion.time)[rows]
     return JointStrength(
         joint_names=body.joint_names,
-        limit=body.torque_limit,
+        limit=np.where(pushed, body.torque_upper, -body.torque_lower),
         share=share,
         peak=known.max(axis=0),
         peak_time=motion.time[rows][peak],

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import ConvexHull, QhullError
 
 from manikin.errors import InputError
-from manikin.spatial import FloatArray, finite_number, frozen_array
+from manikin.spatial import FloatArray, PlanarTransform, finite_number, frozen_array
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,24 @@ class WalkObstacle:
         if len(path) == 0:
             raise InputError(f"obstacle {name!r} has no centres; valid: at least one")
         return cls(name, path[:1], radius, times=times, displacements=path - path[0])
+
+    def moved(self, transform: PlanarTransform, decimals: int) -> Self:
+        """The obstacle in another frame of the floor, its coordinates rounded to some decimals [m].
+
+        Its first corner is that of least x, and of least y among those.
+        """
+        moved = type(self)(
+            self.name,
+            transform.points(self.corners).round(decimals),
+            self.radius,
+            times=self.times,
+            displacements=transform.directions(self.displacements).round(decimals),
+        )
+        first = int(np.lexsort(moved.corners.T[::-1])[0])
+        ordered = np.roll(moved.corners, -first, axis=0)
+        ordered.setflags(write=False)
+        object.__setattr__(moved, "corners", ordered)
+        return moved
 
     @property
     def moves(self) -> bool:

@@ -1,5 +1,6 @@
 """Finding walking paths: the criterion minimised from several guesses, around obstacles as well."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -15,8 +16,12 @@ from manikin.locomotion.obstacles import Walker, WalkObstacle, clearance
 from manikin.locomotion.path import WalkingPath, WalkingTask
 from manikin.locomotion.solve import Guess, bent, cheapest, lacking, programme_of, sharpened, solve
 from manikin.locomotion.ways import Grid
-from manikin.spatial import FloatArray, finite_number, frozen_array
+from manikin.spatial import FloatArray, PlanarTransform, finite_number, frozen_array
+from manikin.spline import BSpline
 from manikin.worker import side_by_side
+
+GRID, GOAL_GRID = 6, 9
+"""Decimals of the obstacles that ways are sought around [m], as exact as floor plans; and of their goal."""
 
 NEAREST, FARTHEST = 0.01, 100.0
 """Distances from start to goal that can be asked [m]; at none, the direction of the goal has no value."""
@@ -136,15 +141,50 @@ def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
     short = lacking(kept)
     if free.succeeded and np.all(short <= 0.0):
         return kept
+    # Ways over a grid depend on its axes: with those of the start, a scene elsewhere has the same ones.
+    x, y, heading = task.start.tolist()
+    transform_start_to_world = PlanarTransform(x, y, math.degrees(heading))
+    transform_world_to_start = transform_start_to_world.inverse
+    from_start = _from_start(task, transform_world_to_start)
+    blocking = [one for one, lack in zip(from_start.obstacles, short, strict=False) if lack > 0.0]
+    found = _on_ways(from_start, _in_frame(kept, from_start, transform_world_to_start, GRID), blocking)
+    return _in_frame(found, task, transform_start_to_world)
+
+
+def _on_ways(task: WalkingTask, free: WalkingPath, blocking: Sequence[WalkObstacle]) -> WalkingPath:
+    """The best of the ways between all obstacles and of the detours around those that are in the way."""
     grid = Grid(task.obstacles, task.start, task.goal)
     narrow = grid.way(task.walker.depth / 2 + task.room - grid.tolerance)
     if narrow is None:
-        return replace(kept, failure="the obstacles leave no way to the goal", others={})
+        return replace(free, failure="the obstacles leave no way to the goal", others={})
     wide = grid.way(task.walker.width / 2 + task.room)
     ways = {"narrow way": narrow} | ({} if wide is None else {"wide way": wide})
-    blocking = [one for one, lack in zip(task.obstacles, short, strict=False) if lack > 0.0]
     guesses = (*_way_guesses(task, free, ways), *_detour_guesses(task, free, blocking))
     return cheapest([solve(task, guess) for guess in guesses])
+
+
+def _from_start(task: WalkingTask, transform_world_to_start: PlanarTransform) -> WalkingTask:
+    """The task in the frame of its start, its places on a grid that leaves no trace of where that is."""
+    goal = transform_world_to_start.points(task.goal[:2])
+    return replace(
+        task,
+        start=np.zeros(3),
+        goal=np.append(goal, task.goal[2] - task.start[2]).round(GOAL_GRID),
+        obstacles=tuple(one.moved(transform_world_to_start, GRID) for one in task.obstacles),
+    )
+
+
+def _in_frame(
+    path: WalkingPath, task: WalkingTask, transform: PlanarTransform, decimals: int | None = None
+) -> WalkingPath:
+    """A path in the frame of another task, whose places are those of its own after a transform."""
+    points = path.spline.control_points
+    moved = np.column_stack([transform.points(points[:, :2]), points[:, 2] + transform.yaw])
+    duration = path.duration
+    if decimals is not None:
+        moved, duration = moved.round(decimals), round(duration, decimals)
+    spline = BSpline(path.spline.degree, path.spline.knots, moved)
+    return replace(path, task=task, spline=spline, duration=duration)
 
 
 def _way_guesses(task: WalkingTask, free: WalkingPath, ways: Mapping[str, FloatArray]) -> Iterator[Guess]:

@@ -13,10 +13,10 @@ from enum import StrEnum
 
 import numpy as np
 
-from manikin.balance import wrench_about
 from manikin.contact import ContactSchedule
 from manikin.mocap.recorded_dynamics import CUTOFF, RecordedDynamics
 from manikin.mocap.recorded_margins import RecordedMargins
+from manikin.spatial import wrench_about
 
 
 class Cause(StrEnum):

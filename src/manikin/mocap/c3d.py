@@ -15,12 +15,12 @@ import numpy as np
 from manikin.errors import InputError
 from manikin.mocap.axes import metres_per, rotation_to_z_up
 from manikin.mocap.c3d_layout import C3dLayout, c3d_layout
-from manikin.mocap.force_plate import ForcePlate, wrench_at_world_origin
+from manikin.mocap.force_plate import ForcePlate
 from manikin.mocap.markers import Event, MarkerRecording, unique_names, without_unseen
 from manikin.mocap.plate_channels import plate_load
 from manikin.mocap.subject import Subject
 from manikin.mocap.text import LARGEST
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, wrench_about
 
 NO_PLACES = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "ENERGIES")
 """Parameters of ``POINT`` that list the points which are no places."""
@@ -247,7 +247,7 @@ def _plates(
             raise layout.error(f"{name} is described or measured by NaN", "finite numbers")
         surface, where = unit * surface @ turn.T, f"{layout.file}: {name}"
         middle, normal = surface.mean(axis=0), _normal(surface, where)
-        wrenches = wrench_at_world_origin(force @ turn.T, unit * moment @ turn.T, middle)
+        wrenches = wrench_about(np.hstack([force @ turn.T, unit * moment @ turn.T]), -middle)
         sampled, start = rate * layout.samples, (layout.first_frame - 1) / rate
         found.append(ForcePlate(where, wrenches, middle, sampled, start, normal, surface))
     return tuple(found)

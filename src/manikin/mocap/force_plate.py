@@ -93,14 +93,3 @@ class ForcePlate:
             for instant in (begin, end)
         )
         return replace(self, wrenches=self.wrenches[first:last], start=self.start + first / self.rate)
-
-
-def wrench_at_world_origin(force: FloatArray, moment: FloatArray, point: FloatArray) -> FloatArray:
-    """(n, 6) wrenches about the world's origin.
-
-    Args:
-        force: (n, 3) [N].
-        moment: (n, 3) about the points [N.m].
-        point: (3,) or (n, 3) [m].
-    """
-    return np.concatenate([force, moment + np.cross(point, force)], axis=1)

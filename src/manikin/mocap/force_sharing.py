@@ -16,8 +16,8 @@ on measured kinematics", J. Biomech. 41, 2008) for contacts of any number and ki
 Shares that the contacts can give stay as they are. Others become pushes within the friction pyramids: with
 ``G`` the wrenches of unit pushes at the corners, one a column, and ``l`` the pushes of each contact that come
 next to its share, the nearest to ``l`` that supply the wrench are ``max(0, l + G^T y)`` for the six
-multipliers ``y`` that solve ``G max(0, l + G^T y) + e y = w``, found by Newton's method for all frames of a
-phase at once; caps and torsion limits of contacts are not regarded there. What they cannot supply, because
+multipliers ``y`` that solve ``G max(0, l + G^T y) + e y = w`` (:func:`manikin.balance.contact_forces.share`);
+caps and torsion limits of contacts are not regarded there. What they cannot supply, because
 the wrench is outside what the contacts admit, is added as the smallest wrenches at the contacts: the sum is
 always the whole wrench, so that the pelvis needs no hand from heaven, and a centre of pressure outside its
 sole is seen as such.
@@ -30,18 +30,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from manikin.balance.friction import contact_to_world, edge_wrenches
+from manikin.balance.contact_forces import ContactGenerators, share
 from manikin.balance.limits import contact_limits
-from manikin.balance.motion_margin import wrench_about
-from manikin.contact import Contact, ContactKind, Stance
+from manikin.contact import Stance
 from manikin.mocap.runs import runs
-from manikin.spatial import FloatArray, cross
+from manikin.spatial import FloatArray, wrench_about, wrench_map
 
 SOFTNESS = 1e-6
 """``e``, per mean eigenvalue of ``G G^T``: so small that little of an admissible wrench is left."""
-
-ROUNDS = 30
-"""Most steps of Newton's method."""
 
 LEVER = 0.1
 """Length by which a moment counts as much as a force [m]: about half a sole."""
@@ -103,9 +99,9 @@ def shared_wrenches(
 def _admissible(stance: Stance, shares: FloatArray, weight: float) -> NDArray[np.bool_]:
     """(n,) whether every contact can give its share."""
     fine = np.ones(len(shares), dtype=bool)
-    for contact, share in zip(stance, shares.swapaxes(0, 1), strict=True):
-        limits, turn = contact_limits(contact), contact.rotation_contact_to_world
-        there = wrench_about(share, contact.position)
+    for contact, part in zip(stance, shares.swapaxes(0, 1), strict=True):
+        limits, turn = contact_limits(contact, stance.friction_model), contact.rotation_contact_to_world
+        there = wrench_about(part, contact.position)
         local = np.hstack([there[:, :3] @ turn, there[:, 3:] @ turn])
         fine &= (local @ limits.A.T - limits.b).max(axis=1) <= SOFTNESS * weight
     return fine
@@ -115,7 +111,7 @@ def _nearest(stance: Stance, wrench: FloatArray, weight: float, near: FloatArray
     """(n, c, 6) admissible shares of several contacts, nearest to given ones, or the least."""
     middle = np.mean([contact.position for contact in stance], axis=0)
     wanted = _scaled(wrench, middle, weight)
-    generators = [_generators(contact, middle, weight) for contact in stance]
+    generators = _generators(stance, middle, weight)
     columns = np.vstack(generators).T
     known = np.zeros((len(wanted), columns.shape[1]))
     if near is not None:
@@ -202,11 +198,7 @@ def _sums(frame: NDArray[np.int64], arm: FloatArray, frames: int) -> sparse.csr_
 
 def _carried(arm: FloatArray) -> FloatArray:
     """(k, 6, 6) which carry wrenches, moments per lever, from points (k, 3) away."""
-    x, y, z = (arm / LEVER).T
-    carried = np.tile(np.eye(6), (len(arm), 1, 1))
-    zero = np.zeros_like(x)
-    carried[:, 3:, :3] = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
-    return carried
+    return wrench_map(-arm / LEVER)
 
 
 def _about(wrench: FloatArray, point: FloatArray) -> FloatArray:
@@ -223,54 +215,22 @@ def _scaled(wrench: FloatArray, middle: FloatArray, weight: float) -> FloatArray
     return wanted
 
 
-def _generators(contact: Contact, middle: FloatArray, weight: float) -> FloatArray:
-    """(k, 6) wrenches of unit pushes about the middle, moments per lever."""
-    if contact.kind is ContactKind.GRASP:
-        axes = np.vstack([np.eye(3), -np.eye(3)]) * contact.max_force / weight
-        wrenches = np.hstack([axes, cross(contact.position - middle, axes)])
-    else:
-        wrenches = contact_to_world(contact, edge_wrenches(contact, "outer"), middle)
-    wrenches = np.array(wrenches)
+def _generators(stance: Stance, middle: FloatArray, weight: float) -> list[FloatArray]:
+    """(k, 6) wrenches of unit pushes of each contact about the middle, moments per lever.
+
+    A grasp's unit is its limit, in body weights.
+    """
+    found = ContactGenerators.of(stance, grasp_moments=False)
+    unit = np.where(np.isfinite(found.upper), found.upper / weight, 1.0)
+    wrenches = unit[:, None] * found.about(middle).T
     wrenches[:, 3:] /= LEVER
-    return wrenches
+    return [wrenches[found.contact == number] for number in range(len(stance))]
 
 
 def _pushes(columns: FloatArray, wanted: FloatArray, known: FloatArray | float = 0.0) -> FloatArray:
-    """(n, k) pushes nearest to known ones that supply (n, 6) wrenches, as far as pushes can.
-
-    They are ``max(0, known + G^T y)`` at the zeros ``y`` of the slope of a convex function, by Newton's
-    method. A step that does not make the slope smaller is halved.
-    """
+    """(n, k) pushes nearest to known ones that supply (n, 6) wrenches, as far as pushes can."""
     soft = SOFTNESS * float(np.trace(columns @ columns.T)) / 6.0
-    told = np.broadcast_to(known, (len(wanted), columns.shape[1]))
-    least = columns @ columns.T + soft * np.eye(6)
-    y = np.asarray(np.linalg.solve(least, (wanted - told @ columns.T).T).T, dtype=np.float64)
-    active = np.arange(len(y))
-    slope = _slope(columns, soft, y, wanted, told)
-    for _ in range(ROUNDS):
-        active = active[np.linalg.norm(slope[active], axis=1) > 1e-10]
-        if not len(active):
-            break
-        pushed = told[active] + y[active] @ columns > 0.0
-        bend = np.einsum("ik,nk,jk->nij", columns, pushed, columns, optimize=True) + soft * np.eye(6)
-        step = -np.linalg.solve(bend, slope[active][..., None])[..., 0]
-        size = np.linalg.norm(slope[active], axis=1)
-        length = np.ones(len(active))
-        for _ in range(8):
-            there = y[active] + length[:, None] * step
-            found = _slope(columns, soft, there, wanted[active], told[active])
-            worse = np.linalg.norm(found, axis=1) > (1.0 - 1e-4 * length) * size
-            if not worse.any():
-                break
-            length[worse] *= 0.5
-        y[active], slope[active] = there, found
-    return np.maximum(told + y @ columns, 0.0)
-
-
-def _slope(
-    columns: FloatArray, soft: float, y: FloatArray, wanted: FloatArray, known: FloatArray
-) -> FloatArray:
-    return np.maximum(known + y @ columns, 0.0) @ columns.T + soft * y - wanted
+    return share(columns, wanted, np.ones((len(wanted), columns.shape[1])), soft, prior=known).magnitude
 
 
 def _smallest(arms: Sequence[FloatArray], missing: FloatArray) -> FloatArray:

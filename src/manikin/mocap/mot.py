@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from manikin.errors import InputError
 from manikin.mocap.axes import rotation_to_z_up
-from manikin.mocap.force_plate import LEAST_FORCE, ForcePlate, wrench_at_world_origin
+from manikin.mocap.force_plate import LEAST_FORCE, ForcePlate
 from manikin.mocap.text import check_even, numbers, read_text, whole_number
-from manikin.spatial import FloatArray, frozen_array, skew
+from manikin.spatial import FloatArray, frozen_array, skew, wrench_about
 
 FEWEST_PRESSED = 10
 """Loaded samples without which no fixed point of the moments is looked for."""
@@ -72,7 +72,7 @@ def _plate(
     if any(np.isnan(values).any() for values in (force, point, moment)):
         raise InputError(f"{name} has a force that is no number or acts nowhere; valid: finite numbers")
     about = _fixed_point(force[pressed], point[pressed], moment[pressed]) if fixed is None else fixed
-    wrenches = wrench_at_world_origin(force, moment, point if about is None else about)
+    wrenches = wrench_about(np.hstack([force, moment]), -(point if about is None else about))
     surface = point[pressed, 2] if pressed.any() else point[:, 2]
     return ForcePlate(name, wrenches, np.array([0.0, 0.0, np.median(surface)]), rate, float(start))
 

@@ -6,14 +6,13 @@ The wrench that a motion needs is known, and shared among its contacts by
 
 import numpy as np
 
-from manikin.balance import wrench_about
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.mocap.force_sharing import shared_wrenches, smooth_shares
 from manikin.mocap.recorded_dynamics import RecordedDynamics
 from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
 from manikin.motion.motion import Motion
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.spatial import GRAVITY, FloatArray, wrench_about
 
 
 def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches: FloatArray) -> FloatArray:

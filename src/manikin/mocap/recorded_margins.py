@@ -17,12 +17,11 @@ from manikin.balance import (
     MotionMargin,
     WrenchPolytope,
     motion_margin,
-    wrench_about,
     wrench_polytopes,
 )
 from manikin.contact import ContactSchedule, Stance
 from manikin.mocap.recorded_dynamics import RecordedDynamics
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, wrench_about
 
 FLIGHT = Stance(())
 """Contacts of a phase without any."""

@@ -37,14 +37,22 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import BSpline
 
-from manikin.balance import WrenchPolytope, wrench_about
+from manikin.balance import WrenchPolytope
 from manikin.contact import ContactKind
 from manikin.errors import InputError
 from manikin.mocap.reconstruction import Reconstruction
 from manikin.mocap.recorded_dynamics import RecordedDynamics, dynamics_of_postures
 from manikin.mocap.recorded_margins import RecordedMargins, margins_within
 from manikin.mocap.recorded_motion import level_heading
-from manikin.spatial import GRAVITY, FloatArray, cross, finite_number, frozen_array, rotation_from_yaw
+from manikin.spatial import (
+    GRAVITY,
+    FloatArray,
+    cross,
+    finite_number,
+    frozen_array,
+    rotation_from_yaw,
+    wrench_about,
+)
 
 PLACE_ERROR = 0.005
 """``e``: of the centre of mass by markers [m]."""

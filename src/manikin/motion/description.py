@@ -25,8 +25,11 @@ def describe_body(body: BodyModel) -> Json:
     return {
         "name": body.name,
         "stature_m": body.stature,
-        "mass_kg": body.mass,
+        "mass_kg": body.own_mass,
         "sex": body.sex,
+        "age": body.age,
+        "strength": body.strength,
+        "loads_kg": dict(body.loads),
         "sole_length_m": body.sole_length,
         "sole_width_m": body.sole_width,
         "segments": [_describe_segment(segment) for segment in body.segments],
@@ -65,6 +68,9 @@ def body_from(description: Mapping[str, Any]) -> BodyModel:
         soft_pairs=frozenset(frozenset(pair) for pair in description["soft_pairs"]),
         stature=description["stature_m"],
         sex=description["sex"],
+        age=description["age"],
+        strength=description["strength"],
+        loads=description["loads_kg"],
         sole_length=description["sole_length_m"],
         sole_width=description["sole_width_m"],
         limbs=tuple(_limb_from(limb) for limb in description.get("limbs", ())),
@@ -95,7 +101,8 @@ def _describe_segment(segment: Segment) -> Json:
         "inertia": segment.inertia.tolist(),
         "hinges": [
             {"name": h.name, "axis": h.axis.tolist(), "lower": h.lower, "upper": h.upper,
-             "velocity_limit": h.velocity_limit, "torque_limit": h.torque_limit}
+             "velocity_limit": h.velocity_limit, "torque_lower": h.torque_lower,
+             "torque_upper": h.torque_upper}
             for h in segment.hinges
         ],
         "shapes": [

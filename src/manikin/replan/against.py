@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from manikin.balance import pseudo_wrench
+from manikin.balance import motion_margin, pseudo_wrench
 from manikin.centroidal.certificate import phase_margins, phase_times
 from manikin.comparison.compare import RunComparison, compare_runs
 from manikin.motion.file import MotionFile
 from manikin.record import ComTrack, RunRecord
 from manikin.replan.planned_anew import Replan
 from manikin.spatial import FloatArray
-from manikin.wholebody.full_motion import margins
 
 
 def against_recording(found: Replan) -> RunComparison:
@@ -45,7 +44,10 @@ def _recorded_track(found: Replan) -> ComTrack:
 
 def _margins(found: Replan, time: FloatArray, com: FloatArray, acceleration: FloatArray) -> FloatArray:
     wrench = pseudo_wrench(found.body.mass, com, acceleration)
-    return margins(found.recording.schedule, found.com.polytopes, time, wrench)
+    schedule = found.recording.schedule
+    stances = [phase.stance for phase in schedule.sequence]
+    known = found.com.polytopes
+    return motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=known).margin
 
 
 def _planned_track(found: Replan) -> ComTrack | None:

@@ -247,7 +247,7 @@ def _strong_part(contact: Contact, body: BodyModel) -> Contact:
     line = hinge_line(body, contact.effector)
     if contact.kind is not ContactKind.SOLE or contact.part is SolePart.HEEL or toes is None or line is None:
         return contact
-    strength = float(body.torque_limit[body.joint_index(toes.hinges[0].name)])
+    strength = -float(body.torque_lower[body.joint_index(toes.hinges[0].name)])
     reach = line + strength / (TOE_LOAD * body.mass * GRAVITY)
     points = np.array(contact.points)
     points[:, 0] = np.minimum(points[:, 0], reach)

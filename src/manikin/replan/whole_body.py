@@ -96,7 +96,7 @@ def adapt_postures(
         body: The body.
         scene: Obstacles and floor.
         trajectory: Centre of mass with the contacts.
-        polytopes: Of its phases, about the world origin.
+        polytopes: Of its phases.
         recorded: (n,) instants [s] and (n, nq) postures.
         clock: (k,) key instants of the trajectory and the recorded instants that they stand for [s].
     """

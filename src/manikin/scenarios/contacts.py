@@ -6,7 +6,7 @@ import numpy as np
 
 from manikin.contact import Contact, grasp, point, sole
 from manikin.scenarios.sections import ContactSection, SoleSection
-from manikin.spatial import rotation_from_rpy
+from manikin.spatial import rotation_from_normal, rotation_from_rpy
 
 
 def build_contact(
@@ -45,7 +45,8 @@ def build_contact(
     force_cap = entry.normal_force_cap_N or force_cap
     if kind == "point":
         return point(
-            effector, entry.position, friction=friction, normal=entry.normal,
+            effector, entry.position, friction=friction,
+            rotation=rotation_from_normal(entry.normal or (0.0, 0.0, 1.0), math.radians(entry.yaw_deg)),
             normal_force_cap=force_cap,
         )  # fmt: skip
     own = entry.sole or default_sole

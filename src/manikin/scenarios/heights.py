@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from manikin.scenarios.expressions import Expression, functions_for
-from manikin.spatial import FloatArray
+from manikin.spatial import IDENTITY, FloatArray, PlanarTransform
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +61,14 @@ class HeightBand:
         upper_expression: Greatest height for the reference stature.
         level: Height of the supports.
         scale: Stature over reference stature.
+        transform_expressions_to_world: Where the expressions' x and y are measured.
     """
 
     lower_expression: Expression
     upper_expression: Expression
     level: SupportLevel
     scale: float = 1.0
+    transform_expressions_to_world: PlanarTransform = IDENTITY
 
     def lower(self, x: Any, y: Any, z: Any) -> Any:
         """Lowest height of a CoM at (x, y, z) [m]; floats, arrays or CasADi expressions."""
@@ -89,7 +91,17 @@ class HeightBand:
         return np.maximum(self.lower(x, y, z) - z, z - self.upper(x, y, z))
 
     def _scaled(self, expression: Expression, x: Any, y: Any, z: Any) -> Any:
+        own_x, own_y = self._in_frame(x, y)
         if self.scale == 1.0:
-            return expression(x, y, z)
+            return expression(own_x, own_y, z)
         base = self.level(x, y)
-        return base + self.scale * (expression(x, y, base + (z - base) / self.scale) - base)
+        return base + self.scale * (expression(own_x, own_y, base + (z - base) / self.scale) - base)
+
+    def _in_frame(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """Horizontal position in the frame of the expressions."""
+        frame = self.transform_expressions_to_world
+        if frame.is_identity:
+            return x, y
+        cosine, sine, _ = frame.rotation[:, 0].tolist()
+        x, y = x - frame.x, y - frame.y
+        return cosine * x + sine * y, cosine * y - sine * x

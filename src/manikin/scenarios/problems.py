@@ -17,6 +17,7 @@ from manikin.scenarios.recordings import load_recording
 from manikin.scenarios.sequence import stance_sequence
 from manikin.scenarios.values import ScenarioValues
 from manikin.scenarios.world import build_body, build_scene
+from manikin.spatial import IDENTITY
 
 
 def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
@@ -33,7 +34,7 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
     given = {"degree": options.degree, "samples": options.samples}
     try:
         return CentroidalProblem(
-            values.mass,
+            values.moved_mass,
             _standing(values, planning=True),
             values.start_com,
             values.goal_com,
@@ -66,7 +67,11 @@ def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
         return None
     path, sequence = values.find_file(options.recording), stance_sequence(values, planning=True)
     try:
-        recording = load_recording(path, sequence, values.file.body.stature_m, values.support_level())
+        frame = options.recording_frame
+        recording = load_recording(
+            path, sequence, values.file.body.stature_m, values.support_level(),
+            IDENTITY if frame is None else frame.transform_to_world(),
+        )  # fmt: skip
         return KeyframeProblem.of(centroidal_problem(values), recording, options.control_points)
     except ScenarioError:
         raise

@@ -10,13 +10,19 @@ from manikin.errors import InputError
 from manikin.motion.derived import phases_of
 from manikin.motion.file import MotionFile, read_motions
 from manikin.scenarios.heights import SupportLevel
-from manikin.spatial import FloatArray
+from manikin.spatial import IDENTITY, FloatArray, PlanarTransform
 
 SAME_PLACE = 0.01
 """Distance up to which a recorded contact is that of the scenario [m]."""
 
 
-def load_recording(path: Path, sequence: StanceSequence, stature: float, level: SupportLevel) -> Recording:
+def load_recording(
+    path: Path,
+    sequence: StanceSequence,
+    stature: float,
+    level: SupportLevel,
+    transform_recording_to_world: PlanarTransform = IDENTITY,
+) -> Recording:
     """Read the CoM of a motion file and lay its timing over the stances of a scenario.
 
     The executed motion is taken, or else the planned one. Its phases are those of the file's
@@ -28,6 +34,7 @@ def load_recording(path: Path, sequence: StanceSequence, stature: float, level: 
         sequence: The scenario's stances.
         stature: Of the scenario's body [m].
         level: Height of the supports below the CoM.
+        transform_recording_to_world: From the file's coordinates to the scenario's.
 
     Raises:
         MotionFileError: If the file cannot be read.
@@ -41,8 +48,8 @@ def load_recording(path: Path, sequence: StanceSequence, stature: float, level: 
     if found != wanted:
         raise InputError(f"{path}: {_difference(found, wanted)}; valid: a motion on the scenario's supports")
     if content.schedule is not None:
-        _check_places(path, content.schedule, sequence)
-    com = _scaled(motion.com, content, stature, level)
+        _check_places(path, content.schedule, sequence, transform_recording_to_world)
+    com = _scaled(transform_recording_to_world.points(motion.com), content, stature, level)
     return Recording(motion.time, com, sequence, table.instants)
 
 
@@ -57,10 +64,12 @@ def _difference(found: list[list[str]], wanted: list[list[str]]) -> str:
     return f"was recorded on {names} in phase {number}, the scenario stands on {others}"
 
 
-def _check_places(path: Path, schedule: ContactSchedule, sequence: StanceSequence) -> None:
+def _check_places(
+    path: Path, schedule: ContactSchedule, sequence: StanceSequence, transform: PlanarTransform
+) -> None:
     for number, (recorded, phase) in enumerate(zip(schedule.sequence, sequence, strict=True)):
         for contact in phase.stance:
-            place = recorded.stance[contact.effector].position
+            place = transform.points(recorded.stance[contact.effector].position)
             if np.linalg.norm(place - contact.position) > SAME_PLACE:
                 raise InputError(
                     f"{path}: {contact.effector} was recorded at {np.round(place, 3).tolist()} in phase "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +11,12 @@ import yaml
 from manikin.contact import StanceSequence
 from manikin.display import Displayed
 from manikin.scenarios.overrides import override
+from manikin.scenarios.placement import FILE_GRID, TASK_GRID, moved_data
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.tree import Tree
 from manikin.scenarios.validation import validate
 from manikin.scenarios.values import ScenarioValues
+from manikin.spatial import PlanarTransform, finite_number
 
 if TYPE_CHECKING:
     from manikin.body import BodyModel
@@ -36,14 +38,27 @@ class Scenario(Displayed, ScenarioValues):
         }
 
     def with_body(
-        self, stature_m: float | None = None, mass_kg: float | None = None, sex: str | None = None
+        self,
+        stature_m: float | None = None,
+        mass_kg: float | None = None,
+        sex: str | None = None,
+        age: float | None = None,
+        strength: float | None = None,
+        load: Mapping[str, float | str] | None = None,
     ) -> Scenario:
         """Return the same scenario for another body; what is None stays.
 
         Raises:
             ScenarioError: If a value is out of its range.
         """
-        given = {"stature_m": stature_m, "mass_kg": mass_kg, "sex": sex}
+        given = {
+            "stature_m": stature_m,
+            "mass_kg": mass_kg,
+            "sex": sex,
+            "age": age,
+            "strength": strength,
+            "load": load,
+        }
         return self._changed(body={k: v for k, v in given.items() if v is not None})
 
     def with_seed(self, seed: int) -> Scenario:
@@ -68,6 +83,34 @@ class Scenario(Displayed, ScenarioValues):
         changed = override(Tree(self._data(), self.lines), settings)
         file = validate(ScenarioFile, changed.data, self.source, changed.lines)
         return Scenario(file, self.source, self.folder, changed.lines)
+
+    def moved(self, x: float, y: float, yaw_deg: float) -> Scenario:
+        """Return the same scenario at another place in the world, its coordinates written anew.
+
+        Args:
+            x: Where the origin of this scenario comes to lie [m].
+            y: The same [m].
+            yaw_deg: Turn about the vertical through it, counter-clockwise [deg].
+
+        Raises:
+            InputError: If a number is not finite.
+            ScenarioError: If a coordinate becomes larger than a file may hold.
+        """
+        x, y = finite_number(x, "moved x [m]"), finite_number(y, "moved y [m]")
+        yaw_deg = finite_number(yaw_deg, "moved yaw [deg]")
+        return self._in_frame(PlanarTransform(x, y, yaw_deg), FILE_GRID)
+
+    def in_task_frame(self) -> Scenario:
+        """Return the same scenario with its coordinates in the frame of its task, rounded.
+
+        The frame depends on the task alone (:attr:`transform_task_to_world`): a scenario and the same one
+        :meth:`moved` have the same coordinates there, to the last bit.
+        """
+        return self._in_frame(self.transform_task_to_world.inverse, TASK_GRID)
+
+    def from_task_frame(self, transform_task_to_world: PlanarTransform) -> Scenario:
+        """Return a scenario with coordinates in the frame of a task as one in the world."""
+        return self._in_frame(transform_task_to_world, FILE_GRID)
 
     def replaced(self, **sections: Any) -> Scenario:
         """Return the same scenario with whole sections replaced; None takes one out.
@@ -180,6 +223,10 @@ class Scenario(Displayed, ScenarioValues):
             data[key] = {**data[key], **change} if isinstance(change, dict) else change
         file = validate(ScenarioFile, data, self.source)
         return Scenario(file, self.source, self.folder, self.lines)
+
+    def _in_frame(self, transform: PlanarTransform, decimals: int) -> Scenario:
+        data = moved_data(self.file, self._data(), transform, decimals)
+        return Scenario(validate(ScenarioFile, data, self.source), self.source, self.folder, self.lines)
 
     def _data(self) -> dict[str, Any]:
         """Content of the file in plain values, with every default."""

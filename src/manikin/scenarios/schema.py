@@ -186,9 +186,9 @@ class ScenarioFile(Section):
         for key in ("supports", "contacts"):
             if getattr(self, key) is not None:
                 raise refuse(key, "is given beside recovery; valid: one of them")
-        for key in ("at", "heading_deg", "posture", "height_m"):
+        for key in ("posture", "height_m"):
             value = getattr(self.task.start, key)
-            if value not in (None, (0.0, 0.0), 0.0, "standing"):
+            if value not in (None, 0.0, "standing"):
                 raise refuse(f"task.start.{key}", f"is {value}; valid in a recovery: leave it out")
         if self.task.act is not None:
             raise refuse("task.act", "is given beside recovery; valid: one of them")

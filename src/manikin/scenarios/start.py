@@ -51,7 +51,7 @@ def start_posture(
         raise ScenarioError(f"posture is {name!r}; valid: {', '.join((*Habit, CLIMBING))}")
     heading_deg = None if heading_deg is None else finite_number(heading_deg, "heading [deg]")
     at = None if at is None else (finite_number(at[0], "at x [m]"), finite_number(at[1], "at y [m]"))
-    yaw = float(np.deg2rad(_heading(values) if heading_deg is None else heading_deg))
+    yaw = float(np.deg2rad(values.start_heading_deg if heading_deg is None else heading_deg))
     place = at or start.at
     if name == CLIMBING:
         spot = values.start_com[:2] if place is None else place
@@ -89,15 +89,3 @@ def turned(q: FloatArray, yaw: float) -> FloatArray:
         half[1] * z + half[0] * w, half[1] * w - half[0] * z,
     )  # fmt: skip
     return found
-
-
-def _heading(values: ScenarioValues) -> float:
-    """Heading of the start, or that of the feet of the first phase, or 0 [deg]."""
-    given = values.file.task.start.heading_deg
-    if given is not None:
-        return float(given)
-    if values.file.supports is None:
-        return 0.0
-    contacts = values.explicit_supports().resolved_phases()[0]
-    yaws = np.deg2rad([item.yaw_deg for name, item in contacts.items() if "foot" in name] or [0.0])
-    return float(np.rad2deg(np.arctan2(np.sin(yaws).sum(), np.cos(yaws).sum())))

@@ -3,6 +3,7 @@
 import difflib
 import re
 from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
 from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import (
@@ -21,6 +22,19 @@ from manikin.errors import ScenarioError
 Path = tuple[str | int, ...]
 
 
+class Moves(Enum):
+    """How a value of a file changes with the frame of the world, as a mark in the annotation of its field."""
+
+    POINT = "point"
+    """Position in the world, x and y, or x, y and z [m]."""
+    DIRECTION = "direction"
+    """Vector in the world, such as a normal or a velocity."""
+    HEADING = "heading"
+    """Angle counter-clockwise from world x [deg]."""
+    ORIENTATION = "orientation"
+    """Fixed-axis roll, pitch and yaw in the world [deg]."""
+
+
 class Section(BaseModel):
     """A mapping of a file: read-only, and every key must be known."""
 
@@ -36,6 +50,10 @@ class Section(BaseModel):
             if key not in keys:
                 raise PydanticCustomError("unknown_key", "{rule}", _unknown_key(key, keys))
         return data
+
+    def implied(self) -> dict[str, Any]:
+        """Values that are left out and yet depend on the frame of the world, as a heading that is then 0."""
+        return {}
 
     @classmethod
     def _keys(cls) -> list[str]:

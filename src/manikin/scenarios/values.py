@@ -13,6 +13,7 @@ from manikin.contact import ContactModel
 from manikin.errors import InputError, ScenarioError
 from manikin.scenarios.expressions import Expression
 from manikin.scenarios.heights import HeightBand, SupportLevel
+from manikin.scenarios.placement import start_heading_deg, task_frame
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.sections import (
     ActSection,
@@ -28,7 +29,7 @@ from manikin.scenarios.sections import (
 )
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.validation import place
-from manikin.spatial import FloatArray, frozen_array
+from manikin.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +68,18 @@ class ScenarioValues:
 
     @property
     def mass(self) -> float:
-        """Body mass [kg]."""
+        """Body mass, without a load [kg]."""
         if self.file.body.model in ("urdf", "kudoh"):
             from manikin.scenarios.world import build_body
 
-            return build_body(self).mass
+            return build_body(self).own_mass
         return self.file.body.mass_kg
+
+    @property
+    def moved_mass(self) -> float:
+        """Body mass with the load in the hands [kg]."""
+        load = self.file.body.load
+        return self.mass if load is None else self.mass + load.mass_kg
 
     @property
     def is_point_mass(self) -> bool:
@@ -87,7 +94,7 @@ class ScenarioValues:
     @property
     def contact_model(self) -> ContactModel:
         """Friction model of the file and the default cap of the body, for every stance of every stage."""
-        return ContactModel.of_body(self.mass, self.planning.friction_model)
+        return ContactModel.of_body(self.moved_mass, self.planning.friction_model)
 
     @property
     def planning(self) -> PlanningSection:
@@ -165,8 +172,9 @@ class ScenarioValues:
         if constraint is None or constraint.height_band is None:
             return None
         band = constraint.height_band
+        frame = IDENTITY if band.frame is None else band.frame.transform_to_world()
         return HeightBand(
-            Expression(band.lower), Expression(band.upper), self.support_level(), self.stature_scale
+            Expression(band.lower), Expression(band.upper), self.support_level(), self.stature_scale, frame
         )
 
     @property
@@ -239,6 +247,20 @@ class ScenarioValues:
         if self.file.supports is None:
             return self.file.floor_height_m or 0.0
         return _level(self.explicit_supports().resolved_phases()[0])
+
+    @property
+    def start_heading_deg(self) -> float:
+        """Heading at the start: the file's, or that of the feet of the first phase, or 0 [deg]."""
+        return start_heading_deg(self.file.task.start, self._first_contacts)
+
+    @property
+    def transform_task_to_world(self) -> PlanarTransform:
+        """Transform from the task's own frame to the world, see :mod:`manikin.scenarios.placement`."""
+        return task_frame(self.file.task.start, self._first_contacts)
+
+    @property
+    def _first_contacts(self) -> dict[str, ContactSection] | None:
+        return None if self.file.supports is None else self.file.supports.resolved_phases()[0]
 
     def support_level(self) -> SupportLevel:
         """Height of the supports below the CoM, from the start to the goal."""

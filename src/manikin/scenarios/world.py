@@ -4,6 +4,7 @@ import numpy as np
 
 from manikin.body import (
     BodyModel,
+    carrying,
     creature_from_urdf,
     human,
     insect,
@@ -26,14 +27,19 @@ def build_body(values: ScenarioValues) -> BodyModel:
     """
     if values.file.body.model in ("insect", "urdf"):
         return _creature(values)
+    load = values.file.body.load
     if values.file.body.model == "kudoh":
-        return kudoh()
+        return kudoh() if load is None else carrying(kudoh(), load.mass_kg, load.hand)
     if values.is_point_mass:
         return point_mass(values.mass)
     data, sole = values.file.body, values.sole
     length, width = (None, None) if sole is None else (sole.length_m, sole.width_m)
     try:
-        body = human(data.stature_m, data.mass_kg, data.sex, sole_length=length, sole_width=width)
+        body = human(
+            data.stature_m, data.mass_kg, data.sex, age=data.age, strength=data.strength,
+            sole_length=length, sole_width=width,
+        )  # fmt: skip
+        body = body if load is None else carrying(body, load.mass_kg, load.hand)
         return with_further_contacts(body, data.further_contacts) if data.further_contacts else body
     except InputError as error:
         path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)

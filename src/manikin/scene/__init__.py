@@ -1,5 +1,6 @@
 """Obstacles, support surfaces, and distances between the body and the scene."""
 
+from manikin.callable_package import make_callable
 from manikin.scene.covering import SphereCover, cover
 from manikin.scene.distance import Clearance, Proximity, ProximityResult, segment_of
 from manikin.scene.mesh import Mesh, load_mesh
@@ -29,3 +30,5 @@ __all__ = [
     "load_mesh",
     "segment_of",
 ]
+
+make_callable(__name__)

@@ -272,7 +272,7 @@ def _add_hinge(spec: Any, item: Any, hinge: Hinge, options: PhysicsOptions) -> N
     )  # fmt: skip
     motor = spec.add_actuator(
         name=hinge.name, target=hinge.name, trntype=mujoco.mjtTrn.mjTRN_JOINT,
-        ctrllimited=True, ctrlrange=[-hinge.torque_limit, hinge.torque_limit],
+        ctrllimited=True, ctrlrange=[hinge.torque_lower, hinge.torque_upper],
     )  # fmt: skip
     motor.set_to_motor()
 

@@ -270,7 +270,7 @@ class _Run:
             max_penetration_m=world.penetration,
             max_padding_compression_m=world.padding_compression,
             peak_torque_Nm=dict(zip(self.body.joint_names, peak.tolist(), strict=True)),
-            max_limit_use=float((peak / self.body.torque_limit).max()),
+            max_limit_use=float(self.body.torque_share(executed.tau[:, 6:]).max(initial=0.0)),
             realtime_factor=simulated / wall,
             wall_s=wall,
             control_ms=1e3 * control / len(recorder.samples),
@@ -278,6 +278,7 @@ class _Run:
             counted_touches=touches,
             fallbacks=tuple(recorder.fallbacks),
             max_slip_m=recorder.max_slip,
+            friction=recorder.friction_use(),
             push=push_outcome(self.pushes, recorder, self.failure),
             schedule=recorder.delayed_schedule(),
         )

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from manikin.balance.contact_forces import FrictionUse
 from manikin.contact import ContactSchedule
 from manikin.display import Displayed
 from manikin.motion import Motion
@@ -45,6 +46,7 @@ class Execution(Displayed):
         fallbacks: Time [s] and reason of every control step whose program was not solved.
         max_slip_m: Farthest that an effector moved along its surface while in contact [m].
         push: What became of the pushes; None without one.
+        friction: Largest use of friction by the forces that control counted on; None without control.
         schedule: When the planned contacts were due, later where the plan waited; None where it did not.
     """
 
@@ -72,6 +74,7 @@ class Execution(Displayed):
     max_slip_m: float
     push: PushOutcome | None = None
     schedule: ContactSchedule | None = None
+    friction: FrictionUse | None = None
 
     @property
     def succeeded(self) -> bool:
@@ -86,6 +89,7 @@ class Execution(Displayed):
             "realtime_factor", "wall_s",
         )  # fmt: skip
         block = {name: getattr(self, name) for name in names}
+        block["friction"] = None if self.friction is None else self.friction.summary()
         block["unplanned_touches"] = [touch.as_dict() for touch in self.touches]
         block["push"] = None if self.push is None else self.push.as_dict()
         return block

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from manikin.balance.contact_forces import FrictionUse, friction_share
 from manikin.balance.motion_margin import MotionMargin, motion_margin
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.control import ControlOutput, SupportMode
@@ -107,6 +108,26 @@ class Recorder:
         moved = position - landing
         along = moved - (moved @ support.contact.normal) * support.contact.normal
         self.max_slip = max(self.max_slip, float(np.linalg.norm(along)))
+
+    def friction_use(self) -> FrictionUse:
+        """Largest use of friction by the forces that control counted on, in the model of the plan.
+
+        What slides to its place is left out: it has kinetic friction only, which is on the friction cone.
+        """
+        model = self._schedule.sequence[0].stance.friction_model
+        most = FrictionUse(model, 0.0, 0.0, "")
+        for sample in self.samples:
+            for name, support in sample.output.supports.items():
+                contact = support.contact
+                wrench = sample.output.wrenches.get(name)
+                if contact is None or wrench is None:
+                    continue
+                if contact.kind is ContactKind.GRASP or support.settling:
+                    continue
+                share = float(friction_share(contact, wrench[None, :3], model)[0])
+                if share > most.share:
+                    most = FrictionUse(model, share, sample.sensed.time, name)
+        return most
 
     # --- measures --------------------------------------------------------------------------
 

@@ -11,6 +11,8 @@ from manikin.acting import (
     plan_act,
     share_force,
 )
+from manikin.balance.contact_forces import FrictionUse, friction_share
+from manikin.contact import ContactKind, FrictionModel
 from manikin.motion import Motion
 from manikin.requirement import Requirement, RequirementTable
 from manikin.scenarios import Scenario
@@ -44,10 +46,11 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
     if act is None or section is None:
         return planned
     q, contacts = planned.motion.q[-1], list(planned.schedule.sequence[-1].stance)
-    friction = context.scenario.explicit_supports().friction
-    largest = largest_force(context.body, q, contacts, act, friction)
-    forces = share_force(context.body, q, contacts, act, friction)
-    report.finish("act", _summary(act, largest, forces))
+    rub = context.scenario.explicit_supports().friction, context.scenario.contact_model.friction
+    largest = largest_force(context.body, q, contacts, act, *rub)
+    forces = share_force(context.body, q, contacts, act, *rub)
+    used = _used_friction(planned, forces, context.scenario.contact_model.friction)
+    report.finish("act", _summary(act, largest, forces) | {"friction": used})
     if forces is not None:
         report.require("act", RequirementTable((
             Requirement("max_torque_share", "share of a torque limit in the act", "", forces.torque_share,
@@ -90,6 +93,21 @@ def measured_act_failure(
         reason = f"the mean force was {found.mean_force:.0f} N; wanted {act.force:g} N"
         return Failure("execution", reason, acting.timing.end, act.obstacle)
     return None
+
+
+def _used_friction(
+    planned: PlannedMotion, forces: BracedForces | None, model: FrictionModel
+) -> dict[str, float | str] | None:
+    """Largest share of the friction that the feet use while they act."""
+    if forces is None:
+        return None
+    feet = [
+        (float(friction_share(contact, force[None, :3], model)[0]), contact.effector)
+        for contact, force in zip(planned.schedule.sequence[-1].stance, forces.contact_force, strict=True)
+        if contact.kind is not ContactKind.GRASP
+    ]
+    share, effector = max(feet)
+    return FrictionUse(model, share, planned.end, effector).summary()
 
 
 def _summary(act: Act, largest: BracedForces | None, forces: BracedForces | None) -> dict[str, Any]:

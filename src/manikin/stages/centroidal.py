@@ -2,9 +2,12 @@
 
 from typing import Any
 
-from manikin.balance import pseudo_wrench
+import numpy as np
+
+from manikin.balance.contact_forces import friction_use
 from manikin.centroidal import (
     CentroidalResult,
+    CentroidalTrajectory,
     KeyframeProblem,
     KeyframeResult,
     plan_com,
@@ -12,6 +15,8 @@ from manikin.centroidal import (
 )
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report, place
+from manikin.stages.world_frame import trajectory_in_world
+from manikin.wholebody.point_mass import point_mass_forces
 
 
 def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult:
@@ -46,7 +51,7 @@ def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[
     if result.certificate is not None:
         report.require("centroidal", result.certificate.table(result.problem))
     if result.trajectory is not None:
-        report.keep("com_trajectory", result.trajectory.to_dict())
+        report.keep("com_trajectory", trajectory_in_world(result.trajectory, report.transform).to_dict())
 
 
 def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
@@ -60,6 +65,7 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
         "phase_durations_s": None if trajectory is None else trajectory.schedule.durations.tolist(),
         "min_margin": result.d_min,
         "margin_unit": result.problem.margin_unit,
+        "friction": None if trajectory is None else _friction(trajectory),
         "limiting_phase": result.limiting_phase,
         "limiting_contact": limiting_contact(result),
         "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
@@ -72,9 +78,16 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
 
 def limiting_contact(result: CentroidalResult) -> str | None:
     """Contact and limit behind the smallest margin, such as ``"left_foot: tipping over ..."``."""
-    certificate, trajectory = result.certificate, result.trajectory
-    if certificate is None or trajectory is None:
-        return None
-    time = certificate.limiting_time
-    wrench = pseudo_wrench(result.problem.mass, trajectory.position(time), trajectory.acceleration(time))
-    return result.polytopes[certificate.limiting_phase].limiting(wrench).description
+    limiting = result.limiting
+    return None if limiting is None else limiting.description
+
+
+FORCE_STEP = 0.02
+"""Time between the samples at which the use of friction is measured [s]."""
+
+
+def _friction(trajectory: CentroidalTrajectory) -> dict[str, float | str]:
+    """Use of friction by the contact forces of the point mass, the least ones that carry it."""
+    time = np.linspace(0.0, trajectory.duration, max(2, round(trajectory.duration / FORCE_STEP) + 1))
+    forces = point_mass_forces(trajectory, time)
+    return friction_use(trajectory.schedule, time, trajectory.schedule.sequence.effectors, forces).summary()

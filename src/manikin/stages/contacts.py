@@ -48,7 +48,7 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
     report.progress("contacts", 0.0)
     found = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
     report.summary["contacts"] = dict(found.summary)
-    report.keep("contacts", found.to_dict())
+    report.keep("contacts", found.to_dict(report.transform))
     if found.plan is None:
         report.fail("contacts", found.failure or "", where=found.where)
         return None

@@ -1,5 +1,7 @@
 """The execution stage: the planned motion under control in the physics engine, and its report."""
 
+from typing import Any
+
 from manikin.contact import ContactSchedule
 from manikin.control import ControlSettings, ReturnSettings, SupportSettings
 from manikin.motion import Motion
@@ -47,15 +49,22 @@ def execute_motion(
     block = {
         "required": True,
         "failure": None if failure is None else failure.as_dict(),
-        **result.summary(),
+        **_summary_in_world(result, report),
         **context.passage(result.schedule or planned.schedule, result.motion).summary(),
     }
     report.finish("execution", block)
     report.proved = failure is None
     if failure is not None:
-        report.failure = failure
+        report.fail(failure.stage, failure.reason, failure.time_s, failure.where)
     report.keep_motions(planned.schedule, planned.motion, result.motion)
     return result
+
+
+def _summary_in_world(result: Execution, report: Report) -> dict[str, Any]:
+    block = result.summary()
+    if block["push"] is not None:
+        block["push"] |= {"direction_deg": report.transform.turned(block["push"]["direction_deg"])}
+    return block
 
 
 def _failure(schedule: ContactSchedule, result: Execution, table: RequirementTable) -> Failure | None:

@@ -124,11 +124,11 @@ class _FootSearch:
         if act is None:
             return stage_at(self._endpoints, self._scenario, "goal")
         samples = sample_limbs(self._body, self._rng, natural=self._natural)
-        friction = self._scenario.contacts.friction
+        friction, model = self._scenario.contacts.friction, self._scenario.contact_model.friction
         found = find_brace(
             self._body, self._scene, samples, act, start.com[:2],
             level=min(contact.position[2] for contact in start.contacts.values()),
-            settings=BraceSettings(friction=friction), reference=self._reference,
+            settings=BraceSettings(friction=friction, friction_model=model), reference=self._reference,
         )  # fmt: skip
         self._tally.summary["act_places"] = found.tried
         if found.brace is None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from manikin.contact_planning import ContactPlan, GuideLine
 from manikin.scenarios import Scenario
+from manikin.spatial import PlanarTransform
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +29,11 @@ class ContactSearch:
     failure: str | None = None
     where: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Guide and postures in plain values."""
-        plan = self.plan
+    def to_dict(self, transform_task_to_world: PlanarTransform) -> dict[str, Any]:
+        """Guide and postures in plain values, in the world."""
+        plan, transform = self.plan, transform_task_to_world
         return {
             **self.summary,
-            "guide": None if self.guide is None else self.guide.poses.tolist(),
-            "postures": None if plan is None else plan.postures.tolist(),
+            "guide": None if self.guide is None else transform.poses(self.guide.poses).tolist(),
+            "postures": None if plan is None else transform.poses(plan.postures).tolist(),
         }

@@ -7,6 +7,7 @@ from manikin.contact import ContactSchedule, StanceSequence
 from manikin.stages.centroidal import centroidal_summary, report_centre_of_mass
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report, place
+from manikin.stages.world_frame import reason_in_world
 from manikin.wholebody import (
     Eligibility,
     KeyPostures,
@@ -121,9 +122,21 @@ def _on_real_supports(
     return continuation.trajectory
 
 
+def _in_world(found: KeyPostures, report: Report) -> KeyPostures:
+    transform = report.transform
+    postures = [
+        replace(
+            item, com=transform.points(item.com), q=transform.poses(item.q),
+            reason=None if item.reason is None else reason_in_world(item.reason, transform),
+        )
+        for item in found.postures
+    ]  # fmt: skip
+    return replace(found, postures=tuple(postures))
+
+
 def _reported(report: Report, found: Eligibility) -> KeyedPlan:
     """Report a plan that was tested, and return it with its trajectory if it can be done."""
-    postures = found.postures
+    postures = None if found.postures is None else _in_world(found.postures, report)
     block = centroidal_summary(found.centroidal) | {
         "replans": found.replans,
         "key_postures": None if postures is None else postures.summary(),
@@ -136,4 +149,4 @@ def _reported(report: Report, found: Eligibility) -> KeyedPlan:
         trajectory, failed = None, found.failure.posture
         where = place(failed.phase, ", ".join(failed.contacts))
         report.fail(found.failure.stage, found.failure.reason, failed.time, where)
-    return KeyedPlan(found.centroidal, trajectory, postures, found.replans)
+    return KeyedPlan(found.centroidal, trajectory, found.postures, found.replans)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from manikin.acting import PlannedAct
+from manikin.balance.contact_forces import friction_use
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
 
@@ -25,3 +26,8 @@ class PlannedMotion:
     def end(self) -> float:
         """Time of the last sample [s]."""
         return float(self.motion.time[-1])
+
+
+def use_of_friction(schedule: ContactSchedule, motion: Motion) -> dict[str, float | str]:
+    """Largest use of friction by the contact forces of a planned motion, for the run's summary."""
+    return friction_use(schedule, motion.time, motion.contact_names, motion.contact_force).summary()

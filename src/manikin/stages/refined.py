@@ -4,6 +4,7 @@ from typing import Any
 
 from manikin.stages.context import RunContext
 from manikin.stages.keyed_contacts import KeyedContacts
+from manikin.stages.planned_motion import use_of_friction
 from manikin.stages.report import Report
 from manikin.wholebody import RefineResult, RefineScales, RefineSettings, refine_motion
 
@@ -29,7 +30,8 @@ def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -
         padded=padded, progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
     passage = context.passage(result.schedule, result.motion).summary()
-    block = refined_summary(result) | passage | {"seed_matters": context.plan is not None}
+    used = {"friction": use_of_friction(result.schedule, result.motion)}
+    block = refined_summary(result) | passage | used | {"seed_matters": context.plan is not None}
     report.finish("wholebody", block)
     report.require("wholebody", result.requirements)
     report.planned = result.succeeded
@@ -54,6 +56,9 @@ def refined_summary(result: RefineResult) -> dict[str, Any]:
         "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
         "max_velocity_share": certificate.max_velocity_share,
         "max_torque_share": certificate.max_torque_share,
+        "max_torque_joint": certificate.tightest_joint,
+        "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
+        "impacts": [],
         "min_margin": certificate.min_margin,
         "min_zmp_distance_m": None,
         "swings": None,

@@ -1,4 +1,7 @@
-"""What a run reports: its summary and verdict, the files of its directory, its progress."""
+"""What a run reports: its summary and verdict, the files of its directory, its progress.
+
+The stages work in the frame of the task; what leaves through here is in the world.
+"""
 
 import time as clock
 from collections.abc import Callable, Mapping
@@ -12,7 +15,9 @@ from manikin.motion.file import MotionFile, write_motions
 from manikin.output import MOTION, RunDirectory, other_motion
 from manikin.requirement import RequirementTable
 from manikin.scenarios import Scenario
+from manikin.spatial import PlanarTransform
 from manikin.stages.context import RunContext
+from manikin.stages.world_frame import motion_in_world, reason_in_world, schedule_in_world
 
 Progress = Callable[[str, float], None]
 """Told the stage and the share of it that is done, in [0, 1]."""
@@ -71,8 +76,8 @@ class Report:
         self.proved = False
         self._tables: dict[str, RequirementTable] = {}
         self._directory = None if out is None else RunDirectory(out)
-        scenario = context.scenario
-        self.keep_scenario(scenario)
+        scenario = context.given
+        self._keep_scenario(scenario)
         stature = None if scenario.is_point_mass else context.body.stature
         self.summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
@@ -84,6 +89,11 @@ class Report:
         }  # fmt: skip
 
     @property
+    def transform(self) -> PlanarTransform:
+        """From the frame of the task to the world, where everything is that is kept."""
+        return self._context.transform_task_to_world
+
+    @property
     def path(self) -> Path | None:
         """The run directory, or None."""
         return None if self._directory is None else self._directory.path
@@ -93,11 +103,11 @@ class Report:
 
         Args:
             stage: Stage that failed.
-            reason: In one line.
+            reason: In one line; positions in it, in the frame of the task, are moved to the world.
             time: When in the motion [s].
             where: Phase, contact, limb or pair.
         """
-        self.failure = Failure(stage, reason, float(time), where)
+        self.failure = Failure(stage, reason_in_world(reason, self.transform), float(time), where)
 
     def require(self, stage: str, table: RequirementTable) -> None:
         """Take the requirements of a stage's result into the summary, in place of earlier ones.
@@ -119,24 +129,18 @@ class Report:
             self._directory.write_stage(name, result)
 
     def keep_scenario(self, scenario: Scenario) -> None:
-        """Keep the scenario, resolved or with the supports that were found."""
-        if self._directory is not None:
-            self._directory.write_scenario(scenario.to_yaml())
+        """Keep a scenario of the task frame with the supports that were found, in the world."""
+        self._keep_scenario(scenario.from_task_frame(self.transform))
 
     def keep_motions(
         self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None
     ) -> None:
-        """Keep the motions that there are so far."""
-        if self._directory is not None:
-            body, scene = self._context.body, self._context.scene
-            content = MotionFile(planned, executed, body, scene, schedule)
-            write_motions(self._directory.path / MOTION, content)
+        """Keep the motions that there are so far, moved to the world."""
+        self._keep_motions(MOTION, schedule, planned, executed)
 
     def keep_other(self, name: str, schedule: ContactSchedule, planned: Motion) -> None:
-        """Keep the motion of somebody else, who has the same body."""
-        if self._directory is not None:
-            content = MotionFile(planned, None, self._context.body, self._context.scene, schedule)
-            write_motions(self._directory.path / other_motion(name), content)
+        """Keep the motion of somebody else, who has the same body, moved to the world."""
+        self._keep_motions(other_motion(name), schedule, planned)
 
     def close(self) -> dict[str, Any]:
         """Complete the summary, write it and return it."""
@@ -164,6 +168,25 @@ class Report:
         if self.failure is None and not (self.proved if required else self.planned):
             stage = "execution" if required else "wholebody"
             self.fail(stage, "the motion was not executed" if required else "there is no plan")
+
+    def _keep_scenario(self, scenario: Scenario) -> None:
+        if self._directory is not None:
+            self._directory.write_scenario(scenario.to_yaml())
+
+    def _keep_motions(
+        self, name: str, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None
+    ) -> None:
+        if self._directory is None:
+            return
+        transform = self.transform
+        content = MotionFile(
+            None if planned is None else motion_in_world(planned, transform),
+            None if executed is None else motion_in_world(executed, transform),
+            self._context.body,
+            self._context.scene_in_world,
+            schedule_in_world(schedule, transform),
+        )
+        write_motions(self._directory.path / name, content)
 
 
 def place(phase: int | None, where: str) -> str:

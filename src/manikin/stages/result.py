@@ -7,7 +7,9 @@ from typing import Any
 from manikin.centroidal import CentroidalResult
 from manikin.motion import Motion
 from manikin.simulation import Execution, Recovery
+from manikin.spatial import IDENTITY, PlanarTransform
 from manikin.stages.report import Report
+from manikin.stages.world_frame import motion_in_world
 from manikin.wholebody import RefineResult, WholeBodyResult
 
 
@@ -17,13 +19,15 @@ class RunResult:
 
     Attributes:
         summary: As printed by ``manikin run --json``.
-        planned: Planned whole-body motion, or that of a point mass; None when there is none.
-        executed: Executed motion, or None.
-        centroidal: Result of the centre-of-mass stage, or None where there was none.
+        planned: Planned whole-body motion, or that of a point mass, in the world; None when there is none.
+        executed: Executed motion in the world, or None.
+        centroidal: Result of the centre-of-mass stage, or None where there was none; it and those of the
+            other stages are in the frame of the task.
         wholebody: Result of the whole-body stage, or None.
         execution: Result of the execution, or None.
         directory: Where the files are, or None.
         recovery: Result of a recovery from a push, or None.
+        transform_task_to_world: From the frame of the task to the world.
     """
 
     summary: dict[str, Any]
@@ -34,6 +38,7 @@ class RunResult:
     execution: Execution | None
     directory: Path | None
     recovery: Recovery | None = None
+    transform_task_to_world: PlanarTransform = IDENTITY
 
     @classmethod
     def of(
@@ -59,15 +64,18 @@ class RunResult:
         executed = execution.motion if execution is not None else None
         if recovery is not None:
             executed = recovery.trace.motion
+        planned = planned if wholebody is None else wholebody.motion
+        transform = report.transform
         return cls(
             report.close(),
-            planned if wholebody is None else wholebody.motion,
-            executed,
+            None if planned is None else motion_in_world(planned, transform),
+            None if executed is None else motion_in_world(executed, transform),
             centroidal,
             wholebody,
             execution,
             report.path,
             recovery,
+            transform,
         )
 
     @property

@@ -63,7 +63,7 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
         raise scenario.refused(("walking",), error) from None
     report.finish(STAGE, path_block(plan) | {"steps": footprints.count})
     report.keep_scenario(walked)
-    return RunContext.of(walked, context.settings)
+    return replace(context, body=walked.build_body()).with_supports(walked)
 
 
 def _along(path: WalkingPath, rule: StepRule, height: float, context: RunContext) -> Footprints:

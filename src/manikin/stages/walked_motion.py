@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance import wrench_polytope
+from manikin.balance import wrench_polytopes
 from manikin.contact import (
     Contact,
     ContactSchedule,
@@ -39,7 +39,7 @@ def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
         height: Of the floor [m].
     """
     schedule, motion = walked_schedule(walk, height), walk.motion
-    polytopes = [wrench_polytope(phase.stance) for phase in schedule.sequence]
+    polytopes = wrench_polytopes([phase.stance for phase in schedule.sequence])
     rate = (len(motion.time) - 1) / motion.duration
     v = low_passed(motion.v, CUTOFF, rate, padding=9)
     a = np.gradient(v, 1.0 / rate, axis=0)

@@ -31,7 +31,7 @@ from manikin.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections import StandSection, WalkingSection, WaypointSection
 from manikin.scenarios.validation import Path as KeyPath
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, PlanarTransform
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report
 from manikin.stages.walked_motion import walked_motion
@@ -41,14 +41,14 @@ STAGE = "walk"
 PATH_EVERY = 5
 """Instants of a route for each one that is kept."""
 
+CLOCK = 0.01
+"""Step of the common clock on which distances of walkers are measured [s]."""
+
 ROOM_TOLERANCE = 1e-3
 """The path keeps its room at the instants of its optimisation; between them it may miss this much [m]."""
 
 STANCE_SLIDE = 1e-3
 """A foot on the ground moves by at most this, as a planned support does [m]."""
-
-CLOCK = 0.01
-"""Step of the common clock on which distances of walkers are measured [s]."""
 
 OBJECTIVES = {
     "prose": PROSE_ORDER, "literal": LITERAL_ORDER,
@@ -176,9 +176,17 @@ def keep_paths(report: Report, plan: PlannedWalks) -> None:
     """Keep the ways of all who walk among the files of the run: instants [s], x, y [m], headings [rad]."""
     routes = {BODY: plan.route, **plan.others}
     report.keep(WALK_PATHS, {
-        name: {"time_s": route.time[::PATH_EVERY], "place": route.place[::PATH_EVERY]}
+        name: {
+            "time_s": route.time[::PATH_EVERY],
+            "place": _in_world(route.place[::PATH_EVERY], report.transform),
+        }
         for name, route in routes.items()
     })  # fmt: skip
+
+
+def _in_world(places: FloatArray, transform: PlanarTransform) -> FloatArray:
+    """(n, 3) x, y [m] and headings [rad] in the world."""
+    return np.column_stack([transform.points(places[:, :2]), places[:, 2] + transform.yaw])
 
 
 def end_of(scenario: Scenario, end: str) -> FloatArray:

@@ -1,5 +1,6 @@
 """The whole-body stage: a motion of all joints that follows the centre of mass, and its report."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from manikin.centroidal import CentroidalResult
 from manikin.motion import Motion
 from manikin.stages.context import RunContext
 from manikin.stages.key_postures import KeyedPlan
+from manikin.stages.planned_motion import use_of_friction
 from manikin.stages.report import Report
 from manikin.wholebody import WholeBodyResult, plan_whole_body
 from manikin.wholebody.point_mass import point_mass_motion
@@ -33,7 +35,8 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
     )  # fmt: skip
     drawn = rng.bit_generator.state != unused
     passage = context.passage(trajectory.schedule, result.motion).summary()
-    report.finish("wholebody", wholebody_summary(result) | passage | {"seed_matters": drawn})
+    used = {"friction": use_of_friction(trajectory.schedule, result.motion)}
+    report.finish("wholebody", wholebody_summary(result) | passage | used | {"seed_matters": drawn})
     report.require("wholebody", result.requirements)
     report.planned = result.succeeded
     if result.failure is not None:
@@ -71,6 +74,9 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
         "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
         "max_velocity_share": certificate.max_velocity_share,
         "max_torque_share": certificate.max_torque_share,
+        "max_torque_joint": certificate.tightest_joint,
+        "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
+        "impacts": [asdict(impact) for impact in certificate.impacts],
         "min_margin": float(result.motion.margin.min()),
         "min_zmp_distance_m": certificate.min_zmp_distance_m,
         "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],

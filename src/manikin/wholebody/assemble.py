@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytope
+from manikin.balance import WrenchPolytope, motion_margin, pseudo_wrench, wrench_polytopes
 from manikin.body import BodyModel
 from manikin.centroidal import CentroidalTrajectory
 from manikin.display import Displayed
@@ -26,7 +26,7 @@ from manikin.wholebody.failure import WholeBodyFailure
 from manikin.wholebody.fit import FitResult, MotionFit
 from manikin.wholebody.fit_scales import FitScales
 from manikin.wholebody.flights import FlightPlanner, PlannedSwing
-from manikin.wholebody.full_motion import full_motion, margins
+from manikin.wholebody.full_motion import full_motion
 from manikin.wholebody.guide import Guide, guide_times, plan_guide
 from manikin.wholebody.key_postures import KeyPostures
 from manikin.wholebody.knots import phase_knots, refined, sample_times, touch_downs_at_speed
@@ -389,7 +389,7 @@ class _Planner:
             com=self.trajectory.position(time),
             com_weight=np.where(self.trajectory.binds(time), 1.0, LOOSE_COM),
             com_acceleration=self.trajectory.acceleration(time),
-            margin=margins(schedule, self._polytopes, time, self._point_mass_wrench(time)),
+            margin=self._planned_margins(time),
             reference=_with_joints(reference, toes),
             reference_scale=scale,
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
@@ -405,12 +405,15 @@ class _Planner:
 
     @cached_property
     def _polytopes(self) -> list[WrenchPolytope]:
-        """Of each phase, about the world origin."""
-        return [wrench_polytope(phase.stance) for phase in self.trajectory.schedule.sequence]
+        """Of each phase, about the middle of its contacts."""
+        return list(wrench_polytopes([phase.stance for phase in self.trajectory.schedule.sequence]))
 
-    def _point_mass_wrench(self, time: FloatArray) -> FloatArray:
-        trajectory = self.trajectory
-        return pseudo_wrench(self.body.mass, trajectory.position(time), trajectory.acceleration(time))
+    def _planned_margins(self, time: FloatArray) -> FloatArray:
+        """(n,) margins of the planned centre of mass [N.m]."""
+        schedule, com = self.trajectory.schedule, self.trajectory.position(time)
+        wrench = pseudo_wrench(self.body.mass, com, self.trajectory.acceleration(time))
+        stances = [phase.stance for phase in schedule.sequence]
+        return motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=self._polytopes).margin
 
     def _failure(
         self, swings: tuple[PlannedSwing, ...], guide: Guide, table: RequirementTable

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from manikin.balance import least_zmp_distance
 from manikin.body import BodyModel
@@ -51,6 +50,25 @@ class WholeBodyRequirements:
 
 
 @dataclass(frozen=True)
+class Impact:
+    """A contact that is made at speed.
+
+    Attributes:
+        effector: What touches down.
+        time_s: When [s].
+        torque_share: Largest share of a joint's torque limit in the :data:`IMPACT` after it.
+        joint: Name of that joint.
+        at_s: When that share is reached [s].
+    """
+
+    effector: str
+    time_s: float
+    torque_share: float
+    joint: str
+    at_s: float
+
+
+@dataclass(frozen=True)
 class WholeBodyResiduals:
     """Largest violations of a planned motion.
 
@@ -68,9 +86,12 @@ class WholeBodyResiduals:
         max_velocity_share: Largest share of a joint's velocity limit.
         max_missing_wrench: Part of the dynamics that no admissible contact force supplies [N, N.m].
         max_torque_share: Largest share of a joint's torque limit.
+        tightest_joint: Name of that joint.
         min_zmp_distance_m: Least distance of the ZMP to the edge of the support polygon, negative
             outside; of the phases whose contacts lie in one plane, None without any [m].
         worst_times_s: When each of the errors is largest [s], by field name.
+        impacts: Largest share of a torque limit just after each contact that is made at speed; they count in
+            ``max_torque_share`` like any other instant.
     """
 
     max_support_error_m: float
@@ -84,8 +105,10 @@ class WholeBodyResiduals:
     max_velocity_share: float
     max_missing_wrench: float
     max_torque_share: float
+    tightest_joint: str
     min_zmp_distance_m: float | None
     worst_times_s: dict[str, float]
+    impacts: tuple[Impact, ...] = ()
 
     def table(self, requirements: WholeBodyRequirements) -> RequirementTable:
         """Every requirement with its measured value; keys are the names of the fields."""
@@ -101,7 +124,8 @@ class WholeBodyResiduals:
             self._row("max_joint_limit_violation_rad", "joint range violation", "rad", r.joint_limit),
             self._row("max_velocity_share", "share of a velocity limit", "", r.velocity_share),
             self._row("max_missing_wrench", "missing wrench", "N, N.m", r.missing_wrench),
-            self._row("max_torque_share", "share of a torque limit", "", r.torque_share),
+            self._row("max_torque_share", "share of a torque limit", "", r.torque_share,
+                      where=self.tightest_joint),
         ])  # fmt: skip
 
     def _row(
@@ -137,8 +161,8 @@ def certify(
     angles = motion.q[:, 7:]
     limit = np.maximum(body.lower - angles, angles - body.upper).max(axis=1)
     speed = (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1)
-    torque = (np.abs(motion.tau[:, 6:]) / body.torque_limit).max(axis=1)
-    torque = np.where(_impact(trajectory.schedule, motion.time), 0.0, torque)
+    share = body.torque_share(motion.tau[:, 6:])
+    torque = share.max(axis=1, initial=0.0)
     missing = np.linalg.norm(motion.tau[:, :6], axis=1)
     clearance = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
     series = {
@@ -156,8 +180,10 @@ def certify(
         min_clearance_m=float(clearance.distance),
         closest_pair=clearance.pair or ("", ""),
         max_scuff_m=scuff,
+        tightest_joint=body.joint_names[int(np.argmax(share.max(axis=0)))],
         min_zmp_distance_m=_least_zmp_distance(trajectory.schedule, motion.time, wrench),
         worst_times_s=times,
+        impacts=_impacts(body, trajectory.schedule, motion.time, share),
     )
 
 
@@ -169,17 +195,30 @@ def _least_zmp_distance(schedule: ContactSchedule, time: FloatArray, wrench: Flo
 
 
 IMPACT = 0.03
-"""Time after a touch-down at speed in which torques are not counted [s]: the smooth plan has no
-impact, and what the joints really give there is bounded, and measured, in the execution."""
+"""Time after a touch-down at speed whose torques are listed as those of the impact [s]."""
 
 
-def _impact(schedule: ContactSchedule, time: FloatArray) -> NDArray[np.bool_]:
-    """(n,) whether a contact was made at speed just before each time."""
-    found = np.zeros(len(time), dtype=bool)
+def _impacts(
+    body: BodyModel, schedule: ContactSchedule, time: FloatArray, share: FloatArray
+) -> tuple[Impact, ...]:
+    """Torques just after each contact that is made at speed, in time.
+
+    Args:
+        body: The body.
+        schedule: Its contacts in time.
+        time: (n,) [s].
+        share: (n, nv - 6) shares of the torque limits.
+    """
+    found = []
     for name in schedule.sequence.effectors:
         settling = schedule.settling(time, name)
-        found |= settling & ~schedule.settling(time - IMPACT, name)
-    return found
+        for first in np.flatnonzero(settling & ~np.append(False, settling[:-1])):
+            rows = np.arange(first, int(np.searchsorted(time, time[first] + IMPACT)))
+            sample, joint = np.unravel_index(int(np.argmax(share[rows])), share[rows].shape)
+            largest = float(share[rows][sample, joint])
+            at = float(time[rows[sample]])
+            found.append(Impact(name, float(time[first]), largest, body.joint_names[joint], at))
+    return tuple(sorted(found, key=lambda impact: impact.time_s))
 
 
 def support_errors(

@@ -15,9 +15,9 @@ from scipy.optimize import linprog
 from scipy.sparse import block_diag, coo_array, vstack
 
 from manikin.balance.limits import contact_limits
-from manikin.contact import Contact, ContactKind, ContactSchedule, Stance
-from manikin.spatial import FloatArray, skew
-from manikin.wholebody.refine_physics import about, centre_of
+from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
+from manikin.spatial import FloatArray, wrench_map
+from manikin.wholebody.refine_physics import centre_of
 
 TOGETHER = 50
 """Instants that one program holds side by side."""
@@ -51,7 +51,7 @@ class _Program:
 
     def __init__(self, stance: Stance) -> None:
         self._centre = centre_of(stance)
-        parts = [_limits(contact) for contact in stance]
+        parts = [_limits(contact, stance.friction_model) for contact in stance]
         maps = [_map(contact, self._centre) for contact in stance]
         self._balance = np.hstack([*maps, np.zeros((6, 1))])
         limits = np.zeros((sum(len(part[1]) for part in parts), self._balance.shape[1]))
@@ -82,7 +82,7 @@ class _Program:
         cost = np.tile(np.append(np.zeros(width - 1), -1.0), n)
         equal = block_diag([coo_array(self._balance)] * n)
         below = block_diag([coo_array(self._limits)] * n)
-        wanted = (wrench @ about(self._centre).T).ravel()
+        wanted = (wrench @ wrench_map(self._centre).T).ravel()
         found = linprog(
             cost, A_ub=vstack([below]), b_ub=np.tile(self._bound, n), A_eq=equal, b_eq=wanted,
             bounds=(None, None), method="highs",
@@ -101,16 +101,14 @@ def _map(contact: Contact, centre: FloatArray) -> FloatArray:
     """(6, 3 or 6) from a contact's wrench in the frame of its limits to one about the centre."""
     grasped = contact.kind is ContactKind.GRASP
     rotation = np.eye(3) if grasped else contact.rotation_contact_to_world
-    moved = np.zeros((6, 6))
-    moved[:3, :3] = moved[3:, 3:] = rotation
-    moved[3:, :3] = skew(contact.position - centre) @ rotation
+    moved = wrench_map(centre - contact.position) @ np.kron(np.eye(2), rotation)
     forces_only = contact.kind is ContactKind.POINT or (grasped and contact.max_moment == 0.0)
     return moved[:, :3] if forces_only else moved
 
 
-def _limits(contact: Contact) -> tuple[FloatArray, FloatArray]:
+def _limits(contact: Contact, model: FrictionModel) -> tuple[FloatArray, FloatArray]:
     """Rows (k, 6) and bounds (k,) of a contact, without those of moments that it does not have."""
-    limits = contact_limits(contact)
+    limits = contact_limits(contact, model)
     if contact.kind is ContactKind.GRASP and contact.max_moment == 0.0:
         kept = np.any(limits.A[:, :3] != 0.0, axis=1)
         return limits.A[kept], limits.b[kept]

@@ -2,8 +2,8 @@
 
 The generalised forces of inverse dynamics leave a six-dimensional wrench that the contacts
 must supply.  It is shared among the force-carrying points with the least squared force along
-the edges of their friction pyramids; contacts that have just been made, or are about to be
-left, cost more, so that load passes smoothly from one to the next.
+the edges of their friction pyramids, in the friction model of each stance; contacts that have
+just been made, or are about to be left, cost more, so that load passes smoothly from one to the next.
 """
 
 from collections.abc import Iterator
@@ -14,8 +14,8 @@ import daqp
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear, nnls
 
+from manikin.balance.contact_forces import ContactGenerators, share
 from manikin.body import BodyModel
 from manikin.body.limb import carrying_segment, hinge_line
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
@@ -32,12 +32,8 @@ _SUDDEN_RAMP = 0.02
 TORQUE_SHARE = 0.98
 """Share of the joints' strength that the forces are shared for where it does not suffice at once."""
 
-_WRENCH_WEIGHT = 1.0e3
-"""Cost of missing the wrench relative to the cost of force."""
-
-
-_NEWTON_STEPS = 40
-"""Steps after which the sharing of a wrench is left to a general solver."""
+_MISSING_COST = 1.0e-6
+"""Square of the cost of force relative to that of missing the wrench."""
 
 _ARM = 0.1
 """Length that makes moments comparable with forces [m]."""
@@ -165,15 +161,15 @@ def plan_forces(
             continue
         cost = generators.cost / shares[rows][:, generators.contact]
         matrix, target = _centred(generators, part.wrench)
-        magnitude = share_wrenches(matrix, target, cost)
+        magnitude = share(matrix, target, cost**-2.0, _MISSING_COST).magnitude
         tau[rows] = part.needed - _apply(part.jacobians, generators, magnitude)
-        over = np.any(np.abs(tau[rows, 6:]) > body.torque_limit, axis=1)
+        over = np.any(body.torque_share(tau[rows, 6:]) > 1.0, axis=1)
         over |= np.any(magnitude > generators.limit, axis=1)
         for k in np.flatnonzero(over):
             joint_map = _joint_map(part.jacobians[k], generators)
             other = _share_within_limits(
                 generators, matrix, target[k], cost[k], part.needed[k, 6:], joint_map[6:],
-                TORQUE_SHARE * body.torque_limit,
+                TORQUE_SHARE * body.torque_lower, TORQUE_SHARE * body.torque_upper,
             )  # fmt: skip
             if other is not None:
                 magnitude[k] = other
@@ -224,23 +220,20 @@ def load_shares(schedule: ContactSchedule, time: FloatArray, names: tuple[str, .
 
 
 def _generators(body: BodyModel, stance: Stance, names: tuple[str, ...]) -> _Generators:
-    points, directions, contacts, carriers, costs, limits = [], [], [], [], [], []
-    for contact in stance:
-        edges = _edges(contact)
-        for local in _force_points(body, contact):
+    points = [_force_points(body, contact) for contact in stance]
+    found = ContactGenerators.of(stance, points, grasp_moments=False)
+    contacts = [names.index(contact.effector) for contact in stance]
+    carriers, costs = [], []
+    for number, contact in enumerate(stance):
+        count = int(np.sum(found.contact == number)) // len(points[number])
+        for local in points[number]:
             segment = carrying_segment(body, contact.effector, local)
-            carrier = body.pinocchio.frames[body.segment_frame(segment)].parentJoint
             hanging = segment != body.effector(contact.effector).segment
-            for edge in edges:
-                points.append(contact.position + contact.rotation_contact_to_world @ local)
-                directions.append(edge)
-                contacts.append(names.index(contact.effector))
-                carriers.append(carrier)
-                costs.append(_HANGING_COST if hanging else 1.0)
-                limits.append(contact.max_force if contact.kind is ContactKind.GRASP else np.inf)
+            carriers += [body.pinocchio.frames[body.segment_frame(segment)].parentJoint] * count
+            costs += [_HANGING_COST if hanging else 1.0] * count
     return _Generators(
-        np.array(points), np.array(directions), np.array(contacts), np.array(carriers), np.array(costs),
-        np.array(limits), moves_by_joint(body.pinocchio),
+        found.point, found.force, np.array(contacts, dtype=np.int64)[found.contact], np.array(carriers),
+        np.array(costs), found.upper, moves_by_joint(body.pinocchio),
     )  # fmt: skip
 
 
@@ -257,61 +250,6 @@ def _force_points(body: BodyModel, contact: Contact) -> FloatArray:
         return contact.points
     half = 0.5 * contact.width
     return np.vstack([contact.points, [[line, half, 0.0], [line, -half, 0.0]]])
-
-
-def _edges(contact: Contact) -> FloatArray:
-    if contact.kind is ContactKind.GRASP:
-        return np.vstack([np.eye(3), -np.eye(3)])
-    signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * contact.friction
-    local = np.column_stack([signs, np.ones(4)])
-    return local @ contact.rotation_contact_to_world.T
-
-
-def share_wrenches(matrix: FloatArray, targets: FloatArray, cost: FloatArray) -> FloatArray:
-    """Magnitudes ``x >= 0`` that supply wrenches with the least weighted square, for many samples at once.
-
-    They minimise ``w^2 |A x - b|^2 + sum_j (c_j x_j)^2``.  With the multiplier ``y`` of the wrench,
-    ``x_j = max(0, a_j . y) / c_j^2``, and ``y`` minimises a convex, piecewise quadratic function of six
-    unknowns.  Newton's method finds it in a few steps; a sample for which it does not end within
-    :data:`_NEWTON_STEPS` is left to a general solver.
-
-    Args:
-        matrix: (6, g) wrench ``a_j`` of each unit magnitude.
-        targets: (n, 6) wrenches ``b`` to supply.
-        cost: (n, g) cost ``c`` of each magnitude.
-
-    Returns:
-        (n, g).
-    """
-    inverse_cost = cost**-2.0
-    active = np.ones(cost.shape, dtype=bool)
-    magnitude = np.empty(cost.shape)
-    open_ones = np.arange(len(cost))
-    for _ in range(_NEWTON_STEPS):
-        weight = np.where(active[open_ones], inverse_cost[open_ones], 0.0)
-        system = (matrix * weight[:, None, :]) @ matrix.T + np.eye(6) / _WRENCH_WEIGHT**2
-        multiplier = np.linalg.solve(system, targets[open_ones, :, None])[:, :, 0]
-        along = multiplier @ matrix
-        settled = np.all((along > 0.0) == active[open_ones], axis=1)
-        active[open_ones] = along > 0.0
-        done = open_ones[settled]
-        magnitude[done] = (weight * along)[settled]
-        open_ones = open_ones[~settled]
-        if len(open_ones) == 0:
-            break
-    for k in open_ones:
-        magnitude[k] = _share_wrench(matrix, targets[k], cost[k])
-    return magnitude
-
-
-def _share_wrench(matrix: FloatArray, target: FloatArray, cost: FloatArray) -> FloatArray:
-    """Like :func:`share_wrenches` for one sample, by an active-set method."""
-    stacked = np.vstack([_WRENCH_WEIGHT * matrix, np.diag(cost)])
-    wanted = np.concatenate([_WRENCH_WEIGHT * target, np.zeros(len(cost))])
-    try:
-        return nnls(stacked, wanted)[0]
-    except RuntimeError:  # its active set cycles where generators are nearly dependent
-        return lsq_linear(stacked, wanted, bounds=(0.0, np.inf), tol=1e-12).x
 
 
 def _centred(generators: _Generators, wrench: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -331,7 +269,8 @@ def _share_within_limits(
     cost: FloatArray,
     needed: FloatArray,
     joint_map: FloatArray,
-    torque_limit: FloatArray,
+    torque_lower: FloatArray,
+    torque_upper: FloatArray,
 ) -> FloatArray | None:
     """Magnitudes (g,) that keep the joints' torques and the grasps' forces within their limits, or None.
 
@@ -342,7 +281,8 @@ def _share_within_limits(
         cost: (g,) cost of each magnitude.
         needed: (nv - 6,) joint torques without contacts [N.m].
         joint_map: (nv - 6, g) torque that a unit magnitude takes from each joint.
-        torque_limit: (nv - 6,) [N.m].
+        torque_lower: (nv - 6,) most negative joint torques [N.m].
+        torque_upper: (nv - 6,) largest ones [N.m].
     """
     cost = cost**2
     count = len(cost)
@@ -351,8 +291,8 @@ def _share_within_limits(
         np.diag(cost / cost.mean()),
         np.zeros(count),
         np.ascontiguousarray(np.vstack([matrix, joint_map])),
-        np.concatenate([limit, target, needed + torque_limit]),
-        np.concatenate([np.zeros(count), target, needed - torque_limit]),
+        np.concatenate([limit, target, needed - torque_lower]),
+        np.concatenate([np.zeros(count), target, needed - torque_upper]),
         np.concatenate([np.zeros(count), np.full(6, _EQUALITY), np.zeros(len(needed))]).astype(np.int32),
     )
     return np.maximum(np.asarray(solution, dtype=np.float64), 0.0) if flag > 0 else None

@@ -2,9 +2,7 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from manikin.balance import WrenchPolytope
+from manikin.balance import WrenchPolytope, motion_margin
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
@@ -27,7 +25,7 @@ def full_motion(
     Args:
         body: The body.
         schedule: Its contacts in time.
-        polytopes: Of each phase, about the world origin.
+        polytopes: Of each phase.
         time: (n,) [s].
         q: (n, nq) configurations.
         v: (n, nv) velocities.
@@ -38,23 +36,12 @@ def full_motion(
     """
     found = centroidal_motion(body, q, v, a)
     forces = plan_forces(body, schedule, time, q, v, a)
+    stances = [phase.stance for phase in schedule.sequence]
+    margin = motion_margin(stances, schedule.phase_at(time), found.wrench, found.com, polytopes=polytopes)
     names = schedule.sequence.effectors
     motion = Motion(
-        time=time, q=q, v=v, a=a, tau=forces.tau, com=found.com,
-        angular_momentum=found.angular_momentum,
-        margin=margins(schedule, polytopes, time, found.wrench), support=schedule.support(time, names),
+        time=time, q=q, v=v, a=a, tau=forces.tau, com=found.com, angular_momentum=found.angular_momentum,
+        margin=margin.margin, support=schedule.support(time, names),
         contact_force=forces.contact_force, contact_names=names, joint_names=body.joint_names,
     )  # fmt: skip
     return motion, found.wrench
-
-
-def margins(
-    schedule: ContactSchedule, polytopes: Sequence[WrenchPolytope], time: FloatArray, wrench: FloatArray
-) -> FloatArray:
-    """(n,) margin of wrenches (n, 6) at instants (n,), each in the polytope of its phase [N.m]."""
-    phases = schedule.phase_at(time)
-    margin = np.zeros(len(time))
-    for number, polytope in enumerate(polytopes):
-        rows = phases == number
-        margin[rows] = polytope.margin(wrench[rows])
-    return margin

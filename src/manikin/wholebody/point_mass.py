@@ -10,11 +10,10 @@ from ctypes import c_int
 import daqp
 import numpy as np
 
-from manikin.balance import WrenchPolytope
-from manikin.balance.friction import pyramid_friction
+from manikin.balance import WrenchPolytope, motion_margin
+from manikin.balance.contact_forces import ContactGenerators
 from manikin.centroidal import CentroidalProblem, CentroidalTrajectory
-from manikin.centroidal.certificate import facet_margins
-from manikin.contact import Contact, ContactKind, Stance
+from manikin.contact import ContactKind, Stance
 from manikin.motion import Motion
 from manikin.spatial import FloatArray, skew
 from manikin.wholebody.forces import load_shares
@@ -31,7 +30,7 @@ def point_mass_motion(
     Args:
         problem: What was planned.
         trajectory: The plan.
-        polytopes: W_i of the phases about the world origin.
+        polytopes: W_i of the phases.
 
     Returns:
         The motion of :func:`manikin.body.point_mass.point_mass`, every :data:`STEP` and at the key
@@ -54,7 +53,7 @@ def point_mass_motion(
         angular_momentum=rest,
         margin=_margins(problem, trajectory, polytopes, time),
         support=schedule.support(time, names),
-        contact_force=_contact_forces(problem, trajectory, time, names),
+        contact_force=point_mass_forces(trajectory, time),
         contact_names=names,
         joint_names=(),
         margin_unit=problem.margin_unit,
@@ -68,21 +67,28 @@ def _margins(
     time: FloatArray,
 ) -> FloatArray:
     """(n,) margin in the phase of each instant; at a key instant the smaller of both phases."""
+    schedule = trajectory.schedule
+    starts = np.searchsorted(time, schedule.instants - 1e-9)
+    owners = [np.arange(starts[k], starts[k + 1] + 1) for k in range(len(polytopes))]
+    rows, phases = np.concatenate(owners), np.repeat(np.arange(len(polytopes)), [len(own) for own in owners])
+    stances = [phase.stance for phase in schedule.sequence]
+    wrench, com = trajectory.pseudo_wrench(time), trajectory.position(time)
+    found = motion_margin(stances, phases, wrench[rows], com[rows], polytopes=polytopes)
     margin = np.full(len(time), np.inf)
-    instants = trajectory.schedule.instants
-    for phase, polytope in enumerate(polytopes):
-        inside = (time >= instants[phase] - 1e-9) & (time <= instants[phase + 1] + 1e-9)
-        blocks = [b.min(axis=1) for b in facet_margins(problem, trajectory, polytope, time[inside])]
-        margin[inside] = np.minimum(margin[inside], np.concatenate(blocks))
+    np.minimum.at(margin, rows, found.force if problem.margin_space == "force" else found.margin)
     return margin
 
 
-def _contact_forces(
-    problem: CentroidalProblem, trajectory: CentroidalTrajectory, time: FloatArray, names: tuple[str, ...]
-) -> FloatArray:
-    """(n, c, 6) forces and moments about each contact's origin [N, N.m]."""
+def point_mass_forces(trajectory: CentroidalTrajectory, time: FloatArray) -> FloatArray:
+    """(n, c, 6) contact forces of a CoM trajectory, with moments about each contact's origin [N, N.m].
+
+    Args:
+        trajectory: The plan.
+        time: (n,) [s].
+    """
+    names = trajectory.schedule.sequence.effectors
     schedule = trajectory.schedule
-    corners = [_Corners(phase.stance, names, problem) for phase in schedule.sequence]
+    corners = [_Corners(phase.stance, names) for phase in schedule.sequence]
     wrench, phases = trajectory.pseudo_wrench(time), schedule.phase_at(time)
     shares = load_shares(schedule, time, names)
     forces = np.zeros((len(time), len(names), 6))
@@ -94,18 +100,15 @@ def _contact_forces(
 class _Corners:
     """The edges of the friction pyramids at every corner of one stance."""
 
-    def __init__(self, stance: Stance, names: tuple[str, ...], problem: CentroidalProblem) -> None:
+    def __init__(self, stance: Stance, names: tuple[str, ...]) -> None:
         self._count = len(names)
-        directions, owners, points = [], [], []
-        for contact in stance:
-            for corner in contact.points_in_world:
-                for edge in _edges(contact, problem):
-                    directions.append(edge)
-                    points.append(corner)
-                    owners.append(names.index(contact.effector))
-        force, place = np.array(directions), np.array(points)
-        self._owner = np.array(owners)
-        self._wrenches = np.vstack([force.T, np.cross(place, force).T])
+        generators = ContactGenerators.of(stance, grasp_moments=False)
+        owners = [names.index(contact.effector) for contact in stance]
+        self._owner = np.array(owners, dtype=np.int64)[generators.contact]
+        limited = np.isfinite(generators.upper)
+        self._unit, self._upper = np.where(limited, generators.upper, 1.0), np.where(limited, 1.0, 1e30)
+        self._wrenches = self._unit * generators.about(np.zeros(3))
+        self._normal = generators.normal
         origin = {names.index(contact.effector): contact.position for contact in stance}
         self._origin = origin
         self._limits, self._caps = self._rows(stance, names)
@@ -117,13 +120,18 @@ class _Corners:
             if contact.kind is not ContactKind.GRASP and contact.normal_force_cap is not None:
                 rows.append((self._owner == names.index(contact.effector)).astype(float))
                 caps.append(contact.normal_force_cap)
+        if stance.normal_force_cap is not None:
+            rows.append(self._normal)
+            caps.append(stance.normal_force_cap)
         return np.array(rows).reshape(-1, len(self._owner)), np.array(caps)
 
     def share(self, wrench: FloatArray, shares: FloatArray) -> FloatArray:
         """(c, 6) forces and moments that supply the wrench about the world origin."""
         size = len(self._owner)
+        if not size:
+            return np.zeros((self._count, 6))
         cost = np.diag(1.0 / shares[self._owner])
-        upper = np.concatenate([np.full(size, 1e30), wrench, self._caps])
+        upper = np.concatenate([self._upper, wrench, self._caps])
         lower = np.concatenate([np.zeros(size), wrench, np.full(len(self._caps), -1e30)])
         sense = np.zeros(len(upper), dtype=c_int)
         sense[size : size + 6] = 5  # equalities
@@ -137,11 +145,3 @@ class _Corners:
             out[index, :3] = total[:3]
             out[index, 3:] = total[3:] - skew(origin) @ total[:3]
         return out
-
-
-def _edges(contact: Contact, problem: CentroidalProblem) -> FloatArray:
-    if contact.kind is ContactKind.GRASP:
-        return contact.max_force * np.vstack([np.eye(3), -np.eye(3)])
-    friction = pyramid_friction(contact, problem.sequence[0].stance.friction_model)
-    signs = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * friction
-    return np.column_stack([signs, np.ones(4)]) @ contact.rotation_contact_to_world.T

@@ -28,7 +28,7 @@ class RefineRequirements:
         velocity_share: Largest share of a joint's velocity limit.
         physics_violation: Largest wrench that no admissible contact force supplies [N].
         margin: Least margin of the whole body's wrench, where the stance's wrenches fill a volume [N.m].
-        torque_share: Largest share of a joint's torque limit; None asks for none.
+        torque_share: Largest share of a joint's torque limit.
     """
 
     support_error: float = 1.0e-3
@@ -39,7 +39,7 @@ class RefineRequirements:
     velocity_share: float = 1.0
     physics_violation: float = 1.0
     margin: float = 0.0
-    torque_share: float | None = None
+    torque_share: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,10 @@ class RefineResiduals:
         max_velocity_share: Largest share of a joint's velocity limit.
         max_physics_violation: Wrench that no admissible contact force supplies, about the stance's mean
             contact point with 1 m [N].
-        min_margin: Least margin of the whole body's wrench about the world origin, over the stances whose
+        min_margin: Least margin of the whole body's wrench about the CoM, over the stances whose
             wrenches fill a volume; infinite without any [N.m].
         max_torque_share: Largest share of a joint's torque limit.
+        tightest_joint: Name of that joint.
         worst_times_s: When each of the errors is largest [s], by field name.
     """
 
@@ -72,12 +73,12 @@ class RefineResiduals:
     max_physics_violation: float
     min_margin: float
     max_torque_share: float
+    tightest_joint: str
     worst_times_s: dict[str, float]
 
     def table(self, requirements: RefineRequirements) -> RequirementTable:
         """Every requirement with its measured value; keys are the names of the fields."""
         r, pair = requirements, " and ".join(self.closest_pair)
-        torque = np.inf if r.torque_share is None else r.torque_share
         return requirement_table([
             self._row("max_support_error_m", "support error", "m", r.support_error),
             self._row("max_support_turn_rad", "support turn", "rad", r.support_turn),
@@ -88,7 +89,8 @@ class RefineResiduals:
             self._row("max_physics_violation", "wrench without contact force", "N", r.physics_violation),
             None if self.min_margin == np.inf
             else self._row("min_margin", "margin of the whole body", "N.m", r.margin, ">="),
-            self._row("max_torque_share", "share of a torque limit", "", torque),
+            self._row("max_torque_share", "share of a torque limit", "", r.torque_share,
+                      where=self.tightest_joint),
         ])  # fmt: skip
 
     def _row(
@@ -122,11 +124,12 @@ def certify_refined(
     angles = motion.q[:, 7:]
     limit = np.maximum(body.lower - angles, angles - body.upper).max(axis=1, initial=0.0)
     margin = np.where(np.array(flat)[schedule.phase_at(motion.time)], np.inf, motion.margin)
+    share = body.torque_share(motion.tau[:, 6:])
     series = {
         "max_support_error_m": support, "max_support_turn_rad": turn,
         "max_joint_limit_violation_rad": limit,
         "max_velocity_share": (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1, initial=0.0),
-        "max_torque_share": (np.abs(motion.tau[:, 6:]) / body.torque_limit).max(axis=1, initial=0.0),
+        "max_torque_share": share.max(axis=1, initial=0.0),
         "max_physics_violation": violation,
     }  # fmt: skip
     times = {name: float(motion.time[int(np.argmax(values))]) for name, values in series.items()}
@@ -141,5 +144,6 @@ def certify_refined(
         closest_pair=apart.pair or ("", ""),
         max_penetration_m=max(0.0, -float(flying.distance)),
         min_margin=float(margin.min()),
+        tightest_joint=body.joint_names[int(np.argmax(share.max(axis=0)))],
         worst_times_s=times,
     )

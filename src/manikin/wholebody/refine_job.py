@@ -21,7 +21,7 @@ from manikin.wholebody.fit import FitResult, MotionFit, spline_through
 from manikin.wholebody.knots import phase_knots, refined, sample_times
 from manikin.wholebody.objective import MotionObjective
 from manikin.wholebody.refine_balance import BalanceRoom
-from manikin.wholebody.refine_certificate import RefineRequirements, RefineResiduals
+from manikin.wholebody.refine_certificate import RefineResiduals
 from manikin.wholebody.refine_input import KeyPath, stretched_around, stretched_for_speed
 from manikin.wholebody.refine_measures import (
     STEP,
@@ -65,7 +65,7 @@ NEARLY = 0.02
 PATIENT = 0.004
 """Relative decrease of the objective below which a repair stops."""
 
-_SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin"})
+_SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin", "max_torque_share"})
 """Broken requirements that a slower motion may keep."""
 
 _EXACT = frozenset({"max_support_error_m", "max_support_turn_rad"})
@@ -81,6 +81,7 @@ _SCALES = MappingProxyType(
         "max_velocity_share": ("joint_velocity",),
         "max_physics_violation": ("missing_wrench", "margin_violation"),
         "min_margin": ("margin_violation", "missing_wrench"),
+        "max_torque_share": ("force",),
     }
 )
 """Scales that decide each field of the certificate."""
@@ -187,8 +188,7 @@ class Refinement:
                 break
             self.path, self.schedule = shortened(best.path, best.schedule, factors)
             trial = self._attempt(scales, fine, self._retimed(best.spline, best.schedule))
-            required = self._strong(best)
-            broken = trial.certificate.table(required).broken
+            broken = trial.certificate.table(self.settings.requirements).broken
             if broken:
                 blamed = (around(trial.schedule, trial.certificate.worst_times_s[name]) for name in broken)
                 settled = settled.union(*blamed)
@@ -196,12 +196,6 @@ class Refinement:
             else:
                 best = trial
         return best
-
-    def _strong(self, attempt: _Attempt) -> RefineRequirements:
-        """The requirements, with no more of the joints' strength than an attempt needs, or all of it."""
-        required = self.settings.requirements
-        share = max(1.0, attempt.certificate.max_torque_share)
-        return replace(required, torque_share=min(share, required.torque_share or share))
 
     def _retimed(self, spline: ConfigurationSpline, before: ContactSchedule) -> ConfigurationSpline:
         """A spline in the time of the present schedule."""

@@ -11,19 +11,20 @@ import daqp
 import numpy as np
 import pinocchio as pin
 
+from manikin.balance import motion_margin
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Stance
 from manikin.contact_planning.efort import Task
 from manikin.motion.dynamics import centroidal_motion
 from manikin.scene import Proximity
 from manikin.scene.distance import moves_by_joint
-from manikin.spatial import FloatArray
+from manikin.spatial import FloatArray, wrench_map
 from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_contacts import contact_variables
 from manikin.wholebody.refine_efort import LEAST, efort_with_derivative, limb_directions
 from manikin.wholebody.refine_input import KeyPath
 from manikin.wholebody.refine_obstacles import RefineObstacles
-from manikin.wholebody.refine_physics import about, centre_of
+from manikin.wholebody.refine_physics import centre_of
 
 STEP = 0.01
 """Spacing of the samples that are measured [s]."""
@@ -52,7 +53,7 @@ class RefineMeasures:
         efort_cost: Mean over time of ``sum c / alpha`` (7.9), alpha clamped.
         max_joint_limit_violation_rad: [rad].
         max_velocity_share: Largest share of a joint's velocity limit.
-        min_margin: Least margin of the whole body's wrench about the stance's mean contact point [N.m].
+        min_margin: Least margin of the whole body's wrench about the CoM [N.m].
     """
 
     duration_s: float
@@ -131,18 +132,21 @@ def room_of(stance: Stance, friction_share: float = 1.0) -> BalanceRoom:
 
 
 def balance_of(
-    schedule: ContactSchedule, rooms: tuple[BalanceRoom, ...], time: FloatArray, wrench: FloatArray
+    schedule: ContactSchedule,
+    rooms: tuple[BalanceRoom, ...],
+    time: FloatArray,
+    wrench: FloatArray,
+    com: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """(n,) margin and physics violation of wrenches (n, 6) about the world origin."""
-    phases = schedule.phase_at(time)
-    margin, violation = np.zeros(len(time)), np.zeros(len(time))
+    """(n,) margin and physics violation of wrenches (n, 6) about the world origin with CoM (n, 3)."""
+    phases, violation = schedule.phase_at(time), np.zeros(len(time))
     for number, (phase, room) in enumerate(zip(schedule.sequence, rooms, strict=True)):
         rows = phases == number
         if np.any(rows):
-            local = wrench[rows] @ about(centre_of(phase.stance)).T
-            margin[rows] = room.polytope.margin(local)
-            violation[rows] = physics_violation(room, local)
-    return margin, violation
+            violation[rows] = physics_violation(room, wrench[rows] @ wrench_map(centre_of(phase.stance)).T)
+    polytopes = [room.polytope for room in rooms]
+    found = motion_margin([one.stance for one in polytopes], phases, wrench, com, polytopes=polytopes)
+    return found.margin, violation
 
 
 def measure(
@@ -171,7 +175,8 @@ def measure(
     """
     v, a = differences(body, time, q)
     step = float(time[1] - time[0])
-    margin, violation = balance_of(schedule, rooms, time, centroidal_motion(body, q, v, a).wrench)
+    found = centroidal_motion(body, q, v, a)
+    margin, violation = balance_of(schedule, rooms, time, found.wrench, found.com)
     error, slide, cost = _contact_terms(body, path, schedule, time, q, v, task)
     outside = np.maximum(body.lower - q[:, 7:], q[:, 7:] - body.upper).max()
     clearance = proximity.minimum_over(q, obstacles.during_flights(), tolerance=1e-5)

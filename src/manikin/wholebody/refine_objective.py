@@ -11,6 +11,7 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
@@ -120,6 +121,12 @@ def sole_toes(body: BodyModel, schedule: ContactSchedule) -> tuple[int, ...]:
     return tuple(sorted(found))
 
 
+def _centres_of_mass(body: BodyModel, q: FloatArray) -> FloatArray:
+    """(n, 3) of configurations (n, nq) [m]."""
+    data = body.pinocchio.createData()
+    return np.array([pin.centerOfMass(body.pinocchio, data, row).copy() for row in q])
+
+
 class RefineObjective(MotionObjective):
     """Evaluates and linearises the objective of a spline's control points.
 
@@ -143,12 +150,15 @@ class RefineObjective(MotionObjective):
         self._refine = targets
         schedule, self._names = targets.schedule, tuple(targets.fit.effectors)
         time = targets.fit.time
+        com = _centres_of_mass(body, targets.fit.reference)
+        self._wanted: dict[tuple[int, float], float] = {}
         # At a key instant the stances on both sides of it have to do.
         self._stances = [
-            (np.flatnonzero((time >= start) & (time <= end)), ContactForces(phase.stance, self._names), room)
+            (rows, ContactForces(phase.stance, self._names), room, com[rows].mean(axis=0))
             for phase, room, (start, end) in zip(
                 schedule.sequence, rooms, itertools.pairwise(schedule.instants), strict=True
             )
+            for rows in (np.flatnonzero((time >= start) & (time <= end)),)
         ]
         self._load = targets.load
         self._knees = [7 + k for k, name in enumerate(body.joint_names) if name.endswith(KNEE)]
@@ -190,8 +200,10 @@ class RefineObjective(MotionObjective):
         """Physics violation and balance, which depend on the wrench that the whole body needs."""
         assert isinstance(scales, RefineScales)
         wrench = WrenchSamples.of(motion, self._body.mass)
-        cost = self.wrench_cost(wrench.value, scales)
+        cost = self.wrench_cost(wrench.value, motion.com, scales)
         out.sample_cost += cost.value
+        # The lengths of the rows change little with the CoM; the gradient alone has it.
+        out.gradient[0] += np.einsum("nc,ncq->nq", cost.by_com, wrench.com_jacobian)
         # With the curvature L L^T, the rows L^T db and the residual L^-1 gradient have its gradient
         # and its Gauss-Newton matrix.
         size = np.abs(cost.curvature).max(axis=(1, 2))
@@ -200,23 +212,33 @@ class RefineObjective(MotionObjective):
         first, second, third = (root.transpose(0, 2, 1) @ part for part in wrench.jacobians)
         out.momentum = MomentumRate(residual, (first, second, third))
 
-    def wrench_cost(self, wrench: FloatArray, scales: RefineScales) -> WrenchCost:
-        """Physics violation and missing balance of wrenches (n, 6) about the world origin."""
+    def wrench_cost(self, wrench: FloatArray, com: FloatArray, scales: RefineScales) -> WrenchCost:
+        """Physics violation and missing balance of wrenches (n, 6) about the world origin, CoM (n, 3)."""
         n = len(wrench)
         value, gradient, curvature = np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6, 6))
+        by_com = np.zeros((n, 3))
         weight = self._body.mass * 9.81
-        for rows, forces, room in self._stances:
+        for rows, forces, room, place in self._stances:
             part = wrench[rows]
             share = forces.share(
                 part, self._load[rows], tolerance=scales.missing_wrench, force=scales.force * weight
             )
+            wanted = self._wanted_margin(room, scales.margin, place)
             cost = share.cost + room.cost(
-                part, scales.margin, scales.margin_violation, scales.margin_softness
+                part, com[rows], wanted, scales.margin_violation, scales.margin_softness
             )
             value[rows] += cost.value
             gradient[rows] += cost.gradient
             curvature[rows] += cost.curvature
-        return WrenchCost(value, gradient, curvature)
+            by_com[rows] += cost.by_com
+        return WrenchCost(value, gradient, curvature, by_com)
+
+    def _wanted_margin(self, room: BalanceRoom, margin: float, place: FloatArray) -> float:
+        """:meth:`BalanceRoom.wanted`, found once for each stance."""
+        key = id(room), margin
+        if key not in self._wanted:
+            self._wanted[key] = room.wanted(margin, place)
+        return self._wanted[key]
 
     def _add_contact_motion(self, out: Linearised, motion: MotionSamples, scales: RefineScales) -> None:
         """Speeds of effectors in contact, and the EFORT of their limbs."""

@@ -14,11 +14,10 @@ the next.  Caps on sums of forces are left to the margin.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
-from manikin.balance.friction import contact_to_world, edge_wrenches
-from manikin.contact import ContactKind, Stance
-from manikin.spatial import GRAVITY_VECTOR, FloatArray, skew
+from manikin.balance.contact_forces import ContactGenerators, share
+from manikin.contact import Stance
+from manikin.spatial import GRAVITY_VECTOR, FloatArray, skew, wrench_map
 from manikin.wholebody.motion_samples import MotionSamples
 
 ARM = 0.25
@@ -26,9 +25,6 @@ ARM = 0.25
 
 LEAST_VARIABLE = 0.05
 """Contact variables below this do not make a force any costlier."""
-
-STEPS = 40
-"""Newton steps after which a sample is left to a general solver."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +34,12 @@ class WrenchSamples:
     Attributes:
         value: (n, 6) force and moment [N, N.m].
         jacobians: Three (n, 6, nq) derivatives, by the raw coordinates, their rates and second derivatives.
+        com_jacobian: (n, 3, nq) derivative of the CoM by the raw coordinates.
     """
 
     value: FloatArray
     jacobians: tuple[FloatArray, FloatArray, FloatArray]
+    com_jacobian: FloatArray
 
     @classmethod
     def of(cls, motion: MotionSamples, mass: float) -> "WrenchSamples":
@@ -58,14 +56,7 @@ class WrenchSamples:
             [motion.com_jacobian[:, :, :6] @ tangent, motion.com_jacobian[:, :, 6:]], axis=2
         )
         jacobians[0][:, 3:] -= skew(force) @ by_com
-        return cls(np.hstack([force, moment]), (jacobians[0], jacobians[1], jacobians[2]))
-
-
-def about(point: FloatArray) -> FloatArray:
-    """(6, 6) map of wrenches about the world origin to such about a point (3,)."""
-    moved = np.eye(6)
-    moved[3:, :3] = -skew(point)
-    return moved
+        return cls(np.hstack([force, moment]), (jacobians[0], jacobians[1], jacobians[2]), by_com)
 
 
 def centre_of(stance: Stance) -> FloatArray:
@@ -81,16 +72,19 @@ class WrenchCost:
         value: (n,).
         gradient: (n, 6).
         curvature: (n, 6, 6) positive semi-definite.
+        by_com: (n, 3) derivative by the CoM at the same wrench.
     """
 
     value: FloatArray
     gradient: FloatArray
     curvature: FloatArray
+    by_com: FloatArray
 
     def __add__(self, other: "WrenchCost") -> "WrenchCost":
         return WrenchCost(
-            self.value + other.value, self.gradient + other.gradient, self.curvature + other.curvature
-        )
+            self.value + other.value, self.gradient + other.gradient, self.curvature + other.curvature,
+            self.by_com + other.by_com,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,34 +115,21 @@ class ContactForces:
 
     def __init__(self, stance: Stance, names: tuple[str, ...]) -> None:
         self.centre = centre_of(stance)
-        wrenches, limits, columns = [np.zeros((0, 6))], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
-        for contact in stance:
-            if contact.kind is ContactKind.GRASP:
-                axes = np.vstack([np.eye(6), -np.eye(6)])
-                arm = np.cross(contact.position - self.centre, axes[:, :3])
-                local = np.hstack([axes[:, :3], axes[:, 3:] + arm])
-                limit = np.tile(np.repeat([contact.max_force, contact.max_moment], 3), 2)
-                local, limit = local[limit > 0.0], limit[limit > 0.0]
-            else:
-                local = contact_to_world(contact, edge_wrenches(contact), self.centre)
-                limit = np.full(len(local), np.inf)
-            wrenches.append(local)
-            limits.append(limit)
-            columns.append(np.full(len(local), names.index(contact.effector)))
+        generators = ContactGenerators.of(stance)
+        columns = [names.index(contact.effector) for contact in stance]
         scale = np.repeat([1.0, 1.0 / ARM], 3)
-        self._to_local = scale[:, None] * about(self.centre)
-        self._matrix = (np.vstack(wrenches) * scale).T
-        self._limit, self.columns = np.concatenate(limits), np.concatenate(columns)
+        self._to_local = scale[:, None] * wrench_map(self.centre)
+        self._matrix = scale[:, None] * generators.about(self.centre)
+        self._limit = generators.upper
+        self.columns = np.array(columns, dtype=np.int64)[generators.contact]
 
     def share(
         self, wrench: FloatArray, variables: FloatArray, *, tolerance: float, force: float
     ) -> ForceShare:
         """Solve the program for many samples at once.
 
-        With the multiplier ``y = (b - A x) / s^2`` of the wrench the forces are
-        ``x_j = clip(a_j . y c_j^2 / k^2, 0, u_j)``, and ``y`` solves six monotone, piecewise linear
-        equations.  Newton's method finds it in a few steps.  The gradient of the least value by ``b`` is
-        ``y``, its second derivative the inverse of Newton's matrix.
+        See :func:`~manikin.balance.contact_forces.share`. The gradient of the least value by ``b`` is the
+        multiplier of the wrench, its second derivative the inverse of Newton's matrix.
 
         Args:
             wrench: (n, 6) needed, about the world origin.
@@ -158,44 +139,10 @@ class ContactForces:
         """
         target = wrench @ self._to_local.T
         gain = (force * np.maximum(variables, LEAST_VARIABLE)[:, self.columns]) ** 2
-        multiplier, magnitude, system = self._solve(target, gain, tolerance)
+        found = share(self._matrix, target, gain, tolerance**2, upper=self._limit)
+        magnitude, multiplier = found.magnitude, found.multiplier
         value = 0.5 * tolerance**2 * np.sum(multiplier**2, axis=1)
         value += 0.5 * np.sum(magnitude**2 / gain, axis=1)
-        curvature = self._to_local.T @ np.linalg.inv(system) @ self._to_local
-        cost = WrenchCost(value, multiplier @ self._to_local, curvature)
+        curvature = self._to_local.T @ np.linalg.inv(found.system) @ self._to_local
+        cost = WrenchCost(value, multiplier @ self._to_local, curvature, np.zeros((len(value), 3)))
         return ForceShare(magnitude, tolerance**2 * multiplier, cost)
-
-    def _solve(
-        self, target: FloatArray, gain: FloatArray, tolerance: float
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Multipliers (n, 6), magnitudes (n, g) and Newton's matrices (n, 6, 6)."""
-        matrix, limit = self._matrix, self._limit
-        free, full = np.ones(gain.shape, dtype=bool), np.zeros(gain.shape, dtype=bool)
-        multiplier, system = np.zeros((len(target), 6)), np.empty((len(target), 6, 6))
-        magnitude = np.zeros(gain.shape)
-        rest = np.arange(len(target))
-        for _ in range(STEPS):
-            weight = np.where(free[rest], gain[rest], 0.0)
-            system[rest] = (matrix * weight[:, None, :]) @ matrix.T + tolerance**2 * np.eye(6)
-            given = np.where(full[rest], limit, 0.0) @ matrix.T if np.any(full) else 0.0
-            multiplier[rest] = np.linalg.solve(system[rest], (target[rest] - given)[:, :, None])[:, :, 0]
-            wanted = (multiplier[rest] @ matrix) * gain[rest]
-            magnitude[rest] = np.clip(wanted, 0.0, limit)
-            now_full = wanted >= limit
-            now_free = (wanted > 0.0) & ~now_full
-            settled = np.all((now_free == free[rest]) & (now_full == full[rest]), axis=1)
-            free[rest], full[rest] = now_free, now_full
-            rest = rest[~settled]
-            if len(rest) == 0:
-                break
-        for k in rest:
-            magnitude[k] = self._share_one(target[k], gain[k], tolerance)
-            multiplier[k] = (target[k] - matrix @ magnitude[k]) / tolerance**2
-        return multiplier, magnitude, system
-
-    def _share_one(self, target: FloatArray, gain: FloatArray, tolerance: float) -> FloatArray:
-        """Like :meth:`_solve` for one sample, by a general solver."""
-        stacked = np.vstack([self._matrix / tolerance, np.diag(gain**-0.5)])
-        wanted = np.concatenate([target / tolerance, np.zeros(len(gain))])
-        found = lsq_linear(stacked, wanted, bounds=(0.0, self._limit), method="bvls", tol=1e-12).x
-        return np.clip(found, 0.0, self._limit)

@@ -35,8 +35,7 @@ class RefineSettings:
         contact_variables: Whether contacts that the motion does not need, and whose effectors are not there,
             are let go; else all contacts of the sequence are held.
         speed_share: Share of the velocity limits up to which phases are shortened, as far as every
-            requirement is kept and no joint needs more than its strength, or than before; None leaves them as
-            they are.
+            requirement is kept; None leaves them as they are.
     """
 
     knot_spacing: float = 0.1

@@ -39,9 +39,9 @@ def sampled_motion(
         The motion, and (n,) its physics violation [N].
     """
     time = sample_uniformly(schedule, sampling)
-    polytopes = [room.polytope.at_reference(np.zeros(3)) for room in rooms]
+    polytopes = [room.polytope for room in rooms]
     motion, wrench = full_motion(body, schedule, polytopes, time, *spline.evaluate(time))
-    _, violation = balance_of(schedule, tuple(rooms), time, wrench)
+    _, violation = balance_of(schedule, tuple(rooms), time, wrench, motion.com)
     return motion, violation
 
 

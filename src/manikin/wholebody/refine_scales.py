@@ -22,7 +22,7 @@ class RefineScales(MotionScales):
     Attributes:
         missing_wrench: Wrench that no contact supplies, moments divided by :data:`ARM` [N].
         force: Contact force that costs one unit, relative to the body's weight, at a contact variable of 1.
-        margin: Wanted margin of the wrench about the stance's mean contact point [N.m].
+        margin: Wanted margin of the wrench about the CoM [N.m].
         margin_violation: Missing margin [N.m].
         margin_softness: Width of the bend of its softened penalty [N.m].
         slide: Speed of an effector at a contact variable of 1 [m/s].
@@ -47,7 +47,7 @@ class RefineScales(MotionScales):
     pelvis_acceleration: float = 3.0
     missing_wrench: float = 10.0
     force: float = 1.0
-    margin: float = 30.0
+    margin: float = 22.0
     margin_violation: float = 1.0
     margin_softness: float = 3.0
     slide: float = 0.1

@@ -29,7 +29,7 @@ from manikin.errors import ContactError
 from manikin.motion.dynamics import centroidal_motion
 from manikin.scene import Scene
 from manikin.spatial import FloatArray
-from manikin.wholebody.refine_balance import SHARE, BalanceRoom
+from manikin.wholebody.refine_balance import BalanceRoom
 from manikin.wholebody.refine_measures import room_of
 from manikin.wholebody.refine_physics import LEAST_VARIABLE, ContactForces
 from manikin.wholebody.refine_scales import RefineScales
@@ -54,6 +54,7 @@ class VariableSamples:
     Attributes:
         time: (n,) [s].
         wrench: (n, 6) that the whole body needs, about the world origin [N, N.m].
+        com: (n, 3) centre of mass [m].
         key_time: (m,) times at which the contacts are looked at [s].
         place: By effector, (m, 3) where it is then [m].
         speed: By effector, (m,) how fast [m/s].
@@ -61,13 +62,15 @@ class VariableSamples:
 
     time: FloatArray
     wrench: FloatArray
+    com: FloatArray
     key_time: FloatArray
     place: Mapping[str, FloatArray]
     speed: Mapping[str, FloatArray]
 
-    def during(self, start: float, end: float) -> FloatArray:
-        """(k, 6) wrenches at the samples of an interval [s]."""
-        return self.wrench[(self.time >= start) & (self.time <= end)]
+    def during(self, start: float, end: float) -> tuple[FloatArray, FloatArray]:
+        """(k, 6) wrenches and (k, 3) CoM at the samples of an interval [s]."""
+        rows = (self.time >= start) & (self.time <= end)
+        return self.wrench[rows], self.com[rows]
 
     @classmethod
     def at_rest(
@@ -86,7 +89,8 @@ class VariableSamples:
         still = np.zeros((len(q), body.nv))
         place, _ = _effectors(body, names, keys[1], np.zeros((len(keys[1]), body.nv)))
         speed = {name: np.zeros(len(keys[0])) for name in names}
-        return cls(time, centroidal_motion(body, q, still, still).wrench, keys[0], place, speed)
+        found = centroidal_motion(body, q, still, still)
+        return cls(time, found.wrench, found.com, keys[0], place, speed)
 
     @classmethod
     def of_motion(
@@ -95,7 +99,8 @@ class VariableSamples:
     ) -> "VariableSamples":  # fmt: skip
         """A motion at ``time`` (n,) with configurations, velocities and accelerations."""
         place, speed = _effectors(body, names, states[0], states[1])
-        return cls(time, centroidal_motion(body, *states).wrench, time, place, speed)
+        found = centroidal_motion(body, *states)
+        return cls(time, found.wrench, found.com, time, place, speed)
 
 
 class VariableChoice:
@@ -157,9 +162,12 @@ class VariableChoice:
         return found
 
     def _of_phase(
-        self, stance: Stance, motions: Sequence[FloatArray], errors: Mapping[str, float]
+        self,
+        stance: Stance,
+        motions: Sequence[tuple[FloatArray, FloatArray]],
+        errors: Mapping[str, float],
     ) -> tuple[dict[str, float], Stance]:
-        wrench = motions[0]
+        wrench, _ = motions[0]
         kept, needed, chosen = stance, set[str](), dict[str, float]()
         while len(kept) and len(wrench):
             free = [name for name in kept.effectors if name not in needed]
@@ -168,23 +176,24 @@ class VariableChoice:
             if not loose:
                 break
             fewer = _without(kept, loose[0])
-            if any(self._carries(fewer, item) for item in motions):
+            if any(self._carries(fewer, *item) for item in motions):
                 kept = fewer
             else:
                 needed.add(loose[0])
                 chosen[loose[0]] = 1.0
         return {name: chosen.get(name, 1.0) for name in stance.effectors}, kept
 
-    def _carries(self, stance: Stance, wrench: FloatArray) -> bool:
-        """Whether a stance keeps the wanted balance at all wrenches (n, 6)."""
-        if not len(stance):
+    def _carries(self, stance: Stance, wrench: FloatArray, com: FloatArray) -> bool:
+        """Whether a stance keeps the wanted balance at all wrenches (n, 6) with CoM (n, 3)."""
+        if not len(stance) or not len(wrench):
             return False
         key = frozenset(stance)
         if key not in self._rooms:
             self._rooms[key] = room_of(stance, self._friction_share)
         room = self._rooms[key]
-        wanted = min(self._scales.margin, SHARE * room.radius)
-        return not room.is_flat and bool(room.margin(wrench).min() >= wanted)
+        if room.is_flat:
+            return False
+        return bool(room.margin(wrench, com).min() >= room.wanted(self._scales.margin, com.mean(axis=0)))
 
     def _off_surface(self, contact: Contact) -> float:
         """Distance of a contact from the nearest obstacle; 0 where it lies on one [m]."""

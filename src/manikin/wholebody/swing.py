@@ -215,7 +215,7 @@ def check_swing(
         place = ", ".join(f"{x:.3f}" for x in state.position[worst])
         failure = (
             f"clearance is {distance[worst]:.4f} m at t = {state.time[worst]:.3f} s with the effector at "
-            f"({place}); required {required[worst]:.4f} m"
+            f"[{place}]; required {required[worst]:.4f} m"
         )
     else:
         failure = _hurry(curve, limits)

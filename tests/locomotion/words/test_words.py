@@ -174,7 +174,7 @@ def test_polynomials_of_higher_degree_change_nothing():
 def test_more_guesses_find_nothing_cheaper():
     """Sixty random guesses for each turn, beside the fifteen that are used."""
     rng = np.random.default_rng(8)
-    goals = grid_goals(rng, 40)
+    goals = grid_goals(rng, 10)
     used = cheapest(BEGIN, goals, guesses())[1].cost
     random = [tuple(rng.normal(size=5) * [2.0, 1.5, 1.0, 0.5, 0.3]) for _ in range(60)]
     assert np.all(cheapest(BEGIN, goals, random)[1].cost > used * (1.0 - 1e-8))

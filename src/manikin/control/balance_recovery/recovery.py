@@ -195,8 +195,7 @@ class BalanceRecovery:
         state = self._dynamics.evaluate(q, v)
         if not reacting:
             tau = held_posture(state, self.standing, self.groups, self.settings, self._resting)
-            limit = self.settings.strength * self.body.torque_limit
-            return self._output(state, Strategy.STIFF, np.clip(tau, -limit, limit))
+            return self._output(state, Strategy.STIFF, np.clip(tau, *self._torque_limits))
         felt = push if push is not None else FeltPush.none(self.body.nv)
         loop = close_loop(state, self.standing.feet, felt, settling=SETTLING)
         law = self._law(state, may_turn=swing is None)
@@ -283,15 +282,19 @@ class BalanceRecovery:
             state.q[7:], state.v[6:], body.lower, body.upper, settings.strength * body.velocity_limit,
             settings.joint_limit_horizon, settings.max_joint_acceleration,
         )  # fmt: skip
-        most = settings.strength * body.torque_limit
-        return JointBounds(-most, most, lower, upper)
+        return JointBounds(*self._torque_limits, lower, upper)
+
+    @property
+    def _torque_limits(self) -> tuple[FloatArray, FloatArray]:
+        """(nv - 6,) most negative and largest joint torques [N.m]."""
+        strength = self.settings.strength
+        return strength * self.body.torque_lower, strength * self.body.torque_upper
 
     # --- solution ----------------------------------------------------------------------------
 
     def _torque(self, problem: RecoveryProblem, solution: QPSolution, state: DynamicsState) -> FloatArray:
         """Torques of the solution, with what overcomes the passive damping."""
-        limit = self.settings.strength * self.body.torque_limit
-        return np.clip(problem.torque(solution.x) + self._damping * state.v[6:], -limit, limit)
+        return np.clip(problem.torque(solution.x) + self._damping * state.v[6:], *self._torque_limits)
 
     def _solve(self, problem: RecoveryProblem) -> tuple[QPSolution | None, str]:
         solution = self._solvers["full"].solve(problem.program)

@@ -4,6 +4,7 @@ from manikin.scenarios.sections.body import BodySection, LimbSection
 from manikin.scenarios.sections.com_constraint import ComConstraintSection, HeightBandSection
 from manikin.scenarios.sections.contact import ContactSection, SoleSection
 from manikin.scenarios.sections.contacts import ContactsSection
+from manikin.scenarios.sections.frame import FrameSection
 from manikin.scenarios.sections.obstacle import ObstacleSection, RoundSection, SphereSection
 from manikin.scenarios.sections.phase import PhaseSection
 from manikin.scenarios.sections.planning import PlanningSection, WeightsSection
@@ -19,6 +20,7 @@ __all__ = [
     "ComConstraintSection",
     "ContactSection",
     "ContactsSection",
+    "FrameSection",
     "HeightBandSection",
     "LimbSection",
     "ObstacleSection",

@@ -1,17 +1,18 @@
 """Section of a scenario file: whose motion it is."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from manikin.body.strength import AGE_RANGE, DEFAULT_AGE
 from manikin.scenarios.sections.contact import SoleSection
 from manikin.scenarios.validation import Number, Positive, Section, Text, Vector3, refuse
 
 _KEYS = {
-    "human": ("stature_m", "mass_kg", "sex", "further_contacts"),
+    "human": ("stature_m", "mass_kg", "sex", "age", "strength", "load", "further_contacts"),
     "point_mass": ("mass_kg",),
-    "kudoh": (),
+    "kudoh": ("load",),
     "insect": ("length_m", "mass_kg"),
     "urdf": ("urdf", "limbs", "standing_deg", "sole"),
 }
@@ -46,6 +47,15 @@ class LimbSection(Section):
     )  # fmt: skip
 
 
+class LoadSection(Section):
+    """What the hands carry during the whole motion."""
+
+    mass_kg: Positive = Field(description="mass of the load [kg], a point at the middle of the palms")
+    hand: Literal["left", "right", "both"] = Field(
+        default="both", description="which hand carries it; both carry half each"
+    )
+
+
 class BodySection(Section):
     """Whose motion it is."""
 
@@ -61,6 +71,17 @@ class BodySection(Section):
     )
     sex: Literal["male", "female"] = Field(
         default="male", description="which anthropometric table, of a human only"
+    )
+    age: Annotated[Number, Field(ge=AGE_RANGE[0], le=AGE_RANGE[1])] = Field(
+        default=DEFAULT_AGE,
+        description="age [years], of a human only; its strength depends on it, nothing else",
+    )
+    strength: Positive = Field(
+        default=1.0,
+        description="torque limits relative to a healthy adult of that sex, size and age, of a human only",
+    )
+    load: LoadSection | None = Field(
+        default=None, description="load in the hands during the whole motion, of a human or kudoh"
     )
     further_contacts: list[Literal["knees", "elbows", "pelvis"]] | None = Field(
         default=None,

@@ -1,11 +1,12 @@
 """Sections of a scenario file: constraints on the centre of mass."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from manikin.errors import ScenarioError
 from manikin.scenarios.expressions import Expression
+from manikin.scenarios.sections.frame import FrameSection
 from manikin.scenarios.validation import Positive, Section, Text, refuse
 
 
@@ -14,6 +15,13 @@ class HeightBandSection(Section):
 
     lower: Text = Field(description="expression of the lowest height [m] in x, y, z of the CoM")
     upper: Text = Field(description="expression of the greatest height [m] in x, y, z of the CoM")
+    frame: FrameSection | None = Field(
+        default=None, description="frame of the expressions' x and y (default: the world's)"
+    )
+
+    def implied(self) -> dict[str, Any]:
+        """The frame of the expressions."""
+        return {} if self.frame is not None else {"frame": FrameSection()}
 
     @field_validator("lower", "upper")
     @classmethod

@@ -1,10 +1,19 @@
 """Sections of a scenario or stance file: one contact."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from manikin.scenarios.validation import NonNegative, Number, Positive, Section, Vector3, refuse, rule_error
+from manikin.scenarios.validation import (
+    Moves,
+    NonNegative,
+    Number,
+    Positive,
+    Section,
+    Vector3,
+    refuse,
+    rule_error,
+)
 
 _KIND_KEYS: dict[str, tuple[str, ...]] = {
     "sole": ("normal", "sole", "friction", "normal_force_cap_N", "torsion_limit_Nm", "settle_s"),
@@ -27,12 +36,20 @@ class ContactSection(Section):
     kind: Literal["sole", "point", "grasp"] | None = Field(
         default=None, description="default: sole for a foot, grasp for a hand"
     )
-    position: Vector3 = Field(description="of the contact (centre of a sole) in the world [m]")
-    yaw_deg: Number = Field(
-        default=0.0, description="heading of the toes, counter-clockwise from world x [deg]"
+    position: Annotated[Vector3, Moves.POINT] = Field(
+        description="of the contact (centre of a sole) in the world [m]"
     )
-    normal: Vector3 | None = Field(default=None, description="surface normal, into the body (default up)")
-    rpy_deg: Vector3 | None = Field(default=None, description="orientation of a grasping hand [deg]")
+    yaw_deg: Annotated[Number, Moves.HEADING] = Field(
+        default=0.0,
+        description="heading of the toes, or of the axes of a point's friction, counter-clockwise from "
+        "world x [deg]",
+    )
+    normal: Annotated[Vector3 | None, Moves.DIRECTION] = Field(
+        default=None, description="surface normal, into the body (default up)"
+    )
+    rpy_deg: Annotated[Vector3 | None, Moves.ORIENTATION] = Field(
+        default=None, description="orientation of a grasping hand [deg]"
+    )
     sole: SoleSection | None = Field(default=None, description="size of this sole")
     friction: Positive | None = Field(default=None, description="Coulomb coefficient")
     normal_force_cap_N: Positive | None = Field(
@@ -45,7 +62,8 @@ class ContactSection(Section):
         default=None, description="time after the touch-down in which it may still slide to its place [s]"
     )
     max_force_N: Positive | None = Field(
-        default=None, description="grasp: largest force along each world axis [N]"
+        default=None,
+        description="grasp: largest force along each axis of the world, in a scenario of the task frame [N]",
     )
     planning_max_force_N: Positive | None = Field(
         default=None, description="grasp: smaller limit that planning balances with (default: max_force_N)"

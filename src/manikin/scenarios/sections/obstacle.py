@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from manikin.scenarios.validation import Positive, Section, Size3, Text, Vector3, refuse
+from manikin.scenarios.validation import Moves, Positive, Section, Size3, Text, Vector3, refuse
 
 OBSTACLE_SHAPES = ("box", "cylinder", "capsule", "sphere", "plane", "half_space", "mesh")
 
@@ -31,10 +31,10 @@ class ObstacleSection(Section):
     capsule: RoundSection | None = Field(default=None, description="capsule along z")
     sphere: SphereSection | None = Field(default=None, description="sphere")
     plane: Vector3 | None = Field(
-        default=None, description="normal of an infinite two-sided plane through position"
+        default=None, description="normal of an infinite two-sided plane through position, turned by rpy_deg"
     )
     half_space: Vector3 | None = Field(
-        default=None, description="outward normal of a solid half-space at position"
+        default=None, description="outward normal of a solid half-space at position, turned by rpy_deg"
     )
     mesh: Text | None = Field(
         default=None, description="STL, OBJ, PLY or DAE file, relative to this file's folder"
@@ -49,8 +49,12 @@ class ObstacleSection(Section):
     padded: Annotated[bool, Field(strict=True)] = Field(
         default=False, description="whether any part of the body may lean on it, as on a seat"
     )
-    position: Vector3 = Field(default=(0.0, 0.0, 0.0), description="origin in the world [m]")
-    rpy_deg: Vector3 = Field(default=(0.0, 0.0, 0.0), description="fixed-axis roll, pitch, yaw [deg]")
+    position: Annotated[Vector3, Moves.POINT] = Field(
+        default=(0.0, 0.0, 0.0), description="origin in the world [m]"
+    )
+    rpy_deg: Annotated[Vector3, Moves.ORIENTATION] = Field(
+        default=(0.0, 0.0, 0.0), description="fixed-axis roll, pitch, yaw [deg]"
+    )
 
     @property
     def shape(self) -> str:

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from manikin.scenarios.sections.contact import ContactSection
-from manikin.scenarios.validation import Duration, Section, Vector3, refuse
+from manikin.scenarios.validation import Duration, Moves, Section, Vector3, refuse
 
 EFFECTORS = ("left_foot", "right_foot", "left_hand", "right_hand", "buttocks")
 """Effectors of a human that a phase may put in contact, in the order of the contact tables."""
@@ -47,11 +47,13 @@ class PhaseSection(Section):
     buttocks: ContactEntry | None = Field(default=None, description="contact with a seat, or 'same'")
     min_duration_s: Duration = Field(default=0.1, description="shortest duration [s]")
     max_duration_s: Duration | None = Field(default=None, description="longest duration [s]")
-    com_near: Vector3 | None = Field(
+    com_near: Annotated[Vector3 | None, Moves.POINT] = Field(
         default=None, description="where the centre of mass should be when the phase begins [m]"
     )
     com_within_m: Vector3 = Field(
-        default=(0.05, 0.05, 0.05), description="how far it may be from there along x, y and z [m]"
+        default=(0.05, 0.05, 0.05),
+        description="how far it may be from there along x, y and z of the task frame, x being the heading "
+        "at the start [m]",
     )
 
     @model_validator(mode="after")

@@ -1,10 +1,11 @@
 """Sections of a scenario file: options of the centre-of-mass planner."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
 from manikin.contact import FrictionModel
+from manikin.scenarios.sections.frame import FrameSection
 from manikin.scenarios.validation import NonNegative, Positive, Section, Text, Weights3, refuse
 
 FrictionModelName = Annotated[
@@ -23,9 +24,12 @@ class WeightsSection(Section):
     margin: NonNegative | None = Field(default=None, description="of the smallest margin [1/(N.m)] or [1/N]")
     smoothness: NonNegative | None = Field(default=None, description="of the mean squared derivatives")
     duration: NonNegative | None = Field(default=None, description="of the duration [1/s]")
-    velocity: Weights3 | None = Field(default=None, description="along x, y, z [s^2/m^2]")
-    acceleration: Weights3 | None = Field(default=None, description="along x, y, z [s^4/m^2]")
-    jerk: Weights3 | None = Field(default=None, description="along x, y, z [s^6/m^2]")
+    velocity: Weights3 | None = Field(
+        default=None,
+        description="along x, y, z of the task frame, x being the heading at the start [s^2/m^2]",
+    )
+    acceleration: Weights3 | None = Field(default=None, description="along the same axes [s^4/m^2]")
+    jerk: Weights3 | None = Field(default=None, description="along the same axes [s^6/m^2]")
 
 
 class PlanningSection(Section):
@@ -39,6 +43,9 @@ class PlanningSection(Section):
         default=None,
         description="keyframes: run directory or motion file of the same supports, relative to this file's "
         "folder or else to the current one",
+    )
+    recording_frame: FrameSection | None = Field(
+        default=None, description="keyframes: frame of the recording's coordinates (default: the world's)"
     )
     control_points: Annotated[int, Field(strict=True, ge=4, le=1000)] | None = Field(
         default=None, description="keyframes: of the B-spline (default: key frames plus 7)"
@@ -60,11 +67,17 @@ class PlanningSection(Section):
     )
     weights: WeightsSection = Field(default=WeightsSection(), description="of the objectives")
 
+    def implied(self) -> dict[str, Any]:
+        """The frame of a recording."""
+        if self.recording is None or self.recording_frame is not None:
+            return {}
+        return {"recording_frame": FrameSection()}
+
     @model_validator(mode="after")
     def _recorded(self) -> Self:
         if self.method == "keyframes" and self.recording is None:
             raise refuse("recording", "is missing; valid: a run directory or motion file for keyframes")
-        for key in ("recording", "control_points"):
+        for key in ("recording", "recording_frame", "control_points"):
             if self.method != "keyframes" and getattr(self, key) is not None:
                 raise refuse(key, f"is given for the method {self.method}; valid: only with keyframes")
         return self

@@ -1,10 +1,11 @@
 """Sections of a scenario file: from where to where."""
 
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from manikin.scenarios.validation import (
+    Moves,
     NonNegative,
     Number,
     Positive,
@@ -20,12 +21,16 @@ from manikin.scenarios.validation import (
 class StateSection(Section):
     """Where the body starts or ends."""
 
-    com: Vector3 | None = Field(default=None, description="centre of mass [m]")
-    velocity_m_s: Vector3 | None = Field(
+    com: Annotated[Vector3 | None, Moves.POINT] = Field(default=None, description="centre of mass [m]")
+    velocity_m_s: Annotated[Vector3 | None, Moves.DIRECTION] = Field(
         default=None, description="of the centre of mass when the body sits down at the goal (default: free)"
     )
-    at: Vector2 | None = Field(default=None, description="where to stand, x and y [m]")
-    heading_deg: Number | None = Field(default=None, description="where to face [deg]")
+    at: Annotated[Vector2 | None, Moves.POINT] = Field(
+        default=None, description="where to stand, x and y [m]"
+    )
+    heading_deg: Annotated[Number | None, Moves.HEADING] = Field(
+        default=None, description="where to face [deg]"
+    )
     height_m: Number | None = Field(
         default=None,
         description="height of the surface to stand or sit on there [m] (default: the lowest one on "
@@ -43,13 +48,19 @@ class StateSection(Section):
             raise refuse("com", "is missing; valid: three numbers [x, y, z] in metres, or at: [x, y]")
         return self
 
+    def implied(self) -> dict[str, Any]:
+        """The heading of a body that stands at a place."""
+        return {} if self.at is None or self.heading_deg is not None else {"heading_deg": 0.0}
+
 
 class ActSection(Section):
     """What the hands do to an object where the way ends."""
 
     kind: Literal["push", "pull"] = Field(description="press with the palms, or hold on and draw")
     on: Text = Field(description="name of an obstacle; it does not move")
-    direction: Vector3 = Field(description="where the force on the object points; level")
+    direction: Annotated[Vector3, Moves.DIRECTION] = Field(
+        description="where the force on the object points; level"
+    )
     force_N: Positive = Field(description="force on the object [N]")
     ramp_s: Positive = Field(default=1.0, description="time in which the force rises from none [s]")
     hold_s: NonNegative = Field(default=2.0, description="time for which it is held then [s]")

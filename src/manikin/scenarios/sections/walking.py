@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from manikin.scenarios.validation import Name, NonNegative, Number, Section, Vector2, refuse
+from manikin.scenarios.validation import Moves, Name, NonNegative, Number, Section, Vector2, refuse
 
 LARGEST_WALKERS = 8
 """How many others may walk in a scenario."""
@@ -15,8 +15,8 @@ Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=4.0)
 class StandSection(Section):
     """Where a walker stands at the beginning."""
 
-    at: Vector2 = Field(description="x and y [m]")
-    heading_deg: Number = Field(default=0.0, description="where to face [deg]")
+    at: Annotated[Vector2, Moves.POINT] = Field(description="x and y [m]")
+    heading_deg: Annotated[Number, Moves.HEADING] = Field(default=0.0, description="where to face [deg]")
 
 
 class WaypointSection(StandSection):

@@ -1,0 +1,322 @@
+"""Runs: planned, executed, walked, pushed and compared, to print, draw and watch."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from manikin.body import BodyModel
+from manikin.display import Displayed
+from manikin.errors import InputError
+from manikin.motion import Motion
+from manikin.record import RunRecord, read_run
+from manikin.scenarios import Scenario, load_scenario
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from manikin.comparison import RunComparison
+
+Place = tuple[float, float, float]
+"""x [m], y [m] and heading [deg, counter-clockwise from x]."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Displayed):
+    """What a run found: its verdict, motions and figures.
+
+    Attributes:
+        summary: As printed by ``manikin run --json``.
+        directory: Where its files are.
+        scenario: What was run.
+    """
+
+    summary: Mapping[str, Any]
+    directory: Path
+    scenario: Scenario
+    _kept: TemporaryDirectory[str] | None = field(default=None)
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        failure, motion = self.summary["failure"], self.motion
+        duration = {} if motion is None else {"duration": f"{motion.duration:.2f} s"}
+        reason = {} if failure is None else {"failure": f"{failure['stage']}: {failure['reason']}"}
+        return {"scenario": str(self.summary["scenario"]), "verdict": self.verdict} | duration | reason
+
+    @property
+    def verdict(self) -> str:
+        """``"proved"``, ``"planned"`` or ``"failed"``."""
+        return str(self.summary["verdict"])
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether what was asked for is proved, or for a plan alone planned."""
+        return bool(self.summary["succeeded"])
+
+    @cached_property
+    def record(self) -> RunRecord:
+        """Everything that the run left behind."""
+        return read_run(self.directory)
+
+    @property
+    def planned(self) -> Motion | None:
+        """The planned motion."""
+        return self.record.content.planned
+
+    @property
+    def executed(self) -> Motion | None:
+        """The motion in the physics engine."""
+        return self.record.content.executed
+
+    @property
+    def motion(self) -> Motion | None:
+        """The executed motion, or else the planned one."""
+        return self.planned if self.executed is None else self.executed
+
+    @property
+    def requirements(self) -> "Requirements":
+        """What the run had to keep, measured and allowed."""
+        return Requirements(tuple(self.summary["requirements"]))
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """Names of the figures that :meth:`plot` may draw; some apply to a part of the runs only."""
+        from manikin.figures import FIGURES
+
+        return tuple(FIGURES)
+
+    def plot(self, figure: str = "margin") -> "Figure":
+        """Draw a figure.
+
+        Args:
+            figure: One of :attr:`figures`.
+
+        Raises:
+            InputError: If there is no such figure, or the run has no data for it.
+        """
+        from manikin.figures import FIGURES
+
+        if figure not in FIGURES:
+            raise InputError(f"figure is {figure!r}; valid: {', '.join(FIGURES)}")
+        return FIGURES[figure](self.record)
+
+    def view(self, port: int = 8080) -> None:
+        """Play the motion in the browser until Ctrl-C, on this computer only."""
+        from manikin.viewer import serve
+
+        serve(self.record.content, port, print)
+
+    def simulate(self, *, push: Mapping[str, float] | None = None) -> "Run":
+        """Execute the plan in the physics engine; see :func:`simulate`."""
+        return simulate(self.scenario, push=push)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Requirements(Displayed):
+    """Table of what a run had to keep.
+
+    Attributes:
+        rows: One for each requirement, as in ``summary.json``.
+    """
+
+    rows: tuple[Mapping[str, Any], ...]
+
+    def facts(self) -> dict[str, str]:
+        """How many there are, and which are broken."""
+        broken = [str(row["name"]) for row in self.rows if not row["held"]]
+        return {"requirements": str(len(self.rows)), "broken": ", ".join(broken) or "none"}
+
+    def to_frame(self) -> Any:
+        """Table with one row for each requirement."""
+        from pandas import DataFrame
+
+        return DataFrame(list(self.rows))
+
+    def _repr_html_(self) -> str:
+        return str(self.to_frame().to_html(index=False))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Displayed):
+    """Two runs side by side.
+
+    Attributes:
+        result: Timing, centre of mass, margins and postures.
+    """
+
+    result: "RunComparison"
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        first, second = self.result.names
+        matched = sum(pair.matched for pair in self.result.pairs)
+        return {"first": first, "second": second, "matched phases": str(matched)}
+
+    def plot(self, figure: str = "compare_timing") -> "Figure":
+        """Draw a figure of both.
+
+        Args:
+            figure: ``compare_timing``, ``compare_planes``, ``compare_scene``, ``compare_margin`` or
+                ``compare_postures``.
+
+        Raises:
+            InputError: If there is no such figure, or the runs have no data for it.
+        """
+        from manikin.figures import COMPARISONS
+
+        if figure not in COMPARISONS:
+            raise InputError(f"figure is {figure!r}; valid: {', '.join(COMPARISONS)}")
+        return COMPARISONS[figure](self.result)
+
+
+def plan(scenario: str | Path | Scenario, **options: Any) -> Run:
+    """Plan a scenario without executing it.
+
+    Args:
+        scenario: Name of a built-in scenario, a scenario file, or a scenario.
+        options: ``body``, ``variant``, ``friction``, ``overrides``, ``seed`` and ``out`` as of
+            :func:`simulate`.
+
+    Raises:
+        InputError: If the scenario is not usable.
+    """
+    return _run(_changed(scenario, execution="none", **_job_options(options)), **options)
+
+
+def simulate(
+    scenario: str | Path | Scenario | Run, *, push: Mapping[str, float] | None = None, **options: Any
+) -> Run:
+    """Plan a scenario and execute it in the physics engine.
+
+    Args:
+        scenario: Name of a built-in scenario, a scenario file, a scenario, or a run of one.
+        push: ``force_N``, ``direction_deg``, ``duration_s`` and ``at_s`` of a push on the way, or None.
+        options: ``body``, a human whose stature, mass and sex are taken; ``variant``; ``friction`` of soles
+            and points; ``overrides``, such as ``["planning.min_margin=15"]``; ``seed``; ``out``, a run
+            directory that is kept.
+
+    Raises:
+        InputError: If the scenario is not usable.
+    """
+    source = scenario.scenario if isinstance(scenario, Run) else scenario
+    sections = {} if push is None else {"push": dict(push)}
+    return _run(_changed(source, execution="required", **sections, **_job_options(options)), **options)
+
+
+def walk(
+    to: Place,
+    *,
+    start: Place = (0.0, 0.0, 0.0),
+    body: BodyModel | None = None,
+    max_speed: float | None = None,
+    seed: int | None = None,
+    out: str | Path | None = None,
+) -> Run:
+    """Walk to a place as people do: path by optimal control, whole body from recorded walks.
+
+    Args:
+        to: Goal.
+        start: Where the walk begins.
+        body: Who walks; the default human when omitted.
+        max_speed: Limit of the speed over the floor [m/s].
+        seed: Of every random choice.
+        out: Run directory that is kept.
+
+    Raises:
+        InputError: If a value is not usable.
+    """
+    from manikin.scenarios.tasks import walk_task
+
+    return _run(_with_body(walk_task(to, start=start, max_speed=max_speed), body), seed=seed, out=out)
+
+
+def push(
+    force: float,
+    direction: float = 0.0,
+    *,
+    duration: float = 0.1,
+    body: BodyModel | None = None,
+    seed: int | None = None,
+    out: str | Path | None = None,
+    **recovery: Any,
+) -> Run:
+    """Push a standing body and see whether it stays on its feet.
+
+    Args:
+        force: [N].
+        direction: Of the force, counter-clockwise from the body's forward axis [deg].
+        duration: Of the push [s].
+        body: A human; the body of Kudoh when omitted.
+        seed: Of every random choice.
+        out: Run directory that is kept.
+        recovery: Keys of a scenario's ``recovery``, such as ``feet="free"`` and ``steps=1``.
+
+    Raises:
+        InputError: If a value is not usable.
+    """
+    from manikin.scenarios.tasks import push_task
+
+    model = "kudoh" if body is None else "human"
+    job = push_task(force, direction, duration=duration, body={"model": model}, recovery=recovery)
+    return _run(_with_body(job, body), seed=seed, out=out)
+
+
+def compare(first: Run | str | Path, second: Run | str | Path) -> Comparison:
+    """Compare the timing, centre of mass, margins and postures of two runs.
+
+    Args:
+        first: A run, or its directory.
+        second: Another one.
+
+    Raises:
+        InputError: If a directory is not that of a run.
+    """
+    from manikin.comparison import compare_runs
+
+    records = [run.record if isinstance(run, Run) else read_run(run) for run in (first, second)]
+    return Comparison(compare_runs(*records))
+
+
+def _job_options(options: dict[str, Any]) -> dict[str, Any]:
+    """Take what changes the scenario out of the options of a run."""
+    known = ("body", "variant", "friction", "overrides", "seed", "out")
+    unknown = [name for name in options if name not in known]
+    if unknown:
+        raise InputError(f"option {unknown[0]!r} is not known; valid: {', '.join(known)}")
+    return {name: options.pop(name) for name in known[:4] if name in options}
+
+
+def _changed(
+    source: str | Path | Scenario,
+    *,
+    body: BodyModel | None = None,
+    variant: str | None = None,
+    friction: float | None = None,
+    overrides: Sequence[str] = (),
+    **sections: Any,
+) -> Scenario:
+    job = source if isinstance(source, Scenario) else load_scenario(str(source), variant)
+    settings = list(overrides)
+    if friction is not None:
+        section = "supports" if job.file.supports is not None else "contacts"
+        settings.append(f"{section}.friction={friction!r}")
+    return _with_body(job.with_overrides(settings), body).replaced(**sections)
+
+
+def _with_body(job: Scenario, body: BodyModel | None) -> Scenario:
+    if body is None:
+        return job
+    if body.sex is None:
+        raise InputError(f"body is {body.name!r}; valid: a human, whose stature, mass and sex are taken")
+    return job.with_body(body.stature, body.mass, body.sex)
+
+
+def _run(job: Scenario, *, seed: int | None = None, out: str | Path | None = None) -> Run:
+    from manikin.pipeline import run
+
+    kept = None if out is not None else TemporaryDirectory(prefix="manikin-")
+    folder = Path(kept.name) / job.name if kept is not None else Path(str(out))
+    result = run(job, out=folder, seed=seed)
+    return Run(result.summary, folder, job, kept)

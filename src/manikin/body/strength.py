@@ -1,0 +1,248 @@
+"""Largest voluntary joint torques of the human body, by direction, sex and age.
+
+Two kinds of published values are used:
+
+* Hips, knees and ankles in the sagittal plane: ``C_1 m g h`` with the peak isometric coefficient ``C_1`` of
+  [Anderson2007]_ Table 3 for three age groups of each sex. Between the ages that stand for the groups it
+  changes linearly (our choice of the ages), outside of them it stays.
+* All other joints: N.m per kilogram of body mass of young men. A torque that was printed in N.m is divided by
+  :data:`PRINTED_FOR` (ours). Women have the share of :data:`WOMEN` of the men's value; both fall with age as
+  :func:`age_factor` says ([DanneskioldSamsoe2009]_).
+
+The values are means of healthy adults, who differ among themselves by 20 to 30 % of the mean
+([Benfica2018]_). They are peaks over the joint's range at rest: the limits do not fall with the angle or with
+the speed of shortening, and they do not rise in lengthening, although [Anderson2007]_ gives all three for the
+leg.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+
+import numpy as np
+
+from manikin.errors import BodyError
+from manikin.spatial import GRAVITY, finite_number
+
+DEFAULT_AGE = 30.0
+"""Age of a body that was given none [years]."""
+
+AGE_RANGE = (18.0, 90.0)
+"""Accepted age [years]."""
+
+PRINTED_FOR = 79.0
+"""Mass that a printed torque of men is divided by [kg]; ours, the groups' masses were not printed with it."""
+
+GROUP_AGES = (21.5, 60.0, 70.0)
+"""Ages that stand for the groups 18-25, 55-65 and over 65 of [Anderson2007]_ [years]; ours."""
+
+MEAN_MEN_PER_WOMEN = 85.52 / 67.76
+"""Mean mass of men over that of women (ANSUR II): ratios of torques times it are per kg."""
+
+
+class Grade(StrEnum):
+    """How a value was come by: from the paper or its abstract, as others quote it, or estimated by us."""
+
+    PAPER = "paper"
+    QUOTED = "quoted"
+    ESTIMATE = "estimate"
+
+
+class Women(StrEnum):
+    """Part of the body in which women have a certain share of men's strength."""
+
+    GENERAL = "general"
+    SHOULDER = "shoulder"
+    FOREARM = "forearm"
+    WRIST = "wrist"
+
+
+WOMEN: Mapping[Women, float] = MappingProxyType({
+    Women.GENERAL: MEAN_MEN_PER_WOMEN / 1.75,
+    Women.SHOULDER: MEAN_MEN_PER_WOMEN * 0.5,
+    Women.FOREARM: MEAN_MEN_PER_WOMEN / 1.7,
+    Women.WRIST: 0.786,
+})  # fmt: skip
+"""Women's torque per kg over men's. Torques: 1/1.75, the middle of [DanneskioldSamsoe2009]_ (men 1.5 to
+2 times as strong); shoulder 0.5 (Clin. Biomech. 1989, doi 10.1016/0268-0033(89)90046-6, and
+:data:`SHOULDER_STUDY`); forearm 1/1.7
+(Axelsson et al. 2018); wrist 0.786 per kg (J. Funct. Morphol. Kinesiol. 10:377, 2025)."""
+
+ANDERSON = "Anderson et al. 2007, Table 3"
+HARBO = "Harbo et al. 2012, men of 25 y, 1.80 m, 80 kg"
+STOBBE = "Stobbe 1982, medians, in Chaffin and Andersson"
+FICE = "Fice et al. 2014"
+DELP = "Delp et al. 1996"
+ABDUCTION = "1.29 standing (Sugimoto et al. 2014), 30 % more lying on the side (Cerda Vega et al. 2018)"
+HIP_STUDY = "isometric hip study of 30 people, PMC11329127"
+SHOULDER_STUDY = "static at 0 deg, 26 men (Dynamic shoulder flexion strength ...)"
+
+
+@dataclass(frozen=True)
+class LegStrength:
+    """Peak isometric coefficients of one direction of a leg's joint, for :data:`GROUP_AGES`.
+
+    Attributes:
+        male: ``C_1`` of men, torque per weight times stature.
+        female: Of women.
+    """
+
+    male: tuple[float, float, float]
+    female: tuple[float, float, float]
+
+    source = ANDERSON
+    grade = Grade.QUOTED
+
+    def torque(self, mass: float, stature: float, sex: str, age: float) -> float:
+        """Torque of a person [N.m]."""
+        groups = self.female if sex == "female" else self.male
+        return float(np.interp(age, GROUP_AGES, groups)) * mass * GRAVITY * stature
+
+
+@dataclass(frozen=True)
+class MassStrength:
+    """Strength of one direction of a joint per kilogram of body mass.
+
+    Attributes:
+        per_kg: Of young men [N.m/kg].
+        source: Where it is from.
+        grade: How it was come by.
+        women: What women's share is.
+    """
+
+    per_kg: float
+    source: str
+    grade: Grade
+    women: Women = Women.GENERAL
+
+    def torque(self, mass: float, stature: float, sex: str, age: float) -> float:  # noqa: ARG002
+        """Torque of a person [N.m]."""
+        share = WOMEN[self.women] if sex == "female" else 1.0
+        return self.per_kg * mass * share * age_factor(sex, age)
+
+
+DirectionStrength = LegStrength | MassStrength
+
+
+def _printed(torque: float, source: str, grade: Grade, women: Women = Women.GENERAL) -> MassStrength:
+    return MassStrength(torque / PRINTED_FOR, source, grade, women)
+
+
+def _estimate(per_kg: float, why: str) -> MassStrength:
+    return MassStrength(per_kg, why, Grade.ESTIMATE)
+
+
+def _harbo(per_kg: float, women: Women = Women.GENERAL) -> MassStrength:
+    return MassStrength(per_kg, HARBO, Grade.QUOTED, women)
+
+
+def _both(strength: MassStrength) -> tuple[MassStrength, MassStrength]:
+    return strength, strength
+
+
+_HIGHER = 0.75
+_THORAX = "0.75 of the lumbar's: the same muscles, fewer of them"
+_TRUNK_TURN = _estimate(1.25, "young men, quoted without a source")
+_TRUNK_SIDE = _printed(159.0, STOBBE, Grade.QUOTED)
+_TRUNK_BEND, _TRUNK_EXTEND = (_printed(value, STOBBE, Grade.QUOTED) for value in (143.0, 234.0))
+_KNEE_TURN = _estimate(0.70, "muscles 0.35 (Armour et al. 2004, quoted), as much by the ligaments under load")
+_FOOT_SIDE = "quoted without a source"
+
+HUMAN_STRENGTH: Mapping[str, tuple[DirectionStrength, DirectionStrength]] = MappingProxyType({
+    "lumbar_flexion": (_TRUNK_EXTEND, _TRUNK_BEND),
+    "lumbar_side_bend": (_TRUNK_SIDE, _TRUNK_SIDE),
+    "lumbar_rotation": (_TRUNK_TURN, _TRUNK_TURN),
+    "thorax_flexion": (
+        _estimate(_HIGHER * _TRUNK_EXTEND.per_kg, _THORAX), _estimate(_HIGHER * _TRUNK_BEND.per_kg, _THORAX),
+    ),
+    "thorax_side_bend": _both(_estimate(_HIGHER * _TRUNK_SIDE.per_kg, _THORAX)),
+    "thorax_rotation": _both(_estimate(_HIGHER * _TRUNK_TURN.per_kg, _THORAX)),
+    "neck_flexion": (_printed(51.0, FICE, Grade.PAPER), _printed(30.0, FICE, Grade.PAPER)),
+    "neck_side_bend": _both(_printed(32.0, FICE, Grade.PAPER)),
+    "neck_rotation": _both(_printed(13.0, FICE, Grade.PAPER)),
+    "shoulder_flexion": (
+        _harbo(1.25, Women.SHOULDER), _printed(89.9, SHOULDER_STUDY, Grade.PAPER, Women.SHOULDER),
+    ),
+    "shoulder_abduction": (_harbo(1.07, Women.SHOULDER), _harbo(0.84, Women.SHOULDER)),
+    "shoulder_rotation": (
+        _printed(33.0, STOBBE, Grade.QUOTED, Women.SHOULDER),
+        _printed(52.0, STOBBE, Grade.QUOTED, Women.SHOULDER),
+    ),
+    "elbow_flexion": (_harbo(0.61), _harbo(0.67)),
+    "forearm_pronation": (
+        MassStrength(0.127, "PMC9515161, supination", Grade.QUOTED, Women.FOREARM),
+        MassStrength(0.076, "PMC9515161, pronation", Grade.QUOTED, Women.FOREARM),
+    ),
+    "wrist_flexion": (_harbo(0.155, Women.WRIST), _harbo(0.33, Women.WRIST)),
+    "wrist_radial_deviation": (
+        _printed(9.5, DELP, Grade.PAPER, Women.WRIST), _printed(11.0, DELP, Grade.PAPER, Women.WRIST),
+    ),
+    "hip_flexion": (
+        LegStrength((0.161, 0.171, 0.144), (0.181, 0.140, 0.138)),
+        LegStrength((0.113, 0.107, 0.101), (0.127, 0.091, 0.081)),
+    ),
+    "hip_abduction": (
+        MassStrength(1.08, HIP_STUDY, Grade.QUOTED), MassStrength(1.30 * 1.29, ABDUCTION, Grade.PAPER),
+    ),
+    "hip_rotation": (
+        MassStrength(0.66, HIP_STUDY, Grade.QUOTED), MassStrength(0.72, HIP_STUDY, Grade.QUOTED),
+    ),
+    "knee_flexion": (
+        LegStrength((0.163, 0.156, 0.137), (0.159, 0.128, 0.124)),
+        LegStrength((0.087, 0.081, 0.069), (0.080, 0.060, 0.060)),
+    ),
+    "knee_rotation": (_KNEE_TURN, _KNEE_TURN),
+    "ankle_dorsiflexion": (
+        LegStrength((0.095, 0.114, 0.106), (0.104, 0.093, 0.125)),
+        LegStrength((0.033, 0.028, 0.029), (0.027, 0.024, 0.022)),
+    ),
+    "ankle_inversion": (_estimate(0.42, _FOOT_SIDE), _estimate(0.46, _FOOT_SIDE)),
+    "toe_extension": (
+        _estimate(0.63, "toe flexors and plantar fascia together"), _estimate(0.13, "a fifth of the flexors"),
+    ),
+})  # fmt: skip
+"""Strength against and along the positive direction of each hinge, by its name without the side.
+
+A hinge's first entry bounds its negative torque, so that of ``knee_flexion`` is the knee's extension.
+"""
+
+
+def age_factor(sex: str, age: float) -> float:
+    """Strength over that of the young ([DanneskioldSamsoe2009]_).
+
+    Men lose linearly from 25 years on and have 54 to 89 % at 75, women from 40 years on and have 48 to 92 %
+    at 75, by joint; here the middle of these.
+
+    Args:
+        sex: ``"male"`` or ``"female"``.
+        age: [years].
+    """
+    start, left = (40.0, 0.5 * (0.48 + 0.92)) if sex == "female" else (25.0, 0.5 * (0.54 + 0.89))
+    return 1.0 - (1.0 - left) * max(0.0, age - start) / (75.0 - start)
+
+
+def hinge_strength(
+    name: str, mass: float, stature: float, sex: str, age: float = DEFAULT_AGE
+) -> tuple[float, float]:
+    """Torques of a hinge against and along its positive direction, both as sizes [N.m].
+
+    Args:
+        name: Key of :data:`HUMAN_STRENGTH`.
+        mass: [kg].
+        stature: [m].
+        sex: ``"male"`` or ``"female"``.
+        age: [years].
+    """
+    against, along = HUMAN_STRENGTH[name]
+    return against.torque(mass, stature, sex, age), along.torque(mass, stature, sex, age)
+
+
+def check_strength(age: float, strength: float) -> None:
+    """Refuse an age or a multiple of the strength that no person has.
+
+    Raises:
+        BodyError: If one is out of its range.
+    """
+    finite_number(age, "age [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1], error=BodyError)
+    finite_number(strength, "strength", above=0.0, error=BodyError)
