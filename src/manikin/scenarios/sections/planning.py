@@ -57,7 +57,8 @@ class PlanningSection(Section):
         default=None, description="instants per phase at which balance is imposed, less one"
     )
     min_margin: NonNegative = Field(
-        default=0.0, description="smallest stability margin allowed [N.m], or [N] in the force space"
+        default=0.0,
+        description="smallest stability margin allowed, moments about the CoM [N.m], or [N] in the force space",
     )
     margin_space: Literal["wrench", "force"] = Field(default="wrench", description="what the margin measures")
     friction_model: FrictionModelName = Field(default="outer", description=FRICTION_MODEL_TEXT)
