@@ -83,7 +83,7 @@ def test_feet_slide_where_the_load_is_beyond_their_friction(body, brace, push):
     """On level ground at ``mu m g``: below it there is a margin somewhere, above it nowhere."""
     feet = list(brace.feet.values())
     limit = 0.7 * body.mass * GRAVITY
-    near = Configuration(body, brace.q).com[:2]
+    near = Configuration(body, brace.q).com
     margins = []
     for force in (0.2 * limit, 1.01 * limit):
         low = np.concatenate([push.reaction(force), np.zeros(3)])  # at the height of the ground: no tipping

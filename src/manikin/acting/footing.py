@@ -59,12 +59,12 @@ class Loads:
 
         Args:
             feet: Contacts that carry.
-            near: (2,) middle of the places that are looked at [m].
+            near: (3,) middle of the places that are looked at, at the height of the CoM [m].
             reach: (2,) how far they go along x and y [m].
         """
         x, y = (np.linspace(-r, r, 2 * int(np.ceil(r / 0.02)) + 1) for r in reach)
         grid = np.stack(np.meshgrid(near[0] + x, near[1] + y, indexing="ij"), axis=-1).reshape(-1, 2)
-        margins = self.margins(feet, np.column_stack([grid, np.zeros(len(grid))]))
+        margins = self.margins(feet, np.column_stack([grid, np.full(len(grid), near[2])]))
         best = int(np.argmax(margins))
         return grid[best], float(margins[best])
 
@@ -146,6 +146,6 @@ class Footing:
 
     def _stands(self, situation: Situation, candidates: Candidates, row: int) -> bool:
         contact = contact_at(situation, candidates, row, situation.limb.kind, self.rules)
-        near = situation.state.com[:2]
+        near = situation.state.com
         _, margin = self.loads.best_place([self.other, contact], near, np.array(self.reach))
         return margin >= self.margin

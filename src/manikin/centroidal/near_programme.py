@@ -48,13 +48,13 @@ TURN_PULL = 2.0
 """Cost of its mean squared distance from the recorded one, in that unit: 10 N.m cost as much as the
 key frames missed by a little more than a millimetre."""
 
-RESERVE = 8.0
+RESERVE = 5.8
 """Margin of the body that turns beyond that of the point mass: arms and legs meet the rate of its angular
 momentum only nearly [N.m]."""
 
-ROOM = 20.0
+ROOM = 14.5
 """Margin wished for beyond that: whoever follows a plan needs some to come back to it. A controller that
-keeps its forces 1 cm inside the soles has 7 N.m less [N.m]."""
+keeps its forces 1 cm inside the soles has 5 N.m less [N.m]."""
 
 ROOM_PULL = 1.0
 """Cost of the mean square of the share of it that lacks: all of it costs as much as key frames missed by a

@@ -32,8 +32,8 @@ the plan ([Qiu2012]_ 5.4.4). Feet that roll need about 0.26 s on both [s]."""
 STANDING = 0.3
 """Least duration of the first and the last support [s]."""
 
-MARGIN = 15.0
-"""Margin that the plan of a walk must keep, of a person of 1.75 m and 70 kg [N.m]."""
+MARGIN = 10.9
+"""Margin about the CoM that the plan of a walk must keep, of a person of 1.75 m and 70 kg [N.m]."""
 
 PLANNING: Mapping[str, Any] = {
     "degree": 4,
