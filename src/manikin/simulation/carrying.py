@@ -99,25 +99,31 @@ class CarryingContacts:
             if points.forces[chosen].sum() < PRESSES:
                 continue
             left &= ~chosen
-            contacts.append(self._known(_touched(contact, pose(name), points, chosen)))
+            contacts.append(self._known(*_touched(contact, pose(name), points, chosen)))
         for segment, other in dict.fromkeys(zip(points.segments, points.others, strict=True)):
             pair = np.array(points.others) == other
             chosen = left & pair & points.of([segment])
             if points.forces[chosen].sum() >= PRESSES:
-                contacts.append(self._known(_unplanned(f"{segment} on {other}", points, chosen)))
+                contacts.append(
+                    self._known(_unplanned(f"{segment} on {other}", points, chosen), partial=True)
+                )
         return Stance(contacts, model=model).bounded(self._mass)
 
-    def _known(self, contact: Contact) -> Contact:
+    def _known(self, contact: Contact, partial: bool) -> Contact:
         """The same contact as before where it has not moved, so that stances can be told apart by it."""
         last = self._last.get(contact.effector)
         if last is not None and _same_place(last, contact):
             return last
-        self._last[contact.effector] = contact
-        return contact
+        kept = replace(contact, points=_hull(contact.points)) if partial else contact
+        self._last[contact.effector] = kept
+        return kept
 
 
 def _same_place(first: Contact, second: Contact) -> bool:
-    """Whether two contacts of an effector are the same but for less than :data:`TOUCHING`."""
+    """Whether a contact is the one of before but for less than :data:`TOUCHING`.
+
+    Every corner of the first is still met by a point of the second, none of which is outside its hull.
+    """
     alike = first.kind is second.kind and first.part is second.part and first.friction == second.friction
     if not alike or first.normal @ second.normal < 1.0 - 1e-6:
         return False
@@ -127,7 +133,8 @@ def _same_place(first: Contact, second: Contact) -> bool:
                   for c in (first, second))  # fmt: skip
     if np.abs(np.concatenate([one[:, 2], other[:, 2]])).max() > TOUCHING:
         return False
-    return max(_outside(other[:, :2], one[:, :2]), _outside(one[:, :2], other[:, :2])) <= TOUCHING
+    missing = np.linalg.norm(one[:, None, :2] - other[:, :2], axis=2).min(axis=1)
+    return bool(missing.max() <= TOUCHING and _outside(other[:, :2], one[:, :2]) <= TOUCHING)
 
 
 def _outside(points: FloatArray, corners: FloatArray) -> float:
@@ -145,12 +152,14 @@ def _outside(points: FloatArray, corners: FloatArray) -> float:
     return float(apart.max(initial=0.0))
 
 
-def _touched(contact: Contact, pose: Pose, points: CarriedPoints, chosen: NDArray[np.bool_]) -> Contact:
-    """A planned contact where it is, with what of it touches."""
+def _touched(
+    contact: Contact, pose: Pose, points: CarriedPoints, chosen: NDArray[np.bool_]
+) -> tuple[Contact, bool]:
+    """A planned contact where it is, with what of it touches, and whether that is not all of it."""
     weights = points.forces[chosen]
     centre = weights @ points.positions[chosen] / weights.sum()
     if contact.kind is ContactKind.POINT:
-        return replace(contact, position=centre)
+        return replace(contact, position=centre), False
     position, rotation = pose
     normal = contact.normal
     if contact.part is SolePart.FULL:
@@ -159,12 +168,12 @@ def _touched(contact: Contact, pose: Pose, points: CarriedPoints, chosen: NDArra
         if len(corners) == len(contact.points):
             whole = replace(contact, position=position - ((position - centre) @ normal) * normal)
             if np.all(_beyond(whole, points.positions[chosen]) <= TOUCHING):
-                return contact if _same_place(contact, whole) else whole
+                return (contact if _same_place(contact, whole) else whole), False
     else:
         corners = contact.points_in_world
     local = (np.vstack([corners, points.positions[chosen]]) - centre) @ contact.rotation_contact_to_world
     local[:, 2] = 0.0
-    return replace(contact, position=centre, points=_hull(local), torsion_limit=None)
+    return replace(contact, position=centre, points=local, torsion_limit=None), True
 
 
 def _beyond(contact: Contact, positions: FloatArray) -> FloatArray:
@@ -209,6 +218,4 @@ def _unplanned(name: str, points: CarriedPoints, chosen: NDArray[np.bool_]) -> C
     rotation = rotation_from_normal(normal / np.linalg.norm(normal), 0.0)
     local = (points.positions[chosen] - centre) @ rotation
     local[:, 2] = 0.0
-    return Contact(
-        name, ContactKind.SOLE, centre, rotation, _hull(local), float(points.friction[chosen].min())
-    )
+    return Contact(name, ContactKind.SOLE, centre, rotation, local, float(points.friction[chosen].min()))

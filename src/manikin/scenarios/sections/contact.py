@@ -62,7 +62,8 @@ class ContactSection(Section):
         default=None, description="time after the touch-down in which it may still slide to its place [s]"
     )
     max_force_N: Positive | None = Field(
-        default=None, description="grasp: largest force along each world axis [N]"
+        default=None,
+        description="grasp: largest force along each axis of the world, in a scenario of the task frame [N]",
     )
     planning_max_force_N: Positive | None = Field(
         default=None, description="grasp: smaller limit that planning balances with (default: max_force_N)"
