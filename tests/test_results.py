@@ -24,7 +24,10 @@ GOOD = {
         "feasibility_radius": 69.34321, "wall_s": 0.71234,
     },
     "wholebody": {"min_clearance_m": 0.0241512, "closest_pair": ["a", "b"], "wall_s": 3.31234},
-    "execution": {"min_margin": 20.61234, "com_rms_error_m": 7.0e-5, "fell": False, "wall_s": 1.2987},
+    "execution": {
+        "min_margin": 20.61234, "min_force_at_com_N": 29.71, "min_zmp_distance_m": 0.03262,
+        "com_rms_error_m": 7.0e-5, "fell": False, "wall_s": 1.2987,
+    },
 }  # fmt: skip
 POINT_MASS = {
     **GOOD, "scenario": "walls@trial-4", "variant": "trial-4", "wholebody": None, "execution": None,
@@ -43,8 +46,8 @@ REPORT = {"runs": [GOOD, POINT_MASS, BAD], "wall_s": 12.345678, **counts([GOOD, 
 
 def test_a_row_says_what_the_run_measured():
     assert result_rows(REPORT)[0] == (
-        "platform", "-", "5.00", "24.3 N.m", "69.3", "24.2", "20.6", "0.07", "no", "0.7 + 3.3 + 1.3",
-        "yes", "yes", "proved",
+        "platform", "-", "5.00", "24.3 N.m", "69.3", "24.2", "20.6", "30", "33", "0.07", "no",
+        "0.7 + 3.3 + 1.3", "yes", "yes", "proved",
     )  # fmt: skip
 
 

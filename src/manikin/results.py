@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 HEADER = (
-    "scenario", "variant", "duration", "planned margin", "radius", "clearance", "executed margin",
-    "CoM rms", "fell", "wall", "planned", "proved", "result",
+    "scenario", "variant", "duration", "planned margin", "bound", "clearance", "executed margin",
+    "force at the CoM", "ZMP to the edge", "CoM rms", "fell", "wall", "planned", "proved", "result",
 )  # fmt: skip
 """Columns of the table."""
 
-UNITS = ("", "", "s", "", "N.m", "mm", "N.m", "mm", "", "s + s + s", "", "", "")
+UNITS = ("", "", "s", "", "N.m", "mm", "N.m", "N", "mm", "mm", "", "s + s + s", "", "", "")
 """Units of the columns; the planned margin brings its own."""
 
 NOTHING = "-"
@@ -27,10 +27,20 @@ _RUN_WITH = ("stature_m", "mass_kg", "seed")
 _YES_OR_NO = {True: "yes", False: "no", None: NOTHING}
 
 _KEPT: dict[str, tuple[str, ...]] = {
-    "centroidal": ("duration_s", "min_margin", "margin_unit", "feasibility_radius", "wall_s"),
+    "centroidal": (
+        "duration_s",
+        "min_margin",
+        "margin_unit",
+        "min_force_at_com_N",
+        "min_zmp_distance_m",
+        "feasibility_radius",
+        "wall_s",
+    ),
     "wholebody": (
         "duration_s",
         "min_margin",
+        "min_force_at_com_N",
+        "min_zmp_distance_m",
         "min_clearance_m",
         "lowest_com_m",
         "head_clearance_m",
@@ -38,6 +48,8 @@ _KEPT: dict[str, tuple[str, ...]] = {
     ),
     "execution": (
         "min_margin",
+        "min_force_at_com_N",
+        "min_zmp_distance_m",
         "com_rms_error_m",
         "lowest_com_m",
         "head_clearance_m",
@@ -116,6 +128,8 @@ def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
         number(com.get("feasibility_radius"), 1),
         number(body.get("min_clearance_m"), 1, scale=1000.0),
         number(executed.get("min_margin"), 1),
+        number(executed.get("min_force_at_com_N"), 0),
+        number(executed.get("min_zmp_distance_m"), 0, scale=1000.0),
         number(executed.get("com_rms_error_m"), 2, scale=1000.0),
         _YES_OR_NO[executed.get("fell")],
         " + ".join(number(wall, 1) for wall in walls if wall is not None) or NOTHING,

@@ -6,9 +6,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from manikin.balance.contact_forces import ContactGenerators, friction_share, share
+from manikin.balance.contact_forces import ContactGenerators, friction_share, friction_use, share
 from manikin.balance.friction import contact_to_world, edge_wrenches
-from manikin.contact import FRICTION_MODELS, Stance, grasp, point, sole
+from manikin.contact import (
+    FRICTION_MODELS,
+    ContactSchedule,
+    Phase,
+    Stance,
+    StanceSequence,
+    grasp,
+    point,
+    sole,
+)
 
 
 def test_generators_are_the_edges_of_the_stances_friction_model_and_the_axes_of_its_grasps():
@@ -50,12 +59,25 @@ def test_wrenches_are_shared_as_a_bounded_least_squares_solver_shares_each(seed,
 def test_the_share_of_the_friction_is_one_on_the_sides_of_the_model():
     """A force of mu f_n along x is too much for the inner pyramid alone; one along the diagonal is not."""
     foot = point("foot", (0.0, 0.0, 0.0), friction=0.5)
-    along = np.array([[[50.0, 0.0, 100.0, 0.0, 0.0, 0.0]]])
-    diagonal = np.array([[[50.0 * np.sqrt(0.5), 50.0 * np.sqrt(0.5), 100.0, 0.0, 0.0, 0.0]]])
+    along = np.array([[50.0, 0.0, 100.0]])
+    diagonal = np.array([[50.0 * np.sqrt(0.5), 50.0 * np.sqrt(0.5), 100.0]])
     shares = {
-        model: [float(friction_share(Stance([foot], 1e3, model), ["foot"], f)[0]) for f in (along, diagonal)]
+        model: [float(friction_share(foot, force, model)[0]) for force in (along, diagonal)]
         for model in FRICTION_MODELS
     }
     assert shares["outer"] == pytest.approx([1.0, np.sqrt(0.5)])
     assert shares["inner"] == pytest.approx([np.sqrt(2.0), 1.0])
     assert shares["cone"] == pytest.approx([1.0, 1.0])
+
+
+def test_the_use_of_friction_is_that_of_the_worst_sample_in_the_model_of_its_stance():
+    """Two phases on one foot: the second force is half way to the side of the inner pyramid of both."""
+    foot = point("foot", (0.0, 0.0, 0.0), friction=0.5)
+    hand = grasp("hand", (0.3, 0.0, 1.0), max_force=100.0)
+    stances = [Stance([foot], 1e3, "inner"), Stance([foot, hand], 1e3, "inner")]
+    schedule = ContactSchedule(StanceSequence([Phase(stance) for stance in stances]), [0.0, 1.0, 2.0])
+    forces = np.zeros((2, 2, 6))
+    forces[:, 0, 2], forces[1, 0, 0], forces[1, 1, 0] = 200.0, 25.0 * np.sqrt(2.0), 90.0
+    found = friction_use(schedule, np.array([0.5, 1.5]), ["foot", "hand"], forces)
+    assert found.share == pytest.approx(0.5)
+    assert (found.model, found.time, found.effector) == ("inner", 1.5, "foot")

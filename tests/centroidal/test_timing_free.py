@@ -1,11 +1,21 @@
 """The timing-free method on the scenarios of the thesis."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from manikin.centroidal import CentroidalProblem, GeometricConstraint, Weights, height_band, plan_com
+from manikin.centroidal import (
+    BentSurface,
+    CentroidalProblem,
+    GeometricConstraint,
+    Weights,
+    height_band,
+    plan_com,
+)
 from manikin.centroidal.certificate import phase_margins
 from manikin.contact import Phase, Stance, StanceSequence, sole
+from manikin.spatial import rotation_from_yaw
 
 
 def peak_acceleration(trajectory) -> float:
@@ -244,3 +254,49 @@ def test_a_start_on_the_edge_of_the_height_band_is_no_obstacle():
     result = plan_com(CentroidalProblem(**arguments, **changed))
     assert result.succeeded, result.failure
     assert result.d_min >= 20.0
+
+
+def moved(problem: CentroidalProblem, turn, shift) -> CentroidalProblem:
+    """The same problem elsewhere and turned about the vertical; its constraints look at heights alone."""
+
+    def contact(item):
+        rotation = turn @ item.rotation_contact_to_world
+        return replace(item, position=turn @ item.position + shift, rotation_contact_to_world=rotation)
+
+    phases = [
+        replace(phase, stance=phase.stance.with_contacts([contact(item) for item in phase.stance]))
+        for phase in problem.sequence
+    ]
+    ends = {name: turn @ getattr(problem, name) + shift for name in ("start_com", "goal_com")}
+    return CentroidalProblem(
+        problem.mass, StanceSequence(phases), **ends, required_margin=14.7, support_distance=1.0,
+        geometric=height_band(BentSurface(0.8, 0.0, 1.0, 0.0), BentSurface(1.0, 0.0, 1.0, 0.0)),
+        max_duration=5.0,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def at_origin(platform):
+    return plan_com(moved(platform(), np.eye(3), np.zeros(3)))
+
+
+@pytest.mark.parametrize("yaw", [0.0, 37.0])
+def test_a_plan_does_not_depend_on_where_the_scene_stands(platform, at_origin, yaw):
+    """Durations, margins and path of the platform's problem moved by (10, -7, 0) m and turned.
+
+    Moved alone, the programme has the same numbers but for rounding (5e-13 of the margin). Turned, its
+    iterates have other components and end elsewhere within the solver's tolerance (3e-8).
+    """
+    tolerance = 1e-6
+    turn, shift = rotation_from_yaw(np.deg2rad(yaw)), np.array([10.0, -7.0, 0.0])
+    first, second = at_origin, plan_com(moved(platform(), turn, shift))
+    assert first.succeeded, first.failure
+    assert second.succeeded, second.failure
+    assert second.d_min == pytest.approx(first.d_min, rel=tolerance)
+    assert second.feasibility_radius == pytest.approx(first.feasibility_radius, rel=1e-6)
+    np.testing.assert_allclose(second.key_instants, first.key_instants, rtol=tolerance)
+    share = np.linspace(0.0, 1.0, 101)
+    path = first.trajectory.position(share * first.trajectory.duration) @ turn.T + shift
+    np.testing.assert_allclose(
+        second.trajectory.position(share * second.trajectory.duration), path, atol=tolerance
+    )

@@ -12,7 +12,7 @@ from manikin.contact import FRICTION_MODELS, ContactSchedule, Phase, Stance, Sta
 from manikin.contact_planning import Task
 from manikin.contact_planning.efort import efort
 from manikin.scene import Box, Obstacle, Proximity, Scene
-from manikin.spatial import wrench_map
+from manikin.spatial import rotation_from_yaw, wrench_map
 from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
 from manikin.wholebody.knots import phase_knots, sample_times
 from manikin.wholebody.refine_balance import BalanceRoom
@@ -200,3 +200,27 @@ def test_forces_of_the_refinement_keep_to_the_friction_model_of_the_stance(model
         own = generators.contact == number
         shares.append(friction_share(contact, magnitude[:, own] @ generators.force[own], model))
     assert np.max(shares) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_cost_of_balance_does_not_depend_on_where_the_scene_stands(stance):
+    """Moved by (10, -7, 0) m and turned by 37 degrees: cost, margin and wanted margin to 1e-6 relative."""
+    turn, shift = rotation_from_yaw(np.deg2rad(37.0)), np.array([10.0, -7.0, 0.0])
+    free = Stance(stance.contacts[:2], 1500.0)
+    there = []
+    for contact in free:
+        rotation = turn @ contact.rotation_contact_to_world
+        place = turn @ contact.position + shift
+        there.append(replace(contact, position=place, rotation_contact_to_world=rotation))
+    rng = np.random.default_rng(2)
+    com = np.array([0.02, -0.03, 0.9]) + 0.05 * rng.normal(size=(8, 3))
+    force = np.array([0.0, 0.0, 775.0]) + 30.0 * rng.normal(size=(8, 3))
+    wrench = np.hstack([force, np.cross(com, force)])
+    com_there, force_there = com @ turn.T + shift, force @ turn.T
+    wrench_there = np.hstack([force_there, np.cross(com_there, force_there)])
+    first, second = BalanceRoom(free), BalanceRoom(free.with_contacts(there))
+    np.testing.assert_allclose(second.margin(wrench_there, com_there), first.margin(wrench, com), rtol=1e-6)
+    wanted = first.wanted(22.0, com[0])
+    assert second.wanted(22.0, com_there[0]) == pytest.approx(wanted, rel=1e-6)
+    here = first.cost(wrench, com, wanted, 1.0, 3.0)
+    moved = second.cost(wrench_there, com_there, wanted, 1.0, 3.0)
+    np.testing.assert_allclose(moved.value, here.value, rtol=1e-6)

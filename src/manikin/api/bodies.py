@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from manikin.body import BodyModel, creature_from_urdf, human, insect
-from manikin.contact import Contact, Stance
+from manikin.contact import Contact, FrictionModel, Stance
 from manikin.contact import grasp as contact_grasp
 from manikin.contact import point as contact_point
 from manikin.contact import sole as contact_sole
@@ -71,6 +71,7 @@ def stance(
     *,
     friction: float = FRICTION,
     normal_force_cap: float | None = 1500.0,
+    friction_model: FrictionModel = "outer",
     **contacts: Sequence[float] | Unnamed | Contact,
 ) -> Stance:
     """Stance from its contacts by effector: ``stance(left_foot=(0, .1), right_hand=grasp((.4, 0, 1), 100))``.
@@ -78,6 +79,7 @@ def stance(
     Args:
         friction: Of contacts that are given as a place alone.
         normal_force_cap: Largest sum of the normal forces [N].
+        friction_model: Pyramid that stands for the friction cone: ``outer``, ``inner`` or ``cone``.
         contacts: By effector: a place (2,) or (3,) [m], which is a sole that faces x, or what
             :func:`sole`, :func:`point` or :func:`grasp` made.
 
@@ -91,7 +93,7 @@ def stance(
             continue
         kind = given if isinstance(given, Unnamed) else sole(given, friction=friction)
         made.append(kind.named(effector))
-    return Stance(made, normal_force_cap)
+    return Stance(made, normal_force_cap, friction_model)
 
 
 def creature(

@@ -43,6 +43,12 @@ class MotionMargin:
         return int(np.argmin(self.margin))
 
     @property
+    def min_force(self) -> float | None:
+        """Smallest force at the CoM that ends balance at any sample [N]; None where no force alone does."""
+        least = float(self.force.min(initial=np.inf))
+        return least if np.isfinite(least) else None
+
+    @property
     def min_zmp_distance(self) -> float | None:
         """Least distance of the ZMP to the edge [m]; None where it is not known at any sample."""
         known = self.zmp_distance[np.isfinite(self.zmp_distance)]

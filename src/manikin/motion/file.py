@@ -52,8 +52,8 @@ DATASETS: Mapping[str, tuple[str, str]] = {
     "angular_momentum": ("kg.m^2/s", "about the centre of mass, world axes"),
     "margin": (
         "N.m",
-        "distance of the pseudo-wrench to the faces of the wrench polytope, negative outside; with the unit "
-        "N, the smallest force at the centre of mass that ends balance",
+        "distance of the pseudo-wrench to the faces of the wrench polytope, moments about the centre of "
+        "mass, negative outside; with the unit N, the smallest force at the centre of mass that ends balance",
     ),
     "support": ("-", "1 where the contact is active, in the order of contact_names"),
     "contact_force": ("N, N.m", "force and moment of the scene on the body, world axes, about the contact"),
@@ -150,12 +150,30 @@ def _fill(file: h5py.File, content: MotionFile) -> None:
     file.attrs.update(format=FORMAT, format_version=FORMAT_VERSION, created_by=f"manikin {__version__}")
     for name, motion in content.motions.items():
         _write_motion(file.create_group(name), motion)
+        file[f"{name}/margin"].attrs["form"] = margin_form(motion, content.schedule)
     if content.body is not None:
         _write_json(file, "body", describe_body(content.body))
     if content.scene is not None:
         _write_json(file, "scene", describe_scene(content.scene))
     if content.schedule is not None:
         _write_json(file, "schedule", describe_schedule(content.schedule))
+
+
+def margin_form(motion: Motion, schedule: ContactSchedule | None) -> str:
+    """Form and friction model of a motion's margin, in words.
+
+    Args:
+        motion: Gives the unit.
+        schedule: Gives the friction model, with its stances; None leaves it unsaid.
+    """
+    form = (
+        "residual ball of the wrench polytope, moments about the centre of mass, alpha = 1 m"
+        if motion.margin_unit == "N.m"
+        else "smallest force at the centre of mass"
+    )
+    phases = () if schedule is None else schedule.sequence
+    models = sorted({phase.stance.friction_model for phase in phases if len(phase.stance)})
+    return f"{form}; friction model {' and '.join(models)}" if models else form
 
 
 def _write_motion(group: h5py.Group, motion: Motion) -> None:

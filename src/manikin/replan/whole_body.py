@@ -106,7 +106,7 @@ def adapt_postures(
     dense = np.linspace(0.0, trajectory.duration, max(2, round(trajectory.duration / STEP) + 1))
     motion, wrench = full_motion(body, schedule, polytopes, dense, *spline.evaluate(dense))
     ignored = ignored_pairs(body, scene, schedule, dense)
-    certificate = certify(body, task.proximity, trajectory, motion, ignored, wrench)
+    certificate = certify(body, task.proximity, trajectory, motion, ignored, wrench, polytopes=polytopes)
     told = [7 + joint for joint in range(body.nq - 7) if joint not in task.toes]
     away = motion.q[:, told] - _postures(recorded, np.interp(dense, *clock))[:, told]
     return AdaptedMotion(motion, certificate, float(np.sqrt(np.mean(away**2))))

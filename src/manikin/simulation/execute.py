@@ -249,7 +249,8 @@ class _Run:
         touches = self._counted_touches()
         if not self.failure and touches:
             self._fail(f"unplanned touch: {touches[0]}", touches[0].time)
-        executed = recorder.motion(self.body.joint_names, self.body.mass)
+        balance = recorder.margins(self.body.mass)
+        executed = recorder.motion(self.body.joint_names, balance.margin)
         com = recorder.com_errors()
         bound = com[: max(recorder.bound_samples(), 1)]
         peak = np.abs(executed.tau[:, 6:]).max(axis=0)
@@ -267,6 +268,8 @@ class _Run:
             worst_effector_time_s=effector_time,
             final_com_error_m=float(com[-1]),
             min_margin=float(executed.margin.min()),
+            min_force_at_com_N=balance.min_force,
+            min_zmp_distance_m=balance.min_zmp_distance,
             max_penetration_m=world.penetration,
             max_padding_compression_m=world.padding_compression,
             peak_torque_Nm=dict(zip(self.body.joint_names, peak.tolist(), strict=True)),

@@ -33,7 +33,7 @@ class Execution(Displayed):
         worst_effector: Which effector that is; empty without one.
         worst_effector_time_s: When [s].
         final_com_error_m: Distance of the CoM from its plan at the end of the hold [m].
-        min_margin: Least wrench margin [N.m].
+        min_margin: Least wrench margin, about the CoM [N.m].
         max_penetration_m: Deepest penetration of any hard contact, at every engine step [m].
         max_padding_compression_m: How far the body sank into something padded [m].
         peak_torque_Nm: Largest absolute torque by joint [N.m].
@@ -48,6 +48,9 @@ class Execution(Displayed):
         push: What became of the pushes; None without one.
         friction: Largest use of friction by the forces that control counted on; None without control.
         schedule: When the planned contacts were due, later where the plan waited; None where it did not.
+        min_force_at_com_N: Smallest force at the CoM that would have ended balance; None where none does [N].
+        min_zmp_distance_m: Least distance of the measured ZMP to the edge of what carries, negative outside;
+            None where it never spans one plane [m].
     """
 
     motion: Motion
@@ -75,6 +78,8 @@ class Execution(Displayed):
     push: PushOutcome | None = None
     schedule: ContactSchedule | None = None
     friction: FrictionUse | None = None
+    min_force_at_com_N: float | None = None
+    min_zmp_distance_m: float | None = None
 
     @property
     def succeeded(self) -> bool:
@@ -85,7 +90,8 @@ class Execution(Displayed):
         """The "execution" block of the run's summary."""
         names = (
             "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m",
-            "min_margin", "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm",
+            "min_margin", "min_force_at_com_N", "min_zmp_distance_m",
+            "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm",
             "realtime_factor", "wall_s",
         )  # fmt: skip
         block = {name: getattr(self, name) for name in names}

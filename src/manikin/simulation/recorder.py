@@ -218,8 +218,8 @@ class Recorder:
             self._schedule.stance_at(sample.plan_time).model,
         )  # fmt: skip
 
-    def motion(self, joint_names: Sequence[str], mass: float) -> Motion:
-        """Turn the samples into a motion."""
+    def motion(self, joint_names: Sequence[str], margin: FloatArray) -> Motion:
+        """Turn the samples into a motion with its margin (n,) [N.m]."""
         states = [s.output.state for s in self.samples]
         wrenches = np.array([s.wrenches for s in self.samples])
         tau = np.array([s.output.tau for s in self.samples])
@@ -231,7 +231,7 @@ class Recorder:
             tau=np.concatenate((np.zeros((len(tau), 6)), tau), axis=1),
             com=np.array([state.com for state in states]),
             angular_momentum=np.array([state.momentum[3:] for state in states]),
-            margin=self.margins(mass).margin,
+            margin=margin,
             support=np.linalg.norm(wrenches[..., :3], axis=-1) > PRESSES,
             contact_force=wrenches,
             contact_names=tuple(self.effectors),

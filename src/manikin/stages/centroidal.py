@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from manikin.balance import motion_margin
 from manikin.balance.contact_forces import friction_use
 from manikin.centroidal import (
     CentroidalResult,
@@ -13,6 +14,7 @@ from manikin.centroidal import (
     plan_com,
     plan_com_through_key_frames,
 )
+from manikin.centroidal.certificate import phase_times
 from manikin.stages.context import RunContext
 from manikin.stages.report import Report, place
 from manikin.stages.world_frame import trajectory_in_world
@@ -68,12 +70,28 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
         "friction": None if trajectory is None else _friction(trajectory),
         "limiting_phase": result.limiting_phase,
         "limiting_contact": limiting_contact(result),
+        "min_force_at_com_N": least_force_at_com(result),
         "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
         "feasibility_radius": result.feasibility_radius,
         "replans": 0,
         "key_postures": None,
         "wall_s": result.wall_time,
     }
+
+
+def least_force_at_com(result: CentroidalResult) -> float | None:
+    """Smallest force at the CoM that would end the point mass's balance, every millisecond [N]."""
+    trajectory = result.trajectory
+    if trajectory is None:
+        return None
+    times = phase_times(trajectory)
+    phases = np.repeat(np.arange(len(times)), [len(instants) for instants in times])
+    instants = np.concatenate(times)
+    found = motion_margin(
+        [phase.stance for phase in trajectory.schedule.sequence], phases,
+        trajectory.pseudo_wrench(instants), trajectory.position(instants), polytopes=result.polytopes,
+    )  # fmt: skip
+    return found.min_force
 
 
 def limiting_contact(result: CentroidalResult) -> str | None:

@@ -60,7 +60,8 @@ def refined_summary(result: RefineResult) -> dict[str, Any]:
         "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
         "impacts": [],
         "min_margin": certificate.min_margin,
-        "min_zmp_distance_m": None,
+        "min_force_at_com_N": certificate.min_force_at_com_N,
+        "min_zmp_distance_m": certificate.min_zmp_distance_m,
         "swings": None,
         "refinement": {
             "min_contact_slack": result.contact_slack,

@@ -78,6 +78,7 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
         "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
         "impacts": [asdict(impact) for impact in certificate.impacts],
         "min_margin": float(result.motion.margin.min()),
+        "min_force_at_com_N": certificate.min_force_at_com_N,
         "min_zmp_distance_m": certificate.min_zmp_distance_m,
         "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],
         "wall_s": result.wall_time,

@@ -321,7 +321,9 @@ class _Planner:
         if self.leaning:
             ignored = tuple(pairs | self.leaning for pairs in ignored)
         meeting = meeting_at(self.body, self.scene, self.trajectory.schedule, motion.time)
-        certificate = certify(self.body, self.proximity, self.trajectory, motion, ignored, wrench, meeting)
+        certificate = certify(
+            self.body, self.proximity, self.trajectory, motion, ignored, wrench, meeting, self._polytopes
+        )
         table = certificate.table(self.settings.requirements)
         failure = self._failure(swings, guide, table)
         wall = clock.perf_counter() - began

@@ -4,12 +4,13 @@ Nothing here comes from the solver: placements, centre of mass, distances and dy
 computed again from the samples of the finished motion.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance import least_zmp_distance
+from manikin.balance import WrenchPolytope, motion_margin
 from manikin.body import BodyModel
 from manikin.body.limb import hanging_segment
 from manikin.centroidal import CentroidalTrajectory
@@ -87,6 +88,7 @@ class WholeBodyResiduals:
         max_missing_wrench: Part of the dynamics that no admissible contact force supplies [N, N.m].
         max_torque_share: Largest share of a joint's torque limit.
         tightest_joint: Name of that joint.
+        min_force_at_com_N: Smallest force at the CoM that would end balance; None where none does [N].
         min_zmp_distance_m: Least distance of the ZMP to the edge of the support polygon, negative
             outside; of the phases whose contacts lie in one plane, None without any [m].
         worst_times_s: When each of the errors is largest [s], by field name.
@@ -106,6 +108,7 @@ class WholeBodyResiduals:
     max_missing_wrench: float
     max_torque_share: float
     tightest_joint: str
+    min_force_at_com_N: float | None
     min_zmp_distance_m: float | None
     worst_times_s: dict[str, float]
     impacts: tuple[Impact, ...] = ()
@@ -143,6 +146,7 @@ def certify(
     ignored: tuple[Ignored, ...],
     wrench: FloatArray,
     meeting: Meeting | None = None,
+    polytopes: Sequence[WrenchPolytope] | None = None,
 ) -> WholeBodyResiduals:
     """Measure a motion against its contacts, centre of mass, limits and obstacles.
 
@@ -154,6 +158,7 @@ def certify(
         ignored: Pairs that may touch, per sample.
         wrench: (n, 6) pseudo-wrench of the whole body about the world origin, per sample.
         meeting: What is met at speed, at the motion's samples.
+        polytopes: Of the phases, where they are known.
     """
     support, turn = support_errors(body, trajectory.schedule, motion)
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
@@ -175,22 +180,19 @@ def certify(
     scuff, times["max_scuff_m"] = deepest_scuff(body, proximity, trajectory.schedule, motion, ignored)
     closest_sample = clearance.sample if clearance.sample is not None else 0
     times["min_clearance_m"] = float(motion.time[closest_sample])
+    stances = [phase.stance for phase in trajectory.schedule.sequence]
+    phases = trajectory.schedule.phase_at(motion.time)
+    balance = motion_margin(stances, phases, wrench, motion.com, polytopes=polytopes)
     return WholeBodyResiduals(
         **{name: float(values.max()) for name, values in series.items()},
         min_clearance_m=float(clearance.distance),
         closest_pair=clearance.pair or ("", ""),
         max_scuff_m=scuff,
         tightest_joint=body.joint_names[int(np.argmax(share.max(axis=0)))],
-        min_zmp_distance_m=_least_zmp_distance(trajectory.schedule, motion.time, wrench),
+        min_force_at_com_N=balance.min_force,
+        min_zmp_distance_m=balance.min_zmp_distance,
         worst_times_s=times,
         impacts=_impacts(body, trajectory.schedule, motion.time, share),
-    )
-
-
-def _least_zmp_distance(schedule: ContactSchedule, time: FloatArray, wrench: FloatArray) -> float | None:
-    phases = schedule.phase_at(time)
-    return least_zmp_distance(
-        (phase.stance, wrench[phases == index]) for index, phase in enumerate(schedule.sequence)
     )
 
 

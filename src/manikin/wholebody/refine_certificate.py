@@ -58,6 +58,10 @@ class RefineResiduals:
             contact point with 1 m [N].
         min_margin: Least margin of the whole body's wrench about the CoM, over the stances whose
             wrenches fill a volume; infinite without any [N.m].
+        min_force_at_com_N: Smallest force at the CoM that would end balance, over the same stances; None
+            where it was not measured or no force does [N].
+        min_zmp_distance_m: Least distance of the ZMP to the edge of the support polygon [m]; None where it
+            was not measured or no stance spans one plane.
         max_torque_share: Largest share of a joint's torque limit.
         tightest_joint: Name of that joint.
         worst_times_s: When each of the errors is largest [s], by field name.
@@ -75,6 +79,8 @@ class RefineResiduals:
     max_torque_share: float
     tightest_joint: str
     worst_times_s: dict[str, float]
+    min_force_at_com_N: float | None = None
+    min_zmp_distance_m: float | None = None
 
     def table(self, requirements: RefineRequirements) -> RequirementTable:
         """Every requirement with its measured value; keys are the names of the fields."""

@@ -11,7 +11,7 @@ import daqp
 import numpy as np
 import pinocchio as pin
 
-from manikin.balance import motion_margin
+from manikin.balance import MotionMargin, motion_margin
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Stance
 from manikin.contact_planning.efort import Task
@@ -137,8 +137,8 @@ def balance_of(
     time: FloatArray,
     wrench: FloatArray,
     com: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """(n,) margin and physics violation of wrenches (n, 6) about the world origin with CoM (n, 3)."""
+) -> tuple[MotionMargin, FloatArray]:
+    """Margins and (n,) physics violation of wrenches (n, 6) about the world origin with CoM (n, 3)."""
     phases, violation = schedule.phase_at(time), np.zeros(len(time))
     for number, (phase, room) in enumerate(zip(schedule.sequence, rooms, strict=True)):
         rows = phases == number
@@ -146,7 +146,7 @@ def balance_of(
             violation[rows] = physics_violation(room, wrench[rows] @ wrench_map(centre_of(phase.stance)).T)
     polytopes = [room.polytope for room in rooms]
     found = motion_margin([one.stance for one in polytopes], phases, wrench, com, polytopes=polytopes)
-    return found.margin, violation
+    return found, violation
 
 
 def measure(
@@ -194,7 +194,7 @@ def measure(
         efort_cost=cost,
         max_joint_limit_violation_rad=max(0.0, float(outside)),
         max_velocity_share=float((np.abs(v[:, 6:]) / body.velocity_limit).max(initial=0.0)),
-        min_margin=float(margin.min()),
+        min_margin=float(margin.margin.min()),
     )
 
 

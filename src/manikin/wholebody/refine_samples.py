@@ -1,9 +1,11 @@
 """A refined motion at dense samples, with what is measured on them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from manikin.balance import MotionMargin
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
 from manikin.motion import Motion
@@ -25,7 +27,7 @@ def sampled_motion(
     rooms: Sequence[BalanceRoom],
     spline: ConfigurationSpline,
     sampling: float,
-) -> tuple[Motion, FloatArray]:
+) -> tuple[Motion, FloatArray, MotionMargin]:
     """Sample a spline with its contact forces and torques.
 
     Args:
@@ -36,13 +38,13 @@ def sampled_motion(
         sampling: Spacing of the samples [s].
 
     Returns:
-        The motion, and (n,) its physics violation [N].
+        The motion, (n,) its physics violation [N] and its margins.
     """
     time = sample_uniformly(schedule, sampling)
     polytopes = [room.polytope for room in rooms]
     motion, wrench = full_motion(body, schedule, polytopes, time, *spline.evaluate(time))
-    _, violation = balance_of(schedule, tuple(rooms), time, wrench, motion.com)
-    return motion, violation
+    balance, violation = balance_of(schedule, tuple(rooms), time, wrench, motion.com)
+    return motion, violation, balance
 
 
 def certified_motion(
@@ -67,10 +69,17 @@ def certified_motion(
         sampling: Spacing of the samples [s].
         padded: Obstacles that any part of the body may lean on.
     """
-    motion, violation = sampled_motion(body, schedule, rooms, spline, sampling)
+    motion, violation, balance = sampled_motion(body, schedule, rooms, spline, sampling)
     obstacles = RefineObstacles(body, scene, schedule, motion.time, padded)
     flat = tuple(room.is_flat for room in rooms)
-    return motion, certify_refined(body, proximity, schedule, obstacles, motion, violation, flat)
+    found = certify_refined(body, proximity, schedule, obstacles, motion, violation, flat)
+    force = np.where(np.array(flat)[schedule.phase_at(motion.time)], np.inf, balance.force)
+    found = replace(
+        found,
+        min_force_at_com_N=replace(balance, force=force).min_force,
+        min_zmp_distance_m=balance.min_zmp_distance,
+    )
+    return motion, found
 
 
 def least_slack(
