@@ -1,5 +1,7 @@
 """The README: its commands are the ones that are checked, its example runs, its tables are true."""
 
+import ast
+import json
 import os
 import re
 import subprocess
@@ -66,14 +68,32 @@ def _options(parameter):
     return [*parameter.opts, *parameter.secondary_opts]
 
 
-def test_the_example_prints_what_the_readme_says():
+def test_the_example_prints_what_the_readme_says(tmp_path):
     """The margins follow from the example's numbers alone, so they are compared to the printed digit."""
     example = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", README, re.DOTALL)
     assert len(example[1].splitlines()) <= 10
     found = subprocess.run(
-        [sys.executable, "-c", example[1]], capture_output=True, text=True, check=True, env={**os.environ}
-    )
+        [sys.executable, "-c", example[1]], capture_output=True, text=True, check=True, cwd=tmp_path,
+        env={**os.environ, "MPLBACKEND": "Agg"},
+    )  # fmt: skip
     assert found.stdout == example[2]
+    assert (tmp_path / "margin.png").stat().st_size > 10_000
+
+
+def test_the_notebook_runs_from_top_to_bottom(tmp_path, monkeypatch):
+    """Each code cell runs as it stands, and each but the imports ends in a value that a notebook shows."""
+    monkeypatch.chdir(tmp_path)
+    cells = json.loads((ROOT / "docs/tutorials/first-motion.ipynb").read_text(encoding="utf-8"))["cells"]
+    names: dict[str, object] = {}
+    for cell in (cell for cell in cells if cell["cell_type"] == "code"):
+        tree = ast.parse("".join(cell["source"]))
+        last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+        exec(compile(tree, "cell", "exec"), names)
+        if last is not None:
+            shown = eval(compile(ast.Expression(last.value), "cell", "eval"), names)
+            assert hasattr(shown, "_repr_html_") or hasattr(shown, "savefig")
+    assert names["planned"].verdict == "planned"
+    assert names["pushed"].verdict == "proved"
 
 
 def test_every_linked_file_exists():

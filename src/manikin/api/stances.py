@@ -32,7 +32,7 @@ class Balance(Displayed):
     @property
     def margin(self) -> float:
         """Wrench margin about the centre of mass [N.m]."""
-        return self.report.margin_about_com
+        return self.report.margin
 
     @property
     def limiting(self) -> str:

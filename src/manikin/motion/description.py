@@ -70,7 +70,7 @@ def body_from(description: Mapping[str, Any]) -> BodyModel:
         sex=description["sex"],
         age=description["age"],
         strength=description["strength"],
-        loads=description["loads_kg"],
+        loads=description.get("loads_kg", {}),
         sole_length=description["sole_length_m"],
         sole_width=description["sole_width_m"],
         limbs=tuple(_limb_from(limb) for limb in description.get("limbs", ())),
