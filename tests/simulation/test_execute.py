@@ -102,8 +102,9 @@ def test_summary_has_the_agreed_keys(body, stepped):
     _, result = stepped
     assert list(result.summary()) == [
         "fell", "com_rms_error_m", "com_max_error_m", "max_foot_error_m", "final_com_error_m",
-        "min_margin", "min_force_at_com_N", "min_zmp_distance_m", "max_penetration_m", "max_padding_compression_m", "peak_torque_Nm",
-        "realtime_factor", "wall_s", "unplanned_touches", "push",
+        "min_margin", "min_force_at_com_N", "min_zmp_distance_m", "max_penetration_m",
+        "max_padding_compression_m", "peak_torque_Nm",
+        "realtime_factor", "wall_s", "friction", "unplanned_touches", "push",
     ]  # fmt: skip
     assert set(result.peak_torque_Nm) == set(body.joint_names)
     assert result.max_limit_use <= 1 + 1e-6

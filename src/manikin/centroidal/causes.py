@@ -7,7 +7,7 @@ import numpy as np
 
 from manikin.balance import WrenchPolytope, admissible_com_polygon, wrench_polytopes
 from manikin.centroidal.problem import CentroidalProblem
-from manikin.contact import ContactKind, Stance
+from manikin.contact import ContactKind, Stance, StanceSequence
 from manikin.errors import InputError
 from manikin.spatial import FloatArray
 
@@ -16,6 +16,9 @@ FIRM_FRICTION = 0.7
 
 REACH_TOLERANCE = 0.01
 """A place that misses the constraints on the CoM by less than this may be off the grid's points [m]."""
+
+SLIPPERY = 0.2
+"""Friction below this is tried otherwise where a plan fails: of ice, or of wet and smooth floors."""
 
 _GRID = 25
 _LEVELS = 15
@@ -57,7 +60,7 @@ def low_friction(
         problem: Where it occurs.
         measure: The quantity from the stances' polytopes; it suffices above the required margin.
     """
-    least = min((c.friction for s in stances for c in s if c.kind is not ContactKind.GRASP), default=np.inf)
+    least = least_friction(stances)
     if least >= FIRM_FRICTION:
         return ""
     firm = wrench_polytopes([_firm(s) for s in stances], reference=problem.reference)
@@ -65,6 +68,17 @@ def low_friction(
     if value <= problem.required_margin:
         return ""
     return f"; the friction of {least:g} is too low: with {FIRM_FRICTION:g} it would be {value:.2f} N.m"
+
+
+def least_friction(stances: Sequence[Stance]) -> float:
+    """Least coefficient of the soles and points of some stances; infinite without any."""
+    return min((c.friction for s in stances for c in s if c.kind is not ContactKind.GRASP), default=np.inf)
+
+
+def with_firm_friction(problem: CentroidalProblem) -> CentroidalProblem:
+    """The same problem with friction of :data:`FIRM_FRICTION` at least."""
+    phases = [replace(phase, stance=_firm(phase.stance)) for phase in problem.sequence]
+    return replace(problem, sequence=StanceSequence(phases))
 
 
 def _firm(stance: Stance) -> Stance:

@@ -11,6 +11,7 @@ from manikin.balance import WrenchPolytope, pseudo_wrench, wrench_polytopes
 from manikin.balance.margin import force_levers, wrench_levers
 from manikin.centroidal.causes import low_friction, out_of_reach, slipping_slope
 from manikin.centroidal.problem import CentroidalProblem
+from manikin.contact import Stance
 from manikin.polytope import Polytope
 from manikin.spatial import GRAVITY, FloatArray, skew
 
@@ -282,7 +283,8 @@ def _end_balance_failure(problem: CentroidalProblem, polytopes: Sequence[Polytop
     for name, phase, com, acceleration in ends:
         margin = best_margin_at(polytopes[phase], problem, com, acceleration)
         if margin <= max(problem.required_margin, VANISHING_MARGIN):
-            held = ", ".join(problem.sequence[phase].stance.effectors)
+            stance = problem.sequence[phase].stance
+            held = ", ".join(stance.effectors)
             what = (
                 "cannot be balanced" if margin <= VANISHING_MARGIN
                 else f"reaches a margin of at most {margin:.2f} {problem.margin_unit}"
@@ -290,10 +292,20 @@ def _end_balance_failure(problem: CentroidalProblem, polytopes: Sequence[Polytop
             return Failure(
                 f"{name} balance",
                 f"{name} CoM {np.round(com, 3).tolist()} {what} on {held or 'no contact'}; "
-                f"required {problem.required_margin:g} {problem.margin_unit}",
+                f"required {problem.required_margin:g} {problem.margin_unit}"
+                f"{_end_friction(stance, problem, com, acceleration)}",
                 phase, where=held,
             )  # fmt: skip
     return None
+
+
+def _end_friction(
+    stance: Stance, problem: CentroidalProblem, com: FloatArray, acceleration: FloatArray | None
+) -> str:
+    def margin(firm: Sequence[WrenchPolytope]) -> float:
+        return best_margin_at(firm[0], problem, com, acceleration)
+
+    return low_friction([stance], problem, margin) if len(stance) else ""
 
 
 def best_margin_at(

@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from manikin.balance import LimitingConstraint, WrenchPolytope
+from manikin.centroidal.causes import FIRM_FRICTION, SLIPPERY, least_friction, with_firm_friction
 from manikin.centroidal.certificate import Residuals, measure
 from manikin.centroidal.facets import facet_distances, nearest_facets, with_violated
 from manikin.centroidal.feasibility import Failure, Feasibility, assess_feasibility, polytopes_of
@@ -123,7 +124,9 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     if failure is None:
         attempts = _search(problem, polytopes)
         best = min(attempts, key=lambda attempt: attempt.certificate.rank)
-        failure = None if best.certificate.within() else _explain(problem, polytopes, best)
+        if not best.certificate.within():
+            failure = _explain(problem, polytopes, best)
+            failure = replace(failure, reason=failure.reason + _friction_cause(problem))
     return CentroidalResult(
         problem, polytopes, feasibility, failure,
         best.trajectory if best is not None and failure is None else None,
@@ -182,6 +185,20 @@ def limiting_at(
     fixed = problem.margin_space == "wrench_about_origin"
     about = np.zeros(3) if fixed else trajectory.position(time)
     return polytope.limiting(trajectory.pseudo_wrench(time, problem.reference), about)
+
+
+def _friction_cause(problem: CentroidalProblem) -> str:
+    """Say that the same problem has a plan with firm friction; empty where it has none or is not slippery."""
+    least = least_friction([phase.stance for phase in problem.sequence])
+    if least >= SLIPPERY:
+        return ""
+    firm = plan_com(with_firm_friction(problem))
+    if firm.d_min is None or not firm.succeeded:
+        return ""
+    return (
+        f"; the friction of {least:g} is too low: with {FIRM_FRICTION:g} it would be {firm.d_min:.2f} "
+        f"{problem.margin_unit}"
+    )
 
 
 def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], best: Attempt) -> Failure:

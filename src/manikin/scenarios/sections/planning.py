@@ -58,7 +58,8 @@ class PlanningSection(Section):
     )
     min_margin: NonNegative = Field(
         default=0.0,
-        description="smallest stability margin allowed, moments about the CoM [N.m], or [N] in the force space",
+        description="smallest stability margin allowed, moments about the CoM [N.m], or [N] in the force "
+        "space",
     )
     margin_space: Literal["wrench", "force"] = Field(default="wrench", description="what the margin measures")
     friction_model: FrictionModelName = Field(default="outer", description=FRICTION_MODEL_TEXT)
