@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from manikin.analysis import analyze, analyze_file
-from manikin.analysis_directory import write_analysis
-from manikin.analysis_sheet import recording_sheet
-from manikin.mocap import read_recording
+from manikin.recordings import read_recording
+from manikin.reports.analysis_directory import write_analysis
+from manikin.reports.analysis_sheet import recording_sheet
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "data" / "mocap"
 FILES = ("cmu_asf_amc/14_21.amc", "accad_male1_bvh/Male1_B3_Walk.bvh", "grf/btkdata/FunctionalWalk.c3d")

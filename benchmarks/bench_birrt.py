@@ -5,15 +5,14 @@ import pytest
 
 from manikin.body import human
 from manikin.contact import sole
-from manikin.posture import PostureProblem, com_target, touching_pairs
+from manikin.kinematics import PostureProblem, com_target, touching_pairs
+from manikin.numerics.spatial import rotation_from_yaw
+from manikin.planning.whole_body.birrt import FlightLimits, SamplingZone, plan_flight
+from manikin.planning.whole_body.swing import SwingLimits, plan_swing
+from manikin.planning.whole_body.swing_curve import SwingCurve
+from manikin.planning.whole_body.swing_path import EffectorClearance, make_pose
+from manikin.planning.whole_body.swing_search import ClearFlight, PostureCheck, search_swing, smooth_path
 from manikin.scene import Box, Obstacle, Proximity, Scene
-from manikin.spatial import rotation_from_yaw
-from manikin.wholebody.birrt import FlightLimits, SamplingZone, plan_flight
-from manikin.wholebody.effector_clearance import EffectorClearance
-from manikin.wholebody.flight_search import ClearFlight, PostureCheck, search_swing
-from manikin.wholebody.path import make_pose
-from manikin.wholebody.smoothing import smooth_path
-from manikin.wholebody.swing import SwingCurve, SwingLimits, plan_swing
 
 BODY = human()
 BOXES = {

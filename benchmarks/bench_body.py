@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from manikin.body import Configuration, human, insect, limbs_of, random_configuration, reach_volume
+from manikin.body import Configuration, human, insect, limbs_of, random_configuration
+from manikin.kinematics import reach_volume
 from manikin.scene import Scene
 from manikin.simulation import compile_model
 

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from manikin.centroidal import (
+from manikin.contact import Phase, Stance, StanceSequence, sole
+from manikin.planning.com import (
     BentSurface,
     CentroidalProblem,
     KeyframeProblem,
-    Recording,
+    RecordedCom,
     assess_feasibility,
     height_band,
     plan_com,
     plan_com_through_key_frames,
 )
-from manikin.centroidal.feasibility import polytopes_of
-from manikin.centroidal.transcription import transcribe
-from manikin.contact import Phase, Stance, StanceSequence, sole
+from manikin.planning.com.feasibility import polytopes_of
+from manikin.planning.com.transcription import transcribe
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +69,6 @@ def test_through_key_frames(benchmark, problem):
     """Polytopes, quadratic programme and certificate, on the timing-free trajectory as a recording."""
     trajectory = plan_com(problem).trajectory
     time = np.linspace(0.0, trajectory.duration, 501)
-    recording = Recording(time, trajectory.position(time), problem.sequence, trajectory.schedule.instants)
+    recording = RecordedCom(time, trajectory.position(time), problem.sequence, trajectory.schedule.instants)
     asked = KeyframeProblem(79.0, recording)
     assert benchmark(plan_com_through_key_frames, asked).succeeded

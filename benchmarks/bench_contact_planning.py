@@ -10,7 +10,7 @@ import pytest
 
 from manikin.body import human, insect, integrate, limbs_of
 from manikin.contact import ContactKind
-from manikin.contact_planning import ContactGenerator, Task, sample_limb, sample_limbs
+from manikin.planning.contacts import ContactGenerator, Task, sample_limb, sample_limbs
 from manikin.scene import Box, Obstacle, Scene
 
 PLACES = 20

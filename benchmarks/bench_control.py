@@ -10,8 +10,8 @@ import pytest
 from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.control import Controller, ControlSettings
-from manikin.control.solver import make_solver
 from manikin.motion import Motion
+from manikin.numerics.qp import make_solver
 from manikin.scene import Scene
 from manikin.simulation import execute
 

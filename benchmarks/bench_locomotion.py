@@ -9,18 +9,10 @@ import itertools
 import numpy as np
 import pytest
 
-from manikin.locomotion import (
-    LITERAL_ORDER,
-    PROSE_ORDER,
-    START,
-    WalkObstacle,
-    experiment_targets,
-    walking_path,
-)
-from manikin.locomotion.guesses import kinds_of_guesses
-from manikin.locomotion.inverse import RecordedWalk, identify_objective
-from manikin.locomotion.plan import _guesses
-from manikin.locomotion.solve import solve
+from manikin.walking import LITERAL_ORDER, PROSE_ORDER, START, WalkObstacle, experiment_targets, walking_path
+from manikin.walking.path.inverse import RecordedWalk, identify_objective
+from manikin.walking.path.path_plan import _guesses, kinds_of_guesses
+from manikin.walking.path.path_solver import solve
 
 ORDERS = {"prose": PROSE_ORDER, "literal": LITERAL_ORDER}
 

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from manikin.body import human
-from manikin.mocap import MarkerRecording, motion_of, read_trc, reconstruct
+from manikin.recordings import MarkerRecording, motion_of, read_trc, reconstruct
 
 RATE, FRAMES = 120.0, 960
 

@@ -7,8 +7,8 @@ import pytest
 
 from manikin.body import human
 from manikin.contact import sole
-from manikin.posture import PostureProblem, SolverSettings, generate_posture, touching_pairs
-from manikin.posture.generate import PostureSolver
+from manikin.kinematics import PostureProblem, SolverSettings, generate_posture, touching_pairs
+from manikin.kinematics.posture_search import PostureSolver
 from manikin.scene import Box, Obstacle, Proximity, Scene
 
 BODY = human()

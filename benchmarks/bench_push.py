@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 
 from manikin.body import human, kudoh
-from manikin.control.balance_recovery import (
-    BalanceRecovery,
-    FeltPush,
-    RecoverySettings,
-    Strategy,
-    close_loop,
-)
+from manikin.control.recovery import BalanceRecovery, FeltPush, RecoverySettings, Strategy, close_loop
 from manikin.simulation import RecoveryTask, push_near_com, recover
 
 BODIES = {"kudoh": kudoh, "human": human}

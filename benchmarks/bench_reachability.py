@@ -9,22 +9,23 @@ import numpy as np
 import pytest
 import trimesh
 
-from manikin.body import human, limbs_of, reach_volume
-from manikin.reachability import (
+from manikin.body import human, limbs_of
+from manikin.kinematics import reach_volume
+from manikin.planning.guide import (
     Condition,
     GuideTask,
+    GuideWorld,
     LimbRule,
     ReachabilityChecker,
     SamplingRegion,
     UsableSurface,
-    World,
     abstraction_of,
     offline_roadmap,
     plan_guide,
     request,
     root_pose,
 )
-from manikin.reachability.steering import LocalPlanner
+from manikin.planning.guide.steering import LocalPlanner
 from manikin.scene import Box, Mesh, Obstacle, Scene
 
 TRUCK = Path(__file__).parents[2] / "shared/data/scenes/hpp_environments/truck.stl"
@@ -54,7 +55,7 @@ def crouch(creature):
     region = SamplingRegion((-1, -1.5, 0), (4, 1.5, 1.4), (-0.6, 0.6), (-0.2, 1.8), (-0.3, 0.3))
     condition = Condition.standing_or_bent(LEGS, creature.limb_names)
     task = GuideTask(root_pose((-0.3, 0.0, 0.87)), root_pose((3.3, 0.0, 0.87)))
-    return World(scene, creature, region, condition), task
+    return GuideWorld(scene, creature, region, condition), task
 
 
 def climb(creature):
@@ -62,7 +63,7 @@ def climb(creature):
     holds = [Obstacle(f"hold{i}", Box((0.1, 0.1, 0.1)), translation=place) for i, place in enumerate(HOLDS)]
     region = SamplingRegion((-1, -1, 0.5), (1, 1, 2.2), (-0.5, 0.5), (-0.3, 0.5), (-0.3, 0.3))
     task = GuideTask(root_pose((-0.4, 0.0, 0.85)), root_pose((-0.4, 0.0, 1.8)))
-    return World(Scene(holds), creature, region, Condition.limbs(at_least=3)), task
+    return GuideWorld(Scene(holds), creature, region, Condition.limbs(at_least=3)), task
 
 
 def cabin(creature):
@@ -88,7 +89,7 @@ def cabin(creature):
     scene = Scene([Obstacle("cabin", Mesh(whole.vertices, whole.faces))])
     region = SamplingRegion((-1.8, -1.2, 0.2), (3.2, 1.4, 2.4), (-0.8, 0.8), (-0.5, 1.7), (-0.4, 0.4))
     task = GuideTask(root_pose((-0.85, -0.4, 1.25)), root_pose((2.6, -0.4, 0.87)))
-    return World(scene, creature, region, Condition.limbs(at_least=2)), task
+    return GuideWorld(scene, creature, region, Condition.limbs(at_least=2)), task
 
 
 def truck(creature):
@@ -98,7 +99,7 @@ def truck(creature):
     scene = Scene([Obstacle.from_file("truck", TRUCK)], floor_height=0.0)
     region = SamplingRegion((-1.8, -1.2, 0.2), (3.2, 1.4, 2.4), (-0.8, 0.8), (-0.5, 1.7), (-0.4, 0.4))
     task = GuideTask(root_pose((-0.6, -0.22, 1.08)), root_pose((2.9, -0.4, 0.87)))
-    return World(scene, creature, region, Condition.limbs(at_least=2)), task
+    return GuideWorld(scene, creature, region, Condition.limbs(at_least=2)), task
 
 
 def stairs(creature):
@@ -113,7 +114,7 @@ def stairs(creature):
     ground = UsableSurface((0.0, 0.0, 1.0), float(np.deg2rad(35.0)))
     condition = Condition((LimbRule(LEGS, 2),), dict.fromkeys(LEGS, ground))
     task = GuideTask(root_pose((0.0, 0.0, 0.87)), root_pose((2.0, 0.0, 1.51)))
-    return World(Scene(boxes, floor_height=0.0), creature, region, condition), task
+    return GuideWorld(Scene(boxes, floor_height=0.0), creature, region, condition), task
 
 
 WORLDS = {"crouch": crouch, "climb": climb, "cabin": cabin, "truck": truck, "stairs": stairs}

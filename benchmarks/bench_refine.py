@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manikin.numerics.banded import BlockBandedSystem, SampledBasis
+from manikin.planning.whole_body import refine_motion
+from manikin.planning.whole_body.fit_scales import RefineScales
+from manikin.planning.whole_body.fit_targets import phase_knots, sample_times
+from manikin.planning.whole_body.refine_input import KeyPath
+from manikin.planning.whole_body.refine_measures import rooms_of
+from manikin.planning.whole_body.refine_objective import RefineObjective, refine_targets
 from manikin.scene import Proximity
-from manikin.wholebody import refine_motion
-from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
-from manikin.wholebody.knots import phase_knots, sample_times
-from manikin.wholebody.refine_input import KeyPath
-from manikin.wholebody.refine_measures import rooms_of
-from manikin.wholebody.refine_objective import RefineObjective, refine_targets
-from manikin.wholebody.refine_scales import RefineScales
 
-CASES = Path(__file__).parents[1] / "tests/wholebody/refine_cases.py"
+CASES = Path(__file__).parents[1] / "tests/planning/whole_body/refine_cases.py"
 
 
 @pytest.fixture(scope="module")

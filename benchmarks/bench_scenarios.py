@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from manikin.centroidal import plan_com, plan_com_through_key_frames
-from manikin.centroidal.transcription import transcribe
 from manikin.contact import ContactSchedule
+from manikin.planning.com import plan_com, plan_com_through_key_frames
+from manikin.planning.com.transcription import transcribe
+from manikin.planning.whole_body import WholeBodySettings, plan_whole_body
+from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.scenarios import list_scenarios, load_scenario
 from manikin.simulation import execute
-from manikin.wholebody import WholeBodySettings, plan_whole_body
-from manikin.wholebody.manner import manner_of
 
 pytestmark = pytest.mark.benchmark(timer=time.process_time)
 
@@ -34,7 +34,7 @@ def _plan_whole_body(name, trajectory):
     scenario = scenario_of(name)
     return plan_whole_body(
         scenario.build_body(), scenario.build_scene(), trajectory, rng=np.random.default_rng(scenario.seed),
-        settings=WholeBodySettings(manner=manner_of(scenario.manner)),
+        settings=WholeBodySettings(manner=posture_style_of(scenario.manner)),
     )  # fmt: skip
 
 

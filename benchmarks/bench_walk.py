@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from manikin.centroidal import plan_com
-from manikin.centroidal.transcription import transcribe
 from manikin.contact import ContactSchedule
-from manikin.locomotion import place_footprints, walking_path
-from manikin.pipeline import run
+from manikin.pipeline.runner import run
+from manikin.planning.com import plan_com
+from manikin.planning.com.transcription import transcribe
+from manikin.planning.whole_body import WholeBodySettings, plan_whole_body
+from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.scenarios import load_scenario
-from manikin.scenarios.walked import walk_before, walking_supports
-from manikin.wholebody import WholeBodySettings, plan_whole_body
-from manikin.wholebody.manner import manner_of
+from manikin.scenarios.planned import walk_before, walking_supports
+from manikin.walking import place_footprints, walking_path
 
 
 @pytest.fixture(scope="module", params=["walk", "walk@flat"])
@@ -33,7 +33,7 @@ def test_whole_body(benchmark, scenario):
     com = plan_com(scenario.build_centroidal_problem()).trajectory
     trajectory = replace(com, schedule=ContactSchedule(scenario.build_sequence(), com.schedule.instants))
     body, scene = scenario.build_body(), scenario.build_scene()
-    settings = WholeBodySettings(manner=manner_of(scenario.manner))
+    settings = WholeBodySettings(manner=posture_style_of(scenario.manner))
     result = benchmark.pedantic(
         lambda: plan_whole_body(body, scene, trajectory, rng=np.random.default_rng(0), settings=settings),
         rounds=2, iterations=1,

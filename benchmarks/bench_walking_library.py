@@ -9,7 +9,7 @@ import itertools
 import numpy as np
 import pytest
 
-from manikin.locomotion import WalkController, load_library, walk_along, walking_path
+from manikin.walking import WalkController, load_library, walk_along, walking_path
 
 DIRECTIVES = {
     "straight": [(1.2, 0.0, 0.0)],
@@ -38,7 +38,7 @@ def test_walk_along(benchmark, name):
 
 
 def test_load(benchmark, tmp_path):
-    from manikin.locomotion import save_library
+    from manikin.walking import save_library
 
     save_library(load_library(), tmp_path / "library.npz")
     benchmark.pedantic(load_library, (tmp_path / "library.npz",), rounds=10, warmup_rounds=1)

@@ -1,7 +1,7 @@
 """The climb between two walls: polytopes of its stances, and the plan with the force margin."""
 
-from manikin.centroidal import plan_com
-from manikin.centroidal.feasibility import polytopes_of
+from manikin.planning.com import plan_com
+from manikin.planning.com.feasibility import polytopes_of
 from manikin.scenarios import load_scenario
 
 

@@ -9,16 +9,16 @@ import itertools
 import numpy as np
 import pytest
 
-from manikin.centroidal import plan_com
-from manikin.pipeline import run
+from manikin.balance.motion_forces import plan_forces
+from manikin.numerics.banded import BlockBandedSystem, SampledBasis
+from manikin.pipeline.runner import run
+from manikin.planning.com import plan_com
+from manikin.planning.whole_body import plan_whole_body
+from manikin.planning.whole_body.fit_objective import MotionObjective
+from manikin.planning.whole_body.fit_targets import ignored_pairs
+from manikin.planning.whole_body.plan_whole_body import WholeBodySettings, _Planner
 from manikin.scenarios import load_scenario
 from manikin.scene import Proximity
-from manikin.wholebody import plan_whole_body
-from manikin.wholebody.assemble import WholeBodySettings, _Planner
-from manikin.wholebody.banded import BlockBandedSystem, SampledBasis
-from manikin.wholebody.forces import plan_forces
-from manikin.wholebody.objective import MotionObjective
-from manikin.wholebody.targets import ignored_pairs
 
 
 @pytest.fixture(scope="module")

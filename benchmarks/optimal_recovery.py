@@ -18,9 +18,9 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel, kudoh
-from manikin.control.balance_recovery import BalanceRecovery, RecoverySettings
+from manikin.control.recovery import BalanceRecovery, RecoverySettings
+from manikin.numerics.spatial import GRAVITY
 from manikin.simulation import Feet, RecoveryTask, push_near_com, recover
-from manikin.spatial import GRAVITY
 
 JOINTS = (
     "ankle_dorsiflexion", "knee_flexion", "hip_flexion", "waist_flexion", "shoulder_flexion",

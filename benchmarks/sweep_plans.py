@@ -12,10 +12,18 @@ import pytest
 
 from manikin.balance import wrench_polytope
 from manikin.body import human
-from manikin.centroidal import CentroidalProblem, plan_com
-from manikin.centroidal.feasibility import polytopes_of
 from manikin.contact import ContactModel, Phase, Stance, StanceSequence, sole
-from manikin.locomotion import (
+from manikin.pipeline.runner import run
+from manikin.pipeline.stages.contact_stage import find_supports
+from manikin.pipeline.stages.refinement_stage import KeyedContacts
+from manikin.planning.com import CentroidalProblem, plan_com
+from manikin.planning.com.feasibility import polytopes_of
+from manikin.planning.whole_body import WholeBodySettings, plan_whole_body, refine_motion
+from manikin.planning.whole_body.posture_style import CLOSE
+from manikin.scenarios import load_scenario
+from manikin.scenarios.planned import walk_before, walking_supports
+from manikin.scene import Box, Obstacle, Scene
+from manikin.walking import (
     START,
     Walker,
     WalkObstacle,
@@ -24,17 +32,9 @@ from manikin.locomotion import (
     walking_path,
     walking_paths,
 )
-from manikin.locomotion.words import residuals, word_paths
-from manikin.pipeline import run
-from manikin.scenarios import load_scenario
-from manikin.scenarios.walked import walk_before, walking_supports
-from manikin.scene import Box, Obstacle, Scene
-from manikin.stages.contacts import find_supports
-from manikin.stages.keyed_contacts import KeyedContacts
-from manikin.wholebody import WholeBodySettings, plan_whole_body, refine_motion
-from manikin.wholebody.manner import CLOSE
+from manikin.walking.words import residuals, word_paths
 
-CASES = Path(__file__).parents[1] / "tests/wholebody/refine_cases.py"
+CASES = Path(__file__).parents[1] / "tests/planning/whole_body/refine_cases.py"
 
 
 # --- centre of mass -------------------------------------------------------------------------------

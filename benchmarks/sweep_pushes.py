@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from manikin.body import human, kudoh
-from manikin.control.balance_recovery import RecoverySettings
+from manikin.control.recovery import RecoverySettings
 from manikin.simulation import (
     Feet,
     PushMap,

@@ -13,10 +13,10 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.ergonomics import Circumstances, Ergonomics, ergonomics_of, upright_neck
-from manikin.mocap import motion_of, read_recording, reconstruct
 from manikin.motion import Motion
 from manikin.motion.file import read_motions
-from manikin.pipeline import run
+from manikin.pipeline.runner import run
+from manikin.recordings import motion_of, read_recording, reconstruct
 
 PAGE = Path(__file__).with_suffix(".md")
 RECORDINGS = {

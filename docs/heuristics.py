@@ -13,10 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from manikin.body import BodyModel, Configuration, LimbKinematics, human, integrate, limb_named
+from manikin.body import BodyModel, Configuration, human, integrate, limb_named
 from manikin.body.limbs import parent_segment
 from manikin.contact import ContactKind
-from manikin.contact_planning import (
+from manikin.kinematics import LimbKinematics
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts import (
     ClosestDistance,
     ContactGenerator,
     ContactRules,
@@ -28,13 +30,12 @@ from manikin.contact_planning import (
     Random,
     StrongEfort,
     Task,
-    exertable_force,
+    limb_strength,
     sample_limbs,
 )
-from manikin.figures import ChoicePanel, contact_choice_figure
-from manikin.figures.write import save_figure
+from manikin.reports.figures import ChoicePanel, contact_choice_figure
+from manikin.reports.figures.write_figures import save_figure
 from manikin.scene import Box, Obstacle, Scene
-from manikin.spatial import FloatArray
 
 DOCS = Path(__file__).parent
 RESULTS = DOCS / "heuristics.json"
@@ -135,7 +136,7 @@ def force_of(body: BodyModel, answer: GeneratedContact, task: Task) -> float:
     assert answer.contact is not None
     jacobian = chain.place(answer.q[None, chain.slots]).jacobians[0]
     turn, _ = Configuration(body, answer.q).segment_placement(parent_segment(body, limb))
-    return exertable_force(
+    return limb_strength(
         jacobian, chain.torque_lower, chain.torque_upper, task.reaction_on(answer.limb) @ turn, answer.contact.normal @ turn,
         ContactRules().friction,
     )  # fmt: skip

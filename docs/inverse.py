@@ -16,20 +16,22 @@ from acknowledgements import THANKS
 from scipy.optimize import minimize_scalar
 from scipy.stats import binomtest
 
-from manikin.locomotion import LITERAL_ORDER, PROSE_ORDER, ShoulderPaths, WalkObjective
-from manikin.locomotion.inverse import (
+from manikin.numerics.spatial import FloatArray
+from manikin.recordings import Recording, read_recording
+from manikin.walking import LITERAL_ORDER, PROSE_ORDER, ShoulderPaths, WalkObjective
+from manikin.walking.path.inverse import (
     FIRST_GUESS,
     HEADING_LENGTH,
     IDENTIFIED,
+    SWAY,
     IdentifiedObjective,
+    RecordedWalk,
     identify_objective,
     predicted,
+    recorded_walk,
     share_errors,
 )
-from manikin.locomotion.path import WalkingPath
-from manikin.locomotion.recorded_walk import SWAY, RecordedWalk, recorded_walk
-from manikin.mocap import Recording, read_recording
-from manikin.spatial import FloatArray
+from manikin.walking.path.walking_path import WalkingPath
 
 mpl.use("Agg")
 
@@ -65,7 +67,7 @@ TEXT = """# Weights from recorded walks
 
 Which weights of Truong's criterion (5.6) explain recorded walks? {count} walks of the CMU Graphics Lab and
 of the ACCAD Open Motion Project are reduced to the middle of the shoulders and the heading; one set of
-weights is fitted to all of them at once (`manikin.locomotion.inverse`). By `docs/inverse.py`.
+weights is fitted to all of them at once (`manikin.walking.path.inverse`). By `docs/inverse.py`.
 
 * *Walks*: the classes {classes} of `clips_locomotion.csv` without runs, and two clips from standing to
   walking and back. Of turns, the window and {around:g} s on both sides, for the recordings are told where

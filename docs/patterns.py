@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from manikin.locomotion import (
+from manikin.numerics.spatial import FloatArray
+from manikin.walking import (
     LITERAL_ORDER,
     PROSE_ORDER,
     RECORDED_TURNS,
@@ -21,7 +22,6 @@ from manikin.locomotion import (
     segment_path,
     walking_path,
 )
-from manikin.spatial import FloatArray
 
 PAGE = Path(__file__).with_suffix(".md")
 OBJECTIVES = {

@@ -18,20 +18,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from threadpoolctl import threadpool_limits
 
-from manikin.atomic import atomic_path
-from manikin.balance.impulse import predict_impulse
+from manikin.balance.zmp import predict_impulse
 from manikin.body import BodyModel, Configuration
 from manikin.contact import ContactSchedule
 from manikin.control import ControlSettings, ReturnSettings
-from manikin.figures.style import dress, new_figure
-from manikin.figures.write import save_figure
 from manikin.motion import Motion
 from manikin.motion.file import read_motions
-from manikin.palette import COLOURS, CYCLE
-from manikin.pipeline import run
+from manikin.pipeline.runner import run
+from manikin.pipeline.stages import ExecutionRequirements
+from manikin.reports.figures.style import dress, new_figure
+from manikin.reports.figures.write_figures import save_figure
+from manikin.runtime.files import atomic_path
+from manikin.runtime.palette import COLOURS, CYCLE
 from manikin.scene import Scene
 from manikin.simulation import Push, execute, push_on_the_way
-from manikin.stages import ExecutionRequirements
 
 DOCS = Path(__file__).parent
 RESULTS = DOCS / "pushed.json"

@@ -12,13 +12,12 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.body.human_volumes import FILE, save_volumes
+from manikin.body.human_parts import HUMAN_HINGES
 from manikin.body.joint_volume import JointVolume, volume_of
-from manikin.body.range_of_motion import HUMAN_HINGES
-from manikin.mocap import Recording, read_recording
-from manikin.mocap.anatomy import anatomy_of
-from manikin.mocap.ball_joints import BALL_SEGMENTS, ball_joint_angles
-from manikin.spatial import FloatArray
+from manikin.body.natural_range import FILE, save_volumes
+from manikin.numerics.spatial import FloatArray
+from manikin.recordings import Recording, read_recording
+from manikin.recordings.reconstruction.anatomy import BALL_SEGMENTS, anatomy_of, ball_joint_angles
 
 HERE = Path(__file__).parent
 UPRIGHT = "Male1_A1_Stand.bvh"

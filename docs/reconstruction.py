@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from manikin.mocap import MarkerRecording, Reconstruction, read_recording, reconstruct
+from manikin.recordings import MarkerRecording, Reconstruction, read_recording, reconstruct
 
 PAGE = Path(__file__).with_suffix(".md")
 COMPUTED = {

@@ -17,10 +17,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from manikin.balance import force_space, zero_moment_point
-from manikin.balance.polygon import polygon_of_halfplanes
 from manikin.body.configuration import Configuration
 from manikin.contact import ContactSchedule
-from manikin.mocap import (
+from manikin.motion import Motion
+from manikin.numerics.polygon import polygon_of_halfplanes
+from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.recordings import (
     Cause,
     ForcePlate,
     LeastShift,
@@ -50,18 +52,13 @@ from manikin.mocap import (
     touch_downs_of,
     with_mass,
 )
-from manikin.mocap.force_sharing import shared_wrenches
-from manikin.mocap.local_cutoff import TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH
-from manikin.mocap.plate_forces import UNSURE
-from manikin.mocap.plate_torques import JOINTS, compare_torques, plate_torques
-from manikin.mocap.recorded_dynamics import CUTOFF
-from manikin.mocap.recorded_forces import contact_wrenches, torques_of
-from manikin.mocap.recorded_margins import margins_of_wrenches
-from manikin.mocap.recorded_stances import FRICTION
-from manikin.mocap.shifted_motion import ASIDE, INSIDE, LARGEST_SHIFT, PLACE_ERROR
-from manikin.motion import Motion
-from manikin.palette import readable
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.recordings.dynamics.plate_forces import JOINTS, UNSURE, compare_torques, plate_torques
+from manikin.recordings.dynamics.recorded_dynamics import CUTOFF, TOUCH_DOWN_CUTOFF, TOUCH_DOWN_WIDTH
+from manikin.recordings.dynamics.recorded_forces import contact_wrenches, shared_wrenches, torques_of
+from manikin.recordings.dynamics.recorded_margins import margins_of_wrenches
+from manikin.recordings.dynamics.shifted_motion import ASIDE, INSIDE, LARGEST_SHIFT, PLACE_ERROR
+from manikin.recordings.supports.recorded_stances import FRICTION
+from manikin.runtime.palette import readable
 
 PAGE = Path(__file__).with_name("recorded-balance.md")
 IMAGES = Path(__file__).parent / "images"
@@ -107,7 +104,7 @@ is fitted to the plates but the mass of the person; the cutoff at touch-downs wa
 that is least and leaves the centre of pressure {1e2 * INSIDE:.0f} cm inside of the edges of the soles, if
 none longer than {1e2 * LARGEST_SHIFT:.0f} cm along an axis is needed, and rather near the axis of a foot that
 carries alone
-(`manikin.mocap.least_shift`). Markers tell the place of a body to a centimetre; a millimetre at 4 Hz moves
+(`manikin.recordings.least_shift`). Markers tell the place of a body to a centimetre; a millimetre at 4 Hz moves
 the centre of pressure by 6 cm. The plates have no part in a shift, but the weight of a foot's axis
 ({1e2 * ASIDE:.0f} cm count as much as {1e3 * PLACE_ERROR:.0f} mm of shift) was chosen with them.
 """
@@ -142,7 +139,7 @@ Torques of the legs by inverse dynamics from the motion alone, beside those with
 feet, both sides, while a foot is on a plate of its own: root mean square of the difference (*least, smooth,
 shifted*), and the largest magnitudes of the shifted motion and by plates [N.m]. Two feet that carry together
 can share the wrench in many ways. *Least*: forces of least squares; *smooth*: each foot is loaded and
-unloaded bit by bit (`manikin.mocap.force_sharing`), as `manikin analyze` measures; *shifted*: the same of
+unloaded bit by bit (`manikin.recordings.dynamics.recorded_forces`), as `manikin analyze` measures; *shifted*: the same of
 the shifted motion.
 
 """

@@ -10,17 +10,21 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.centroidal import KeyframeProblem, plan_com_through_key_frames
-from manikin.figures.compare_com import compare_planes_figure, compare_scene_figure
-from manikin.figures.compare_timing import compare_timing_figure
-from manikin.figures.postures import draw_moment
-from manikin.figures.style import dress, new_grid
-from manikin.figures.views import ALONG_X, ALONG_Y
-from manikin.figures.write import save_figure
-from manikin.mocap import Reconstruction, RecordedSupports, read_recording, reconstruct, supports_of
+from manikin.analysis.adaptation import Replan, adapt_recording, crop
 from manikin.motion.file import MotionFile
-from manikin.record import RunRecord
-from manikin.replan import Replan, against_recording, replan, window
+from manikin.pipeline.run_directory import RunRecord
+from manikin.planning.com import KeyframeProblem, plan_com_through_key_frames
+from manikin.recordings import Reconstruction, RecordedSupports, read_recording, reconstruct, supports_of
+from manikin.reports.analysis_directory import compare_with_recording
+from manikin.reports.figures.compare_runs import (
+    compare_planes_figure,
+    compare_scene_figure,
+    compare_timing_figure,
+)
+from manikin.reports.figures.scene import draw_moment
+from manikin.reports.figures.style import dress, new_grid
+from manikin.reports.figures.views import ALONG_X, ALONG_Y
+from manikin.reports.figures.write_figures import save_figure
 
 PAGE = Path(__file__).with_suffix(".md")
 IMAGES = PAGE.parent / "images"
@@ -50,8 +54,8 @@ What people did, on the very stances they did it on, planned by both methods of 
 executed by our controller in the physics engine. By `docs/replanning.py`; in Python:
 
 ```text
-from manikin.replan import against_recording, replan
-result = replan(found, supports, method="keyframes", execute=True)   # of manikin.mocap
+from manikin.analysis.adaptation import against_recording, replan
+result = replan(found, supports, method="keyframes", execute=True)   # of manikin.recordings
 result.as_dict(), result.planned, result.executed, result.schedule
 against_recording(result).as_dict()                                  # timing, centre of mass, margins
 ```
@@ -122,7 +126,7 @@ of `walking5`, for 5 ms. `STS1` is its first five seconds: rise, sit down, rise;
 place.
 
 Tried and left out: the recording moved by the least shift that its contacts can carry
-(`manikin.mocap.least_shift`) as the reference of CoM and postures. On `walking1`, `walking2`, `walking5`
+(`manikin.recordings.least_shift`) as the reference of CoM and postures. On `walking1`, `walking2`, `walking5`
 and `PiG_Motion-FlatFoot-One` it takes 2, 7, 9 and 4 added key frames instead of 2, 8, 8 and 5, ends 5.5,
 8.2, 7.6 and 5.5 mm from the recorded CoM instead of 5.3, 7.6, 6.7 and 4.8, and changes neither the share of
 positive margins nor support errors by more than a hundredth and a tenth of a millimetre. A third plan with
@@ -220,7 +224,7 @@ def against_row(name: str, plan: Replan) -> str:
         return row(f"`{name}`", f"{made['recorded_duration_s']:.2f}", made["failure"], *[""] * 6)
     counts = np.array([len(held) for held in made["supports"]])
     mine, theirs = np.array(made["phase_durations_s"]), np.array(made["recorded_phase_durations_s"])
-    compared = against_recording(plan).as_dict()["margins"]["point_mass"]
+    compared = compare_with_recording(plan).as_dict()["margins"]["point_mass"]
     return row(
         f"`{name}`", f"{made['recorded_duration_s']:.2f}", f"{made['duration_s']:.2f}",
         *(f"{values[counts == count].mean():.2f}" for count in (1, 2) for values in (theirs, mine)),
@@ -246,7 +250,7 @@ def key_frame_figure(plan: Replan) -> Figure:
     """Recorded and planned CoM with the key frames, and both margins (Fig. 5.3 and 5.5)."""
     figure, grid = new_grid(9.0, 9.0, "A recorded centre of mass and the plan near its key frames", 4, 1)
     axes = [figure.add_subplot(grid[number]) for number in range(4)]
-    compared = against_recording(plan)
+    compared = compare_with_recording(plan)
     first, second = compared.first.plan, compared.second.plan
     frames = list(getattr(plan.com, "frames", ()))
     if first is None or second is None:
@@ -299,25 +303,25 @@ def main(folder: Path) -> None:
     near, ran, against, shown = [], [], [], {}
     for path in (*WALKS, *OTHERS):
         toes, end = OTHERS.get(path, (True, np.inf))
-        found, supports = window(*read(folder / path), 0.0, end)
+        found, supports = crop(*read(folder / path), 0.0, end)
         name = Path(path).stem
         print(name, file=sys.stderr)
-        rolling = replan(found, supports, execute=True, rolling=toes)
+        rolling = adapt_recording(found, supports, execute=True, rolling=toes)
         ran.append(executed_row(name, rolling))
         if path not in WALKS:
             continue
-        whole = replan(found, supports, rolling=False)
+        whole = adapt_recording(found, supports, rolling=False)
         near.append(near_row(name, whole, rolling))
-        free = replan(found, supports, method="timing-free", rolling=False)
+        free = adapt_recording(found, supports, method="timing-free", rolling=False)
         against.append(against_row(name, free))
         if path == SHOWN:
             shown = {"near": whole, "free": free, "ran": rolling}
     for name, figure in (
         ("keyframes", key_frame_figure(shown["near"])),
-        ("planes", compare_planes_figure(against_recording(shown["free"]))),
-        ("scene", compare_scene_figure(against_recording(shown["free"]))),
+        ("planes", compare_planes_figure(compare_with_recording(shown["free"]))),
+        ("scene", compare_scene_figure(compare_with_recording(shown["free"]))),
         ("postures", posture_figure(shown["ran"])),
-        ("timing", compare_timing_figure(against_recording(shown["free"]))),
+        ("timing", compare_timing_figure(compare_with_recording(shown["free"]))),
     ):
         save_figure(figure, IMAGES / f"replanning-{name}.png")
     PAGE.write_text(

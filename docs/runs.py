@@ -16,8 +16,8 @@ from acknowledgements import THANKS
 from matplotlib.figure import Figure
 from PIL import Image
 
-from manikin.figures.write import save_figure
-from manikin.mocap import (
+from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.recordings import (
     MarkerRecording,
     Reconstruction,
     RecordedDynamics,
@@ -32,9 +32,8 @@ from manikin.mocap import (
     timing_errors,
     touch_downs_of,
 )
-from manikin.mocap.carried_times import AT_END, CUTOFF, FALLING
-from manikin.mocap.free_fall import vertical_acceleration
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.recordings.supports.running_supports import AT_END, CUTOFF, FALLING, vertical_acceleration
+from manikin.reports.figures.write_figures import save_figure
 
 PAGE = Path(__file__).with_suffix(".md")
 IMAGE = PAGE.parent / "images" / "runs-force.png"

@@ -15,7 +15,8 @@ import numpy as np
 from acknowledgements import THANKS
 from numpy.typing import NDArray
 
-from manikin.locomotion import (
+from manikin.recordings import Recording, read_recording
+from manikin.walking import (
     HOLONOMIC,
     KINDS,
     NONHOLONOMIC,
@@ -24,7 +25,6 @@ from manikin.locomotion import (
     ShoulderPaths,
     segment_path,
 )
-from manikin.mocap import Recording, read_recording
 
 PAGE = Path(__file__).with_suffix(".md")
 WALKS = {

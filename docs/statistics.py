@@ -11,21 +11,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.figures import (
-    LowestPoints,
-    com_distances_figure,
-    com_heights_figure,
-    com_paths_figure,
-    phase_durations_figure,
-    placements_figure,
-    published_lowest,
-)
-from manikin.figures.write import save_figure
-from manikin.mocap import (
+from manikin.numerics.signals import Spread
+from manikin.recordings import (
     GroupStatistics,
     Overhead,
     RecordedClip,
-    Spread,
     StatisticsSettings,
     phase_durations,
     published_consistency,
@@ -35,9 +25,18 @@ from manikin.mocap import (
     sequence_consistency,
     statistics_of,
 )
-from manikin.mocap.clip_files import GroupedFile, read_clips
-from manikin.mocap.phase_durations import by_group
-from manikin.mocap.sequence_consistency import initials
+from manikin.recordings.statistics.clips import GroupedFile, read_clips
+from manikin.recordings.statistics.phases import by_group, initials
+from manikin.reports.figures import (
+    LowestPoints,
+    com_distances_figure,
+    com_heights_figure,
+    com_paths_figure,
+    phase_durations_figure,
+    placements_figure,
+    published_lowest,
+)
+from manikin.reports.figures.write_figures import save_figure
 
 PAGE = Path(__file__).with_suffix(".md")
 IMAGES = PAGE.parent / "images"
@@ -64,7 +63,7 @@ TEXT = """# Statistics of recorded motions
 
 Chapter 3 of Qiu (2012) for any set of recordings: how long phases last, in which order supports follow, where
 they are, how far the centre of mass is from them, and how low it goes below an obstacle. By
-`docs/statistics.py`; the functions are those of `manikin.mocap`, and of the command line:
+`docs/statistics.py`; the functions are those of `manikin.recordings`, and of the command line:
 
 ```bash
 manikin statistics "duck=clips/127_3*.amc" walk=clips/08_04.amc --bar 1.3 --origin lowest --out found

@@ -17,9 +17,7 @@ from acknowledgements import THANKS
 from PIL import Image
 
 from manikin.errors import ManikinError
-from manikin.figures import support_strip_figure
-from manikin.figures.write import save_figure
-from manikin.mocap import (
+from manikin.recordings import (
     MarkerRecording,
     Reconstruction,
     RecordedSupports,
@@ -29,6 +27,8 @@ from manikin.mocap import (
     supports_of,
     timing_errors,
 )
+from manikin.reports.figures import support_strip_figure
+from manikin.reports.figures.write_figures import save_figure
 
 PAGE = Path(__file__).with_suffix(".md")
 IMAGES = PAGE.parent / "images"

@@ -12,20 +12,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manikin.figures.views import ALONG_X, ALONG_Y, draw_body
-from manikin.locomotion import walking_path
-from manikin.locomotion.blend import MIRRORED, TURN_RADIUS, ControlSpace
-from manikin.locomotion.controller import WalkController
-from manikin.locomotion.follow import walk_along
-from manikin.locomotion.fourier import fourier_basis
-from manikin.locomotion.gait import Gait
-from manikin.locomotion.library import ROOT, reference_body
-from manikin.locomotion.library_build import NEAR, NOT_CLOSED
-from manikin.locomotion.library_file import load_library
-from manikin.locomotion.slide import stance_slides
-from manikin.locomotion.stance_foot import Legs, put_in_place
-from manikin.locomotion.steady import travelled
-from manikin.spatial import FloatArray
+from manikin.numerics.signals import fourier_basis
+from manikin.numerics.spatial import FloatArray
+from manikin.reports.figures.views import ALONG_X, ALONG_Y, draw_body
+from manikin.walking import walking_path
+from manikin.walking.gait.blend import TURN_RADIUS, ControlSpace, Gait, travelled
+from manikin.walking.gait.follow_path import WalkController, stance_slides, walk_along
+from manikin.walking.gait.library_build import NEAR, NOT_CLOSED
+from manikin.walking.gait.motion_library import MIRRORED, ROOT, load_library, reference_body
+from manikin.walking.gait.stance_foot import Legs, put_in_place
 
 PAGE = Path(__file__).with_name("walking-library.md")
 LIBRARY, BODY = load_library(), reference_body()
@@ -55,7 +50,7 @@ Walking cycles of recorded people, by velocity, from which whole-body walks are 
 chapter 6). Built by `manikin library build`, measured by `docs/walking_library.py`.
 
 ```python
-from manikin.locomotion import WalkController, walk_along, walking_path
+from manikin.walking import WalkController, walk_along, walking_path
 
 walk = walk_along(walking_path((0, 0, 0), (3, 3, 1.57), max_speed=1.4))
 walk.q, walk.support, walk.slides               # postures at 60 Hz, standing feet, slide of each stance [m]

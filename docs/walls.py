@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from manikin.centroidal import plan_com
+from manikin.planning.com import plan_com
 from manikin.scenarios import Scenario, load_scenario
 
 HERE = Path(__file__).parent

@@ -11,9 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from manikin.figures import equal_paths_figure, holonomic_zone_figure, words_figure
-from manikin.figures.write import save_figure
-from manikin.locomotion import (
+from manikin.numerics.spatial import FloatArray
+from manikin.reports.directories import WordsDirectory, partition_as_dict
+from manikin.reports.figures import equal_paths_figure, holonomic_zone_figure, words_figure
+from manikin.reports.figures.write_figures import save_figure
+from manikin.walking import (
     LITERAL_ORDER,
     PROSE_ORDER,
     START,
@@ -26,11 +28,9 @@ from manikin.locomotion import (
     segment_path,
     walking_path,
 )
-from manikin.locomotion.words import HEADINGS, THESIS_GRID, THESIS_WORDS, EqualPaths, WordSlice, equal_paths
-from manikin.locomotion.words.largest import clothoid_words
-from manikin.locomotion.words.solve import cheapest, guesses
-from manikin.spatial import FloatArray
-from manikin.words_directory import WordsDirectory, partition_as_dict
+from manikin.walking.words import HEADINGS, THESIS_GRID, THESIS_WORDS, EqualPaths, WordSlice, equal_paths
+from manikin.walking.words.word_path import clothoid_words
+from manikin.walking.words.word_solver import cheapest, guesses
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "words.md"
@@ -56,7 +56,7 @@ which goes on where it was interrupted. `--slices 340,150` takes some final head
 
 The integral of 1 + u² along the path, with u = dκ/ds in 1/m², free length, and no curvature at both ends:
 the squared norm of both controls of the system (3.2) with the speed 1. [Why not the derivative of the
-curvature alone, or its largest value](api/locomotion.md): neither has an optimum, because loops may be as
+curvature alone, or its largest value](api/walking.md): neither has an optimum, because loops may be as
 large as one likes. Of {clothoids} random goals of the grid, {extremal} have a word of three exact clothoid
 arcs, IDI or DID, that satisfies the maximum principle; large loops improve all. The price of the length
 makes the problem one with an optimum, and brings the longer words. Its arcs are monotone in the curvature,
@@ -97,7 +97,7 @@ both to it:
 
 ## Holonomic ends by category
 
-The paths of [chapter 5](api/locomotion.md) to 106 goals like those of the experiment, by the nine
+The paths of [chapter 5](api/walking.md) to 106 goals like those of the experiment, by the nine
 categories of 4.4, cut by Function 1 from both shoulders. PLO and PLG are the ways before the first and
 after the last nonholonomic part [m], H-N-H the share of walks with just these three parts; ATD and MTD tell
 how far the paths by both orders of the weights lie apart [m]. Goals with other headings have no category.

@@ -15,9 +15,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from manikin.body import human
-from manikin.export.bvh import to_bvh
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
+from manikin.reports.export.write import to_bvh
 
 FEET = ("left_foot", "right_foot")
 
@@ -32,7 +32,8 @@ settings.load_profile("standard")
 
 
 APART = frozenset({
-    "tests/centroidal/test_walls.py", "tests/pipeline/test_beam.py", "tests/pipeline/test_contact_search.py",
+    "tests/planning/com/test_walls.py", "tests/pipeline/test_beam.py",
+    "tests/pipeline/test_contact_search.py",
     "tests/pipeline/test_key_postures.py", "tests/pipeline/test_limb_contacts.py",
     "tests/pipeline/test_pushed_moving.py", "tests/pipeline/test_run.py", "tests/pipeline/test_walked.py",
     "tests/simulation/test_push_map_holds.py",
@@ -114,7 +115,7 @@ class Runs:
         return self.read[key]
 
     def _made(self, name, variant, overrides, seed, body, moved, place):
-        from manikin.pipeline import run
+        from manikin.pipeline.runner import run
         from manikin.scenarios import load_scenario
 
         scenario = load_scenario(name, variant, overrides)
@@ -172,8 +173,8 @@ def aside():
     """A walking path of 1.2 m to the left that keeps its heading, in 6 s from rest to rest."""
     from dataclasses import replace
 
-    from manikin.locomotion import walking_path
-    from manikin.spline import BSpline
+    from manikin.numerics.spline import BSpline
+    from manikin.walking import walking_path
 
     path = walking_path((0, 0, 0), (0, 1.2, 0), max_speed=0.6)
     share = np.linspace(0.0, 1.0, 200)

@@ -6,9 +6,9 @@ import pytest
 from manikin.balance import evaluate_balance, wrench_polytope
 from manikin.body import human
 from manikin.contact import Stance, sole
-from manikin.display import Displayed, html_table
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
+from manikin.runtime.display import Displayed, html_table
 from manikin.scenarios import load_scenario
 
 

@@ -9,9 +9,9 @@ import pytest
 import typer
 
 import manikin
-from manikin import figures
-from manikin.cli import app
+from manikin.cli.app import app
 from manikin.motion.file import write_motions
+from manikin.reports import figures
 from manikin.scenarios import list_variants, load_scenario
 from manikin.scenarios.stance_file import load_stance_file
 
@@ -122,7 +122,7 @@ def test_scenario_examples_succeed(tmp_path):
     assert examples
     for text in examples:
         (tmp_path / "example.yaml").write_text(text)
-        result = manikin.run(tmp_path / "example.yaml")
+        result = manikin.pipeline.runner.run(tmp_path / "example.yaml")
         assert result.succeeded, result.summary["failure"]
 
 

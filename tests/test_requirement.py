@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from manikin.requirement import Requirement, requirement_table
+from manikin.runtime.requirement import Requirement, requirement_table
 
 
 def row(measured, sense, limit, **further):

@@ -7,7 +7,7 @@ used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from manikin.version import __version__
+from manikin.runtime.version import __version__
 
 if TYPE_CHECKING:
     from manikin.api import (
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
         compare,
         creature,
         grasp,
-        human,
         plan,
         point,
         push,
@@ -27,7 +26,9 @@ if TYPE_CHECKING:
         stance,
         walk,
     )
-    from manikin.pipeline import run
+    from manikin.body import human
+    from manikin.pipeline.runner import run
+
 
 __all__ = [
     "__version__",
@@ -49,8 +50,9 @@ __all__ = [
     "walk",
 ]
 
+
 _PACKAGES = ("balance", "scene")
-"""Verbs whose names are those of packages, which can be called; see :mod:`manikin.callable_package`."""
+"""Verbs whose names are those of packages, which can be called; see :mod:`manikin.runtime.display`."""
 
 
 def __getattr__(name: str) -> Any:
@@ -59,6 +61,6 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'manikin' has no attribute {name!r}; it has {', '.join(__all__)}")
     if name in _PACKAGES:
         return import_module(f"manikin.{name}")
-    home = import_module("manikin.pipeline" if name == "run" else "manikin.api")
+    home = import_module("manikin.pipeline.runner" if name == "run" else "manikin.api")
     globals()[name] = getattr(home, name)
     return globals()[name]

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from manikin.analysis import AnalysisOptions, analyze, analyze_file
-from manikin.analysis_directory import summary_of
-from manikin.analysis_report import report_page
 from manikin.balance import evaluate_balance
 from manikin.body import Configuration
 from manikin.contact import Stance, sole
 from manikin.errors import InputError
-from manikin.mocap import read_recording
-from manikin.mocap.recorded_stances import STRONGEST
-from manikin.mocap.shifted_motion import LARGEST_RMS
-from manikin.spatial import GRAVITY
+from manikin.numerics.spatial import GRAVITY
+from manikin.recordings import read_recording
+from manikin.recordings.dynamics.shifted_motion import LARGEST_RMS
+from manikin.recordings.supports.recorded_stances import STRONGEST
+from manikin.reports.analysis_directory import summary_of
+from manikin.reports.analysis_report import report_page
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from manikin.analysis import Analysis, analyze
-from manikin.mocap import read_recording
-from manikin.mocap.markers import MarkerRecording
-from manikin.mocap.recorded_supports import median_place
-from manikin.spatial import FloatArray, rotation_from_yaw
+from manikin.numerics.spatial import FloatArray, rotation_from_yaw
+from manikin.recordings import read_recording
+from manikin.recordings.readers.markers import MarkerRecording
+from manikin.recordings.supports.recorded_supports import median_place
 
 TURN, PLACE = rotation_from_yaw(np.radians(37.0)), np.array([10.0, -7.0, 0.0])
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from manikin.analysis.sources import recordings_in
+from manikin.analysis.analyze import recordings_in
 from manikin.errors import InputError
 
 

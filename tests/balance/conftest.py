@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import linprog
 
 from manikin.contact import ContactKind, Stance, grasp, point, sole
-from manikin.spatial import skew
+from manikin.numerics.spatial import skew
 
 KILO = 1e3
 

@@ -7,11 +7,8 @@ from manikin.balance import (
     admissible_zmp_polygon,
     center_of_pressure,
     centroidal_moment_pivot,
-    convex_polygon,
     foot_rotation_indicator,
-    polygon_of_halfplanes,
     pseudo_wrench,
-    signed_distance,
     support_height,
     support_polygon,
     wrench_polytope,
@@ -19,6 +16,7 @@ from manikin.balance import (
 )
 from manikin.contact import Stance, grasp, point, sole
 from manikin.errors import InputError
+from manikin.numerics.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
 
 MASS = 60.0
 # [Qiu2012]_ 4.2.8, Fig. 4.4 and Fig. 4.5.

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from manikin.balance.impulse import predict_impulse
+from manikin.balance.zmp import predict_impulse
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.spatial import GRAVITY
+from manikin.numerics.spatial import GRAVITY
 
 MASS, HEIGHT = 70.0, 0.9
 OMEGA = np.sqrt(GRAVITY / HEIGHT)

@@ -5,10 +5,10 @@ from hypothesis import strategies as st
 
 from manikin.balance import LimitKind, contact_limits, pseudo_wrench, wrench_polytope
 from manikin.balance.friction import edge_wrenches
-from manikin.balance.limiting import facet_shares
+from manikin.balance.wrench import facet_shares
 from manikin.contact import Stance, grasp, point, sole
 from manikin.errors import ContactError
-from manikin.polytope import convex_hull
+from manikin.numerics.polytope import convex_hull
 
 CALM = (0.0, 0.0, 0.0)
 

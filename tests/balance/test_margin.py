@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from manikin.balance import force_space, moment_space, pseudo_wrench, stability_margins, wrench_polytope
 from manikin.contact import Stance, grasp
 from manikin.errors import InputError
-from manikin.spatial import skew
+from manikin.numerics.spatial import skew
 
 seeds = st.integers(0, 100_000)
 few = settings(max_examples=12)

@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 
 from manikin.balance import wrench_polytope
 from manikin.contact import ContactKind, SolePart, Stance, grasp, point, sole, sole_part
-from manikin.spatial import rotation_from_rpy
+from manikin.numerics.spatial import rotation_from_rpy
 
 CAP = 1500.0
 SHOE = {"length": 0.28, "width": 0.12, "friction": 0.7}

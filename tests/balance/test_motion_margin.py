@@ -13,7 +13,7 @@ from manikin.balance import (
 )
 from manikin.contact import Contact, Stance, grasp, point, sole
 from manikin.errors import InputError
-from manikin.spatial import rotation_from_yaw
+from manikin.numerics.spatial import rotation_from_yaw
 
 MASS = 79.0
 

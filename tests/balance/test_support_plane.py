@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from manikin.balance import least_zmp_distance, pseudo_wrench, support_plane, wrench_polytope
 from manikin.contact import Stance, grasp, sole
-from manikin.spatial import rotation_from_rpy
+from manikin.numerics.spatial import rotation_from_rpy
 
 SOLE = {"length": 0.28, "width": 0.12, "friction": 0.7}
 

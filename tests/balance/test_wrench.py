@@ -7,7 +7,7 @@ from scipy.interpolate import BSpline
 from manikin.balance import pseudo_wrench, stability_margins, wrench_polytope
 from manikin.contact import Stance, grasp, point, sole
 from manikin.errors import ContactError, InputError
-from manikin.spatial import GRAVITY_VECTOR, rotation_from_rpy
+from manikin.numerics.spatial import GRAVITY_VECTOR, rotation_from_rpy
 
 seeds = st.integers(0, 100_000)
 # HiGHS satisfies constraints to 1e-7 of a kilonewton.

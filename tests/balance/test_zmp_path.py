@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.balance import pseudo_wrench, zero_moment_point
-from manikin.balance.zmp_path import contact_wrench, support_plane, zmp_path
+from manikin.balance.zmp import contact_plane, contact_wrench, zmp_path
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, grasp, point, sole
 from manikin.motion import Motion
-from manikin.spatial import rotation_from_normal
+from manikin.numerics.spatial import rotation_from_normal
 
 SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
 
@@ -31,7 +31,7 @@ def at_rest(com, mass=70.0):
 
 @given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 def test_on_level_ground_it_is_the_classical_one(x, y, ax, ay):
-    plane = support_plane(Stance(feet(), 1000.0))
+    plane = contact_plane(Stance(feet(), 1000.0))
     assert plane.decisive
     wrench = pseudo_wrench(70.0, [[x, y, 0.9]], [[ax, ay, 0.0]])
     found = plane.origin + plane.zero_moment_point(wrench) @ plane.axes[:, :2].T
@@ -41,7 +41,7 @@ def test_on_level_ground_it_is_the_classical_one(x, y, ax, ay):
 @given(st.floats(-0.5, 0.5), st.floats(0.0, 0.3), st.floats(-0.1, 0.1))
 def test_at_rest_on_a_slope_it_lies_where_the_plumb_line_meets_the_slope(tilt, x, y):
     """Friction carries the part of the weight along the slope; the moment is still that of gravity."""
-    plane = support_plane(Stance(feet(tilt=tilt), 1000.0))
+    plane = contact_plane(Stance(feet(tilt=tilt), 1000.0))
     assert plane.decisive
     com = np.array([x, y, 0.9])
     found = (plane.origin + plane.zero_moment_point(at_rest(com)) @ plane.axes[:, :2].T)[0]
@@ -49,15 +49,15 @@ def test_at_rest_on_a_slope_it_lies_where_the_plumb_line_meets_the_slope(tilt, x
 
 
 def test_feet_at_two_heights_and_grasps_do_not_decide():
-    assert not support_plane(Stance(feet(lift=0.2), 1000.0)).decisive
+    assert not contact_plane(Stance(feet(lift=0.2), 1000.0)).decisive
     bar = grasp("right_hand", (0.4, -0.3, 1.0), max_force=100.0)
-    assert not support_plane(Stance([*feet(), bar], 1000.0)).decisive
-    assert support_plane(Stance([bar])) is None
+    assert not contact_plane(Stance([*feet(), bar], 1000.0)).decisive
+    assert contact_plane(Stance([bar])) is None
 
 
 def test_walls_have_no_zmp():
     wall = rotation_from_normal([1.0, 0.0, 0.0])
-    assert support_plane(Stance([sole("left_foot", (0, 0, 1), rotation=wall, **SIZE)], 500.0)) is None
+    assert contact_plane(Stance([sole("left_foot", (0, 0, 1), rotation=wall, **SIZE)], 500.0)) is None
 
 
 def test_on_a_line_of_contacts_nothing_is_inside():

@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from manikin.body import Configuration, human
-from manikin.body.ball_joint import ball_angles, ball_rotation
+from manikin.body.joint_volume import ball_angles, ball_rotation
 from manikin.errors import BodyError
 
 JOINTS = ("left_thigh", "right_thigh", "left_upper_arm", "right_upper_arm", "lumbar", "neck")

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from manikin.body import Configuration, ShapeKind, body_from_signature, human, integrate
-from manikin.body.range_of_motion import HUMAN_HINGES
+from manikin.body.human_parts import HUMAN_HINGES
 from manikin.errors import BodyError
 
 SEXES = st.sampled_from(["male", "female"])

@@ -8,7 +8,6 @@ from hypothesis.extra.numpy import arrays
 
 from manikin.body import (
     JointVolume,
-    LimbKinematics,
     NaturalRange,
     human,
     human_volumes,
@@ -17,9 +16,9 @@ from manikin.body import (
     volume_of,
     with_knees_and_elbows,
 )
-from manikin.body.human_volumes import FILE, load_volumes, save_volumes
-from manikin.body.natural_range import ball_range
+from manikin.body.natural_range import FILE, ball_range, load_volumes, save_volumes
 from manikin.errors import BodyError
+from manikin.kinematics import LimbKinematics
 
 STEP = np.deg2rad(4.0)
 ANGLES = arrays(float, 3, elements=st.floats(-3.5, 3.5))

@@ -8,8 +8,8 @@ import pinocchio as pin
 import pytest
 
 from manikin.body import Configuration, are_mirrored, kudoh, random_configuration
-from manikin.body.kudoh import HIP_WIDTH, PARTS, SHOULDER_WIDTH
-from manikin.body.range_of_motion import HUMAN_HINGES
+from manikin.body.further_bodies import HIP_WIDTH, PARTS, SHOULDER_WIDTH
+from manikin.body.human_parts import HUMAN_HINGES
 from manikin.simulation import compile_model
 
 PAIRED = ("upper_arm", "forearm", "hand", "thigh", "shank", "foot")

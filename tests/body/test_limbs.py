@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from manikin.body import (
     Configuration,
     Limb,
-    LimbKinematics,
     are_mirrored,
     human,
     insect,
@@ -18,16 +17,16 @@ from manikin.body import (
     limb_placement,
     limbs_of,
     random_configuration,
-    reach_volume,
     with_further_contacts,
     with_knees_and_elbows,
 )
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.body.limbs import is_further, limb_slots, parent_segment
 from manikin.body.natural_range import NaturalRange
-from manikin.body.reach_volume import hull_of
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
+from manikin.kinematics import LimbKinematics, reach_volume
+from manikin.kinematics.limb_kinematics import hull_of
 
 BODIES = {"human": with_knees_and_elbows(human()), "insect": insect()}
 LIMBS = [pytest.param(body, limb, id=limb.name) for body in BODIES.values() for limb in limbs_of(body)]

@@ -18,7 +18,7 @@ from manikin.body import (
 )
 from manikin.errors import BodyError
 from manikin.motion.description import body_from, describe_body
-from manikin.spatial import GRAVITY_VECTOR
+from manikin.numerics.spatial import GRAVITY_VECTOR
 
 LOAD = 12.0
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manikin.body import BodyModel, Configuration, human, random_configuration
-from manikin.body.mirror import mirrored, mirrored_hinges, mirrored_name
+from manikin.body.limbs import mirrored, mirrored_hinges, mirrored_name
 from manikin.errors import BodyError
 
 BODY = human()

@@ -9,7 +9,7 @@ import pytest
 from manikin.body import human
 from manikin.body.anthropometry import Anthropometry
 from manikin.body.human import body_from_signature
-from manikin.body.off_axis import off_axis
+from manikin.body.human_parts import off_axis
 from manikin.errors import BodyError
 
 

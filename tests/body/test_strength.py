@@ -4,16 +4,9 @@ import numpy as np
 import pytest
 
 from manikin.body import BodyModel, Configuration, human, kudoh
-from manikin.body.strength import (
-    GROUP_AGES,
-    HUMAN_STRENGTH,
-    LegStrength,
-    Women,
-    age_factor,
-    hinge_strength,
-)
+from manikin.body.strength import GROUP_AGES, HUMAN_STRENGTH, LegStrength, Women, age_factor, hinge_strength
 from manikin.errors import BodyError
-from manikin.spatial import GRAVITY
+from manikin.numerics.spatial import GRAVITY
 
 MAN, WOMAN = (85.52, 1.756, "male"), (67.76, 1.628, "female")
 """Mean man and woman of ANSUR II: mass [kg], stature [m], sex."""

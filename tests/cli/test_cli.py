@@ -14,9 +14,10 @@ import pytest
 import yaml
 
 import manikin
-from manikin.cli import BAD_INPUT, DONE, FAILED, INTERRUPTED, main
-from manikin.figures import FIGURES
+from manikin.cli.app import main
+from manikin.cli.console import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from manikin.motion.file import write_motions
+from manikin.reports.figures import FIGURES
 
 SUMMARY = {
     "scenario": "platform", "stature_m": 1.75, "mass_kg": 79.0, "seed": 0,
@@ -57,7 +58,7 @@ def pipeline(monkeypatch, finished_run):
         if stand_in.error is not None:
             raise stand_in.error
         if out is not None:
-            from manikin.output import RunDirectory
+            from manikin.pipeline.run_directory import RunDirectory
 
             directory = RunDirectory(out)
             directory.write_scenario(scenario.to_yaml())
@@ -72,8 +73,8 @@ def pipeline(monkeypatch, finished_run):
         )
 
     stand_in = types.SimpleNamespace(run=run, calls=calls, summary=SUMMARY, error=None)
-    monkeypatch.setitem(sys.modules, "manikin.pipeline", stand_in)
-    monkeypatch.setattr(manikin, "pipeline", stand_in, raising=False)
+    monkeypatch.setitem(sys.modules, "manikin.pipeline.runner", stand_in)
+    monkeypatch.setattr("manikin.pipeline.runner", stand_in, raising=False)
     return stand_in
 
 
@@ -282,7 +283,7 @@ def test_explained_failure_is_status_3(capfd, pipeline):
 @pytest.fixture
 def two_runs(monkeypatch):
     """Every run of ``run all`` replaced by a process that prints a made-up summary."""
-    from manikin import batch
+    from manikin.pipeline import batch
 
     failure = {"stage": "centroidal", "reason": "no margin", "time_s": 0.0, "where": ""}
     stages = dict.fromkeys(("centroidal", "wholebody", "execution"))
@@ -379,7 +380,8 @@ def test_interruption_that_a_solver_swallows_comes_back(capfd, pipeline, monkeyp
 def test_terminated_process_ends_like_an_interrupted_one(number):
     """SIGTERM unwinds the program, and SIGINT does where a shell has set it to be ignored."""
     code = (
-        "import signal, sys, time\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\nimport manikin.cli as cli\n"
+        "import signal, sys, time\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+        "import manikin.cli.app as cli\n"
         "def wait(*a):\n print('ready', flush=True)\n time.sleep(60)\n"
         "cli.app = lambda **k: wait()\nsys.exit(cli.main([]))"
     )
@@ -483,7 +485,7 @@ def test_wrong_input_is_refused_before_the_engines_load():
 def test_viewer_command_serves_and_ends_with_ctrl_c(finished_run, tmp_path):
     pytest.importorskip("viser")
     write_motions(tmp_path / "motion.h5", finished_run)
-    command = [sys.executable, "-m", "manikin.cli", "view", str(tmp_path), "--port", "0"]
+    command = [sys.executable, "-m", "manikin", "view", str(tmp_path), "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         line = process.stderr.readline()
         assert "http://127.0.0.1:" in line

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from manikin.cli import BAD_INPUT, DONE, main
+from manikin.cli.app import main
+from manikin.cli.console import BAD_INPUT, DONE
 from manikin.motion.file import write_motions
 
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from manikin.cli import BAD_INPUT, DONE, main
+from manikin.cli.app import main
+from manikin.cli.console import BAD_INPUT, DONE
 
 
 def test_published_motions_need_no_file(capsys, tmp_path):

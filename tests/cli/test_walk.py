@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from manikin.cli import BAD_INPUT, DONE, FAILED, main
+from manikin.cli.app import main
+from manikin.cli.console import BAD_INPUT, DONE, FAILED
 from manikin.scenarios import load_scenario
 
 TO = ["walk", "--to", "2", "1", "90"]
@@ -54,7 +55,7 @@ PROMISED = {
 )
 def test_mistakes_give_one_line_and_status_2(capfd, tmp_path, monkeypatch, arguments, says):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("manikin.viewer.page.Page.run", lambda _: None)
+    monkeypatch.setattr("manikin.viewer.canvas.Page.run", lambda _: None)
     assert main(arguments) == BAD_INPUT
     out, err = capfd.readouterr()
     assert out == ""
@@ -69,7 +70,7 @@ def test_mistakes_give_one_line_and_status_2(capfd, tmp_path, monkeypatch, argum
     [(TO, "floor_height_m is null; valid in a walk"), (["walk", "--drive", "--port", "0"], "has no floor")],
 )
 def test_scenes_without_a_floor_are_refused(capfd, tmp_path, monkeypatch, mode, says):
-    monkeypatch.setattr("manikin.viewer.page.Page.run", lambda _: None)
+    monkeypatch.setattr("manikin.viewer.canvas.Page.run", lambda _: None)
     file = tmp_path / "bare.yaml"
     file.write_text("extends: platform\nname: bare\nfloor_height_m: null\n")
     assert main([*mode, "--in", str(file)]) == BAD_INPUT

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from manikin.cli import BAD_INPUT, DONE, INTERRUPTED, main
-from manikin.locomotion import words
-from manikin.locomotion.words import WordGrid, processes
+from manikin.cli.app import main
+from manikin.cli.console import BAD_INPUT, DONE, INTERRUPTED
+from manikin.walking import words
+from manikin.walking.words import WordGrid, partition
 
 TWO = ["words", "--slices", "340,150", "--jobs", "1"]
 
@@ -23,13 +24,13 @@ def small_grid(monkeypatch):
 @pytest.fixture
 def solved(monkeypatch):
     """Headings of the slices that are solved in this process."""
-    asked, solve = [], processes.solve_slice
+    asked, solve = [], partition.solve_slice
 
     def counted(heading, grid):
         asked.append(heading)
         return solve(heading, grid)
 
-    monkeypatch.setattr(processes, "solve_slice", counted)
+    monkeypatch.setattr(partition, "solve_slice", counted)
     return asked
 
 
@@ -61,7 +62,7 @@ def test_a_rerun_goes_on_and_draws(capsys, solved, tmp_path):
 
 
 def test_an_interrupted_run_keeps_what_it_solved(capsys, tmp_path, monkeypatch):
-    solve = processes.solve_slice
+    solve = partition.solve_slice
 
     def stopped(heading, grid):
         if heading == 340:
@@ -70,7 +71,7 @@ def test_an_interrupted_run_keeps_what_it_solved(capsys, tmp_path, monkeypatch):
 
     out = ["--out", str(tmp_path / "w"), "--no-figures"]
     with monkeypatch.context() as patch:
-        patch.setattr(processes, "solve_slice", stopped)
+        patch.setattr(partition, "solve_slice", stopped)
         assert main([*TWO, *out]) == INTERRUPTED
     assert [file.name for file in (tmp_path / "w" / "slices").iterdir()] == ["150.npz"]
     assert not json.loads((tmp_path / "w" / "words.json").read_text())["complete"]
@@ -113,7 +114,7 @@ def running(pid):
 
 NEAR_GRID = """
 from manikin.cli import main
-from manikin.locomotion import words
+from manikin.walking import words
 words.THESIS_GRID = words.WordGrid((-1.0, 1.0), (3.0, 4.0), 0.2)
 raise SystemExit(main())
 """

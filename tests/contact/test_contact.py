@@ -5,16 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manikin.contact import (
-    ContactSchedule,
-    Phase,
-    Stance,
-    StanceSequence,
-    grasp,
-    point,
-    sole,
-    soles_overlap,
-)
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, grasp, point, sole, soles_overlap
 from manikin.errors import ContactError
 
 SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}

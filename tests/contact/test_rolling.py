@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from manikin.balance import (
-    least_zmp_distance,
-    pseudo_wrench,
-    signed_distance,
-    support_plane,
-    wrench_polytope,
-)
+from manikin.balance import least_zmp_distance, pseudo_wrench, support_plane, wrench_polytope
 from manikin.contact import (
     Phase,
     Rolling,
@@ -23,6 +17,7 @@ from manikin.contact import (
 )
 from manikin.contact import sole as make_sole
 from manikin.errors import ContactError
+from manikin.numerics.polygon import signed_distance
 
 SIZE = {"length": 0.28, "width": 0.12, "friction": 0.7}
 HINGE = 0.0644

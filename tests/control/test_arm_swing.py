@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human, kudoh
-from manikin.control.balance_recovery import BalanceRecovery, RecoverySettings, joint_groups
-from manikin.control.balance_recovery.arm_swing import APART, FAR, RAISED, SWUNG, ArmSwing
-from manikin.control.balance_recovery.com_law import capture_point, com_law, fall_momentum
-from manikin.spatial import GRAVITY
+from manikin.control.recovery import BalanceRecovery, RecoverySettings, joint_groups
+from manikin.control.recovery.recovery_problem import APART, FAR, RAISED, SWUNG, ArmSwing
+from manikin.control.recovery.strategy import capture_point, com_law, fall_momentum
+from manikin.numerics.spatial import GRAVITY
 
 BODIES = {"kudoh": kudoh(), "human": human()}
 KUDOH = BODIES["kudoh"]

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manikin.body import BodyModel, human, insect, kudoh
-from manikin.control.balance_recovery import (
+from manikin.control.dynamics import Dynamics
+from manikin.control.recovery import (
     BalanceRecovery,
     ClosedLoop,
     FeltPush,
@@ -25,9 +26,8 @@ from manikin.control.balance_recovery import (
     zmp_of,
     zmp_rows,
 )
-from manikin.control.dynamics import Dynamics
 from manikin.errors import BodyError, InputError
-from manikin.spatial import GRAVITY
+from manikin.numerics.spatial import GRAVITY
 
 SOME = settings(max_examples=15)
 SEEDS = st.integers(0, 2**32 - 1)

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.control import Controller, ControlSettings, SupportMode, TaskWeights
 from manikin.control.controller import RAISED
-from manikin.control.solver import QPSolution
 from manikin.errors import InputError
+from manikin.numerics.qp import QPSolution
 
 
 def disturbed(body, seed, position=2e-3, speed=2e-2):

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from manikin.balance.polygon import convex_polygon, signed_distance
 from manikin.body import kudoh
-from manikin.control.balance_recovery import (
+from manikin.control.recovery import (
     BalanceRecovery,
     RecoverySettings,
     Standing,
@@ -18,11 +17,12 @@ from manikin.control.balance_recovery import (
     edge_limits,
     held_impulse,
 )
-from manikin.control.balance_recovery.muscles import held_posture
-from manikin.control.balance_recovery.turning import Turning, _swayed
+from manikin.control.recovery.recovery_controller import held_posture
+from manikin.control.recovery.turning import Turning, _swayed
 from manikin.control.stepping import StepSettings, SwingFoot, capture_after, step_goals
 from manikin.errors import InputError
-from manikin.spatial import GRAVITY
+from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.spatial import GRAVITY
 
 KUDOH = kudoh()
 SOLES = Standing.of(KUDOH, KUDOH.standing_posture(), ("left_foot", "right_foot"), 0.7).soles

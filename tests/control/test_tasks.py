@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from manikin.contact import grasp, sole
 from manikin.control.build_qp import joint_acceleration_bounds
-from manikin.control.contact_forces import contact_force_basis, contact_geometry, edges_in_world
 from manikin.control.dynamics import Dynamics
+from manikin.control.edge_forces import contact_force_basis, contact_geometry, edges_in_world
 from manikin.control.reference import Reference
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from manikin.balance import wrench_polytope
+from manikin.balance.motion_forces import full_motion
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.ergonomics import lowest_margin
-from manikin.ergonomics.margin import rebuilt_stance
-from manikin.wholebody.full_motion import full_motion
+from manikin.ergonomics.report import rebuilt_stance
 
 from .conftest import still
 

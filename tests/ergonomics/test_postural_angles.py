@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from manikin.body import human, insect, kudoh, random_configuration
 from manikin.ergonomics import postural_angles, upright_neck
 from manikin.errors import BodyError
-from manikin.spatial import rotation_from_rpy
+from manikin.numerics.spatial import rotation_from_rpy
 
 from .conftest import mirrored, posture
 
@@ -107,7 +107,7 @@ def arm_along(side, direction):
     """(nq,) the upper arm along a direction, by search over the shoulder's two first hinges."""
     from scipy.optimize import least_squares
 
-    from manikin.ergonomics.parts import joint_rotation
+    from manikin.ergonomics.body_parts import joint_rotation
 
     names = [f"{side}_shoulder_flexion", f"{side}_shoulder_abduction"]
 

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from manikin.ergonomics import RebaSteps, bearing_of, postural_angles, reba_action_level, reba_score
-from manikin.ergonomics.reba import TABLE_A, TABLE_B, TABLE_C, reba_coupling, reba_load, reba_steps
+from manikin.ergonomics.rula_reba import (
+    REBA_TABLE_A,
+    REBA_TABLE_B,
+    REBA_TABLE_C,
+    reba_coupling,
+    reba_load,
+    reba_steps,
+)
 from manikin.errors import InputError
 
 from .conftest import posture, still
@@ -34,7 +41,7 @@ def test_a_worse_step_never_lowers_the_score(step):
     assert np.all(reba_score(RebaSteps(**worse)) >= reba_score(RebaSteps(**steps)))
 
 
-@pytest.mark.parametrize("table", [TABLE_A, TABLE_B, TABLE_C], ids=["A", "B", "C"])
+@pytest.mark.parametrize("table", [REBA_TABLE_A, REBA_TABLE_B, REBA_TABLE_C], ids=["A", "B", "C"])
 def test_the_tables_do_not_fall_along_any_axis(table):
     for axis in range(table.ndim):
         assert np.all(np.diff(table, axis=axis) >= 0)
@@ -42,7 +49,7 @@ def test_the_tables_do_not_fall_along_any_axis(table):
 
 def test_the_tables_have_room_for_what_is_added():
     """Nine and three make the twelve rows and columns of Table C."""
-    assert (TABLE_A.max() + 3, TABLE_B.max() + 3) == TABLE_C.shape
+    assert (REBA_TABLE_A.max() + 3, REBA_TABLE_B.max() + 3) == REBA_TABLE_C.shape
 
 
 def test_a_worked_example():
@@ -51,8 +58,8 @@ def test_a_worked_example():
     The example of the package ergonomics-metrics (its README), worked there by the published sheet.
     """
     both = {"trunk": 2, "neck": 2, "legs": 2, "upper_arm": 1, "lower_arm": 2}
-    assert TABLE_A[1, 1, 1] == 4
-    assert (TABLE_B[0, 1, 2], TABLE_B[0, 1, 1]) == (3, 2)
+    assert REBA_TABLE_A[1, 1, 1] == 4
+    assert (REBA_TABLE_B[0, 1, 2], REBA_TABLE_B[0, 1, 1]) == (3, 2)
     assert [int(reba_score(RebaSteps(**both, wrist=wrist))) for wrist in (3, 2)] == [4, 4]
 
 

@@ -10,8 +10,8 @@ import pytest
 from manikin.body import insect, kudoh
 from manikin.ergonomics import Circumstances, ergonomics_of, upright_neck
 from manikin.errors import BodyError, InputError
-from manikin.mocap import motion_of, read_recording, reconstruct
-from manikin.result_directory import to_json
+from manikin.recordings import motion_of, read_recording, reconstruct
+from manikin.runtime.files import to_json
 
 from .conftest import still
 

@@ -17,7 +17,7 @@ from manikin.ergonomics import (
     rula_action_level,
     rula_score,
 )
-from manikin.ergonomics.rula import TABLE_A, TABLE_B, TABLE_C, rula_force, rula_steps
+from manikin.ergonomics.rula_reba import TABLE_A, TABLE_B, TABLE_C, rula_force, rula_steps
 from manikin.errors import InputError
 
 from .conftest import mirrored, posture, still
@@ -184,7 +184,7 @@ def test_only_the_arm_that_is_held_costs_a_point(body):
     q[:, 7 + body.joint_index("left_elbow_flexion")] += 0.4 * np.sin(motion.time)
     from dataclasses import replace
 
-    from manikin.ergonomics.held import held
+    from manikin.ergonomics.assessment import held
 
     angles = postural_angles(body, replace(motion, q=q).q)
     assert not held(motion.time, angles.arm("left")).any()
@@ -193,7 +193,7 @@ def test_only_the_arm_that_is_held_costs_a_point(body):
 
 def test_a_minute_is_found_where_it_is():
     """Still from 20 s to 85 s of 120 s, moving before and after (to the sampling of 0.2 s)."""
-    from manikin.ergonomics.held import held
+    from manikin.ergonomics.assessment import held
 
     time = np.linspace(0.0, 120.0, 1201)
     angle = np.where(time < 20.0, np.sin(time), np.where(time > 85.0, np.cos(time), 2.0))

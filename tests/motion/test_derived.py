@@ -5,7 +5,7 @@ import pytest
 
 from manikin.body import Configuration, human
 from manikin.motion import Motion
-from manikin.motion.derived import centre_of_pressure, com_velocity, effector_positions, phases_of
+from manikin.motion.motion import centre_of_pressure, com_velocity, effector_positions, phases_of
 
 
 def standing(body, n, **changes):

@@ -6,7 +6,7 @@ import pytest
 from manikin.balance import pseudo_wrench
 from manikin.body import human, insect
 from manikin.motion.dynamics import FreeDynamics, centroidal_motion
-from manikin.spatial import GRAVITY
+from manikin.numerics.spatial import GRAVITY
 
 HUMAN = human()
 

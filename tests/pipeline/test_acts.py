@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from manikin import pipeline
 from manikin.errors import ScenarioError
+from manikin.pipeline import runner
+from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.scenarios import load_scenario
 from manikin.scenarios.planned import PLANNING, with_supports
-from manikin.stages.contacts import find_supports
 
 
 def search(name, variant=None, overrides=()):
@@ -27,7 +27,7 @@ def test_a_way_ends_with_both_hands_on_the_object():
 
 
 def test_an_object_out_of_reach_ends_in_an_explained_failure():
-    result = pipeline.run("push-cupboard", variant="out-of-reach")
+    result = runner.run("push-cupboard", variant="out-of-reach")
     assert not result.succeeded
     assert result.summary["failure"]["stage"] == "contacts"
     assert "within reach" in result.summary["failure"]["reason"]

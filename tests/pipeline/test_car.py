@@ -38,7 +38,7 @@ def test_getting_into_a_car_is_planned_and_executed_to_the_last_column(runs):
     [("slippery", "friction of 0.05 is too low"), ("wheel-out-of-reach", "right_hand, out of reach")],
 )
 def test_what_nobody_can_do_is_explained(variant, cause):
-    result = manikin.run("car-ingress", variant=variant)
+    result = manikin.pipeline.runner.run("car-ingress", variant=variant)
     assert not result.succeeded
     assert cause in result.summary["failure"]["reason"]
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from manikin import pipeline
 from manikin.contact import FRICTION_MODELS, ContactKind
 from manikin.motion.file import read_motions
+from manikin.pipeline import runner
+from manikin.planning.whole_body.point_mass_motion import point_mass_forces
 from manikin.scenarios import load_scenario
-from manikin.wholebody.point_mass import point_mass_forces
 
 FRICTION = 0.3
 
@@ -57,7 +57,7 @@ def test_forces_of_every_stage_lie_in_the_cone_that_was_asked_for(model, tmp_pat
         f"planning.friction_model={model}",
         "planning.min_margin=8",
     ]
-    run = pipeline.run("platform", out=tmp_path / model, overrides=settings)
+    run = runner.run("platform", out=tmp_path / model, overrides=settings)
     summary = run.summary
     assert run.centroidal.trajectory is not None
     trajectory = run.centroidal.trajectory

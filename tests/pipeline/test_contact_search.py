@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 import yaml
 
-from manikin import pipeline
-from manikin.balance import signed_distance, support_polygon
+from manikin.balance import support_polygon
 from manikin.contact import ContactSchedule, Stance
+from manikin.numerics.polygon import signed_distance
+from manikin.pipeline import runner
+from manikin.pipeline.stages.contact_stage import find_supports
+from manikin.planning.whole_body import refine_motion
 from manikin.scenarios import load_scenario
 from manikin.scene.distance import Proximity
-from manikin.stages.contacts import find_supports
-from manikin.wholebody import refine_motion
 
 FOUND = ("crouch", "stairs", "stand-up-chair", "stand-up-sofa", "platform@found")
 
@@ -91,7 +92,7 @@ def test_every_seed_of_some_succeeds(name):
     ],
 )
 def test_what_nobody_can_do_is_explained(name, where, reason, tmp_path):
-    result = pipeline.run(name, out=tmp_path / "run")
+    result = runner.run(name, out=tmp_path / "run")
     assert not result.succeeded
     failure = result.summary["failure"]
     assert failure["stage"] == "contacts"

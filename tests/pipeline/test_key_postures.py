@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from manikin.pipeline import run
+from manikin.pipeline.runner import run
+from manikin.pipeline.stages import Report, RunContext, whole_body_stage
+from manikin.pipeline.stages.whole_body_stage import plan_centre_of_mass
+from manikin.planning.whole_body import Eligibility
 from manikin.scenarios import load_scenario
-from manikin.stages import Report, RunContext, key_postures
-from manikin.stages.centroidal import plan_centre_of_mass
-from manikin.wholebody import Eligibility
 
 STRIDE = """
 name: stride
@@ -116,7 +116,7 @@ def ramp():
 def test_a_seated_part_that_fits_no_replanned_com_is_tried_without_room_in_the_ranges(ramp, monkeypatch):
     """The first search plans again and finds no seated part; the second one counts, with its result."""
     context, report, planned = ramp
-    search, calls = key_postures.find_eligible_plan, []
+    search, calls = whole_body_stage.find_eligible_plan, []
 
     def first_fails(first, realise, look, *, replan):
         calls.append(look)
@@ -125,8 +125,8 @@ def test_a_seated_part_that_fits_no_replanned_com_is_tried_without_room_in_the_r
             return Eligibility(first, None, None, 1, None)
         return search(first, realise, look, replan=replan)
 
-    monkeypatch.setattr(key_postures, "find_eligible_plan", first_fails)
-    found = key_postures.with_key_postures(context, report, planned)
+    monkeypatch.setattr(whole_body_stage, "find_eligible_plan", first_fails)
+    found = whole_body_stage.with_key_postures(context, report, planned)
     assert len(calls) == 2
     assert found.trajectory is not None
     assert report.failure is None
@@ -135,16 +135,16 @@ def test_a_seated_part_that_fits_no_replanned_com_is_tried_without_room_in_the_r
 def test_a_stricter_search_counts_only_where_it_leads_to_another_plan(ramp, monkeypatch):
     """With the same plan as before nothing changes, the failure of the whole body included."""
     context, report, planned = ramp
-    found = key_postures.with_key_postures(context, report, planned)
+    found = whole_body_stage.with_key_postures(context, report, planned)
     report.fail("wholebody", "nothing found", 1.0, "phase 2")
-    assert key_postures.with_stricter_key_postures(context, report, planned, found) is None
+    assert whole_body_stage.with_stricter_key_postures(context, report, planned, found) is None
     assert report.failure.reason == "nothing found"
 
     def another(first, realise, *_, **__):
         return Eligibility(first, realise(first.trajectory), None, found.replans + 1, None)
 
-    monkeypatch.setattr(key_postures, "find_eligible_plan", another)
-    other = key_postures.with_stricter_key_postures(context, report, planned, found)
+    monkeypatch.setattr(whole_body_stage, "find_eligible_plan", another)
+    other = whole_body_stage.with_stricter_key_postures(context, report, planned, found)
     assert other is not None
     assert other.replans == found.replans + 1
     assert report.failure is None

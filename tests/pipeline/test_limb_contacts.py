@@ -9,12 +9,12 @@ import pytest
 import trimesh
 import yaml
 
-from manikin import pipeline
 from manikin.contact import ContactKind, ContactModel
-from manikin.contact_planning import certify_plan
 from manikin.errors import ScenarioError
+from manikin.pipeline import runner
+from manikin.pipeline.stages.contact_stage import find_supports
+from manikin.planning.contacts import certify_plan
 from manikin.scenarios import load_scenario
-from manikin.stages.contacts import find_supports
 
 DOG = Path(__file__).parents[1] / "body" / "data" / "dog.urdf"
 
@@ -146,4 +146,4 @@ def test_a_creature_from_a_robot_description_walks_up_a_step(tmp_path):
 def test_contacts_of_any_limbs_need_the_refinement():
     scenario = load_scenario("climb-wall", overrides=["wholebody.method=follow"])
     with pytest.raises(ScenarioError, match=r"wholebody\.method is follow; valid: refine"):
-        pipeline.run(scenario)
+        runner.run(scenario)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from manikin.motion.file import read_motions
-from manikin.pipeline import run
+from manikin.numerics.spatial import PlanarTransform
+from manikin.pipeline.runner import run
+from manikin.pipeline.stages.context import reason_in_world
 from manikin.scenarios import load_scenario
-from manikin.spatial import PlanarTransform
-from manikin.stages.world_frame import reason_in_world
 
 MOVE = (10.0, -7.0, 37.0)
 

@@ -7,8 +7,8 @@ import pytest
 
 from manikin.ergonomics import lowest_margin
 from manikin.motion.file import read_motions
-from manikin.pipeline import run
-from manikin.stages import ExecutionRequirements
+from manikin.pipeline.runner import run
+from manikin.pipeline.stages import ExecutionRequirements
 
 KEYS = {
     "centroidal": {

@@ -5,10 +5,10 @@ import json
 import pytest
 import yaml
 
-from manikin import pipeline
-from manikin.cli import main
+from manikin.cli.app import main
 from manikin.errors import ScenarioError
 from manikin.motion.file import read_motions
+from manikin.pipeline import runner
 from manikin.scenarios import list_variants, load_scenario
 
 NAMES = ("push-back-500", "push-front-300", "push-sine-100", "push-right-200")
@@ -66,7 +66,7 @@ def test_a_recovery_writes_its_summary_and_its_motion(write, tmp_path, capsys):
 
 
 def test_a_fall_is_an_explained_failure_and_no_recovery():
-    result = pipeline.run("push-back-500", variant="slack")
+    result = runner.run("push-back-500", variant="slack")
     assert not result.succeeded
     assert result.summary["failure"]["stage"] == "push"
     assert "beyond the soles" in result.summary["failure"]["reason"]

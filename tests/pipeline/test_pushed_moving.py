@@ -2,10 +2,10 @@
 
 import pytest
 
-from manikin import pipeline
 from manikin.errors import ScenarioError
+from manikin.pipeline import runner
 from manikin.scenarios import load_scenario
-from manikin.scenarios.sections.push import LARGEST_FORCE
+from manikin.scenarios.sections.task_sections import LARGEST_FORCE
 from manikin.simulation.recover import STRONGEST
 
 PUSH = "push={force_N: 100, direction_deg: 0, duration_s: 0.1, at_s: 1.0}"
@@ -60,7 +60,7 @@ def test_a_pushed_body_goes_on_to_its_goal(runs):
 
 @pytest.mark.slow
 def test_too_strong_a_push_ends_in_a_failure_that_is_explained():
-    result = pipeline.run("platform@pushed-hard")
+    result = runner.run("platform@pushed-hard")
     failure, push = result.summary["failure"], result.summary["execution"]["push"]
     assert not result.succeeded
     assert failure["stage"] == "execution"

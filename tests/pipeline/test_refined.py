@@ -5,16 +5,16 @@ import json
 import numpy as np
 import pytest
 
-from manikin import pipeline
 from manikin.errors import ScenarioError
-from manikin.figures.flights import flights_figure
 from manikin.motion.dynamics import centroidal_motion
 from manikin.motion.file import read_motions
-from manikin.record import read_run
-from manikin.results import verdict_line
+from manikin.pipeline import runner
+from manikin.pipeline.run_directory import read_run
+from manikin.pipeline.stages import ExecutionRequirements
+from manikin.planning.whole_body.refine_certificate import contact_slack
+from manikin.reports.figures.effectors import flights_figure
+from manikin.reports.summary_table import verdict_line
 from manikin.scenarios import load_scenario
-from manikin.stages import ExecutionRequirements
-from manikin.wholebody.contact_slack import contact_slack
 
 REFINED = ("wholebody.method=refine",)
 
@@ -24,7 +24,7 @@ def risen(tmp_path_factory):
     """Rising from a chair, whose execution is held to what no execution keeps."""
     out = tmp_path_factory.mktemp("runs") / "rise"
     strict = ExecutionRequirements(com_rms_error=0.0)
-    return pipeline.run("stand-up-chair", overrides=REFINED, out=out, requirements=strict)
+    return runner.run("stand-up-chair", overrides=REFINED, out=out, requirements=strict)
 
 
 def test_contacts_become_a_motion_that_keeps_to_physics(risen):
@@ -109,7 +109,7 @@ wholebody: {method: refine}
 
 def test_listed_supports_are_refined_between_their_key_postures(tmp_path):
     (tmp_path / "step.yaml").write_text(STEP)
-    result = pipeline.run(tmp_path / "step.yaml")
+    result = runner.run(tmp_path / "step.yaml")
     assert result.succeeded, result.summary["failure"]
     summary = result.summary
     assert summary["centroidal"]["key_postures"] == {"count": 4, "failed": []}

@@ -5,10 +5,9 @@ import pinocchio as pin
 import pytest
 
 from manikin.errors import ScenarioError
+from manikin.pipeline.stages.context import Report, RunContext
+from manikin.pipeline.stages.walking_stage import walk_on_footprints
 from manikin.scenarios import load_scenario
-from manikin.stages.context import RunContext
-from manikin.stages.report import Report
-from manikin.stages.walk_on_footprints import walk_on_footprints
 
 
 def on_footprints(name: str, *overrides: str) -> RunContext:

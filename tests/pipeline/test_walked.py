@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from manikin.locomotion import walking_path
-from manikin.locomotion.stepper import place_footprints
-from manikin.pipeline import run
+from manikin.pipeline.runner import run
 from manikin.scenarios import load_scenario
-from manikin.scenarios.walked import walking_supports
+from manikin.scenarios.planned import walking_supports
+from manikin.walking import walking_path
+from manikin.walking.footsteps.stepper import place_footprints
 
 
 def check(result):

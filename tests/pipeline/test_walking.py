@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from manikin.errors import ScenarioError
-from manikin.locomotion import Walker, walk_along
-from manikin.locomotion.obstacles import clearance
 from manikin.motion.dynamics import centroidal_motion
 from manikin.motion.file import read_motions
-from manikin.pipeline import run
+from manikin.pipeline.runner import run
+from manikin.pipeline.stages.context import RunContext
+from manikin.pipeline.stages.walking_stage import plan_walks, walked_motion
 from manikin.scenarios import load_scenario
-from manikin.stages.context import RunContext
-from manikin.stages.walked_motion import walked_motion
-from manikin.stages.walking import plan_walks
+from manikin.walking import Walker, walk_along
+from manikin.walking.path.walk_obstacles import clearance
 
 WALKING = ("goal-left", "goal-right", "corridor", "catch", "narrow")
 

@@ -9,10 +9,10 @@ import pytest
 import trimesh
 import yaml
 
-from manikin.cli import main
+from manikin.cli.app import main
 from manikin.errors import ScenarioError
 from manikin.scenarios import load_scenario
-from manikin.scenarios.start import start_posture
+from manikin.scenarios.world import start_posture
 
 NAMES = [f"{end}_{side}" for end in ("front", "rear") for side in ("left", "right")]
 DOG = {

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from manikin.numerics.spatial import PlanarTransform
 from manikin.scenarios import list_scenarios, load_scenario
 from manikin.scenarios.schema import ScenarioFile
-from manikin.scenarios.validation import Moves, Section
-from manikin.spatial import PlanarTransform
+from manikin.scenarios.validation import FrameMoves, Section
 
 NAMES = list_scenarios()
 PLACES = st.tuples(
@@ -130,7 +130,9 @@ def test_every_place_and_angle_of_a_file_says_whether_it_moves_with_the_world():
     for section in sections(ScenarioFile):
         for name, field in section.model_fields.items():
             vector = "tuple" in str(field.annotation) or name == "standing_deg"
-            if (vector or name.endswith("_deg")) and not any(isinstance(m, Moves) for m in field.metadata):
+            if (vector or name.endswith("_deg")) and not any(
+                isinstance(m, FrameMoves) for m in field.metadata
+            ):
                 unmarked.add((section.__name__, name))
     assert unmarked == OF_THE_BODY_OR_SHAPE
 

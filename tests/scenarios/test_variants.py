@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import ScenarioError
-from manikin.pipeline import run
+from manikin.pipeline.runner import run
 from manikin.scenarios import list_scenarios, list_variants, load_scenario
-from manikin.scenarios.tree import Tree, merge
+from manikin.scenarios.yaml_reader import Tree, merge
 
 CHILD = {
     "extends": "platform",

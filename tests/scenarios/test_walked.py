@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from manikin.errors import InputError, ScenarioError
-from manikin.locomotion import walking_path
-from manikin.locomotion.footprints import FEET
-from manikin.locomotion.stepper import StepRule, place_footprints
 from manikin.scenarios import load_scenario
-from manikin.scenarios.walked import LEAST, walk_before, walking_supports
+from manikin.scenarios.planned import LEAST, walk_before, walking_supports
+from manikin.walking import walking_path
+from manikin.walking.footsteps.footprints import FEET
+from manikin.walking.footsteps.stepper import StepRule, place_footprints
 
 
 @pytest.fixture(scope="module")

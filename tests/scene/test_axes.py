@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from manikin.scene.axes import ShapeAxes, segment_distances
+from manikin.scene.distance_bounds import ShapeAxes, segment_distances
 
 GEOMETRIES = (coal.Capsule(0.05, 0.4), coal.Capsule(0.03, 0.2), coal.Sphere(0.1), coal.Box(0.1, 0.2, 0.3))
 

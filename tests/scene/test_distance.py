@@ -11,22 +11,11 @@ from scipy.optimize import minimize_scalar
 
 from manikin.body import human, random_configuration
 from manikin.errors import SceneError
-from manikin.scene import (
-    Box,
-    Capsule,
-    Cylinder,
-    HalfSpace,
-    Mesh,
-    Obstacle,
-    Plane,
-    Proximity,
-    Scene,
-    Sphere,
-)
+from manikin.numerics.spatial import rotation_from_rpy
+from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Proximity, Scene, Sphere
 from manikin.scene.collision import ClosedSurface, triangle_geometry
 from manikin.scene.covering import winding_inside
-from manikin.scene.placed import KnownDistances
-from manikin.spatial import rotation_from_rpy
+from manikin.scene.distance_bounds import KnownDistances
 
 FAR = 100.0
 # Coal iterates to 1e-8 m, on cylinders to 1e-6 m; ten times that is allowed.

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.errors import SceneError
+from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Sphere
-from manikin.spatial import rotation_from_rpy
 
 ANGLE = st.floats(-3.0, 3.0)
 

@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from manikin.contact import Stance, grasp, point, sole
 from manikin.errors import ContactError, SceneError
+from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene import Box, Capsule, Obstacle, Scene, Sphere
-from manikin.spatial import rotation_from_rpy
 
 PLATFORM = Obstacle("platform", Box((1.0, 1.0, 0.2)), translation=(0.6, 0.0, 0.1))
 TILT = st.floats(-0.6, 0.6)

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene
 from manikin.scene.surface import surfaces_of
-from manikin.spatial import rotation_from_rpy
 
 
 def test_a_box_has_six_faces_pointing_out_with_the_right_areas():

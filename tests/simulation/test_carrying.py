@@ -6,8 +6,8 @@ import pytest
 from manikin.balance import pseudo_wrench
 from manikin.balance.motion_margin import motion_margin
 from manikin.contact import Stance, sole
+from manikin.numerics.spatial import GRAVITY
 from manikin.simulation.carrying import TOUCHING, CarriedPoints, CarryingContacts
-from manikin.spatial import GRAVITY
 
 MASS = 70.0
 FEET = {

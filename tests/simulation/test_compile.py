@@ -11,8 +11,7 @@ from manikin.body import Configuration, human, integrate, random_configuration
 from manikin.errors import InputError, SceneError
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Proximity, Scene, Sphere
 from manikin.simulation import PhysicsOptions, compile_model
-from manikin.simulation.compile import root_rotation
-from manikin.simulation.scene_geoms import obstacle_of
+from manikin.simulation.compile import obstacle_of, root_rotation
 
 EXACT = 1e-9
 SEEDS = st.integers(0, 2**32 - 1)

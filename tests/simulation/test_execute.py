@@ -9,9 +9,9 @@ from manikin.body import carrying, human
 from manikin.contact import Stance
 from manikin.control import ControlSettings
 from manikin.errors import ContactError, InputError
+from manikin.numerics.spatial import GRAVITY, GRAVITY_VECTOR
 from manikin.scene import Box, Obstacle, Scene
 from manikin.simulation import PhysicsOptions, Push, execute
-from manikin.spatial import GRAVITY, GRAVITY_VECTOR
 
 
 def smooth(share):

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.body import human, kudoh
-from manikin.control.balance_recovery import RecoverySettings
+from manikin.control.recovery import RecoverySettings
 from manikin.errors import InputError
 from manikin.motion.description import describe_body
 from manikin.simulation import (

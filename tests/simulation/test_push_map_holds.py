@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from manikin.body import kudoh
-from manikin.control.balance_recovery import RecoverySettings
+from manikin.control.recovery import RecoverySettings
 from manikin.simulation import Feet, PushMap, PushTrials, RecoveryTask
 from manikin.simulation.recovery import STANDS_HEIGHT
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from manikin.control import ControlSettings, ReturnSettings
-from manikin.control.balance_recovery.support_area import SupportArea
 from manikin.control.plan_return import Deviation, PlanClock
+from manikin.control.recovery.standing import SupportArea
 from manikin.control.reference import Reference
 from manikin.errors import InputError
+from manikin.pipeline.stages import ExecutionRequirements
 from manikin.scene import Scene
 from manikin.simulation import Push, execute, push_impulse, push_on_the_way
-from manikin.stages import ExecutionRequirements
 
 READY = ControlSettings(returning=ReturnSettings())
 SQUARE = SupportArea(np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]), 0.0)

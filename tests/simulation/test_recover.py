@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manikin.body import Configuration, human, kudoh
-from manikin.control.balance_recovery import (
+from manikin.control.recovery import (
     BalanceRecovery,
     RecoverySettings,
     Strategy,
@@ -17,8 +17,9 @@ from manikin.control.balance_recovery import (
     joint_groups,
     sole_at,
 )
-from manikin.control.stepping.room import StepCheck
+from manikin.control.stepping.stepping import StepCheck
 from manikin.errors import InputError
+from manikin.numerics.spatial import GRAVITY
 from manikin.scene import Box, Obstacle, Scene
 from manikin.simulation import (
     Feet,
@@ -30,7 +31,6 @@ from manikin.simulation import (
 )
 from manikin.simulation.recovery import trunk_lean
 from manikin.simulation.recovery_record import SegmentMomenta
-from manikin.spatial import GRAVITY
 
 KUDOH, HUMAN = kudoh(), human()
 

@@ -3,10 +3,10 @@ import pinocchio as pin
 import pytest
 
 from manikin.errors import BodyError, InputError
+from manikin.numerics.spatial import GRAVITY_VECTOR
 from manikin.scene import Box, Obstacle, Scene
 from manikin.simulation import PhysicsOptions, World, compile_model
 from manikin.simulation.world import Grip
-from manikin.spatial import GRAVITY_VECTOR
 
 
 @pytest.fixture

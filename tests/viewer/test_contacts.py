@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from manikin.body import Configuration, human, point_mass
-from manikin.cli import BAD_INPUT, DONE, main
-from manikin.contact_planning.live_contacts import LiveContacts
-from manikin.contact_planning.single_contact import Role
+from manikin.cli.app import main
+from manikin.cli.console import BAD_INPUT, DONE
 from manikin.errors import BodyError
+from manikin.planning.contacts.single_contact import LiveContacts, Role
 from manikin.scene import Box, Obstacle, Scene
 
 pytest.importorskip("viser")

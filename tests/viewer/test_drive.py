@@ -7,10 +7,11 @@ import urllib.request
 import numpy as np
 import pytest
 
-from manikin.cli import DONE, main
+from manikin.cli.app import main
+from manikin.cli.console import DONE
 from manikin.errors import InputError
-from manikin.locomotion import WalkController
 from manikin.scene import Box, Obstacle, Scene
+from manikin.walking import WalkController
 
 pytest.importorskip("viser")
 

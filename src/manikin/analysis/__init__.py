@@ -1,9 +1,14 @@
 """Recorded motion, measured: supports, timing, balance, forces, walking segments and effort in one value."""
 
 from manikin.analysis.analysis import Analysis
-from manikin.analysis.analyze import AnalysisOptions, analyze, analyze_file
-from manikin.analysis.entry import AnalysisEntry, AnalysisJob
-from manikin.analysis.sources import recordings_in
+from manikin.analysis.analyze import (
+    AnalysisEntry,
+    AnalysisJob,
+    AnalysisOptions,
+    analyze,
+    analyze_file,
+    recordings_in,
+)
 
 __all__ = [
     "Analysis",

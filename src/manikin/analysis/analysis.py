@@ -1,5 +1,10 @@
-"""What was measured of one recording."""
+"""What was measured of one recording.
 
+Also here. What a reader of an analysis must know before believing it. A recorded motion beside the force
+plates under it. A recorded motion as it is, and beside it the nearest one that its contacts can carry.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -7,17 +12,269 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from manikin.analysis.measured_motion import MeasuredMotion
-from manikin.analysis.on_plates import PlateReport
-from manikin.balance.limiting import LimitingConstraint
+from manikin.balance import zero_moment_point
+from manikin.balance.wrench import LimitingConstraint
 from manikin.body import BodyModel
-from manikin.display import Displayed
+from manikin.contact import ContactSchedule
 from manikin.ergonomics import Ergonomics
-from manikin.locomotion.segmentation import PathSegments
-from manikin.mocap.reconstruction import Reconstruction
-from manikin.mocap.recorded_supports import RecordedSupports, SupportPhase
 from manikin.motion import Motion
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.recordings.dynamics.plate_forces import (
+    PlateComparison,
+    TorqueComparison,
+    compare_torques,
+    compare_with_plates,
+    mass_on_plates,
+    plate_forces,
+)
+from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
+from manikin.recordings.dynamics.recorded_margins import RecordedMargins
+from manikin.recordings.dynamics.shifted_motion import LeastShift
+from manikin.recordings.readers.markers import ForcePlate, MarkerRecording
+from manikin.recordings.readers.skeleton_recording import Recording
+from manikin.recordings.reconstruction.proportions import Reconstruction
+from manikin.recordings.supports.plate_supports import TimingError, timing_errors
+from manikin.recordings.supports.recorded_supports import RecordedSupports, SupportPhase
+from manikin.runtime.display import Displayed
+from manikin.walking.segments.segmentation import PathSegments
+
+LARGE_RESIDUAL = 0.02
+"""Median distance between the body and what was recorded above which the body does not fit [m]."""
+
+SLOW_RATE = 50.0
+"""Below this rate instants of supports are as coarse as the frames [Hz]."""
+
+LONG_FLIGHT = 0.5
+"""Nobody is without support for longer [s]."""
+
+OTHER_MASS = 0.03
+"""Share by which the mass of a person is not that on the plates."""
+
+
+def remarks_on(analysis: "Analysis", recording: Recording | MarkerRecording) -> tuple[str, ...]:
+    """Reasons to doubt the numbers, a line each.
+
+    Args:
+        analysis: Whose numbers.
+        recording: What they were measured on.
+    """
+    found, supports, lines = analysis.found, analysis.supports, []
+    if found.median > LARGE_RESIDUAL:
+        lines.append(
+            f"the body does not fit the recording: residual {1e3 * found.median:.0f} mm (median); "
+            "are its units, or the names of its markers, right?"
+        )
+    if found.neutral:
+        names = ", ".join(name.replace("_", " ") for name in found.neutral)
+        lines.append(f"not recorded, held as in standing: {names}")
+    if found.others:
+        lines.append(f"{len(found.others)} markers are not used, for their names say nothing known")
+    dropped = len(recording) - len(found.time)
+    if dropped > 0:
+        lines.append(f"{dropped} of {len(recording)} frames at the ends show too little of the person")
+    if recording.rate < SLOW_RATE:
+        lines.append(
+            f"{recording.rate:g} frames per second: instants are known to {0.5e3 / recording.rate:.0f} ms, "
+            "and the forces of quick steps are cut off"
+        )
+    if not supports.supports:
+        lines.append("no support was found: nothing rests near the ground for long enough")
+    flights = [one.duration for one in supports.phases if not one.effectors]
+    if supports.supports and max(flights, default=0.0) > LONG_FLIGHT:
+        lines.append(
+            f"nothing supports for {max(flights):.2f} s: the person may touch something that is not recorded"
+        )
+    shifted = analysis.measured.shifted
+    if supports.supports and shifted is not None and shifted.solved and not shifted.believable:
+        lines.append(
+            f"balanced in {100.0 * (shifted.margins.balanced or 0.0):.0f} % of the frames in contact "
+            f"if shifted by {1e3 * shifted.rms:.0f} mm (RMS): contacts were not found, or do not carry; "
+            "the shifted motion is not to be believed"
+        )
+    if shifted is not None and not shifted.solved:
+        lines.append("no shift onto the contacts was found: the postures jump")
+    mass = None if analysis.plates is None else analysis.plates.mass
+    if mass is not None and abs(mass / analysis.body.mass - 1.0) > OTHER_MASS:
+        lines.append(
+            f"the force plates carry {mass:.1f} kg, not {analysis.body.mass:.1f} kg: forces, torques and "
+            f"margins are in proportion to the mass (--mass {mass:.1f} for the plates')"
+        )
+    if analysis.plates is not None and not analysis.plates.compared.any():
+        lines.append("no instant has all supports on force plates: their forces are not compared")
+    return tuple(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredMotion:
+    """A motion as recorded, which is what is measured, and shifted onto its contacts, beside it.
+
+    Attributes:
+        recorded: Smoothed, as recorded.
+        recorded_margins: Of it.
+        shifted: The motion nearest to it that its contacts can carry, whether that one is to be believed or
+            not; None if none was looked for.
+    """
+
+    recorded: RecordedDynamics
+    recorded_margins: RecordedMargins
+    shifted: LeastShift | None
+
+    @property
+    def believed(self) -> LeastShift | None:
+        """The shifted motion if it is to be believed."""
+        return self.shifted if self.shifted is not None and self.shifted.believable else None
+
+    def lowest_shifted(self, frames: NDArray[np.bool_] | None = None) -> tuple[float | None, bool | None]:
+        """Lowest margin of the shifted motion [N.m], and whether it is the imposed floor.
+
+        A margin that is the floor was put there by the shift: it is no result, and None stands for it.
+
+        Args:
+            frames: (n,) the frames looked at; all if None.
+        """
+        if self.shifted is None:
+            return None, None
+        margin = self.shifted.margins.whole_body
+        known = np.isfinite(margin) if frames is None else frames & np.isfinite(margin)
+        if not known.any():
+            return None, None
+        lowest = int(np.argmin(np.where(known, margin, np.inf)))
+        if self.shifted.at_floor[lowest]:
+            return None, True
+        return float(margin[lowest]), False
+
+    def shifted_dict(self) -> dict[str, Any] | None:
+        """JSON-ready numbers of the shifted motion; None if none was looked for."""
+        shifted = self.shifted
+        if shifted is None:
+            return None
+        margin, held, at_floor = shifted.margins.whole_body, shifted.margins.held, shifted.at_floor
+        lowest, is_floor = self.lowest_shifted()
+        there = margin[at_floor]
+        return {
+            "believed": shifted.believable,
+            "share_positive": float(np.mean(margin > 0.0)),
+            "share_positive_in_contact": shifted.margins.balanced,
+            "rms_m": shifted.rms,
+            "max_m": float(shifted.size.max()),
+            "floor_m": shifted.floor_length,
+            "floor_Nm": shifted.floor,
+            "margin_at_floor_Nm": float(np.median(there)) if there.size else None,
+            "share_at_floor_in_contact": float(np.mean(at_floor[held])) if held.any() else None,
+            "min_at_floor": is_floor,
+            "min": lowest,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class PlateReport:
+    """What plates say of a motion, and how far the motion is from it.
+
+    Attributes:
+        vertical_force: (n,) of all plates together [N].
+        cop: (n, 2) their centre of pressure [m]; NaN while they are not loaded.
+        compared: (n,) whether every support is on a plate, so that the plates tell all there is.
+        mass: Of the person, by them [kg]; None where they cannot tell.
+        timing: Touch-downs and lift-offs beside those of the plates.
+        forces: Errors of forces and centres of pressure of the motion as recorded; None where no foot alone
+            was on a plate.
+        shifted: The same of it shifted onto its contacts; None as well if no shift was looked for.
+        torques: Of the legs, of the motion as recorded; empty where no foot was on a plate of its own.
+        shifted_torques: The same of the shifted motion; empty if that is not to be believed.
+    """
+
+    vertical_force: FloatArray
+    cop: FloatArray
+    compared: NDArray[np.bool_]
+    mass: float | None
+    timing: tuple[TimingError, ...]
+    forces: PlateComparison | None
+    shifted: PlateComparison | None
+    torques: tuple[TorqueComparison, ...]
+    shifted_torques: tuple[TorqueComparison, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready numbers (SI); None where there was nothing to compare."""
+        forces = self.forces
+        errors = [abs(one.error) for one in self.timing]
+        return {
+            "mass_kg": self.mass,
+            "events": len(errors),
+            "timing_median_s": float(np.median(errors)) if errors else None,
+            "timing_max_s": float(np.max(errors)) if errors else None,
+            "vertical_rms_body_weight": None if forces is None else forces.vertical_rms,
+            "cop_rms_m": None if forces is None else forces.cop_rms,
+            "cop_rms_recorded_m": None if forces is None else forces.cop_rms,
+            "cop_rms_shifted_m": None if self.shifted is None else self.shifted.cop_rms,
+            "frames": int(self.compared.sum()),
+            "single_support_frames": None if forces is None else forces.single_frames,
+            "margin_share_positive": None if forces is None else forces.margin_share,
+            "torques": _torques(self.torques),
+            "torques_shifted": _torques(self.shifted_torques),
+        }
+
+
+def _torques(compared: Sequence[TorqueComparison]) -> dict[str, dict[str, float]]:
+    """JSON-ready, by joint."""
+    return {
+        one.joint: {
+            "frames": one.frames,
+            "rms_Nm": one.rms,
+            "mean_Nm": one.mean,
+            "peak_Nm": one.peak,
+            "peak_by_plates_Nm": one.peak_by_plates,
+        }
+        for one in compared
+    }
+
+
+def measured_mass(
+    plates: Sequence[ForcePlate], dynamics: RecordedDynamics, schedule: ContactSchedule, start: float
+) -> float | None:
+    """Mass by the plates [kg]; None where there are none, or they cannot tell.
+
+    Args:
+        plates: On the clock of the schedule.
+        dynamics: Its motion, of any mass.
+        schedule: Its stances.
+        start: The schedule's clock at the motion's first instant [s].
+    """
+    if not plates:
+        return None
+    return mass_on_plates(dynamics, plate_forces(plates, dynamics.time + start, schedule))
+
+
+def plate_report(
+    plates: Sequence[ForcePlate], supports: RecordedSupports, schedule: ContactSchedule,
+    measured: MeasuredMotion, motions: tuple[Motion, Motion | None], mass: float | None,
+) -> PlateReport:  # fmt: skip
+    """Hold a motion against the plates under it.
+
+    Args:
+        plates: At least one, on the clock of the supports.
+        supports: Of the motion.
+        schedule: Its stances.
+        measured: The motion, with the person's mass.
+        motions: As recorded, and shifted where that is to be believed, with forces and torques.
+        mass: Of the person, by the plates [kg].
+    """
+    forces = plate_forces(plates, measured.recorded.time + supports.start, schedule)
+    height = float(np.mean([plate.origin[2] for plate in plates]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cop = zero_moment_point(forces.wrench, height)
+    loaded = forces.wrench[:, 2] > 20.0
+    shifted, moved, moved_torques = measured.shifted, None, ()
+    if shifted is not None:
+        moved = compare_with_plates(shifted.dynamics, shifted.margins, forces, height)
+        if motions[1] is not None:
+            moved_torques = compare_torques(shifted.dynamics, motions[1], forces)
+    return PlateReport(
+        forces.wrench[:, 2], np.where(loaded[:, None], cop, np.nan), forces.covered, mass,
+        timing_errors(supports, plates),
+        compare_with_plates(measured.recorded, measured.recorded_margins, forces, height), moved,
+        compare_torques(measured.recorded, motions[0], forces), moved_torques,
+    )  # fmt: skip
+
 
 WHOLE_BODY = "whole-body"
 

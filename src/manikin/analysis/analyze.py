@@ -1,40 +1,149 @@
-"""A recording measured from beginning to end."""
+"""A recording measured from beginning to end.
+
+Also here. Holonomic and nonholonomic stretches of a reconstructed person's walk. One file among several that
+are measured, and what came of it. Files of recordings among files and folders.
+"""
 
 import time as clock
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
-from manikin.analysis.analysis import Analysis
-from manikin.analysis.measured_motion import MeasuredMotion
-from manikin.analysis.on_plates import PlateReport, measured_mass, plate_report
-from manikin.analysis.remarks import remarks_on
-from manikin.analysis.walking import walked_segments
-from manikin.balance.zmp_path import LEAST_LOAD
-from manikin.body.further_contacts import with_knees_and_elbows
+from manikin.analysis.analysis import (
+    Analysis,
+    MeasuredMotion,
+    PlateReport,
+    measured_mass,
+    plate_report,
+    remarks_on,
+)
+from manikin.balance.zmp import LEAST_LOAD
+from manikin.body.limbs import with_knees_and_elbows
 from manikin.body.load import HANDS, carrying
 from manikin.ergonomics import Circumstances, LowestMargin, ergonomics_of, upright_neck
 from manikin.errors import BodyError, InputError
-from manikin.mocap.markers import MarkerRecording
-from manikin.mocap.read import read_recording
-from manikin.mocap.reconstruct import reconstruct
-from manikin.mocap.reconstruction import Reconstruction
-from manikin.mocap.recorded_dynamics import (
+from manikin.motion import Motion
+from manikin.numerics.spatial import FloatArray, finite_number
+from manikin.recordings.dynamics.recorded_dynamics import (
     CUTOFF,
     RecordedDynamics,
     dynamics_of,
     touch_downs_of,
     with_mass,
 )
-from manikin.mocap.recorded_forces import motion_on_contacts
-from manikin.mocap.recorded_margins import RecordedMargins, recorded_margins
-from manikin.mocap.recorded_stances import FRICTION, recorded_schedule
-from manikin.mocap.recording import Recording
-from manikin.mocap.shifted_motion import least_shift
-from manikin.mocap.supports import supports_of
-from manikin.motion import Motion
-from manikin.spatial import FloatArray, finite_number
+from manikin.recordings.dynamics.recorded_forces import motion_on_contacts
+from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
+from manikin.recordings.dynamics.shifted_motion import least_shift
+from manikin.recordings.readers.markers import MarkerRecording
+from manikin.recordings.readers.read import READERS, read_recording
+from manikin.recordings.readers.skeleton_recording import Recording
+from manikin.recordings.reconstruction.proportions import Reconstruction
+from manikin.recordings.reconstruction.reconstruct import reconstruct
+from manikin.recordings.supports.recorded_stances import FRICTION, recorded_schedule
+from manikin.recordings.supports.supports import supports_of
+from manikin.walking.segments.segmentation import PathSegments, ShoulderPaths, segment_path
+
+SHOULDERS = ("left_upper_arm", "right_upper_arm")
+"""Segments that begin at the shoulders."""
+
+UPRIGHT = 0.5
+"""Height of the shoulders above the pelvis, per that in standing, below which nobody walks."""
+
+
+def walked_segments(found: Reconstruction) -> PathSegments | None:
+    """Function 1 on the shoulders of the reconstructed body (:mod:`manikin.walking.segments.segmentation`).
+
+    None where the trunk ever lies or is bent so far that the shoulders no longer say where the body looks.
+
+    Args:
+        found: At least three instants at an even rate.
+    """
+    places = _places(found, found.q)
+    standing = _places(found, found.body.standing_posture()[None])[0]
+    height = places[:, :2, 2].mean(axis=1) - places[:, 2, 2]
+    if np.any(height < UPRIGHT * float(standing[:2, 2].mean() - standing[2, 2])):
+        return None
+    rate = (len(found.time) - 1) / float(found.time[-1] - found.time[0])
+    try:
+        return segment_path(ShoulderPaths(places[:, 0, :2], places[:, 1, :2], rate))
+    except InputError:  # the shoulders are above each other
+        return None
+
+
+def _places(found: Reconstruction, postures: FloatArray) -> FloatArray:
+    """(n, 3, 3) left shoulder, right shoulder and pelvis [m]."""
+    body = found.body
+    model, data = body.pinocchio, body.pinocchio.createData()
+    frames = [body.segment_frame(name) for name in SHOULDERS]
+    places = np.empty((len(postures), 3, 3))
+    for number, q in enumerate(postures):
+        pin.framesForwardKinematics(model, data, q)
+        for shoulder, frame in enumerate(frames):
+            places[number, shoulder] = data.oMf[frame].translation
+    places[:, 2] = postures[:, :3]
+    return places
+
+
+@dataclass(frozen=True)
+class AnalysisJob:
+    """One file to measure.
+
+    Attributes:
+        path: The recording.
+        directory: For its files; None to write none.
+        draw: Whether the report has its figure.
+    """
+
+    path: Path
+    directory: Path | None = None
+    draw: bool = True
+
+
+@dataclass(frozen=True)
+class AnalysisEntry:
+    """What came of one file.
+
+    Attributes:
+        job: The file.
+        summary: As :meth:`manikin.analysis.Analysis.as_dict`; None where it was refused.
+        refusal: Why, in one line.
+    """
+
+    job: AnalysisJob
+    summary: dict[str, Any] | None
+    refusal: str = ""
+
+
+def recordings_in(sources: Iterable[str | Path]) -> tuple[Path, ...]:
+    """Recordings among files and folders, each once: files as given, those of a folder in order of path.
+
+    A file that is named is taken whatever its ending, so that its reader can say what is wrong with it.
+
+    Args:
+        sources: Files, or folders that are searched to any depth.
+
+    Raises:
+        InputError: If a source is not there, or a folder holds no recording.
+    """
+    found: dict[Path, None] = {}
+    for source in map(Path, sources):
+        if not source.exists():
+            raise InputError(f"{source}: there is no such file; valid: a recording, or a folder of them")
+        if not source.is_dir():
+            found[source] = None
+            continue
+        inside = sorted(
+            path for path in source.rglob("*") if path.suffix.lower() in READERS and path.is_file()
+        )
+        if not inside:
+            raise InputError(f"{source}: holds no recording; valid: files {', '.join(READERS)}")
+        found |= dict.fromkeys(inside)
+    return tuple(found)
+
 
 SEXES = ("male", "female")
 

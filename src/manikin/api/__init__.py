@@ -1,9 +1,8 @@
 """The library in a few verbs; :mod:`manikin` offers them under its own name."""
 
-from manikin.api.bodies import creature, grasp, human, point, scene, sole, stance
+from manikin.api.bodies import Balance, balance, creature, grasp, point, scene, sole, stance
 from manikin.api.recorded import RecordedMotion, analyze, read
 from manikin.api.runs import Comparison, Run, compare, plan, push, simulate, walk
-from manikin.api.stances import Balance, balance
 
 __all__ = [
     "Balance",
@@ -15,7 +14,6 @@ __all__ = [
     "compare",
     "creature",
     "grasp",
-    "human",
     "plan",
     "point",
     "push",

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from manikin.analysis import Analysis, AnalysisOptions
 from manikin.analysis import analyze as measure
-from manikin.display import Displayed
-from manikin.mocap.markers import MarkerRecording
-from manikin.mocap.read import read_recording
-from manikin.mocap.recording import Recording
 from manikin.motion.file import MotionFile
+from manikin.recordings.readers.markers import MarkerRecording
+from manikin.recordings.readers.read import read_recording
+from manikin.recordings.readers.skeleton_recording import Recording
+from manikin.runtime.display import Displayed
 from manikin.viewer import serve
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class MeasuredRecording(Displayed):
 
     def plot(self) -> "Drawing":
         """Sheet of postures, supports, forces, margin, height and scores over time."""
-        from manikin.analysis_sheet import recording_sheet
+        from manikin.reports.analysis_sheet import recording_sheet
 
         return Drawing(recording_sheet(self.analysis, str(self)))
 

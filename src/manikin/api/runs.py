@@ -8,16 +8,17 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from manikin.body import BodyModel
-from manikin.display import Displayed
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.record import RunRecord, read_run
+from manikin.pipeline.run_directory import RunRecord, read_run
+from manikin.runtime.display import Displayed
 from manikin.scenarios import Scenario, load_scenario
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from manikin.comparison import RunComparison
+    from manikin.reports.comparison import RunComparison
+
 
 Place = tuple[float, float, float]
 """x [m], y [m] and heading [deg, counter-clockwise from x]."""
@@ -83,7 +84,7 @@ class Run(Displayed):
     @property
     def figures(self) -> tuple[str, ...]:
         """Names of the figures that :meth:`plot` may draw; some apply to a part of the runs only."""
-        from manikin.figures import FIGURES
+        from manikin.reports.figures import FIGURES
 
         return tuple(FIGURES)
 
@@ -96,7 +97,7 @@ class Run(Displayed):
         Raises:
             InputError: If there is no such figure, or the run has no data for it.
         """
-        from manikin.figures import FIGURES
+        from manikin.reports.figures import FIGURES
 
         if figure not in FIGURES:
             raise InputError(f"figure is {figure!r}; valid: {', '.join(FIGURES)}")
@@ -164,7 +165,7 @@ class Comparison(Displayed):
         Raises:
             InputError: If there is no such figure, or the runs have no data for it.
         """
-        from manikin.figures import COMPARISONS
+        from manikin.reports.figures import COMPARISONS
 
         if figure not in COMPARISONS:
             raise InputError(f"figure is {figure!r}; valid: {', '.join(COMPARISONS)}")
@@ -227,7 +228,7 @@ def walk(
     Raises:
         InputError: If a value is not usable.
     """
-    from manikin.scenarios.tasks import walk_task
+    from manikin.scenarios.planned import walk_task
 
     return _run(_with_body(walk_task(to, start=start, max_speed=max_speed), body), seed=seed, out=out)
 
@@ -256,7 +257,7 @@ def push(
     Raises:
         InputError: If a value is not usable.
     """
-    from manikin.scenarios.tasks import push_task
+    from manikin.scenarios.planned import push_task
 
     model = "kudoh" if body is None else "human"
     job = push_task(force, direction, duration=duration, body={"model": model}, recovery=recovery)
@@ -273,7 +274,7 @@ def compare(first: Run | str | Path, second: Run | str | Path) -> Comparison:
     Raises:
         InputError: If a directory is not that of a run.
     """
-    from manikin.comparison import compare_runs
+    from manikin.reports.comparison import compare_runs
 
     records = [run.record if isinstance(run, Run) else read_run(run) for run in (first, second)]
     return Comparison(compare_runs(*records))
@@ -314,7 +315,7 @@ def _with_body(job: Scenario, body: BodyModel | None) -> Scenario:
 
 
 def _run(job: Scenario, *, seed: int | None = None, out: str | Path | None = None) -> Run:
-    from manikin.pipeline import run
+    from manikin.pipeline.runner import run
 
     kept = None if out is not None else TemporaryDirectory(prefix="manikin-")
     folder = Path(kept.name) / job.name if kept is not None else Path(str(out))

@@ -10,15 +10,28 @@ from manikin.balance.criteria import (
     support_polygon,
     zero_moment_point,
 )
-from manikin.balance.evaluate import BalanceReport, GroundPoint, evaluate_balance
-from manikin.balance.limiting import LimitingConstraint, LimitShare
-from manikin.balance.limits import ContactLimits, LimitKind, contact_limits
-from manikin.balance.margin import StabilityMargins, force_space, moment_space, stability_margins
+from manikin.balance.friction import ContactLimits, LimitKind, contact_limits
+from manikin.balance.margin import (
+    BalanceReport,
+    GroundPoint,
+    StabilityMargins,
+    evaluate_balance,
+    force_space,
+    moment_space,
+    stability_margins,
+)
 from manikin.balance.motion_margin import MotionMargin, motion_margin
-from manikin.balance.polygon import convex_polygon, polygon_of_halfplanes, signed_distance
-from manikin.balance.support_plane import SupportPlane, least_zmp_distance, support_plane
-from manikin.balance.wrench import WrenchPolytope, pseudo_wrench, wrench_polytope, wrench_polytopes
-from manikin.callable_package import make_callable
+from manikin.balance.static import StaticRegion, static_room, static_torque_share
+from manikin.balance.wrench import (
+    LimitingConstraint,
+    LimitShare,
+    WrenchPolytope,
+    pseudo_wrench,
+    wrench_polytope,
+    wrench_polytopes,
+)
+from manikin.balance.zmp import SupportPlane, least_zmp_distance, support_plane
+from manikin.runtime.display import make_callable
 
 __all__ = [
     "BalanceReport",
@@ -29,6 +42,7 @@ __all__ = [
     "LimitingConstraint",
     "MotionMargin",
     "StabilityMargins",
+    "StaticRegion",
     "SupportPlane",
     "WrenchPolytope",
     "admissible_com_polygon",
@@ -36,17 +50,16 @@ __all__ = [
     "center_of_pressure",
     "centroidal_moment_pivot",
     "contact_limits",
-    "convex_polygon",
     "evaluate_balance",
     "foot_rotation_indicator",
     "force_space",
     "least_zmp_distance",
     "moment_space",
     "motion_margin",
-    "polygon_of_halfplanes",
     "pseudo_wrench",
-    "signed_distance",
     "stability_margins",
+    "static_room",
+    "static_torque_share",
     "support_height",
     "support_plane",
     "support_polygon",
@@ -54,5 +67,6 @@ __all__ = [
     "wrench_polytopes",
     "zero_moment_point",
 ]
+
 
 make_callable(__name__)

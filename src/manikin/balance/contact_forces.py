@@ -21,7 +21,7 @@ from scipy.optimize import lsq_linear
 
 from manikin.balance.friction import pyramid_edges, pyramid_sides
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
-from manikin.spatial import FloatArray, cross
+from manikin.numerics.spatial import FloatArray, cross
 
 STEPS = 40
 """Newton steps after which a sample is left to a general solver."""

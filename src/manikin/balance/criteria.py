@@ -7,11 +7,11 @@ general, as these know neither friction nor walls nor grasps ([Qiu2012]_ 4.1.2, 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.balance.polygon import convex_polygon, polygon_of_halfplanes
 from manikin.balance.wrench import WrenchPolytope, pseudo_wrench
 from manikin.contact import ContactKind, Stance
 from manikin.errors import InputError
-from manikin.spatial import GRAVITY, FloatArray, finite_number, frozen_array, skew
+from manikin.numerics.polygon import convex_polygon, polygon_of_halfplanes
+from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number, frozen_array, skew
 
 
 def support_polygon(stance: Stance) -> FloatArray:

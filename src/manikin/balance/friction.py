@@ -1,10 +1,182 @@
-"""Friction cones: their edges and sides, and the wrenches a frictional contact generates."""
+"""Friction cones: their edges and sides, and the wrenches a frictional contact generates.
+
+Also here. The limits of one contact as named inequalities on its wrench.
+
+All rows act on ``[force; moment]`` in the contact frame (x forward, y left, z the normal),
+moments about its origin; they are of unit length, with alpha = 1 m.
+"""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
-from manikin.contact import Contact, FrictionModel
-from manikin.contact.model import friction_model as checked
-from manikin.spatial import FloatArray, cross
+from manikin.contact import Contact, ContactKind, FrictionModel
+from manikin.contact.contact import friction_model as checked
+from manikin.numerics.facet_enumeration import fan_of_generators
+from manikin.numerics.polytope import facet_rows
+from manikin.numerics.spatial import FloatArray, cross
+
+
+class LimitKind(StrEnum):
+    """What gives way when a limit is reached."""
+
+    SLIPPING = "slipping"
+    TIPPING = "tipping"
+    TURNING = "turning"
+    LIFTING = "lifting"
+    NORMAL_FORCE_CAP = "normal force cap"
+    GRASP_FORCE = "grasp force"
+    GRASP_MOMENT = "grasp moment"
+    UNSUPPORTED = "unsupported"
+
+
+@dataclass(frozen=True, eq=False)
+class ContactLimits:
+    """Rows ``A w <= b`` of one contact, each with its kind and a phrase.
+
+    Attributes:
+        A: (k, 6) unit rows.
+        b: (k,) [N, N.m].
+        kinds: What each row limits.
+        phrases: Words for each row: how the contact moves when it gives way.
+    """
+
+    A: FloatArray
+    b: FloatArray
+    kinds: tuple[LimitKind, ...]
+    phrases: tuple[str, ...]
+
+
+Row = tuple[list[float], float, LimitKind, str]
+
+
+def contact_limits(contact: Contact, friction_model: FrictionModel = "outer") -> ContactLimits:
+    """Limits of a sole, point or grasp.
+
+    A sole without ``torsion_limit`` has the 16 rows equivalent to four corner points with
+    friction pyramids: friction, CoP, and the yaw moment those forces allow (closed form of
+    the sole's wrench cone, our own derivation, checked against the corner forces); under the
+    friction model ``cone`` the rows of the yaw moment are those facets of the cone over the corner
+    forces that bound it. With a
+    ``torsion_limit`` the yaw rows are the safe eight-row form ``|n tau| + mu |s tau| +
+    mu |t tau| <= limit`` ([Qiu2012]_ 4.21 corrected), beside friction on the whole
+    force (4.20) and CoP (4.14).
+
+    A part of a sole is taken about the middle of its points; an edge resists no moment about itself.
+
+    Raises:
+        ContactError: If the friction model is unknown.
+    """
+    if contact.kind is ContactKind.GRASP:
+        rows = _grasp_rows(contact)
+    else:
+        rows = _friction_rows(contact, friction_model)
+        if contact.kind is ContactKind.SOLE:
+            rows += _pressure_rows(contact) + _turning_rows(contact, friction_model)
+        if contact.normal_force_cap is not None:
+            cap = contact.normal_force_cap
+            rows.append(
+                ([0, 0, 1, 0, 0, 0], cap, LimitKind.NORMAL_FORCE_CAP, f"normal force cap of {cap:g} N")
+            )
+    A = np.array([row for row, *_ in rows], dtype=np.float64)
+    b = np.array([bound for _, bound, *_ in rows])
+    length = np.linalg.norm(A, axis=1)
+    return ContactLimits(
+        A / length[:, None], b / length, tuple(r[2] for r in rows), tuple(r[3] for r in rows)
+    )
+
+
+def _friction_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
+    """A force at its limit along +x cannot keep the contact from moving along -x."""
+    rows: list[Row] = []
+    for side in pyramid_sides(contact, friction_model).tolist():
+        axis = int(abs(side[1]) > abs(side[0]))
+        along = ("-" if side[axis] > 0.0 else "+") + "xy"[axis]
+        rows.append(([*side, 0.0, 0.0, 0.0], 0.0, LimitKind.SLIPPING, f"slipping along {along}"))
+    return rows
+
+
+def _pressure_rows(contact: Contact) -> list[Row]:
+    """CoP inside the rectangle ([Qiu2012]_ 4.14): x = -tau_y / f_z, y = tau_x / f_z."""
+    half_length, half_width = contact.length / 2, contact.width / 2
+    left, right = _side_names(contact.effector)
+    tip = LimitKind.TIPPING
+    if half_length == 0.0:
+        return [
+            ([0, 0, 0, 0, -1, 0], 0.0, tip, "rolling forward over its edge"),
+            ([0, 0, 0, 0, 1, 0], 0.0, tip, "rolling backward over its edge"),
+            ([0, 0, -half_width, 1, 0, 0], 0.0, tip, f"tipping over its {left} end"),
+            ([0, 0, -half_width, -1, 0, 0], 0.0, tip, f"tipping over its {right} end"),
+        ]
+    return [
+        ([0, 0, -half_length, 0, -1, 0], 0.0, tip, "tipping over its front edge"),
+        ([0, 0, -half_length, 0, 1, 0], 0.0, tip, "tipping over its rear edge"),
+        ([0, 0, -half_width, 1, 0, 0], 0.0, tip, f"tipping over its {left} edge"),
+        ([0, 0, -half_width, -1, 0, 0], 0.0, tip, f"tipping over its {right} edge"),
+    ]
+
+
+def _side_names(effector: str) -> tuple[str, str]:
+    if effector.startswith("left"):
+        return "outer", "inner"
+    if effector.startswith("right"):
+        return "inner", "outer"
+    return "left", "right"
+
+
+def _turning_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
+    turn, mu = LimitKind.TURNING, pyramid_friction(contact, friction_model)
+    signs = [(a, b) for a in (1.0, -1.0) for b in (1.0, -1.0)]
+    words = {1.0: "turning clockwise on its sole", -1.0: "turning counter-clockwise on its sole"}
+    if contact.torsion_limit is not None:
+        return [
+            ([0, 0, 0, a * mu, b * mu, c], contact.torsion_limit, turn, words[c])
+            for c in (1.0, -1.0)
+            for a, b in signs
+        ]
+    if friction_model == "cone":
+        return [
+            (row.tolist(), 0.0, turn, words[float(np.sign(row[5]))])
+            for row in _yaw_facets(replace(contact, points=contact.points - contact.centre))
+        ]
+    x, y = contact.length / 2, contact.width / 2
+    return [
+        ([a * y, b * x, -mu * (x + y), c * a * mu, c * b * mu, c], 0.0, turn, words[c])
+        for c in (1.0, -1.0)
+        for a, b in signs
+    ]
+
+
+def _yaw_facets(sole: Contact) -> FloatArray:
+    """(k, 6) facets of the cone over the corner forces that bound the yaw moment.
+
+    The other ones are those of friction and pressure: a sum of corner forces has any force in the
+    friction cone together with any centre of pressure in the rectangle.
+    """
+    edges = edge_wrenches(sole, "cone")
+    size = np.hypot(sole.length, sole.width)
+    edges[:, 3:] /= size
+    fan = fan_of_generators(edges, np.ones((len(edges), 1)), np.ones(1, dtype=np.bool_))
+    H, h, _ = facet_rows(fan, 1.0)
+    rows = H[(np.abs(h) < 1e-9) & (np.abs(H[:, 5]) > 1e-9)]
+    rows[:, 3:] /= size
+    return rows / np.abs(rows[:, 5:])
+
+
+def _grasp_rows(contact: Contact) -> list[Row]:
+    """Box per axis ([Qiu2012]_ 4.22); the axes are the world's."""
+    rows: list[Row] = []
+    for axis, name in enumerate("xyz"):
+        for sign, text in ((1.0, "+"), (-1.0, "-")):
+            row = np.zeros(6)
+            row[axis] = sign
+            phrase = f"grasp force limit of {contact.max_force:g} N along {text}{name}"
+            rows.append((row.tolist(), contact.max_force, LimitKind.GRASP_FORCE, phrase))
+            phrase = f"grasp moment limit of {contact.max_moment:g} N.m about {text}{name}"
+            rows.append((np.roll(row, 3).tolist(), contact.max_moment, LimitKind.GRASP_MOMENT, phrase))
+    return rows
+
 
 _CORNERS: FloatArray = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
 

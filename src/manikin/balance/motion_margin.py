@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.balance.margin import stability_margins
-from manikin.balance.support_plane import support_plane
 from manikin.balance.wrench import WrenchPolytope, wrench_polytopes
-from manikin.balance.zmp_path import LEAST_LOAD
+from manikin.balance.zmp import LEAST_LOAD, support_plane
 from manikin.contact import Stance
 from manikin.errors import InputError
-from manikin.spatial import FloatArray, wrench_about
+from manikin.numerics.spatial import FloatArray, wrench_about
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +29,7 @@ class MotionMargin:
             where no force alone does.
         zmp_distance: (n,) of the ZMP to the edge of the support polygon [m]; not a number where the
             contacts do not span one plane, or something is grasped, or less than
-            :data:`~manikin.balance.zmp_path.LEAST_LOAD` presses on it.
+            :data:`~manikin.balance.zmp.LEAST_LOAD` presses on it.
     """
 
     margin: FloatArray

@@ -40,7 +40,7 @@ from types import MappingProxyType
 import numpy as np
 
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray, finite_number
+from manikin.numerics.spatial import FloatArray, finite_number
 
 STATURE_RANGE = (1.40, 2.10)
 """Accepted stature [m]."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from manikin.body.model import BodyModel
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray
 
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

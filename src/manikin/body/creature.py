@@ -22,7 +22,7 @@ from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape
 from manikin.body.urdf import Urdf, UrdfJoint, read_urdf
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray, frozen_array, rotation_from_normal, skew
+from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_normal, skew
 
 _MOST_HINGES = 3
 
@@ -60,7 +60,7 @@ def creature_from_urdf(
     The root floats; massless links above it, such as a world, are left out. Revolute joints become hinges
     of their limits, continuous ones with half a turn either way; prismatic, planar and mimicking joints are
     refused. Spheres, capsules and boxes stand for all
-    shapes, see :mod:`manikin.body.urdf_shapes`. Segments that overlap in the zero or the standing posture are
+    shapes, see :mod:`manikin.body.urdf`. Segments that overlap in the zero or the standing posture are
     not checked against each other. Limbs that are reflections of each other are found.
 
     Args:

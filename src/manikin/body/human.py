@@ -18,23 +18,24 @@ from manikin.body.anthropometry import (
     TOES_MASS_SHARE,
     Anthropometry,
 )
-from manikin.body.load import HANDS, carrying
-from manikin.body.model import OFF_AXIS, BodyModel
-from manikin.body.off_axis import off_axis
-from manikin.body.parts import (
+from manikin.body.human_parts import (
     ALONG_X,
+    HUMAN_HINGES,
     across,
     arms_and_legs,
     cuboid_inertia,
     cylinder_inertia,
+    human_hinges,
+    off_axis,
     palm_rotation,
     upright_capsule,
 )
-from manikin.body.range_of_motion import HUMAN_HINGES, human_hinges
+from manikin.body.load import HANDS, carrying
+from manikin.body.model import OFF_AXIS, BodyModel
 from manikin.body.segments import Effector, Segment, Shape, ShapeKind
 from manikin.body.strength import DEFAULT_AGE, check_strength, hinge_strength
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray, skew
+from manikin.numerics.spatial import FloatArray, skew
 
 _SOFT_PAIRS = (
     # One short link apart: the shapes overlap in ordinary postures.
@@ -77,7 +78,7 @@ def human(
     The free pelvis carries the legs and the spine (lumbar, thorax, neck, 3 hinges each; the
     head is rigid on the neck). Shoulders and hips have 3 hinges, elbows, wrists, knees and
     ankles 2, toes 1. Proportions and inertias: :mod:`manikin.body.anthropometry`; axes, ranges
-    and speeds: :mod:`manikin.body.range_of_motion`; strengths: :mod:`manikin.body.strength`.
+    and speeds: :mod:`manikin.body.human_parts`; strengths: :mod:`manikin.body.strength`.
 
     In the zero posture the body stands upright with hanging arms, palms inward, and all
     segment frames parallel to the world. A segment's frame lies in its proximal joint, the
@@ -91,7 +92,7 @@ def human(
     a seat, axes as the pelvis).
 
     Limbs: ``left_arm``, ``right_arm``, ``left_leg``, ``right_leg``; knees, elbows and the pelvis too with
-    :func:`manikin.body.further_contacts.with_further_contacts`.
+    :func:`manikin.body.limbs.with_further_contacts`.
 
     Collision shapes are the flesh made slim: the breadth over the hips is Winter's 0.191 H, all
     other breadths and girths are our choice. They scale with stature and (within 12 %) with the
@@ -109,7 +110,7 @@ def human(
             :data:`manikin.body.anthropometry.MEASURED_LENGTHS`; the stature scales the others, the foot,
             the head and the flesh.
         off_axis_masses: Whether centres of mass lie off the lines between joints, as
-            :mod:`manikin.body.off_axis` says, instead of on them.
+            :mod:`manikin.body.human_parts` says, instead of on them.
 
     Raises:
         BodyError: If a value is out of its range.

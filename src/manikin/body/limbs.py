@@ -1,28 +1,235 @@
-"""The limbs of a body: which joints move an effector, and where the chain begins."""
+"""The limbs of a body: which joints move an effector, and where the chain begins.
+
+Also here. The end of a limb: the segment of an effector and what hangs on it, as toes on a foot. Reflection
+of postures in the sagittal plane: left becomes right. Knees, elbows and the pelvis as further contacts of a
+human ([Tonneau2015]_ 5.4.1, left open there). The frame of a body's root, for tasks that place it.
+
+The places are on the segments that exist: the knee in front of the origin of the lower leg, the
+elbow behind that of the forearm, each on the thickest shape that meets there. Their z axes, the
+normals of contacts, point through the joint, backwards and forwards. What a human sits on, the
+effector ``buttocks``, belongs to the root: no joint moves it, so its limb has none and goes with the root.
+"""
+
+from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from manikin.body.configuration import Configuration
+from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.body.model import BodyModel
-from manikin.body.segments import Hinge, Limb, Segment
+from manikin.body.segments import Effector, Hinge, Limb, Segment, ShapeKind
+from manikin.contact import ContactKind
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray
-
-REFLECTION = np.array([1.0, -1.0, 1.0])
-"""What the reflection in the sagittal plane does to the coordinates of a point."""
+from manikin.numerics.spatial import FloatArray
 
 __all__ = [
+    "FURTHER",
+    "PELVIS",
     "REFLECTION",
     "Limb",
     "are_mirrored",
+    "carrying_segment",
+    "end_segments",
+    "hanging_segment",
+    "hinge_line",
     "limb_hinges",
     "limb_named",
     "limb_origin",
     "limb_placement",
     "limb_slots",
     "limbs_of",
+    "mirrored",
+    "mirrored_hinges",
+    "mirrored_name",
     "parent_segment",
+    "with_further_contacts",
+    "with_knees_and_elbows",
+    "with_root",
 ]
+
+
+def hanging_segment(body: BodyModel, segment: str) -> Segment | None:
+    """Return the last segment of a limb when it hangs on ``segment``, as toes on a foot, or None."""
+    children = [candidate for candidate in body.segments if candidate.parent == segment]
+    if len(children) != 1 or not children[0].hinges:
+        return None
+    leaf = all(candidate.parent != children[0].name for candidate in body.segments)
+    return children[0] if leaf else None
+
+
+def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
+    """Names of the segments with which an effector touches: its own and the one hanging on it."""
+    own = body.effector(effector).segment
+    hanging = hanging_segment(body, own)
+    return (own,) if hanging is None else (own, hanging.name)
+
+
+def hinge_line(body: BodyModel, effector: str) -> float | None:
+    """Return where the hinge of the hanging segment crosses the effector's x axis [m], or None."""
+    frame = body.effector(effector)
+    hanging = hanging_segment(body, frame.segment)
+    return None if hanging is None else float((frame.rotation.T @ (hanging.origin - frame.translation))[0])
+
+
+def carrying_segment(body: BodyModel, effector: str, point: FloatArray) -> str:
+    """Name of the end segment that carries a point (3,) of the effector frame [m].
+
+    What lies beyond the hinge of the hanging segment is carried by it.
+    """
+    own = body.effector(effector).segment
+    hanging, line = hanging_segment(body, own), hinge_line(body, effector)
+    return hanging.name if hanging is not None and line is not None and point[0] > line else own
+
+
+_OTHER = {"left_": "right_", "right_": "left_"}
+
+
+def mirrored_name(name: str) -> str:
+    """Name of the same part on the other side; one in the middle keeps its name."""
+    for prefix, other in _OTHER.items():
+        if name.startswith(prefix):
+            return other + name[len(prefix) :]
+    return name
+
+
+def mirrored_hinges(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray]:
+    """Where each hinge finds its angle in the mirrored posture, and the factor of the angle.
+
+    Returns:
+        (nv - 6,) indices of hinges on the other side and (nv - 6,) factors, 1 or -1: ``mirrored =
+        factors * angles[..., indices]``.
+
+    Raises:
+        BodyError: If a hinge has no counterpart with a reflected axis.
+    """
+    names = list(body.joint_names)
+    indices, factors = np.empty(len(names), dtype=np.int64), np.empty(len(names))
+    for place, hinge in enumerate(body.hinges):
+        other = mirrored_name(hinge.name)
+        if other not in names:
+            raise BodyError(f"hinge {hinge.name!r} has no counterpart; valid: a body of two equal sides")
+        indices[place] = names.index(other)
+        # An axis of rotation keeps its y component under the reflection and changes the others' signs.
+        along = float(-REFLECTION * body.hinges[indices[place]].axis @ hinge.axis)
+        if abs(abs(along) - 1.0) > 1e-9:
+            raise BodyError(f"axes of {hinge.name!r} and {other!r} are no reflections of each other")
+        factors[place] = np.sign(along)
+    return indices, factors
+
+
+def mirrored(body: BodyModel, q: ArrayLike) -> FloatArray:
+    """Postures reflected in the world's plane y = 0, for a body of two equal sides.
+
+    Args:
+        body: The body.
+        q: (..., nq) postures.
+
+    Returns:
+        (..., nq).
+
+    Raises:
+        BodyError: If the shape does not fit or the body's sides differ.
+    """
+    posture = np.asarray(q, dtype=np.float64)
+    if posture.ndim == 0 or posture.shape[-1] != body.nq:
+        raise BodyError(f"posture has shape {posture.shape}; valid: (..., {body.nq})")
+    indices, factors = mirrored_hinges(body)
+    found = posture.copy()
+    found[..., 1] *= -1.0
+    found[..., [3, 5]] *= -1.0
+    found[..., 7:] = factors * posture[..., 7:][..., indices]
+    return found
+
+
+_BACKWARD = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+_FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+_JOINTS = (
+    # Contact, the segments of the limb, where the contact is seen from the joint.
+    ("knee", ("thigh", "leg"), 1.0),
+    ("elbow", ("upper_arm", "forearm"), -1.0),
+)
+
+FURTHER = ("knees", "elbows", "pelvis")
+"""Kinds of further contacts."""
+
+
+def with_further_contacts(body: BodyModel, kinds: Collection[str] = FURTHER) -> BodyModel:
+    """Give a human further limbs.
+
+    Args:
+        body: Like that of :func:`manikin.body.human`.
+        kinds: Of :data:`FURTHER`: ``left_knee`` and ``right_knee``, ``left_elbow`` and ``right_elbow``,
+            ``pelvis``.
+
+    Raises:
+        BodyError: If a kind is not known, or the body lacks the parts.
+    """
+    unknown = sorted(set(kinds) - set(FURTHER))
+    if unknown:
+        raise BodyError(f"further contact is {unknown[0]!r}; valid: {', '.join(FURTHER)}")
+    effectors, limbs = dict(body.effectors), list(limbs_of(body))
+    for joint, parts, ahead in _JOINTS:
+        if f"{joint}s" not in kinds:
+            continue
+        for side, other in (("left", "right"), ("right", "left")):
+            chain = tuple(f"{side}_{part}" for part in parts)
+            name = f"{side}_{joint}"
+            effectors[name] = _effector(body, name, chain, ahead)
+            limbs.append(Limb(name, name, chain, ContactKind.POINT, f"{other}_{joint}"))
+    if "pelvis" in kinds:
+        limbs.append(_pelvis(body))
+    return replace(body, effectors=effectors, limbs=tuple(limbs))
+
+
+def with_knees_and_elbows(body: BodyModel) -> BodyModel:
+    """Give a human the effectors and limbs ``left_knee``, ``right_knee``, ``left_elbow``, ``right_elbow``.
+
+    Raises:
+        BodyError: If the body has no arms and legs like those of :func:`manikin.body.human`.
+    """
+    return with_further_contacts(body, ("knees", "elbows"))
+
+
+def _pelvis(body: BodyModel) -> Limb:
+    """What presses on a seat: a patch of the root, with no joint between."""
+    if body.stature is None or "buttocks" not in body.effectors:
+        raise BodyError(f"body {body.name!r} has no buttocks; valid: a human")
+    segment = body.effector("buttocks").segment
+    patch = (SEAT_LENGTH * body.stature, SEAT_WIDTH * body.stature)
+    return Limb("pelvis", "buttocks", (segment,), ContactKind.SOLE, patch=patch)
+
+
+def _effector(body: BodyModel, name: str, chain: tuple[str, ...], ahead: float) -> Effector:
+    shapes = [shape for part in chain for shape in body.segment(part).shapes]
+    radii = [float(shape.size[0]) for shape in shapes if shape.kind is ShapeKind.CAPSULE]
+    if not radii:
+        raise BodyError(f"{name} has no round shape around it; valid: a body with capsules for limbs")
+    turn = _BACKWARD if ahead > 0.0 else _FORWARD
+    return Effector(name, chain[-1], np.array([ahead * max(radii), 0.0, 0.0]), turn)
+
+
+PELVIS = "pelvis"
+"""Effector of a human's root."""
+
+
+def with_root(body: BodyModel) -> tuple[BodyModel, str]:
+    """The body, and the name of the effector at the origin of its root; one is added where there is none.
+
+    Configurations are the same for both bodies.
+    """
+    if PELVIS in body.effectors:
+        return body, PELVIS
+    name = body.segments[0].name
+    while name in body.effectors:
+        name += "_root"
+    root = Effector(name, body.segments[0].name, np.zeros(3))
+    return replace(body, effectors={**body.effectors, name: root}), name
+
+
+REFLECTION = np.array([1.0, -1.0, 1.0])
+"""What the reflection in the sagittal plane does to the coordinates of a point."""
 
 
 def limbs_of(body: BodyModel) -> tuple[Limb, ...]:

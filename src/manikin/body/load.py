@@ -9,7 +9,7 @@ import numpy as np
 from manikin.body.model import BodyModel
 from manikin.body.segments import Segment
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray, finite_number
+from manikin.numerics.spatial import FloatArray, finite_number
 
 HANDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"left": ("left_hand",), "right": ("right_hand",), "both": ("left_hand", "right_hand")}

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-import manikin.steady_boxes  # noqa: F401  (before the first distance)
+import manikin.runtime.coal_workarounds  # noqa: F401  (before the first distance)
 from manikin.body.segments import (
     Effector,
     Hinge,
@@ -25,9 +25,9 @@ from manikin.body.segments import (
     hinges_of,
     segments_by_name,
 )
-from manikin.display import Displayed
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray, frozen_array
+from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.runtime.display import Displayed
 
 OFF_AXIS = "off axis"
 """Value of ``masses`` in a signature of :attr:`BodyModel.off_axis_masses`."""

@@ -5,6 +5,8 @@ nothing else, so that the engines cannot disagree about what the body is.
 
 In the zero posture all segment frames are parallel to the world: x forward, y to
 the left, z up.
+
+Also here. Triangles of the body's collision shapes.
 """
 
 from collections.abc import Mapping
@@ -13,11 +15,12 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
+import trimesh
 from numpy.typing import ArrayLike
 
 from manikin.contact import ContactKind
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray, check_rotation, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, check_rotation, finite_number, frozen_array
 
 
 class ShapeKind(StrEnum):
@@ -296,3 +299,36 @@ def segments_by_name(segments: tuple[Segment, ...]) -> Mapping[str, Segment]:
     if twice:
         raise BodyError(f"hinge {twice[0]!r} occurs twice; valid: unique names")
     return index
+
+
+def segment_triangles(segment: Segment, rounds: int = 24) -> tuple[FloatArray, np.ndarray] | None:
+    """Vertices (n, 3) [m] and faces (m, 3) of all shapes in the segment's frame, or None.
+
+    Args:
+        segment: The segment.
+        rounds: Corners of the round cross-section of a capsule.
+    """
+    parts = [_placed(shape, rounds) for shape in segment.shapes]
+    if not parts:
+        return None
+    whole = trimesh.util.concatenate(parts)
+    return np.asarray(whole.vertices), np.asarray(whole.faces)
+
+
+def _placed(shape: Shape, rounds: int) -> trimesh.Trimesh:
+    mesh = _mesh(shape, rounds)
+    placement = np.eye(4)
+    placement[:3, :3], placement[:3, 3] = shape.rotation, shape.translation
+    mesh.apply_transform(placement)
+    return mesh
+
+
+def _mesh(shape: Shape, rounds: int) -> trimesh.Trimesh:
+    if shape.kind is ShapeKind.BOX:
+        return trimesh.creation.box(shape.size)
+    if shape.kind is ShapeKind.SPHERE:
+        return trimesh.creation.icosphere(subdivisions=3 if rounds > 16 else 2, radius=float(shape.size[0]))
+    radius, length = (float(value) for value in shape.size)
+    capsule = trimesh.creation.capsule(height=length, radius=radius, count=[rounds, rounds])
+    capsule.apply_translation(-capsule.bounds.mean(axis=0))  # trimesh does not centre it
+    return capsule

@@ -23,7 +23,7 @@ from types import MappingProxyType
 import numpy as np
 
 from manikin.errors import BodyError
-from manikin.spatial import GRAVITY, finite_number
+from manikin.numerics.spatial import GRAVITY, finite_number
 
 DEFAULT_AGE = 30.0
 """Age of a body that was given none [years]."""

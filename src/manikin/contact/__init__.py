@@ -1,26 +1,21 @@
 """Contacts, stances and their sequences: plain data, no geometry engine."""
 
 from manikin.contact.contact import (
+    BODY_WEIGHTS_CAP,
+    FRICTION_MODELS,
     Contact,
     ContactKind,
+    ContactModel,
+    FrictionModel,
     SolePart,
+    default_normal_force_cap,
     grasp,
     point,
     sole,
     sole_part,
     soles_overlap,
 )
-from manikin.contact.model import (
-    BODY_WEIGHTS_CAP,
-    FRICTION_MODELS,
-    ContactModel,
-    FrictionModel,
-    default_normal_force_cap,
-)
-from manikin.contact.rolling import Rolling, roll_feet
-from manikin.contact.schedule import ContactSchedule
-from manikin.contact.sequence import Phase, StanceSequence, Swing
-from manikin.contact.stance import Stance
+from manikin.contact.stance import ContactSchedule, Phase, Rolling, Stance, StanceSequence, Swing, roll_feet
 
 __all__ = [
     "BODY_WEIGHTS_CAP",

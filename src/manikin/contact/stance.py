@@ -1,12 +1,33 @@
-"""A stance: the contacts that hold the body at one time."""
+"""A stance: the contacts that hold the body at one time.
 
+Also here. A sequence of stances with the bounds of their durations. When each stance of a sequence is held.
+Feet that roll: each support of a foot as heel, full sole and toes ([Qiu2012]_ 7.4.2, left open there).
+
+The expansion is our own. A foot lands on the edge of its heel while the other one still stands
+on its full sole, and rises onto its toes when the other one already does: the admissible wrenches
+of such a phase contain those of the full sole alone, so rolling never costs margin against
+single support.
+"""
+
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from manikin.contact.contact import Contact, ContactKind
-from manikin.contact.model import ContactModel, FrictionModel, default_normal_force_cap
-from manikin.display import Displayed
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.contact.contact import (
+    Contact,
+    ContactKind,
+    ContactModel,
+    FrictionModel,
+    SolePart,
+    default_normal_force_cap,
+    sole_part,
+)
 from manikin.errors import ContactError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.runtime.display import Displayed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,3 +129,244 @@ class Stance(Displayed):
             return self
         cap = default_normal_force_cap(mass)
         return Stance(self.contacts, model=replace(self.model, normal_force_cap=cap))
+
+
+@dataclass(frozen=True, eq=False)
+class Phase:
+    """A stance and how long it may last.
+
+    Attributes:
+        stance: The contacts held during the phase.
+        min_duration: Lower bound [s], > 0.
+        max_duration: Upper bound [s], or None.
+    """
+
+    stance: Stance
+    min_duration: float = 0.1
+    max_duration: float | None = None
+
+    def __post_init__(self) -> None:
+        finite_number(self.min_duration, "phase min_duration [s]", above=0.0, error=ContactError)
+        if self.max_duration is not None:
+            finite_number(
+                self.max_duration, "phase max_duration [s]", at_least=self.min_duration, error=ContactError
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """One flight of an effector from a contact it leaves to the one it makes.
+
+    Attributes:
+        effector: Name of the flying effector.
+        first_phase: Index of the first phase in which it flies.
+        last_phase: Index of the last one (inclusive).
+        start: Contact left, or None when it was free from the beginning.
+        end: Contact made, or None when it stays free to the end.
+    """
+
+    effector: str
+    first_phase: int
+    last_phase: int
+    start: Contact | None
+    end: Contact | None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StanceSequence(Displayed):
+    """Stances in order; consecutive ones share what the motion holds on to.
+
+    Attributes:
+        phases: At least one phase.
+    """
+
+    phases: tuple[Phase, ...]
+
+    def __init__(self, phases: Sequence[Phase]) -> None:
+        if not phases:
+            raise ContactError("stance sequence is empty; valid: at least one phase")
+        for number, (before, after) in enumerate(itertools.pairwise(phases)):
+            for contact in after.stance:
+                name = contact.effector
+                if name in before.stance and not contact.same_place(before.stance[name]):
+                    raise ContactError(
+                        f"effector {name!r} slides between phases {number} and {number + 1}; "
+                        "valid: a phase without its contact in between"
+                    )
+        object.__setattr__(self, "phases", tuple(phases))
+
+    def __len__(self) -> int:
+        return len(self.phases)
+
+    def __iter__(self) -> Iterator[Phase]:
+        return iter(self.phases)
+
+    def __getitem__(self, index: int) -> Phase:
+        return self.phases[index]
+
+    @property
+    def effectors(self) -> tuple[str, ...]:
+        """Every effector that is ever in contact, in order of first use."""
+        return tuple(dict.fromkeys(name for phase in self.phases for name in phase.stance.effectors))
+
+    def swings(self) -> tuple[Swing, ...]:
+        """Every flight of every effector, ordered by its first phase."""
+        found: list[Swing] = []
+        for effector in self.effectors:
+            found.extend(self._swings_of(effector))
+        return tuple(sorted(found, key=lambda swing: (swing.first_phase, swing.effector)))
+
+    def _swings_of(self, effector: str) -> Iterator[Swing]:
+        held = [effector in phase.stance for phase in self.phases]
+        index = 0
+        while index < len(held):
+            if held[index]:
+                index += 1
+                continue
+            last = index
+            while last + 1 < len(held) and not held[last + 1]:
+                last += 1
+            start = self.phases[index - 1].stance[effector] if index > 0 else None
+            end = self.phases[last + 1].stance[effector] if last + 1 < len(held) else None
+            yield Swing(effector, index, last, start, end)
+            index = last + 1
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactSchedule(Displayed):
+    """A stance sequence with its key instants.
+
+    Attributes:
+        sequence: The stances, one per phase.
+        instants: (phases + 1,) start of each phase and end of the last [s], increasing.
+    """
+
+    sequence: StanceSequence
+    instants: FloatArray
+
+    def facts(self) -> dict[str, str]:
+        """What a reader wants to know first."""
+        return {"phases": str(len(self.sequence)), "end": f"{self.instants[-1]:.2f} s"}
+
+    def __init__(self, sequence: StanceSequence, instants: ArrayLike) -> None:
+        times = frozen_array(instants, "schedule instants [s]", (len(sequence) + 1,), ContactError)
+        if not np.all(np.diff(times) > 0):
+            raise ContactError(f"schedule instants are {times.tolist()}; valid: strictly increasing seconds")
+        object.__setattr__(self, "sequence", sequence)
+        object.__setattr__(self, "instants", times)
+
+    @property
+    def durations(self) -> FloatArray:
+        """(phases,) duration of each phase [s]."""
+        return np.diff(self.instants)
+
+    def phase_at(self, time: ArrayLike) -> NDArray[np.int64]:
+        """Index of the phase at each time; the half-open ``[start, end)``, the last one closed.
+
+        Args:
+            time: Scalar or (n,) [s]; times outside are given the first or the last phase.
+        """
+        index = np.searchsorted(self.instants, time, side="right") - 1
+        return np.clip(index, 0, len(self.sequence) - 1)
+
+    def stance_at(self, time: float) -> Stance:
+        """Return the stance held at ``time`` [s]."""
+        return self.sequence[int(self.phase_at(time))].stance
+
+    def support(self, time: ArrayLike, effectors: tuple[str, ...]) -> NDArray[np.bool_]:
+        """(n, effectors) whether each effector is in contact at each time."""
+        table = np.array([[name in phase.stance for name in effectors] for phase in self.sequence])
+        return table[self.phase_at(np.atleast_1d(time))]
+
+    def settling(self, time: ArrayLike, effector: str) -> NDArray[np.bool_]:
+        """(n,) whether the contact of an effector may still slide to its place at each time."""
+        times = np.atleast_1d(np.asarray(time, dtype=np.float64))
+        settling = np.zeros(len(times), dtype=bool)
+        held = False
+        for phase, start in zip(self.sequence, self.instants, strict=False):
+            carries = effector in phase.stance
+            if carries and not held and (lasting := phase.stance[effector].settle) > 0.0:
+                settling |= (times >= start) & (times < start + lasting)
+            held = carries
+        return settling
+
+    def swing_interval(self, swing: Swing) -> tuple[float, float]:
+        """Lift-off and landing time of a swing [s]."""
+        return float(self.instants[swing.first_phase]), float(self.instants[swing.last_phase + 1])
+
+
+@dataclass(frozen=True)
+class Rolling:
+    """How feet roll.
+
+    Attributes:
+        heel: Least time on the heel's edge after landing [s].
+        toes: Least time on the toes before lift-off [s].
+        flat: Least time in between during which both feet lie flat [s].
+        stretch: The phases on heel or toes last at most this many times their least time.
+    """
+
+    heel: float = 0.08
+    toes: float = 0.14
+    flat: float = 0.04
+    stretch: float = 1.5
+
+    def __post_init__(self) -> None:
+        for name in ("heel", "toes", "flat"):
+            finite_number(getattr(self, name), f"rolling {name} [s]", above=0.0, error=ContactError)
+        finite_number(self.stretch, "rolling stretch", at_least=1.0, error=ContactError)
+
+
+def roll_feet(sequence: StanceSequence, hinge: float, rolling: Rolling | None = None) -> StanceSequence:
+    """Split every phase in which a foot lands or leaves beside another full contact.
+
+    The phases of a foot keep its place; the parts' shares are taken from the split phase's least
+    duration, which is never shortened.
+
+    Args:
+        sequence: Stances with full soles.
+        hinge: Where the hinge of the toes crosses a sole's x axis [m].
+        rolling: Least durations of the parts.
+    """
+    rolling = rolling or Rolling()
+    phases: list[Phase] = []
+    for index in range(len(sequence)):
+        phases.extend(_split(sequence, index, hinge, rolling))
+    return StanceSequence(phases)
+
+
+def _split(sequence: StanceSequence, index: int, hinge: float, rolling: Rolling) -> Iterator[Phase]:
+    phase = sequence[index]
+    landing = _changing(phase.stance, sequence[index - 1].stance) if index > 0 else ()
+    leaving = _changing(phase.stance, sequence[index + 1].stance) if index + 1 < len(sequence) else ()
+    taken = (rolling.heel if landing else 0.0) + (rolling.toes if leaving else 0.0)
+    if landing:
+        stance = _with_part(phase.stance, landing, SolePart.HEEL, hinge)
+        yield Phase(stance, rolling.heel, rolling.stretch * rolling.heel)
+    if landing or leaving:
+        least = max(phase.min_duration - taken, rolling.flat)
+        most = None if phase.max_duration is None else max(phase.max_duration - taken, least)
+        yield replace(phase, min_duration=least, max_duration=most)
+    else:
+        yield phase
+    if leaving:
+        stance = _with_part(phase.stance, leaving, SolePart.TOES, hinge)
+        yield Phase(stance, rolling.toes, rolling.stretch * rolling.toes)
+
+
+def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:
+    """Soles that ``other`` lacks; none when nothing else would be left to stand on."""
+    changing = tuple(
+        contact.effector
+        for contact in stance
+        if contact.kind is ContactKind.SOLE and contact.effector not in other
+    )
+    staying = [contact for contact in stance if contact.effector not in changing]
+    return changing if any(contact.kind is ContactKind.SOLE for contact in staying) else ()
+
+
+def _with_part(stance: Stance, effectors: tuple[str, ...], part: SolePart, hinge: float) -> Stance:
+    contacts: list[Contact] = [
+        sole_part(contact, part, hinge) if contact.effector in effectors else contact for contact in stance
+    ]
+    return stance.with_contacts(contacts)

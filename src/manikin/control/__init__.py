@@ -1,8 +1,7 @@
 """Control: weighted multi-task inverse dynamics that follows a planned motion."""
 
-from manikin.control.build_qp import ControlProblem, QuadraticProgram, build_qp
+from manikin.control.build_qp import ControlProblem, build_qp
 from manikin.control.controller import Controller, ControlOutput
-from manikin.control.force_wish import ForceWish
 from manikin.control.settings import (
     ControlSettings,
     Impedance,
@@ -12,7 +11,7 @@ from manikin.control.settings import (
     TaskWeights,
 )
 from manikin.control.supports import SupportMode, SupportState
-from manikin.control.tasks import AccelerationTask
+from manikin.control.tasks import AccelerationTask, ForceWish
 
 __all__ = [
     "AccelerationTask",
@@ -23,7 +22,6 @@ __all__ = [
     "ForceWish",
     "Impedance",
     "Impedances",
-    "QuadraticProgram",
     "ReturnSettings",
     "SupportMode",
     "SupportSettings",

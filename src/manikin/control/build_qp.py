@@ -6,51 +6,15 @@ pelvis) and the torque limits.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from manikin.control.contact_forces import ContactForceBasis
 from manikin.control.dynamics import DynamicsState
+from manikin.control.edge_forces import ContactForceBasis
 from manikin.control.tasks import AccelerationTask
-from manikin.spatial import FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class QuadraticProgram:
-    """Minimise ``x' hessian x / 2 + gradient' x`` under two-sided rows and bounds.
-
-    Attributes:
-        hessian: (n, n) symmetric, positive definite.
-        gradient: (n,).
-        rows: (m, n).
-        rows_lower: (m,).
-        rows_upper: (m,); equal to ``rows_lower`` in the first ``equalities`` rows.
-        lower: (n,).
-        upper: (n,).
-        equalities: Number of leading rows that are equalities.
-    """
-
-    hessian: FloatArray
-    gradient: FloatArray
-    rows: FloatArray
-    rows_lower: FloatArray
-    rows_upper: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    equalities: int
-
-    def violation(self, x: FloatArray) -> float:
-        """Largest violation of a row or bound at ``x`` (n,)."""
-        image = self.rows @ x
-        gaps = (self.rows_lower - image, image - self.rows_upper, self.lower - x, x - self.upper)
-        return float(max(0.0, *(gap.max() for gap in gaps if gap.size)))
-
-    def without_bounds(self, start: int, end: int) -> "QuadraticProgram":
-        """Return the same program with the variables ``start`` to ``end`` (exclusive) unbounded."""
-        lower, upper = self.lower.copy(), self.upper.copy()
-        lower[start:end], upper[start:end] = -np.inf, np.inf
-        return replace(self, lower=lower, upper=upper)
+from manikin.numerics.qp import QuadraticProgram
+from manikin.numerics.spatial import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

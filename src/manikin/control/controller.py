@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, with_root
-from manikin.body.limb import hanging_segment
+from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, SolePart
 from manikin.control.build_qp import (
     ControlProblem,
@@ -16,7 +16,8 @@ from manikin.control.build_qp import (
     build_qp,
     joint_acceleration_bounds,
 )
-from manikin.control.contact_forces import (
+from manikin.control.dynamics import Dynamics, DynamicsState
+from manikin.control.edge_forces import (
     ContactGeometry,
     contact_force_basis,
     contact_geometry,
@@ -24,20 +25,13 @@ from manikin.control.contact_forces import (
     segment_key,
     touches,
 )
-from manikin.control.dynamics import Dynamics, DynamicsState
-from manikin.control.force_wish import ForceWish
-from manikin.control.plan_return import (
-    Deviation,
-    PlanClock,
-    deviation_from_plan,
-    returning_acceleration,
-)
+from manikin.control.plan_return import Deviation, PlanClock, deviation_from_plan, returning_acceleration
 from manikin.control.reference import Reference, ReferenceSample
 from manikin.control.settings import ControlSettings, Impedance
-from manikin.control.solver import QPSolution, make_solver
 from manikin.control.supports import SupportMode, SupportState, SupportSwitch
 from manikin.control.tasks import (
     AccelerationTask,
+    ForceWish,
     angular_momentum_task,
     com_task,
     landing_reference,
@@ -49,7 +43,8 @@ from manikin.control.tasks import (
     swing_task,
 )
 from manikin.motion import Motion
-from manikin.spatial import GRAVITY, FloatArray, frozen_array
+from manikin.numerics.qp import QPSolution, make_solver
+from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
 
 YIELDING = 0.2
 """Stiffness with which a hand that should feel a force is held at its place, relative to a stance's."""

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel
-from manikin.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray
 
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

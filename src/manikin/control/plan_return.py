@@ -27,14 +27,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manikin.balance.polygon import convex_polygon
 from manikin.contact import ContactKind
-from manikin.control.balance_recovery.support_area import SupportArea
 from manikin.control.dynamics import DynamicsState
+from manikin.control.recovery.standing import SupportArea
 from manikin.control.reference import ReferenceSample
 from manikin.control.settings import ReturnSettings
 from manikin.control.supports import SupportMode, SupportState
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.numerics.polygon import convex_polygon
+from manikin.numerics.spatial import GRAVITY, FloatArray
 
 LEAST_HEIGHT = 0.2
 """A centre of mass lower than this over its soles is no pendulum's [m]."""

@@ -8,7 +8,7 @@ import pinocchio as pin
 from manikin.body import BodyModel
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray
 
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

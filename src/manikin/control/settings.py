@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from manikin.contact import BODY_WEIGHTS_CAP, Contact, SolePart
 from manikin.errors import InputError
-from manikin.spatial import finite_number
+from manikin.numerics.spatial import finite_number
 
 
 @dataclass(frozen=True)

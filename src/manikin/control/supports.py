@@ -9,7 +9,7 @@ import numpy as np
 
 from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.control.settings import SupportSettings
-from manikin.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray
 
 _FIRST_SHARE = 0.05
 """Load share at touch-down, and of a foot that lands early until its planned landing."""

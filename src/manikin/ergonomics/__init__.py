@@ -1,15 +1,19 @@
 """Ergonomics of any motion: RULA and REBA, torques against strength, effort, the lowest margin."""
 
 from manikin.ergonomics.assessment import Assessment, PosturalAssessment, assess_posture
-from manikin.ergonomics.bearing import Bearing, bearing_of
-from manikin.ergonomics.circumstances import Circumstances
-from manikin.ergonomics.effort import CumulativeEffort, cumulative_effort
-from manikin.ergonomics.margin import LowestMargin, lowest_margin
+from manikin.ergonomics.body_parts import Bearing, bearing_of
 from manikin.ergonomics.postural_angles import ArmAngles, PosturalAngles, postural_angles, upright_neck
-from manikin.ergonomics.reba import RebaSteps, reba_action_level, reba_score
-from manikin.ergonomics.report import Ergonomics, ergonomics_of
-from manikin.ergonomics.rula import RulaSteps, rula_action_level, rula_score
-from manikin.ergonomics.strength import JointStrength, joint_strength
+from manikin.ergonomics.report import Ergonomics, LowestMargin, ergonomics_of, lowest_margin
+from manikin.ergonomics.rula_reba import (
+    RebaSteps,
+    RulaSteps,
+    reba_action_level,
+    reba_score,
+    rula_action_level,
+    rula_score,
+)
+from manikin.ergonomics.scoring import Circumstances
+from manikin.ergonomics.strength import CumulativeEffort, JointStrength, cumulative_effort, joint_strength
 
 __all__ = [
     "ArmAngles",

@@ -18,7 +18,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.ergonomics.parts import (
+from manikin.ergonomics.body_parts import (
     SIDES,
     Parts,
     joint_rotation,
@@ -28,7 +28,7 @@ from manikin.ergonomics.parts import (
     twist_about_z,
 )
 from manikin.errors import BodyError
-from manikin.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray
 
 SIDEWAYS = np.deg2rad(45.0)
 """An upper arm lifted further sideways than this has no angle in the sagittal plane worth the name; ours."""

@@ -1,24 +1,190 @@
-"""Everything that ergonomics says about one motion, in one report."""
+"""Everything that ergonomics says about one motion, in one report.
+
+Also here. Where a motion comes nearest to losing its balance, and which contact ends it there.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from manikin.body import BodyModel
-from manikin.contact import ContactSchedule
-from manikin.display import Displayed
+from manikin.balance import WrenchPolytope, stability_margins, wrench_polytopes
+from manikin.balance.wrench import LimitingConstraint
+from manikin.balance.zmp import contact_wrench
+from manikin.body import BodyModel, Configuration
+from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
+from manikin.contact import Contact, ContactSchedule, Stance, default_normal_force_cap, point, sole
 from manikin.ergonomics.assessment import PosturalAssessment, assess_posture
-from manikin.ergonomics.circumstances import Circumstances
-from manikin.ergonomics.effort import CumulativeEffort, cumulative_effort
-from manikin.ergonomics.margin import FRICTION, LowestMargin, lowest_margin
-from manikin.ergonomics.parts import parts_of
-from manikin.ergonomics.strength import LOADED, JointStrength, joint_strength
+from manikin.ergonomics.body_parts import parts_of
+from manikin.ergonomics.scoring import Circumstances
+from manikin.ergonomics.strength import (
+    LOADED,
+    CumulativeEffort,
+    JointStrength,
+    cumulative_effort,
+    joint_strength,
+)
 from manikin.errors import BodyError
 from manikin.motion import Motion
-from manikin.spatial import FloatArray
+from manikin.motion.dynamics import centroidal_motion
+from manikin.numerics.spatial import FloatArray, finite_number, wrench_about
+from manikin.runtime.display import Displayed
+
+FRICTION = 0.8
+"""Coefficient of friction of contacts that only the motion tells of."""
+
+AGREES = 0.5
+"""Difference up to which a margin counts as reproduced [N.m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class LowestMargin:
+    """Smallest margin of a motion.
+
+    Attributes:
+        value: In ``unit``.
+        unit: ``"N.m"``, or ``"N"`` of a point mass planned in the force space.
+        time: When [s].
+        supports: Effectors in contact then.
+        limiting: Nearest face of the wrench polytope then, in words; None with its reason in ``unknown``.
+        again: Margin that the stance found gives, to hold against ``value`` [N.m]; None without a stance.
+        stance: ``"planned contacts"`` or ``"effectors in contact"``: from what the stance was rebuilt.
+        unknown: Why there is no limiting contact.
+    """
+
+    value: float
+    unit: str
+    time: float
+    supports: tuple[str, ...]
+    limiting: LimitingConstraint | None = None
+    again: float | None = None
+    stance: str | None = None
+    unknown: str | None = None
+
+    @property
+    def reproduced(self) -> bool:
+        """Whether the stance found gives the margin of the motion, within :data:`AGREES` or 1 %."""
+        return self.again is not None and abs(self.again - self.value) <= max(AGREES, 0.01 * abs(self.value))
+
+
+def lowest_margin(
+    body: BodyModel, motion: Motion, schedule: ContactSchedule | None = None, *, friction: float = FRICTION
+) -> LowestMargin | None:
+    """Find the smallest margin and its limiting contact.
+
+    With the planned contacts the stance is the one among the phase of that instant and its neighbours (an
+    executed motion may be late) that gives the margin of the motion best. Without them it is rebuilt from the
+    effectors in contact: soles as large as the body's, points at the hands, the patch of the buttocks.
+
+    Args:
+        body: Who moves.
+        motion: Its motion; instants whose margin is NaN are passed over.
+        schedule: The planned contacts.
+        friction: Coefficient of contacts that the schedule does not tell of.
+
+    Returns:
+        None if the margin is not known at any instant.
+
+    Raises:
+        InputError: If the friction is not above 0.
+    """
+    finite_number(friction, "friction", above=0.0)
+    if not np.isfinite(motion.margin).any():
+        return None
+    row = int(np.nanargmin(motion.margin))
+    on = tuple(name for name, held in zip(motion.contact_names, motion.support[row], strict=True) if held)
+    found = LowestMargin(float(motion.margin[row]), motion.margin_unit, float(motion.time[row]), on)
+    if motion.margin_unit != "N.m" or body.is_point_mass:
+        return replace(found, unknown="the margin of a point mass in the force space has no stance")
+    if schedule is not None:
+        return _of_schedule(found, body, motion, schedule, row)
+    stance = rebuilt_stance(body, motion, row, friction)
+    if not len(stance):
+        return replace(found, unknown="nothing is in contact at that instant")
+    (W,) = wrench_polytopes([stance])
+    com, wrench = _dynamic_wrench(body, motion, row)
+    return replace(
+        found,
+        limiting=W.limiting(wrench_about(wrench, W.reference), com),
+        again=_margin_margin(W, wrench, com),
+        stance="effectors in contact",
+    )
+
+
+def rebuilt_stance(body: BodyModel, motion: Motion, row: int, friction: float = FRICTION) -> Stance:
+    """Contacts of one frame at the poses of the effectors; effectors that can make none are left out.
+
+    Args:
+        body: Who moves.
+        motion: Its motion.
+        row: The frame.
+        friction: Of every contact.
+    """
+    configuration = Configuration(body, motion.q[row])
+    contacts = []
+    for name, held in zip(motion.contact_names, motion.support[row], strict=True):
+        if held and name in body.effectors:
+            contacts.append(_contact(body, configuration, name, friction))
+    return Stance(contacts, default_normal_force_cap(body.mass))
+
+
+def _contact(body: BodyModel, configuration: Configuration, name: str, friction: float) -> Contact:
+    """A sole of a foot, the patch of the buttocks, else a point."""
+    rotation, place = configuration.effector_placement(name)
+    size = None
+    if name.endswith("foot") and body.sole_length is not None and body.sole_width is not None:
+        size = body.sole_length, body.sole_width
+    if name == "buttocks" and body.stature is not None:
+        size = SEAT_LENGTH * body.stature, SEAT_WIDTH * body.stature
+    if size is None:
+        return point(name, place, rotation=rotation, friction=friction)
+    return sole(name, place, rotation=rotation, length=size[0], width=size[1], friction=friction)
+
+
+def _of_schedule(
+    found: LowestMargin, body: BodyModel, motion: Motion, schedule: ContactSchedule, row: int
+) -> LowestMargin:
+    com, wrench = _dynamic_wrench(body, motion, row)
+    wrenches = [wrench]
+    measured = contact_wrench(_one_frame(motion, row), schedule)[0]
+    if np.isfinite(measured).all() and measured.any():
+        wrenches.insert(0, measured)
+    phase = int(schedule.phase_at(found.time))
+    near = [phase, phase - 1, phase + 1]
+    polytopes = wrench_polytopes([
+        schedule.sequence[number].stance.bounded(body.mass)
+        for number in near
+        if 0 <= number < len(schedule.sequence) and len(schedule.sequence[number].stance)
+    ])  # fmt: skip
+    if not polytopes:
+        return replace(found, unknown="nothing is planned to be in contact at that instant")
+    pairs: list[tuple[WrenchPolytope, FloatArray]] = [(W, wrench) for W in polytopes for wrench in wrenches]
+    W, wrench = min(pairs, key=lambda pair: abs(_margin_margin(*pair, com) - found.value))
+    return replace(
+        found,
+        limiting=W.limiting(wrench_about(wrench, W.reference), com),
+        again=_margin_margin(W, wrench, com),
+        stance="planned contacts",
+    )
+
+
+def _one_frame(motion: Motion, row: int) -> Motion:
+    return replace(motion, **{name: array[row : row + 1] for name, array in motion.arrays().items()})
+
+
+def _margin_margin(W: WrenchPolytope, wrench: FloatArray, com: FloatArray) -> float:
+    """Margin about the CoM of a wrench (6,) about the world's origin [N.m]."""
+    return float(stability_margins(W, wrench_about(wrench, W.reference), com).wrench_about_com)
+
+
+def _dynamic_wrench(body: BodyModel, motion: Motion, row: int) -> tuple[FloatArray, FloatArray]:
+    """CoM (3,) and (6,) wrench about the world's origin that the motion needs of its contacts [N, N.m]."""
+    rows = slice(row, row + 1)
+    found = centroidal_motion(body, motion.q[rows], motion.v[rows], motion.a[rows])
+    return found.com[0], found.wrench[0]
+
 
 NO_TORQUES = "the motion has no joint torques"
 """Reason of strength and effort of a recording without inverse dynamics."""
@@ -114,7 +280,8 @@ def ergonomics_of(
         fraction: Share of the strength above which a joint counts as loaded.
         friction: Of contacts that the schedule does not tell of.
         untold: Segments about which a recording says nothing, as
-            :attr:`manikin.mocap.reconstruction.Reconstruction.neutral`; without the trunk no scores.
+            :attr:`manikin.recordings.reconstruction.proportions.Reconstruction.neutral`; without the trunk
+            no scores.
         lowest: The lowest margin, where it is known already.
 
     Raises:

@@ -14,8 +14,8 @@ import numpy as np
 
 from manikin.body import BodyModel, Effector, Hinge, Limb, Segment, Shape
 from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance, StanceSequence
+from manikin.numerics.spatial import frozen_array
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
-from manikin.spatial import frozen_array
 
 Json = dict[str, Any]
 

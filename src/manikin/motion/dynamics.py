@@ -3,6 +3,9 @@
 Two ways lead there. The rate of the centroidal momentum gives the wrench with the centre of mass and the
 angular momentum (:func:`centroidal_motion`); the recursive Newton-Euler equations give it with the torques of
 a body without contacts (:class:`FreeDynamics`). Both agree to rounding.
+
+Also here. Rate of the centroidal momentum of sampled motions, with exact derivatives by raw coordinates.
+Kinematics of a whole-body spline at its samples, with what one pass over them gives at once.
 """
 
 from dataclasses import dataclass
@@ -12,7 +15,175 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
-from manikin.spatial import GRAVITY_VECTOR, FloatArray, rotation_from_quaternion
+from manikin.motion.configuration_spline import (
+    StateSamples,
+    TurnDerivatives,
+    states_from_raw,
+    tangent_map,
+    turn_derivatives,
+)
+from manikin.numerics.banded import SampledBasis
+from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, rotation_from_quaternion, skew
+from manikin.scene.distance import moves_by_joint
+from manikin.scene.distance_bounds import PlacedShapes, PlacementReader
+
+
+@dataclass(frozen=True, eq=False)
+class MomentumRate:
+    """Rate of linear and angular momentum about the centre of mass.
+
+    Attributes:
+        value: (n, 6) [N, N.m], world axes.
+        jacobians: Three (n, 6, nq) derivatives, by the raw coordinates, their rates and their
+            second derivatives.
+    """
+
+    value: FloatArray
+    jacobians: tuple[FloatArray, FloatArray, FloatArray]
+
+
+class MomentumRateSamples:
+    """Collects Pinocchio's derivatives sample by sample."""
+
+    def __init__(self, model: pin.Model, count: int) -> None:
+        self._model = model
+        self._mass = float(pin.computeTotalMass(model))
+        self._value = np.zeros((count, 6))
+        self._by_q, self._by_v, self._by_a = np.zeros((3, count, 6, model.nv))
+
+    def record(self, sample: int, data: pin.Data, states: StateSamples) -> None:
+        """Evaluate one sample; ``data`` then holds its kinematics and joint Jacobians."""
+        _, by_q, by_v, by_a = pin.computeCentroidalDynamicsDerivatives(
+            self._model, data, states.q[sample], states.v[sample], states.a[sample]
+        )
+        self._value[sample] = data.dhg.vector
+        self._by_q[sample], self._by_v[sample], self._by_a[sample] = by_q, by_v, by_a
+
+    @property
+    def linear_by_acceleration(self) -> FloatArray:
+        """(n, 3, nv) derivative of the linear part by ``a``: mass times the centre of mass' Jacobian."""
+        return self._by_a[:, :3]
+
+    def by_raw(
+        self, states: StateSamples, raw: tuple[FloatArray, FloatArray, FloatArray], tangent: FloatArray
+    ) -> MomentumRate:
+        """Differentiate by the raw coordinates (n, nq), their rates and second derivatives.
+
+        Args:
+            states: The states that were recorded.
+            raw: Raw spline values, rates and second derivatives.
+            tangent: (n, 7, 7) :func:`tangent_map` of the raw values.
+        """
+        turn = turn_derivatives(*(part[:, 3:7] for part in raw))
+        blocks = [np.zeros((*self._by_q.shape[:2], raw[0].shape[1])) for _ in range(3)]
+        for block, joints in zip(blocks, (self._by_q, self._by_v, self._by_a), strict=True):
+            block[:, :, 7:] = joints[:, :, 6:]
+        self._add_pelvis_turn(blocks, states, raw[2], tangent, turn)
+        blocks[2][:, :3, :3] = self._mass * np.eye(3)
+        return MomentumRate(self._value, (blocks[0], blocks[1], blocks[2]))
+
+    def _add_pelvis_turn(
+        self,
+        blocks: list[FloatArray],
+        states: StateSamples,
+        raw_second: FloatArray,
+        tangent: FloatArray,
+        turn: TurnDerivatives,
+    ) -> None:
+        # With the world velocity of the pelvis held, its velocity in the pelvis frame turns.
+        by_omega = self._by_v[:, :, 3:6] + self._by_a[:, :, :3] @ skew(states.v[:, :3])
+        by_alpha = self._by_a[:, :, 3:6]
+        # The whole body turns with the pelvis, and with it all of the momentum's rate but the
+        # part that the pelvis' world acceleration gives.
+        turning = self._value.copy()
+        turning[:, :3] -= self._mass * raw_second[:, :3]
+        pelvis_to_world = tangent[:, :3, :3].transpose(0, 2, 1)
+        turned = [
+            -skew(part) @ pelvis_to_world @ tangent[:, 3:6, 3:7] for part in (turning[:, :3], turning[:, 3:])
+        ]
+        blocks[0][:, :, 3:7] = (
+            np.concatenate(turned, axis=1) + by_omega @ turn.omega_by_value + by_alpha @ turn.alpha_by_value
+        )
+        blocks[1][:, :, 3:7] = by_omega @ turn.omega_by_rate + by_alpha @ turn.alpha_by_rate
+        blocks[2][:, :, 3:7] = by_alpha @ turn.alpha_by_second
+
+
+@dataclass(frozen=True, eq=False)
+class MotionSamples:
+    """A spline's states with their kinematics.
+
+    Attributes:
+        raw: Raw spline values, rates and second derivatives (n, nq) each.
+        states: Configurations, velocities and accelerations.
+        tangent: (n, 7, 7) :func:`~manikin.motion.configuration_spline.tangent_map`.
+        com: (n, 3) centre of mass [m].
+        com_jacobian: (n, 3, nv).
+        momentum: Rate of the centroidal momentum.
+        frames: (n, k, 4, 4) frame-to-world transforms of the frames asked for.
+        shapes: The collision shapes, with the joints' Jacobians.
+    """
+
+    raw: tuple[FloatArray, FloatArray, FloatArray]
+    states: StateSamples
+    tangent: FloatArray
+    com: FloatArray
+    com_jacobian: FloatArray
+    momentum: MomentumRate
+    frames: FloatArray
+    shapes: PlacedShapes
+
+
+class MotionSampler:
+    """Evaluates splines of one basis.
+
+    Args:
+        body: The body.
+        frames: Names of the effectors whose frames are needed.
+        basis: The spline's basis at the samples.
+    """
+
+    def __init__(self, body: BodyModel, frames: tuple[str, ...], basis: SampledBasis) -> None:
+        self._model: pin.Model = body.pinocchio
+        self._data = self._model.createData()
+        self._geometry, self._geometry_data = body.geometry, pin.GeometryData(body.geometry)
+        self._basis, self._mass = basis, body.mass
+        indices = [body.effector_frame(name) for name in frames]
+        self._shape_reader = PlacementReader(self._geometry_data.oMg)
+        self._frame_reader = PlacementReader(self._data.oMf, indices)
+        moves = moves_by_joint(self._model)
+        self._moving = [np.flatnonzero(moves[self._model.frames[index].parentJoint]) for index in indices]
+
+    def sample(self, points: FloatArray) -> MotionSamples:
+        """Evaluate the spline with control points (k, nq)."""
+        raw = (
+            self._basis.evaluate(points), self._basis.evaluate(points, 1), self._basis.evaluate(points, 2)
+        )  # fmt: skip
+        states, tangent = states_from_raw(*raw), tangent_map(raw[0])
+        n, model, data = len(states.q), self._model, self._data
+        momentum = MomentumRateSamples(model, n)
+        com, jacobians = np.empty((n, 3)), np.empty((n, 6, model.nv))
+        frames = np.empty((n, len(self._moving), 4, 4))
+        shapes = np.empty((n, self._geometry.ngeoms, 4, 4))
+        for s in range(n):
+            momentum.record(s, data, states)
+            pin.updateFramePlacements(model, data)
+            pin.updateGeometryPlacements(model, data, self._geometry, self._geometry_data)
+            com[s], jacobians[s] = data.com[0], data.J
+            self._frame_reader.read(frames[s])
+            self._shape_reader.read(shapes[s])
+        return MotionSamples(
+            raw, states, tangent, com, momentum.linear_by_acceleration / self._mass,
+            momentum.by_raw(states, raw, tangent), frames, PlacedShapes(shapes, jacobians),
+        )  # fmt: skip
+
+    def frame_jacobian(self, motion: MotionSamples, number: int) -> FloatArray:
+        """(n, 6, nv) linear, then angular velocity of frame ``number`` in world axes, per ``v``."""
+        columns = self._moving[number]
+        joints = motion.shapes.jacobians[:, :, columns]
+        out = np.zeros_like(motion.shapes.jacobians)
+        out[:, :3, columns] = joints[:, :3] - skew(motion.frames[:, number, :3, 3]) @ joints[:, 3:]
+        out[:, 3:, columns] = joints[:, 3:]
+        return out
 
 
 @dataclass(frozen=True, eq=False)

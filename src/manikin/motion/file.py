@@ -21,10 +21,8 @@ from typing import Any, TypeVar
 import h5py
 import numpy as np
 
-from manikin.atomic import atomic_path
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule
-from manikin.display import Displayed
 from manikin.errors import InputError, MotionFileError
 from manikin.motion.description import (
     body_from,
@@ -35,8 +33,10 @@ from manikin.motion.description import (
     schedule_from,
 )
 from manikin.motion.motion import Motion
+from manikin.runtime.display import Displayed
+from manikin.runtime.files import atomic_path
+from manikin.runtime.version import __version__
 from manikin.scene import Scene
-from manikin.version import __version__
 
 FORMAT = "manikin-motion"
 FORMAT_VERSION = 1

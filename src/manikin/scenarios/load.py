@@ -1,16 +1,185 @@
-"""Reading scenarios: the file, what it extends, the variant asked for and values set from outside."""
+"""Reading scenarios: the file, what it extends, the variant asked for and values set from outside.
 
-from collections.abc import Sequence
+Also here. ``extends``: a scenario file that is built on another one. ``variants``: named changes of a
+scenario, kept in its own file. Finding scenario files: built-in ones by name, others by path, either with a
+variant.
+"""
+
+import difflib
+from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from manikin.errors import ScenarioError
-from manikin.scenarios.extends import read_extended
-from manikin.scenarios.find import built_in, find_scenario
 from manikin.scenarios.scenario import Scenario
 from manikin.scenarios.schema import ScenarioFile
-from manikin.scenarios.tree import VARIANTS, Tree
-from manikin.scenarios.validation import validate
-from manikin.scenarios.variants import apply_variant, variants_of
+from manikin.scenarios.validation import place, validate
+from manikin.scenarios.yaml_reader import VARIANTS, Tree, merge, read_yaml
+
+EXTENDS = "extends"
+"""Key that names the scenario a file is built on; the first key of the file."""
+
+
+def read_extended(path: Path, above: tuple[Path, ...] = ()) -> Tree:
+    """Read a scenario file, laid over the one it extends, if any.
+
+    Args:
+        path: The file.
+        above: Files that extend this one, the first at the front.
+
+    Returns:
+        The content without the key ``extends``; relative mesh paths of an extended file in
+        another folder have become absolute.
+
+    Raises:
+        ScenarioError: One line, if a file cannot be read, is missing or extends itself.
+    """
+    tree = Tree(*read_yaml(path))
+    if not isinstance(tree.data, Mapping) or EXTENDS not in tree.data:
+        return tree
+    named = tree.data[EXTENDS]
+    here = place(str(path), (EXTENDS,), tree.lines)
+    if next(iter(tree.data)) != EXTENDS:
+        raise ScenarioError(f"{here} is not at the top; valid: the first key of the file")
+    if not isinstance(named, str) or not named.strip():
+        raise ScenarioError(f"{here} is {named!r}; valid: a built-in scenario or a scenario file")
+    try:
+        base_path, variant = find_scenario(named, path.parent)
+    except ScenarioError as error:
+        raise ScenarioError(f"{here} names what cannot be used: {error}") from None
+    chain = (*above, path.resolve())
+    if base_path.resolve() in chain:
+        raise ScenarioError(f"{here} is {named!r}, which leads back to {base_path}; valid: no circles")
+    base = read_extended(base_path, chain)
+    if variant is not None:
+        base = apply_variant(base, variant, str(base_path))
+    if base_path.resolve().parent != path.resolve().parent:
+        base = Tree(_with_absolute_meshes(base.data, base_path.resolve().parent), base.lines)
+    return merge(base, tree.without(EXTENDS))
+
+
+def _with_absolute_meshes(data: Any, folder: Path) -> Any:
+    if not isinstance(data, Mapping):
+        return data
+    changed = dict(data)
+    if isinstance(data.get("scene"), list):
+        changed["scene"] = [_with_absolute_mesh(entry, folder) for entry in data["scene"]]
+    if isinstance(data.get(VARIANTS), Mapping):
+        changed[VARIANTS] = {k: _with_absolute_meshes(v, folder) for k, v in data[VARIANTS].items()}
+    return changed
+
+
+def _with_absolute_mesh(entry: Any, folder: Path) -> Any:
+    if isinstance(entry, Mapping) and isinstance(entry.get("mesh"), str):
+        return {**entry, "mesh": str((folder / entry["mesh"]).resolve())}
+    return entry
+
+
+_NOT_IN_A_VARIANT = ("extends", VARIANTS)
+
+
+def variants_of(tree: Tree, source: str) -> dict[str, Tree]:
+    """Changes of each variant, in the order of the file.
+
+    Args:
+        tree: Content of a scenario file.
+        source: Its name, for messages.
+
+    Raises:
+        ScenarioError: If a variant is not a mapping or holds a key that only a file has.
+    """
+    found = tree.data.get(VARIANTS) if isinstance(tree.data, Mapping) else None
+    if found is None:
+        return {}
+    if not isinstance(found, Mapping):
+        here = place(source, (VARIANTS,), tree.lines)
+        raise ScenarioError(f"{here} is {found!r}; valid: a mapping of names and what they change")
+    for name, change in found.items():
+        here = place(source, (VARIANTS, name), tree.lines)
+        if not isinstance(name, str) or not name or set(name) & set("@/ "):
+            raise ScenarioError(f"{here} is a name that cannot be asked for; valid: no @, / or space")
+        if not isinstance(change, Mapping):
+            raise ScenarioError(f"{here} is {change!r}; valid: a mapping with what it changes")
+        for key in _NOT_IN_A_VARIANT:
+            if key in change:
+                raise ScenarioError(f"{here}.{key} is not for a variant; valid: the other keys")
+    return {name: tree.under(VARIANTS, name) for name in found}
+
+
+def apply_variant(tree: Tree, variant: str, source: str) -> Tree:
+    """Lay one variant over the scenario; the variants themselves stay.
+
+    The name of the result is ``NAME@VARIANT``, unless the variant gives one.
+
+    Args:
+        tree: Content of a scenario file.
+        variant: Name of the variant.
+        source: Name of the file, for messages.
+
+    Raises:
+        ScenarioError: If there is no such variant, in one line with the valid names.
+    """
+    known = variants_of(tree, source)
+    if variant not in known:
+        close = difflib.get_close_matches(variant, known, n=1)
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        valid = ", ".join(known) or "none, the scenario has no variants"
+        raise ScenarioError(f"{source}: has no variant {variant!r}; {hint}valid: {valid}")
+    change = known[variant]
+    merged = merge(tree, change)
+    if "name" in change.data or not isinstance(tree.data.get("name"), str):
+        return merged
+    return Tree({**merged.data, "name": f"{tree.data['name']}@{variant}"}, merged.lines)
+
+
+SUFFIXES = (".yaml", ".yml")
+
+
+def built_in() -> dict[str, Path]:
+    """Files of the built-in scenarios by name, sorted."""
+    folder = Path(str(resources.files("manikin.scenarios")))
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def find_scenario(name_or_path: str | Path, folder: Path = Path()) -> tuple[Path, str | None]:
+    """Find a scenario file and the variant that its name may carry.
+
+    Args:
+        name_or_path: ``"walls"``, ``"walls@trial-4"``, or the path of a YAML file, likewise with
+            or without ``@`` and a variant.
+        folder: Folder that a relative path starts from.
+
+    Returns:
+        The file, and the name of the variant or None.
+
+    Raises:
+        ScenarioError: If there is no such file, in one line with the valid names.
+    """
+    known, text = built_in(), str(name_or_path)
+    if isinstance(name_or_path, str) and not (text in known or (folder / text).exists()):
+        before, at, variant = text.rpartition("@")
+        if at and before and "/" not in variant:
+            return _find(before, folder, known), variant
+    return _find(name_or_path, folder, known), None
+
+
+def _find(name_or_path: str | Path, folder: Path, known: dict[str, Path]) -> Path:
+    if isinstance(name_or_path, str) and name_or_path in known:
+        return known[name_or_path]
+    path = folder / name_or_path
+    valid = f"valid: a scenario file (.yaml) or one of the built-in scenarios: {', '.join(known)}"
+    if not str(name_or_path).strip():
+        raise ScenarioError(f"scenario name is empty; {valid}")
+    if path.is_dir():
+        raise ScenarioError(f"{path}: is a directory; {valid}")
+    if not path.is_file():
+        close = difflib.get_close_matches(str(name_or_path), known, n=1)
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        raise ScenarioError(f"{path}: there is no such file; {hint}{valid}")
+    if path.suffix.lower() not in SUFFIXES:
+        raise ScenarioError(f"{path}: is not a scenario file by its name; {valid}")
+    return path
 
 
 def list_scenarios() -> dict[str, str]:
@@ -43,7 +212,7 @@ def load_scenario(
             variant as well.
         variant: Name of one of the file's variants.
         overrides: Values to set, ``"supports.friction=0.5"`` each; see
-            :func:`manikin.scenarios.overrides.override`.
+            :func:`manikin.scenarios.scenario.override`.
 
     Raises:
         ScenarioError: One line that names the file, the key, what was wrong and what is valid.

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from manikin.numerics.spatial import IDENTITY, PlanarTransform
 from manikin.scenarios.sections import ContactSection, StateSection
-from manikin.scenarios.validation import Moves, Section
-from manikin.spatial import IDENTITY, PlanarTransform
+from manikin.scenarios.validation import FrameMoves, Section
 
 TASK_GRID = 9
 """Decimals of the task frame's metres and degrees; direction components have three more."""
@@ -83,7 +83,7 @@ def moved_data(
         value = getattr(section, name)
         if value is None or name not in found:
             continue
-        kind = next((item for item in field.metadata if isinstance(item, Moves)), None)
+        kind = next((item for item in field.metadata if isinstance(item, FrameMoves)), None)
         if kind is None:
             found[name] = _moved_inside(value, found[name], transform, decimals)
         else:
@@ -137,9 +137,9 @@ def _rounded(values: Any, decimals: int) -> list[float]:
     return [round(float(value), decimals) + 0.0 for value in values]
 
 
-_MOVED: Mapping[Moves, Callable[[Any, PlanarTransform, int, Section], Any]] = {
-    Moves.POINT: _point,
-    Moves.DIRECTION: _direction,
-    Moves.HEADING: _heading,
-    Moves.ORIENTATION: _orientation,
+_MOVED: Mapping[FrameMoves, Callable[[Any, PlanarTransform, int, Section], Any]] = {
+    FrameMoves.POINT: _point,
+    FrameMoves.DIRECTION: _direction,
+    FrameMoves.HEADING: _heading,
+    FrameMoves.ORIENTATION: _orientation,
 }

@@ -1,7 +1,11 @@
-"""A scenario: the checked file, and the builders that turn it into the library's values."""
+"""A scenario: the checked file, and the builders that turn it into the library's values.
+
+Also here. ``--set KEY=VALUE``: single values of a scenario, changed from outside.
+"""
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -9,19 +13,94 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from manikin.contact import StanceSequence
-from manikin.display import Displayed
-from manikin.scenarios.overrides import override
+from manikin.errors import ScenarioError
+from manikin.numerics.spatial import PlanarTransform, finite_number
+from manikin.runtime.display import Displayed
 from manikin.scenarios.placement import FILE_GRID, TASK_GRID, moved_data
 from manikin.scenarios.schema import ScenarioFile
-from manikin.scenarios.tree import Tree
 from manikin.scenarios.validation import validate
 from manikin.scenarios.values import ScenarioValues
-from manikin.spatial import PlanarTransform, finite_number
+from manikin.scenarios.yaml_reader import NULL_IS_A_VALUE, VARIANTS, KeyPath, Tree, parse_value
 
 if TYPE_CHECKING:
     from manikin.body import BodyModel
-    from manikin.centroidal import CentroidalProblem, KeyframeProblem
+    from manikin.planning.com import CentroidalProblem, KeyframeProblem
     from manikin.scene import Scene
+
+
+RESOLVED = ("extends", VARIANTS)
+"""Keys that a scenario no longer has when it is loaded."""
+
+
+def override(tree: Tree, settings: Sequence[str]) -> Tree:
+    """Set single values.
+
+    A key is a dotted path; an entry of a list is meant by its number from 0, an obstacle also by
+    its name: ``scene.roof.position.2=0.4``.  The value is YAML; ``null`` removes the key or entry.
+
+    Args:
+        tree: Content of a scenario with its defaults; not changed.
+        settings: ``KEY=VALUE`` each, applied in order.
+
+    Returns:
+        The changed content, not yet checked.
+
+    Raises:
+        ScenarioError: One line, if a key leads nowhere or a value is not YAML.
+    """
+    changed = Tree(copy.deepcopy(tree.data), dict(tree.lines))
+    for setting in settings:
+        changed = _set(changed, setting)
+    return changed
+
+
+def _set(tree: Tree, setting: str) -> Tree:
+    key, equals, text = setting.partition("=")
+    parts = key.strip().split(".")
+    if not equals or not all(parts):
+        raise ScenarioError(f"--set {setting}: is not KEY=VALUE; valid: such as supports.friction=0.5")
+    source = f"--set {key.strip()}"
+    if parts[0] in RESOLVED:
+        raise ScenarioError(f"{source}: {parts[0]} cannot be set; valid: the keys of one scenario")
+    value = parse_value(text, source)
+    holder: Any = tree.data
+    path: KeyPath = ()
+    made: dict[KeyPath, str] = {}
+    for depth, part in enumerate(parts[:-1]):
+        step = _step(holder, part, parts[:depth], source)
+        path = (*path, step)
+        if isinstance(holder, dict) and step not in holder:
+            holder[step], made[path] = {}, source
+        holder = holder[step]
+    step = _step(holder, parts[-1], parts[:-1], source)
+    if value is not None or (*path, step) in NULL_IS_A_VALUE:
+        holder[step] = value
+        changed = (*path, step)
+    elif isinstance(holder, list):
+        holder.pop(int(step))
+        changed = path  # the entries behind it have moved
+    else:
+        holder.pop(step, None)
+        changed = (*path, step)
+    lines = {p: where for p, where in tree.lines.items() if p[: len(changed)] != changed}
+    return Tree(tree.data, {**lines, **made, changed: source})
+
+
+def _step(place: Any, part: str, before: Sequence[str], source: str) -> str | int:
+    """Key or index that ``part`` means in ``place``."""
+    if isinstance(place, dict):
+        return part
+    where = ".".join(before)
+    if not isinstance(place, list):
+        raise ScenarioError(f"{source}: {where} is {place!r}, which holds no {part!r}; valid: {where}=VALUE")
+    if part.isdigit() and int(part) < len(place):
+        return int(part)
+    names = [entry["name"] for entry in place if isinstance(entry, dict) and "name" in entry]
+    if part in names:
+        return names.index(part)
+    numbers = f"an entry from 0 to {len(place) - 1}" if place else "nothing, the list is empty"
+    valid = f"{numbers}, or {', '.join(names)}" if names else numbers
+    raise ScenarioError(f"{source}: {where} has no entry {part!r}; valid: {valid}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,7 +152,7 @@ class Scenario(Displayed, ScenarioValues):
         """Return the same scenario with single values set.
 
         Args:
-            settings: ``"supports.friction=0.5"`` each; see :func:`manikin.scenarios.overrides.override`.
+            settings: ``"supports.friction=0.5"`` each; see :func:`manikin.scenarios.scenario.override`.
 
         Raises:
             ScenarioError: One line, if a key is not known or a value is not valid.
@@ -129,7 +208,7 @@ class Scenario(Displayed, ScenarioValues):
         Raises:
             ScenarioError: If the body's data are out of range.
         """
-        from manikin.scenarios.world import build_body
+        from manikin.scenarios.values import build_body
 
         return build_body(self)
 

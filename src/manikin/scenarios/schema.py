@@ -8,18 +8,24 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from manikin.scenarios.sections.body import WORDS, BodySection
-from manikin.scenarios.sections.com_constraint import ComConstraintSection
-from manikin.scenarios.sections.contacts import ContactsSection
-from manikin.scenarios.sections.expect import Expectation, ExpectSection
-from manikin.scenarios.sections.obstacle import ObstacleSection
-from manikin.scenarios.sections.phase import EFFECTORS, MASSLESS_FEET
-from manikin.scenarios.sections.planning import PlanningSection
-from manikin.scenarios.sections.push import PushSection, RecoverySection
-from manikin.scenarios.sections.supports import SupportsSection
-from manikin.scenarios.sections.task import TaskSection
-from manikin.scenarios.sections.walking import WalkingSection
-from manikin.scenarios.sections.wholebody import WholebodySection
+from manikin.scenarios.sections.planning_sections import (
+    WORDS,
+    BodySection,
+    ComConstraintSection,
+    ContactsSection,
+    PlanningSection,
+    WholebodySection,
+)
+from manikin.scenarios.sections.support_sections import EFFECTORS, MASSLESS_FEET, SupportsSection
+from manikin.scenarios.sections.task_sections import (
+    Expectation,
+    ExpectSection,
+    ObstacleSection,
+    PushSection,
+    RecoverySection,
+    TaskSection,
+    WalkingSection,
+)
 from manikin.scenarios.validation import Name, Number, Positive, Section, Text, refuse
 
 

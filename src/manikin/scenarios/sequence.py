@@ -1,8 +1,16 @@
-"""The stances that a scenario lists, and whether they fit its scene."""
+"""The stances that a scenario lists, and whether they fit its scene.
 
+Also here. The contact that a section of a scenario or stance file describes. What the contacts of a scenario
+can carry, and on which part of a sole it may stand.
+"""
+
+import math
 from dataclasses import replace
 from itertools import combinations
 
+import numpy as np
+
+from manikin.body import BodyModel
 from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
 from manikin.contact import (
@@ -10,15 +18,110 @@ from manikin.contact import (
     Phase,
     Stance,
     StanceSequence,
+    grasp,
+    point,
     roll_feet,
+    sole,
     soles_overlap,
 )
 from manikin.errors import InputError
-from manikin.scenarios.contacts import build_contact
+from manikin.numerics.spatial import rotation_from_normal, rotation_from_rpy
+from manikin.planning.contacts import ContactRules
 from manikin.scenarios.sections import ContactSection, SoleSection
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.values import ScenarioValues
 from manikin.scene import Scene
+
+
+def build_contact(
+    effector: str,
+    entry: ContactSection,
+    friction: float,
+    default_sole: SoleSection,
+    *,
+    planning: bool = False,
+    force_cap: float | None = None,
+) -> Contact:
+    """Build one contact from its section and the defaults around it.
+
+    Args:
+        effector: Name of the effector.
+        entry: The contact's section.
+        friction: Coulomb coefficient where the contact gives none.
+        default_sole: Sole size where the contact gives none.
+        planning: Let ``default_sole`` shrink a sole the contact gives itself.
+        force_cap: Cap on the normal force where the contact gives none [N].
+
+    Raises:
+        ContactError: If a value is out of its range.
+    """
+    kind = entry.kind_for(effector)
+    if kind == "grasp":
+        rpy = None if entry.rpy_deg is None else np.radians(entry.rpy_deg)
+        return grasp(
+            effector,
+            entry.position,
+            max_force=(planning and entry.planning_max_force_N) or entry.max_force_N or 0.0,
+            max_moment=entry.max_moment_Nm or 0.0,
+            rotation=None if rpy is None else rotation_from_rpy(*rpy),
+        )
+    friction = entry.friction or friction
+    force_cap = entry.normal_force_cap_N or force_cap
+    if kind == "point":
+        return point(
+            effector, entry.position, friction=friction,
+            rotation=rotation_from_normal(entry.normal or (0.0, 0.0, 1.0), math.radians(entry.yaw_deg)),
+            normal_force_cap=force_cap,
+        )  # fmt: skip
+    own = entry.sole or default_sole
+    shrink = planning and entry.sole is not None
+    return sole(
+        effector,
+        entry.position,
+        math.radians(entry.yaw_deg),
+        length=min(own.length_m, default_sole.length_m) if shrink else own.length_m,
+        width=min(own.width_m, default_sole.width_m) if shrink else own.width_m,
+        friction=friction,
+        normal=entry.normal,
+        normal_force_cap=force_cap,
+        torsion_limit=entry.torsion_limit_Nm,
+        settle=entry.settle_s or 0.0,
+    )
+
+
+PATCH_WIDTH = 0.7
+"""Width of the front of a sole that has to lie on a hold, relative to the sole's."""
+
+HINGE_ROOM = 0.005
+"""Distance of that part to the hinge of the toes, which would give way [m]."""
+
+
+def contact_rules(values: ScenarioValues, body: BodyModel) -> ContactRules:
+    """Rules of the file's ``contacts`` for a body.
+
+    Args:
+        values: The scenario's values.
+        body: Its body; one without soles has no front of them.
+    """
+    options, patch = values.contacts, None
+    if options.forefoot_m is not None and body.sole_length and body.sole_width:
+        end = _toe_hinge(body) - HINGE_ROOM
+        patch = (end - options.forefoot_m, end, PATCH_WIDTH * body.sole_width)
+    return ContactRules(friction_of(values), options.grasp_force_N, 0.0, patch)
+
+
+def friction_of(values: ScenarioValues) -> float:
+    """Coulomb coefficient of the file's supports, or of its contacts where those are found."""
+    supports = values.file.supports
+    return values.contacts.friction if supports is None else supports.friction
+
+
+def _toe_hinge(body: BodyModel) -> float:
+    """Where the hinge of the toes crosses the sole's x axis; its tip without such a hinge [m]."""
+    foot = body.effector("left_foot")
+    toes = [segment for segment in body.segments if segment.parent == foot.segment and segment.hinges]
+    own = foot.rotation.T @ (toes[0].origin - foot.translation) if toes else None
+    return 0.5 * (body.sole_length or 0.0) if own is None else float(own[0])
 
 
 def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:

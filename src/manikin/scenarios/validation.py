@@ -22,7 +22,7 @@ from manikin.errors import ScenarioError
 Path = tuple[str | int, ...]
 
 
-class Moves(Enum):
+class FrameMoves(Enum):
     """How a value of a file changes with the frame of the world, as a mark in the annotation of its field."""
 
     POINT = "point"

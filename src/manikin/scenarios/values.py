@@ -9,10 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
+from manikin.body import (
+    BodyModel,
+    carrying,
+    creature_from_urdf,
+    human,
+    insect,
+    kudoh,
+    point_mass,
+    with_further_contacts,
+)
 from manikin.contact import ContactModel
 from manikin.errors import InputError, ScenarioError
-from manikin.scenarios.expressions import Expression
-from manikin.scenarios.heights import HeightBand, SupportLevel
+from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
+from manikin.scenarios.expressions import Expression, HeightBand, SupportLevel
 from manikin.scenarios.placement import start_heading_deg, task_frame
 from manikin.scenarios.schema import ScenarioFile
 from manikin.scenarios.sections import (
@@ -29,7 +39,6 @@ from manikin.scenarios.sections import (
 )
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.validation import place
-from manikin.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +79,7 @@ class ScenarioValues:
     def mass(self) -> float:
         """Body mass, without a load [kg]."""
         if self.file.body.model in ("urdf", "kudoh"):
-            from manikin.scenarios.world import build_body
+            pass
 
             return build_body(self).own_mass
         return self.file.body.mass_kg
@@ -335,3 +344,48 @@ class ScenarioValues:
 def _level(contacts: Mapping[str, ContactSection]) -> float:
     feet = [c.position[2] for name, c in contacts.items() if "foot" in name]
     return float(np.mean(feet or [c.position[2] for c in contacts.values()]))
+
+
+def build_body(values: ScenarioValues) -> BodyModel:
+    """Build the body; its soles have the size that the supports give.
+
+    Raises:
+        ScenarioError: If the body's data are out of range.
+    """
+    if values.file.body.model in ("insect", "urdf"):
+        return _creature(values)
+    load = values.file.body.load
+    if values.file.body.model == "kudoh":
+        return kudoh() if load is None else carrying(kudoh(), load.mass_kg, load.hand)
+    if values.is_point_mass:
+        return point_mass(values.mass)
+    data, sole = values.file.body, values.sole
+    length, width = (None, None) if sole is None else (sole.length_m, sole.width_m)
+    try:
+        body = human(
+            data.stature_m, data.mass_kg, data.sex, age=data.age, strength=data.strength,
+            sole_length=length, sole_width=width,
+        )  # fmt: skip
+        body = body if load is None else carrying(body, load.mass_kg, load.hand)
+        return with_further_contacts(body, data.further_contacts) if data.further_contacts else body
+    except InputError as error:
+        path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)
+        raise values.refused(path, error) from None
+
+
+def _creature(values: ScenarioValues) -> BodyModel:
+    """An insect, or the creature of a robot description."""
+    data = values.file.body
+    try:
+        if data.model == "insect":
+            return insect(data.length_m, data.mass_kg)
+        sole = data.sole
+        return creature_from_urdf(
+            values.folder / str(data.urdf),
+            {name: limb.model_dump() for name, limb in (data.limbs or {}).items()},
+            standing={name: float(np.deg2rad(angle)) for name, angle in (data.standing_deg or {}).items()},
+            sole_length=None if sole is None else sole.length_m,
+            sole_width=None if sole is None else sole.width_m,
+        )
+    except InputError as error:
+        raise values.refused(("body",), error) from None

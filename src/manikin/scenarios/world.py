@@ -1,67 +1,135 @@
-"""The body and the scene that a scenario describes."""
+"""The body and the scene that a scenario describes.
+
+Also here. Obstacles of a scenario file. Where the body is at the start of a scenario, before anything is
+planned.
+"""
+
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from manikin.body import (
-    BodyModel,
-    carrying,
-    creature_from_urdf,
-    human,
-    insect,
-    kudoh,
-    point_mass,
-    with_further_contacts,
-)
-from manikin.errors import InputError
-from manikin.scenarios.obstacles import build_obstacle
-from manikin.scenarios.validation import Path as KeyPath
+from manikin.body import BodyModel, Configuration
+from manikin.errors import InputError, ScenarioError
+from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_rpy
+from manikin.planning.contacts import Endpoints, Habit
+from manikin.planning.whole_body.posture_style import posture_style_of
+from manikin.scenarios.sections import ObstacleSection
+from manikin.scenarios.sequence import friction_of
 from manikin.scenarios.values import ScenarioValues
-from manikin.scene import Scene
+from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere, load_mesh
 
 
-def build_body(values: ScenarioValues) -> BodyModel:
-    """Build the body; its soles have the size that the supports give.
+def build_obstacle(entry: ObstacleSection, folder: Path) -> Obstacle:
+    """Build one obstacle.
+
+    Args:
+        entry: Its section of the file.
+        folder: Folder that a relative mesh path starts from.
 
     Raises:
-        ScenarioError: If the body's data are out of range.
+        SceneError: If the mesh cannot be read or the shape is degenerate.
     """
-    if values.file.body.model in ("insect", "urdf"):
-        return _creature(values)
-    load = values.file.body.load
-    if values.file.body.model == "kudoh":
-        return kudoh() if load is None else carrying(kudoh(), load.mass_kg, load.hand)
-    if values.is_point_mass:
-        return point_mass(values.mass)
-    data, sole = values.file.body, values.sole
-    length, width = (None, None) if sole is None else (sole.length_m, sole.width_m)
-    try:
-        body = human(
-            data.stature_m, data.mass_kg, data.sex, age=data.age, strength=data.strength,
-            sole_length=length, sole_width=width,
-        )  # fmt: skip
-        body = body if load is None else carrying(body, load.mass_kg, load.hand)
-        return with_further_contacts(body, data.further_contacts) if data.further_contacts else body
-    except InputError as error:
-        path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)
-        raise values.refused(path, error) from None
+    rotation = rotation_from_rpy(*np.radians(entry.rpy_deg))
+    return Obstacle(entry.name, _shape(entry, folder), rotation, entry.position)
 
 
-def _creature(values: ScenarioValues) -> BodyModel:
-    """An insect, or the creature of a robot description."""
-    data = values.file.body
-    try:
-        if data.model == "insect":
-            return insect(data.length_m, data.mass_kg)
-        sole = data.sole
-        return creature_from_urdf(
-            values.folder / str(data.urdf),
-            {name: limb.model_dump() for name, limb in (data.limbs or {}).items()},
-            standing={name: float(np.deg2rad(angle)) for name, angle in (data.standing_deg or {}).items()},
-            sole_length=None if sole is None else sole.length_m,
-            sole_width=None if sole is None else sole.width_m,
-        )
-    except InputError as error:
-        raise values.refused(("body",), error) from None
+def _shape(
+    entry: ObstacleSection, folder: Path
+) -> Box | Capsule | Cylinder | HalfSpace | Mesh | Plane | Sphere:
+    if entry.box is not None:
+        return Box(entry.box)
+    if entry.cylinder is not None:
+        return Cylinder(entry.cylinder.radius_m, entry.cylinder.length_m)
+    if entry.capsule is not None:
+        return Capsule(entry.capsule.radius_m, entry.capsule.length_m)
+    if entry.sphere is not None:
+        return Sphere(entry.sphere.radius_m)
+    if entry.plane is not None:
+        return Plane(entry.plane)
+    if entry.half_space is not None:
+        return HalfSpace(entry.half_space)
+    path = folder / str(entry.mesh)
+    return load_mesh(path, unit=entry.unit, scale=entry.scale or 1.0, convex=entry.convex or "no")
+
+
+CLIMBING = "climbing"
+"""Name of the posture of one who hangs on holds: where the root is, with whatever contacts are there."""
+
+
+def start_posture(
+    values: ScenarioValues,
+    body: BodyModel,
+    scene: Scene,
+    *,
+    at: tuple[float, float] | None = None,
+    heading_deg: float | None = None,
+    posture: str | None = None,
+) -> FloatArray:
+    """(nq,) configuration at the start: a posture turned and moved to its place.
+
+    A standing body is the standing posture as it is: its root at the place, or its centre of mass over
+    the file's, its soles at the height of the supports or of the floor. A seated or crouched one is what
+    planning would start from (:class:`manikin.planning.contacts.Endpoints`); a climbing one is the reference
+    near which planning would seek holds.
+
+    Args:
+        values: The scenario's values.
+        body: Its body.
+        scene: Its scene.
+        at: Where to stand, x and y [m]; the file's own place when omitted.
+        heading_deg: Where to face, counter-clockwise from world x [deg]; the file's own, or that of
+            its feet, when omitted.
+        posture: Name of a posture; the file's own, or standing, when omitted.
+
+    Raises:
+        ScenarioError: If the posture is not known, does not exist there, or the file gives no place.
+        InputError: If a number is not finite.
+    """
+    start = values.file.task.start
+    name = posture or start.posture or Habit.STANDING
+    if name not in (*Habit, CLIMBING):
+        raise ScenarioError(f"posture is {name!r}; valid: {', '.join((*Habit, CLIMBING))}")
+    heading_deg = None if heading_deg is None else finite_number(heading_deg, "heading [deg]")
+    at = None if at is None else (finite_number(at[0], "at x [m]"), finite_number(at[1], "at y [m]"))
+    yaw = float(np.deg2rad(values.start_heading_deg if heading_deg is None else heading_deg))
+    place = at or start.at
+    if name == CLIMBING:
+        spot = values.start_com[:2] if place is None else place
+        level = values.start_level if start.height_m is None else start.height_m
+        return carried_to(posture_style_of(CLIMBING).posture(body), spot, yaw, level)
+    if name != Habit.STANDING:
+        spot = np.array(values.start_com[:2] if place is None else place)
+        found = Endpoints(
+            body, scene, friction_of(values), friction_model=values.contact_model.friction
+        ).find(spot, yaw, Habit(name), start.height_m)
+        if found.stage is None:
+            raise ScenarioError(f"{values.source}: {found.failure}; valid: another place or posture")
+        return np.array(found.stage.q)
+    q = turned(body.standing_posture(), yaw)
+    q[2] += values.start_level
+    q[:2] = place if place is not None else q[:2] + values.start_com[:2] - Configuration(body, q).com[:2]
+    return q
+
+
+def carried_to(q: FloatArray, at: ArrayLike, yaw: float, level: float) -> FloatArray:
+    """(nq,) a posture made for the ground at the origin, at a place x and y and a level [m], turned [rad]."""
+    found = turned(q, yaw)
+    found[:2] = at
+    found[2] += level
+    return found
+
+
+def turned(q: FloatArray, yaw: float) -> FloatArray:
+    """(nq,) the configuration with its root turned about the vertical through itself [rad]."""
+    found = np.array(q)
+    half = np.array([np.sin(0.5 * yaw), np.cos(0.5 * yaw)])
+    x, y, z, w = q[3:7]
+    found[3:7] = (
+        half[1] * x - half[0] * y, half[1] * y + half[0] * x,
+        half[1] * z + half[0] * w, half[1] * w - half[0] * z,
+    )  # fmt: skip
+    return found
 
 
 def build_scene(values: ScenarioValues) -> Scene:

@@ -1,12 +1,11 @@
 """Obstacles, support surfaces, and distances between the body and the scene."""
 
-from manikin.callable_package import make_callable
+from manikin.runtime.display import make_callable
 from manikin.scene.covering import SphereCover, cover
 from manikin.scene.distance import Clearance, Proximity, ProximityResult, segment_of
 from manikin.scene.mesh import Mesh, load_mesh
-from manikin.scene.obstacle import Obstacle
+from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Obstacle, Plane, Sphere
 from manikin.scene.scene import Scene
-from manikin.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Plane, Sphere
 from manikin.scene.spheres import SphereProximity
 from manikin.scene.surface import Surface
 
@@ -30,5 +29,6 @@ __all__ = [
     "load_mesh",
     "segment_of",
 ]
+
 
 make_callable(__name__)

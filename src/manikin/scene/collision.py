@@ -7,11 +7,20 @@ import coal
 import numpy as np
 import trimesh
 
-import manikin.steady_boxes  # noqa: F401  (before the first distance)
+import manikin.runtime.coal_workarounds  # noqa: F401  (before the first distance)
+from manikin.numerics.spatial import FloatArray
 from manikin.scene.mesh import IntArray, Mesh, MeshPiece
-from manikin.scene.obstacle import Obstacle
-from manikin.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere, local_bounds
-from manikin.spatial import FloatArray
+from manikin.scene.obstacle import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Obstacle,
+    Plane,
+    Shape,
+    Sphere,
+    local_bounds,
+)
 
 
 @dataclass(frozen=True, eq=False)

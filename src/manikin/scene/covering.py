@@ -7,9 +7,9 @@ import numpy as np
 import trimesh
 
 from manikin.errors import SceneError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.scene.mesh import Mesh, MeshPiece, as_trimesh
-from manikin.scene.shapes import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere
-from manikin.spatial import FloatArray, finite_number, frozen_array
+from manikin.scene.obstacle import Box, Capsule, Cylinder, HalfSpace, Plane, Shape, Sphere
 
 _DEFAULT_COUNT = 8
 _LARGEST_COUNT = 4096

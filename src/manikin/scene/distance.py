@@ -11,14 +11,12 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.errors import SceneError
-from manikin.scene.bounds import PairBounds
+from manikin.numerics.spatial import FloatArray
 from manikin.scene.collision import CollisionPart, collision_parts
-from manikin.scene.depth import part_meter
+from manikin.scene.distance_bounds import KnownDistances, PairBounds, PlacedShapes, PlacementReader
 from manikin.scene.mesh import IntArray
-from manikin.scene.pair import Measured, Meter, pair_meter
-from manikin.scene.placed import KnownDistances, PlacedShapes, PlacementReader
+from manikin.scene.pair import Measured, Meter, pair_meter, part_meter
 from manikin.scene.scene import Scene
-from manikin.spatial import FloatArray
 
 Pair = tuple[str, str]
 Ignored = frozenset[Pair]

@@ -11,7 +11,7 @@ import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.errors import SceneError
-from manikin.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 
 IntArray = NDArray[np.int64]
 Convexity = Literal["no", "hull", "parts"]

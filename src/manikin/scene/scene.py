@@ -10,16 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.contact import Contact, ContactKind, Stance
-from manikin.display import Displayed
 from manikin.errors import ContactError, SceneError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.runtime.display import Displayed
 from manikin.scene.collision import collision_parts
-from manikin.scene.depth import part_meter
 from manikin.scene.mesh import Mesh
-from manikin.scene.obstacle import Obstacle
-from manikin.scene.pair import Meter
-from manikin.scene.shapes import HalfSpace
+from manikin.scene.obstacle import HalfSpace, Obstacle
+from manikin.scene.pair import Meter, part_meter
 from manikin.scene.surface import Surface, surfaces_of
-from manikin.spatial import FloatArray, finite_number, frozen_array
 
 FLOOR = "floor"
 """Name of the floor obstacle."""

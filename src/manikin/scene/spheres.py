@@ -6,7 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from manikin.scene.bounds import shape_of
+from manikin.numerics.spatial import FloatArray
 from manikin.scene.covering import SphereCover, cover
 from manikin.scene.distance import (
     NOTHING,
@@ -20,11 +20,10 @@ from manikin.scene.distance import (
     moves_by_shape,
     self_pairs,
 )
+from manikin.scene.distance_bounds import shape_of
 from manikin.scene.mesh import IntArray
-from manikin.scene.obstacle import Obstacle
+from manikin.scene.obstacle import HalfSpace, Obstacle, Plane
 from manikin.scene.scene import Scene
-from manikin.scene.shapes import HalfSpace, Plane
-from manikin.spatial import FloatArray
 
 BODY_SPHERES = 4
 """Spheres per body shape when nothing else is said."""

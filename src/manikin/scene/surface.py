@@ -6,10 +6,9 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
+from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.scene.mesh import Mesh, as_trimesh
-from manikin.scene.obstacle import Obstacle
-from manikin.scene.shapes import Box, Cylinder, HalfSpace, Plane
-from manikin.spatial import FloatArray, frozen_array
+from manikin.scene.obstacle import Box, Cylinder, HalfSpace, Obstacle, Plane
 
 ENDLESS_HALF_SIZE = 1000.0
 """Half the side of the square polygon of an endless plane [m]."""

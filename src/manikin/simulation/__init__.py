@@ -1,16 +1,20 @@
 """Physics: the body and the scene in MuJoCo."""
 
 from manikin.simulation.compile import SimulationModel, compile_model
+from manikin.simulation.engine import PhysicsOptions
 from manikin.simulation.execute import default_physics, execute
-from manikin.simulation.execution import Execution
-from manikin.simulation.options import PhysicsOptions
-from manikin.simulation.push_map import PushMap, equal_directions
-from manikin.simulation.push_processes import search_directions
-from manikin.simulation.push_search import DirectionSearch, HeldImpulse, PushTrials, largest_held
-from manikin.simulation.pushed import PushOutcome, push_impulse, push_on_the_way
+from manikin.simulation.execution import Execution, PushOutcome, push_impulse, push_on_the_way
+from manikin.simulation.push_map import PushMap, equal_directions, search_directions
+from manikin.simulation.push_search import (
+    DirectionSearch,
+    HeldImpulse,
+    PushTrials,
+    feet_apart_posture,
+    largest_held,
+    one_foot_posture,
+)
 from manikin.simulation.recover import Feet, RecoveryTask, push_near_com, recover
 from manikin.simulation.recovery import Recovery
-from manikin.simulation.stances import feet_apart_posture, one_foot_posture
 from manikin.simulation.world import Push, Touch, World
 
 __all__ = [

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from manikin.contact import Contact, ContactKind, ContactModel, SolePart, Stance
-from manikin.spatial import FloatArray, rotation_from_normal
+from manikin.numerics.spatial import FloatArray, rotation_from_normal
 
 PRESSES = 1.0
 """Force from which something counts as a support [N]."""

@@ -7,20 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from manikin.body import BodyModel
-from manikin.body.limb import end_segments
+from manikin.body.limbs import end_segments
 from manikin.contact import Contact, ContactKind, ContactSchedule
 from manikin.control import Controller, ControlOutput, ControlSettings, ForceWish
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.errors import InputError
 from manikin.motion import Motion
+from manikin.numerics.spatial import finite_number
 from manikin.scene import Scene
 from manikin.simulation.compile import compile_model
-from manikin.simulation.execution import Execution
-from manikin.simulation.options import PhysicsOptions
-from manikin.simulation.pushed import push_outcome
+from manikin.simulation.engine import PhysicsOptions
+from manikin.simulation.execution import Execution, push_outcome
 from manikin.simulation.recorder import SWITCHING, Recorder, near
 from manikin.simulation.world import Grip, Push, Touch, World
-from manikin.spatial import finite_number
 
 JOINT_DAMPING = 0.1
 """Passive damping of every joint in the default physics [N.m.s/rad]. Relaxed human joints have

@@ -1,15 +1,125 @@
-"""How hard a standing body can be pushed, by direction."""
+"""How hard a standing body can be pushed, by direction.
 
-from collections.abc import Mapping, Sequence
+Also here. The conditions of push maps in words: what several have in common, and what tells them apart.
+Searches of several directions at once, each in a process beside this one.
+"""
+
+import multiprocessing
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing.synchronize import Event
 from typing import Any
 
 import numpy as np
 
-from manikin.display import Displayed
-from manikin.errors import InputError
-from manikin.simulation.push_search import HeldImpulse
-from manikin.spatial import FloatArray
+from manikin.control.recovery import RecoverySettings
+from manikin.errors import InputError, ManikinError
+from manikin.numerics.spatial import FloatArray
+from manikin.runtime.display import Displayed
+from manikin.runtime.parallel import FRESH, prepare_worker, side_by_side
+from manikin.simulation.push_search import DirectionSearch, HeldImpulse
+
+USUAL = {
+    "on both feet",
+    "usual stance",
+    "no step",
+    "nothing locked",
+    "with the program",
+    "usual strength",
+    "usual ankles",
+}
+"""What goes without saying."""
+
+
+def told_apart(maps: Sequence[Mapping[str, Any]]) -> tuple[str, list[str]]:
+    """What maps have in common, and a name for each that tells it from the others.
+
+    Args:
+        maps: Conditions of each, as in its JSON.
+
+    Returns:
+        Words for what is common, but for what goes without saying, and for each map those for what
+        differs; empty where nothing does.
+    """
+    spoken = [_words(one) for one in maps]
+    differ = [len({words[place] for words in spoken}) > 1 for place in range(len(spoken[0]))]
+    common = [word for word, other in zip(spoken[0], differ, strict=True) if not other]
+    names = [[word for word, other in zip(words, differ, strict=True) if other] for words in spoken]
+    return ", ".join(word for word in common if word not in USUAL), [", ".join(name) for name in names]
+
+
+def _words(one: Mapping[str, Any]) -> list[str]:
+    """One text per condition, the same conditions in every list."""
+    locked = " and ".join(one["locked"])
+    apart = one.get("feet_apart_m")  # not in maps that were searched before there was a choice
+    strength, ankles, steps = one["strength"], one["ankle_stiffness"], one["steps"]
+    return [
+        _body(one["body"]),
+        f"feet {one['feet']}",
+        "on both feet" if one["support"] == "both" else f"on the {one['support']} foot",
+        f"feet {apart:g} m apart" if apart else "usual stance",
+        f"up to {steps} step{'s' * (steps > 1)}" if steps else "no step",
+        f"{locked} locked" if locked else "nothing locked",
+        "posture control only" if one["posture_control_only"] else "with the program",
+        "usual strength" if strength == 1.0 else f"{strength:g} times the strength",
+        "usual ankles" if ankles == RecoverySettings.ankle_stiffness else f"ankles of {ankles:g} m g h",
+        f"reaction after {one['delay_s']:g} s",
+        f"push of {one['duration_s']:g} s",
+    ]
+
+
+def _body(body: Mapping[str, Any]) -> str:
+    if body["model"] == "kudoh":
+        return "body of Kudoh"
+    return f"{body['sex']} of {body['stature_m']:g} m and {body['mass_kg']:g} kg"
+
+
+def search_directions(
+    searches: Sequence[DirectionSearch], *, jobs: int = 1
+) -> Iterator[tuple[int, HeldImpulse]]:
+    """Search directions, of one map or several, side by side.
+
+    Each search depends on nothing but itself, so the result is the same for any number of jobs.
+
+    Args:
+        searches: What to search.
+        jobs: Processes, see :func:`manikin.runtime.parallel.side_by_side`.
+
+    Yields:
+        Index of a search that is done, and what it found, in the order in which they end.
+
+    Raises:
+        InputError: If ``jobs`` is less than 1, or a search refuses its push.
+        ManikinError: If a process ends before its search.
+    """
+    if jobs < 1:
+        raise InputError(f"jobs is {jobs}; valid: at least 1")
+    given_up = multiprocessing.get_context(FRESH).Event()
+    try:
+        yield from side_by_side(_run, searches, jobs, "search", prepare=partial(_prepare, given_up))
+    finally:
+        given_up.set()
+
+
+_given_up: Event | None = None
+
+
+def _prepare(given_up: Event) -> None:
+    """Make a new process one of the search, which ends when it is given up."""
+    global _given_up
+    _given_up = given_up
+    prepare_worker()
+
+
+def _run(search: DirectionSearch) -> HeldImpulse:
+    return search.run(_still_wanted)
+
+
+def _still_wanted() -> None:
+    """Raise if nobody wants the result any more."""
+    if _given_up is not None and _given_up.is_set():
+        raise ManikinError("the search was given up")
 
 
 def equal_directions(count: int) -> tuple[float, ...]:

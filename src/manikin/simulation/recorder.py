@@ -11,9 +11,9 @@ from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Sta
 from manikin.control import ControlOutput, SupportMode
 from manikin.control.supports import SupportInterval, support_intervals
 from manikin.motion import Motion
+from manikin.numerics.spatial import FloatArray
 from manikin.simulation.carrying import PRESSES, CarriedPoints, CarryingContacts
 from manikin.simulation.world import Sensed
-from manikin.spatial import FloatArray
 
 SWITCHING = 0.1
 """A support may touch its surface this long before and after its planned interval [s]."""

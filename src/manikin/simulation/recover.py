@@ -10,25 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.limb import end_segments
-from manikin.control.balance_recovery import (
-    BalanceRecovery,
-    FeltPush,
-    RecoverySettings,
-    joint_groups,
-)
+from manikin.body.limbs import end_segments
 from manikin.control.dynamics import DynamicsState
+from manikin.control.recovery import BalanceRecovery, FeltPush, RecoverySettings, joint_groups
 from manikin.control.stepping import SteppingRecovery, StepSettings
 from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.scene import Scene
 from manikin.simulation.compile import compile_model
+from manikin.simulation.engine import PhysicsOptions, quiet_engine
 from manikin.simulation.execute import CONTACT_TIME, JOINT_DAMPING
-from manikin.simulation.options import PhysicsOptions
-from manikin.simulation.quiet_engine import quiet_engine
 from manikin.simulation.recovery import Recovery, at_rest, judge, trunk_lean
 from manikin.simulation.recovery_record import RecoveryRecorder
 from manikin.simulation.world import Push, World
-from manikin.spatial import FloatArray, finite_number
 
 STANDING = 0.1
 """Time to stand before the run begins, unrecorded [s]; free feet sink in by a fraction of a millimetre."""

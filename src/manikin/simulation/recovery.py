@@ -8,19 +8,14 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
-from manikin.control.balance_recovery import (
-    BalanceRecovery,
-    JointGroups,
-    Strategy,
-    capture_point,
-)
+from manikin.control.recovery import BalanceRecovery, JointGroups, Strategy, capture_point
 from manikin.control.stepping import StepTaken
-from manikin.display import Displayed
 from manikin.motion import Motion
-from manikin.requirement import Requirement, RequirementTable
+from manikin.numerics.spatial import FloatArray
+from manikin.runtime.display import Displayed
+from manikin.runtime.requirement import Requirement, RequirementTable
 from manikin.simulation.recovery_record import RecoveryTrace
 from manikin.simulation.world import Push, Touch
-from manikin.spatial import FloatArray
 
 STANDS_HEIGHT = 0.95
 """A standing body has its centre of mass at least at this share of its first height; kneeling, a human has

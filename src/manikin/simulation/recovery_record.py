@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from manikin.balance.motion_margin import motion_margin
 from manikin.body import BodyModel
-from manikin.body.limb import end_segments
+from manikin.body.limbs import end_segments
 from manikin.contact import Stance, default_normal_force_cap
-from manikin.control.balance_recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
+from manikin.control.recovery import BalanceRecovery, RecoveryOutput, Standing, zmp_of
 from manikin.motion import Motion
+from manikin.numerics.spatial import FloatArray, skew
 from manikin.simulation.carrying import CarriedPoints, CarryingContacts
 from manikin.simulation.world import Sensed
-from manikin.spatial import FloatArray, skew
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, cross, finite_number, frozen_array
 from manikin.simulation.carrying import CarriedPoints
-from manikin.simulation.compile import SimulationModel, root_rotation
-from manikin.simulation.scene_geoms import obstacle_of
-from manikin.spatial import FloatArray, cross, finite_number, frozen_array
+from manikin.simulation.compile import SimulationModel, obstacle_of, root_rotation
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from manikin.contact_planning.live_contacts import LiveContacts
-    from manikin.locomotion import WalkController
     from manikin.motion.file import MotionFile
+    from manikin.planning.contacts.single_contact import LiveContacts
     from manikin.scene import Scene
+    from manikin.walking import WalkController
+
 
 __all__ = ["serve", "serve_contacts", "serve_drive"]
 

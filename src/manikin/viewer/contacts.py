@@ -5,12 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from manikin.contact_planning import HEURISTICS
-from manikin.contact_planning.live_contacts import LiveAnswer, LiveContacts
-from manikin.contact_planning.single_contact import Role
-from manikin.spatial import FloatArray
-from manikin.viewer.page import Page
-from manikin.viewer.stage import BodyShapes, add_scene, look_at, side_colour
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts import HEURISTICS
+from manikin.planning.contacts.single_contact import LiveAnswer, LiveContacts, Role
+from manikin.viewer.canvas import BodyShapes, Page, add_scene, look_at, side_colour
 
 FRAME_RATE = 60.0
 """Largest number of updates per second; a change that comes while one is made waits for the next."""

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from manikin.errors import InputError
-from manikin.locomotion import WalkController, WalkFrame
+from manikin.numerics.spatial import FloatArray
 from manikin.scene import Scene
-from manikin.spatial import FloatArray
-from manikin.viewer.page import Page
-from manikin.viewer.stage import COLOURS, VIEW, BodyShapes, add_scene, look_at
+from manikin.viewer.canvas import COLOURS, VIEW, BodyShapes, Page, add_scene, look_at
+from manikin.walking import WalkController, WalkFrame
 
 if TYPE_CHECKING:
     from viser import ClientHandle, GuiEvent
     from viser._messages import HotkeyKey
+
 
 FRAME_RATE = 60.0
 """Pictures per second."""

@@ -8,11 +8,10 @@ from viser import uplot
 
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.motion.derived import effector_positions
 from manikin.motion.file import MotionFile
-from manikin.spatial import FloatArray
-from manikin.viewer.page import Page
-from manikin.viewer.stage import COLOURS, BodyShapes, add_scene, look_at, side_colour
+from manikin.motion.motion import effector_positions
+from manikin.numerics.spatial import FloatArray
+from manikin.viewer.canvas import COLOURS, BodyShapes, Page, add_scene, look_at, side_colour
 
 FRAME_RATE = 30.0
 """Pictures per second while playing."""

@@ -1,8 +1,7 @@
 """Recovery from pushes with steps: where a foot is put down, whether there is room, and how it gets there."""
 
-from manikin.control.stepping.placement import StepGoal, StepSettings, capture_after, step_goals
-from manikin.control.stepping.stepping import SteppingRecovery, StepTaken
-from manikin.control.stepping.swing_foot import SwingFoot
+from manikin.control.stepping.step_placement import StepGoal, StepSettings, capture_after, step_goals
+from manikin.control.stepping.stepping import SteppingRecovery, StepTaken, SwingFoot
 
 __all__ = [
     "StepGoal",

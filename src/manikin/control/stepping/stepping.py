@@ -1,28 +1,226 @@
-"""Balance recovery that takes a step when standing does not do."""
+"""Balance recovery that takes a step when standing does not do.
 
-from collections.abc import Mapping
+Also here. The way of a foot that steps: polynomials from where it is to a goal that may still move. Whether
+the scene leaves room for a step, and the posture in which the body then stands.
+"""
+
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact
-from manikin.control.balance_recovery.closed_loop import FeltPush
-from manikin.control.balance_recovery.com_law import capture_point
-from manikin.control.balance_recovery.recovery import BalanceRecovery, RecoveryOutput
-from manikin.control.balance_recovery.standing import Standing, sole_at
-from manikin.control.balance_recovery.strategy import Strategy
 from manikin.control.dynamics import DynamicsState
-from manikin.control.stepping.placement import (
-    StepSettings,
-    capture_after,
-    step_goals,
-)
-from manikin.control.stepping.room import StepCheck
-from manikin.control.stepping.swing_foot import SwingFoot
-from manikin.scene import Scene
-from manikin.spatial import GRAVITY, FloatArray
+from manikin.control.recovery.recovery_controller import BalanceRecovery, RecoveryOutput
+from manikin.control.recovery.standing import FeltPush, Standing, SupportArea, sole_at
+from manikin.control.recovery.strategy import Strategy, capture_point
+from manikin.control.reference import EffectorReference
+from manikin.control.stepping.step_placement import StepGoal, StepSettings, capture_after, step_goals
+from manikin.errors import ContactError
+from manikin.kinematics import Placement, PostureProblem, com_target, generate_posture, touching_pairs
+from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.scene import Proximity, Scene
+
+PRESSING = 0.15
+"""Speed with which a foot that has come to its goal without touching goes on down [m/s]."""
+
+
+@dataclass
+class SwingFoot:
+    """A foot on its way; its goal can be moved while it flies.
+
+    Attributes:
+        foot: Effector.
+        rotation: (3, 3) sole to world, kept all the way.
+        start: Time of the lift-off [s].
+        duration: Until the landing [s].
+        goal: (3,) of the middle of the sole on landing [m].
+        clearance: Height half way [m].
+    """
+
+    foot: str
+    rotation: FloatArray
+    start: float
+    duration: float
+    goal: FloatArray
+    clearance: float
+    _time: float
+    _level: FloatArray
+    """(3, 2) position, velocity and acceleration along the ground at ``_time``."""
+    _ground: float
+
+    @classmethod
+    def begin(
+        cls, foot: str, rotation: FloatArray, position: FloatArray, goal: FloatArray, start: float,
+        duration: float, clearance: float,
+    ) -> "SwingFoot":  # fmt: skip
+        """Lift a foot off at a position (3,) [m]."""
+        level = np.zeros((3, 2))
+        level[0] = position[:2]
+        return cls(foot, rotation, start, duration, goal.copy(), clearance, start, level, float(position[2]))
+
+    def share(self, time: float) -> float:
+        """Share of the way in time, in [0, 1]."""
+        return float(np.clip((time - self.start) / self.duration, 0.0, 1.0))
+
+    def sample(self, time: float) -> EffectorReference:
+        """Go on to a time [s], not before the last one, and return where the foot should be."""
+        self._level = _ahead(
+            self._level, self.goal[:2], self.start + self.duration - self._time, time - self._time
+        )
+        self._time = time
+        height, climb, lift = self._height(time)
+        twist, acceleration = np.zeros(6), np.zeros(6)
+        twist[:3], acceleration[:3] = [*self._level[1], climb], [*self._level[2], lift]
+        return EffectorReference(self.rotation, np.array([*self._level[0], height]), twist, acceleration)
+
+    def _height(self, time: float) -> tuple[float, float, float]:
+        """Height [m] and its two derivatives: up and down with a level start, end and top."""
+        end = self.start + self.duration
+        if time >= end:
+            return self.goal[2] - PRESSING * (time - end), -PRESSING, 0.0
+        x = self.share(time)
+        bump, slope, bend = (
+            16.0 * x**2 * (1.0 - x) ** 2,
+            32.0 * x * (1.0 - x) * (1.0 - 2.0 * x),
+            32.0 * (1.0 - 6.0 * x + 6.0 * x**2),
+        )
+        rise = self.goal[2] - self._ground
+        ramp = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+        ramp_slope, ramp_bend = 30.0 * x**2 * (1.0 - x) ** 2, 60.0 * x * (1.0 - 3.0 * x + 2.0 * x**2)
+        return (
+            self._ground + self.clearance * bump + rise * ramp,
+            (self.clearance * slope + rise * ramp_slope) / self.duration,
+            (self.clearance * bend + rise * ramp_bend) / self.duration**2,
+        )
+
+
+def _ahead(state: FloatArray, goal: FloatArray, remaining: float, time: float) -> FloatArray:
+    """State (3, 2) after a time on the fifth-degree polynomial that comes to rest at a goal.
+
+    Args:
+        state: Position, velocity and acceleration.
+        goal: (2,) [m].
+        remaining: Time to the goal [s].
+        time: Time to go on [s].
+    """
+    if remaining <= time + 1e-9:
+        return np.array([goal, np.zeros(2), np.zeros(2)])
+    position, velocity, acceleration = state
+    t = remaining
+    missing = goal - position - velocity * t - 0.5 * acceleration * t**2
+    known = np.array([missing, -velocity - acceleration * t, -acceleration])
+    powers = np.array([[t**3, t**4, t**5], [3 * t**2, 4 * t**3, 5 * t**4], [6 * t, 12 * t**2, 20 * t**3]])
+    third, fourth, fifth = np.linalg.solve(powers, known)
+    x = time
+    return np.array([
+        position + velocity * x + 0.5 * acceleration * x**2 + third * x**3 + fourth * x**4 + fifth * x**5,
+        velocity + acceleration * x + 3 * third * x**2 + 4 * fourth * x**3 + 5 * fifth * x**4,
+        acceleration + 6 * third * x + 12 * fourth * x**2 + 20 * fifth * x**3,
+    ])  # fmt: skip
+
+
+LEVEL = 0.003
+"""Soles of a new stance may lie at heights that differ by this [m]; a step onto another level is none."""
+
+ABOVE = 0.03
+"""Height over a sole at which its place is looked at for what stands there [m]."""
+
+TRIED = 40
+"""Places that are examined before a step is given up."""
+
+
+class StepCheck:
+    """Looks for places of a scene where a foot can be put down."""
+
+    def __init__(self, body: BodyModel, scene: Scene, friction: float) -> None:
+        """Measure one body in one scene."""
+        self._body, self._scene, self._friction = body, scene, friction
+        self._home = body.standing_posture()
+        self.refusal = ""
+
+    @cached_property
+    def _proximity(self) -> Proximity:
+        return Proximity(self._body, self._scene, self_collision=False)
+
+    def first(
+        self, goals: Iterable[StepGoal], soles: tuple[Contact, Contact], q: FloatArray, clearance: float
+    ) -> StepGoal | None:
+        """First goal at which the foot lies on a surface and the body, there and half way, in nothing.
+
+        Args:
+            goals: Best first.
+            soles: Both feet before the step.
+            q: (nq,) present configuration.
+            clearance: Height of the foot half way [m].
+        """
+        self.refusal = "no step can be reached in time"
+        before = {contact.effector: contact for contact in soles}
+        for number, goal in enumerate(goals):
+            if number == TRIED:
+                break
+            moved = sole_at(self._body, goal.foot, goal.rotation, goal.position, self._friction)
+            stays = next(contact for name, contact in before.items() if name != goal.foot)
+            if not self.free(moved):
+                self.refusal = f"no room for the {goal.foot.replace('_', ' ')}"
+                continue
+            half = 0.5 * (before[goal.foot].position + goal.position) + np.array([0.0, 0.0, clearance])
+            if self._passes(stays, goal, half, q) and self._stands(stays, moved, q):
+                self.refusal = ""
+                return goal
+            self.refusal = f"something is in the way of the {goal.foot.replace('_', ' ')}"
+        return None
+
+    def free(self, contact: Contact) -> bool:
+        """Whether a sole would lie on a surface with all its corners, and nothing stands on that place."""
+        try:
+            self._scene.supporting_surface(contact, LEVEL)
+        except ContactError:
+            return False
+        corners = contact.points_in_world
+        around = np.concatenate((corners, 0.5 * (corners + np.roll(corners, 1, axis=0)), [contact.position]))
+        above = around + ABOVE * contact.normal
+        return all(self._scene.nearest(point)[1] > ABOVE - LEVEL for point in above)
+
+    def standing(self, soles: tuple[Contact, ...], q: FloatArray) -> Standing:
+        """Posture on given soles with the centre of mass over their middle, near a configuration (nq,)."""
+        area = SupportArea.of(soles)
+        found = generate_posture(self._problem(soles, area, q), q)
+        state = Configuration(self._body, found.q)
+        return Standing(tuple(soles), area, found.q[7:].copy(), state.com.copy())
+
+    def _problem(self, soles: tuple[Contact, ...], area: SupportArea, q: FloatArray) -> PostureProblem:
+        reference = self._home.copy()
+        reference[:7] = q[:7]
+        return PostureProblem(
+            self._body, tuple(soles), com=com_target(*area.centre), reference=reference,
+        )  # fmt: skip
+
+    def _stands(self, stays: Contact, moved: Contact, q: FloatArray) -> bool:
+        soles = (stays, moved)
+        found = generate_posture(self._problem(soles, SupportArea.of(soles), q), q)
+        return found.succeeded and self._clear(found.q, soles)
+
+    def _passes(self, stays: Contact, goal: StepGoal, half: FloatArray, q: FloatArray) -> bool:
+        """Whether the body is free with its foot half way."""
+        middle = 0.5 * (stays.position + half)[:2]
+        problem = PostureProblem(
+            self._body, (stays,), placements={goal.foot: Placement(half, goal.rotation)},
+            com=com_target(*middle), com_weight=1.0, reference=q,
+        )  # fmt: skip
+        found = generate_posture(problem, q)
+        return found.succeeded and self._clear(found.q, (stays,))
+
+    def _clear(self, q: FloatArray, soles: tuple[Contact, ...]) -> bool:
+        touching = [
+            (contact.effector, self._scene.supporting_surface(contact, LEVEL).obstacle) for contact in soles
+        ]
+        ignored = touching_pairs(self._body, touching)
+        return self._proximity.minimum(q, ignored).distance > 0.0
+
 
 LANDED_FROM = 0.5
 """A touch before this share of the way in time is that of the lift-off."""

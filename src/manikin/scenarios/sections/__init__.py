@@ -1,18 +1,36 @@
 """Sections of a scenario file, one pydantic model each; lengths are metres and angles degrees."""
 
-from manikin.scenarios.sections.body import BodySection, LimbSection
-from manikin.scenarios.sections.com_constraint import ComConstraintSection, HeightBandSection
-from manikin.scenarios.sections.contact import ContactSection, SoleSection
-from manikin.scenarios.sections.contacts import ContactsSection
-from manikin.scenarios.sections.frame import FrameSection
-from manikin.scenarios.sections.obstacle import ObstacleSection, RoundSection, SphereSection
-from manikin.scenarios.sections.phase import PhaseSection
-from manikin.scenarios.sections.planning import PlanningSection, WeightsSection
-from manikin.scenarios.sections.push import PushSection, RecoverySection
-from manikin.scenarios.sections.supports import SupportsSection
-from manikin.scenarios.sections.task import ActSection, StateSection, TaskSection
-from manikin.scenarios.sections.walking import StandSection, WalkerSection, WalkingSection, WaypointSection
-from manikin.scenarios.sections.wholebody import WholebodySection
+from manikin.scenarios.sections.planning_sections import (
+    BodySection,
+    ComConstraintSection,
+    ContactsSection,
+    HeightBandSection,
+    LimbSection,
+    PlanningSection,
+    WeightsSection,
+    WholebodySection,
+)
+from manikin.scenarios.sections.support_sections import (
+    ContactSection,
+    PhaseSection,
+    SoleSection,
+    SupportsSection,
+)
+from manikin.scenarios.sections.task_sections import (
+    ActSection,
+    FrameSection,
+    ObstacleSection,
+    PushSection,
+    RecoverySection,
+    RoundSection,
+    SphereSection,
+    StandSection,
+    StateSection,
+    TaskSection,
+    WalkerSection,
+    WalkingSection,
+    WaypointSection,
+)
 
 __all__ = [
     "ActSection",

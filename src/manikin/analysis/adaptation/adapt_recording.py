@@ -1,0 +1,373 @@
+"""A recorded motion planned anew on its own stances, and executed ([Qiu2012]_ 5.3.3 and 7.3).
+
+Also here. A part of a recording, in time. The centre of mass of a recording, planned anew on its stances by
+either method of [Qiu2012]_ chapter 5.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from manikin.analysis.adaptation.contact_adaptation import (
+    landing_flat,
+    leaving_with_the_hinge,
+    on_one_seat,
+    rising_at_once,
+    scene_under,
+    within_toe_strength,
+    without_remnants,
+)
+from manikin.analysis.adaptation.posture_adaptation import (
+    AdaptedMotion,
+    adapt_postures,
+    rate_on_contacts,
+    rate_on_plan,
+)
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule, Phase, StanceSequence
+from manikin.control import ControlSettings, TaskWeights
+from manikin.errors import InputError
+from manikin.kinematics import PointTargets
+from manikin.motion import Motion
+from manikin.motion.file import MotionFile
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.com import (
+    BentSurface,
+    CentroidalProblem,
+    CentroidalResult,
+    GeometricConstraint,
+    KeyframeProblem,
+    NearKeyFramesResult,
+    RecordedCom,
+    height_band,
+    plan_com,
+    plan_com_near_key_frames,
+)
+from manikin.recordings import (
+    Reconstruction,
+    RecordedSupports,
+    Support,
+    motion_of,
+    recorded_schedule,
+    smoothed,
+)
+from manikin.recordings.supports.recorded_stances import FRICTION
+from manikin.scene import Scene
+from manikin.simulation import Execution, execute
+
+LEAST_FRAMES = 4
+"""Frames of a part, at least: of fewer there are no accelerations."""
+
+
+def crop(
+    found: Reconstruction, supports: RecordedSupports, start: float, end: float
+) -> tuple[Reconstruction, RecordedSupports]:
+    """Cut a reconstruction and its supports, so that the first instant left is 0 on both clocks.
+
+    Args:
+        found: The postures.
+        supports: Found from all of them.
+        start: On the clock of the supports [s].
+        end: The last instant left [s].
+
+    Raises:
+        InputError: If fewer than four frames are left.
+    """
+    time = supports.start + found.time
+    rows = np.flatnonzero((time >= start - 1e-9) & (time <= end + 1e-9))
+    if len(rows) < LEAST_FRAMES:
+        raise InputError(
+            f"window from {start:g} to {end:g} s leaves {len(rows)} frames; valid: at least {LEAST_FRAMES} "
+            f"between {time[0]:g} and {time[-1]:g} s"
+        )
+    begin, last, told = float(time[rows[0]]), float(time[rows[-1]]), found.targets
+    seen = np.flatnonzero(np.any(np.isfinite(told.positions[rows, :, 0]), axis=0))
+    targets = PointTargets(
+        tuple(told.names[k] for k in seen), tuple(told.segments[k] for k in seen), told.points[seen],
+        told.positions[np.ix_(rows, seen)], told.weights[seen],
+    )  # fmt: skip
+    part = replace(
+        found, time=found.time[rows] - found.time[rows[0]], q=found.q[rows], targets=targets,
+        residual=found.residual[np.ix_(rows, seen)], first_frame=found.first_frame + int(rows[0]),
+    )  # fmt: skip
+    held = tuple(
+        _cut(support, begin, last)
+        for support in supports.supports
+        if support.start < last and support.end > begin
+    )
+    return part, RecordedSupports(held, 0.0, last - begin, supports.surfaces)
+
+
+def _cut(support: Support, begin: float, last: float) -> Support:
+    return replace(
+        support, start=max(support.start - begin, 0.0), end=min(support.end, last) - begin,
+        start_seen=support.start_seen and support.start >= begin,
+        end_seen=support.end_seen and support.end <= last,
+    )  # fmt: skip
+
+
+Method = Literal["keyframes", "timing-free"]
+"""``keyframes``: near the recorded positions at the recorded instants (5.3), kept in balance all along;
+``timing-free``: only the stances, both ends and the reach are kept (5.4)."""
+
+METHODS: tuple[Method, ...] = get_args(Method)
+
+SHORTEST, LONGEST = 0.5, 2.0
+"""Bounds of a phase that is planned timing-free, as shares of its recorded duration: nobody swings a leg in
+no time, and phases of a walk are no places to stay."""
+
+HEIGHT_ROOM = 0.1
+"""Beyond the recorded heights of the centre of mass, for a plan that is timing-free [m]."""
+
+
+def plan_recorded_com(
+    mass: float, recording: RecordedCom, velocity: FloatArray, method: Method, required_margin: float = 0.0
+) -> CentroidalResult:
+    """Plan the centre of mass.
+
+    Args:
+        mass: [kg].
+        recording: Samples, key frames and stances.
+        velocity: (2, 3) of the recorded centre of mass at both ends, kept by the timing-free method [m/s].
+        method: See :data:`Method`.
+        required_margin: To keep all along [N.m].
+    """
+    if method == "keyframes":
+        return plan_near_recorded_com(mass, recording, required_margin)
+    return plan_com(
+        CentroidalProblem(
+            mass, _free_durations(recording), recording.com[0], recording.com[-1],
+            start_velocity=velocity[0], goal_velocity=velocity[1], required_margin=required_margin,
+            support_distance=farthest_support(recording), geometric=_recorded_heights(recording),
+        )
+    )  # fmt: skip
+
+
+def plan_near_recorded_com(
+    mass: float, recording: RecordedCom, required_margin: float = 0.0
+) -> NearKeyFramesResult:
+    """Plan the centre of mass near the recorded one.
+
+    Args:
+        mass: [kg].
+        recording: Samples, key frames and stances, and the rate of the angular momentum.
+        required_margin: To keep all along [N.m].
+    """
+    asked = KeyframeProblem(
+        mass, recording, start_velocity=None, goal_velocity=None, required_margin=required_margin
+    )
+    return plan_com_near_key_frames(asked)
+
+
+def farthest_support(recording: RecordedCom) -> float:
+    """Largest distance of the recorded centre of mass from a contact ([Qiu2012]_ Table 3.5, 5.26) [m]."""
+    phases, farthest = recording.schedule.phase_at(recording.time), 0.0
+    for index, phase in enumerate(recording.sequence):
+        # The last sample of a phase is the first of the next one.
+        rows = np.flatnonzero(phases == index)
+        com = recording.com[rows[0] : rows[-1] + 2]
+        for contact in phase.stance:
+            farthest = max(farthest, float(np.linalg.norm(com - contact.position, axis=1).max()))
+    return farthest
+
+
+def _recorded_heights(recording: RecordedCom) -> tuple[GeometricConstraint, ...]:
+    """No lower and no higher than it was recorded, but for some room: feet admit a way through the floor."""
+    heights = recording.com[:, 2]
+    lower, upper = (
+        BentSurface(float(height), 0.0, 0.0, 0.0)
+        for height in (heights.min() - HEIGHT_ROOM, heights.max() + HEIGHT_ROOM)
+    )
+    return height_band(lower, upper)
+
+
+def _free_durations(recording: RecordedCom) -> StanceSequence:
+    return StanceSequence([
+        Phase(phase.stance, SHORTEST * duration, LONGEST * duration)
+        for phase, duration in zip(recording.sequence, recording.schedule.durations.tolist(), strict=True)
+    ])  # fmt: skip
+
+
+SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0))
+"""Of the execution. A recorded posture is worth more than one that was only preferred: six times the usual
+weight keeps arms off the trunk while they make up for what the contacts do not give."""
+
+
+@dataclass(frozen=True, eq=False)
+class Replan:
+    """A recording, its new plan and what became of it; what was not asked for, or failed, is None.
+
+    Attributes:
+        method: Of the centre of mass.
+        body: Who moves.
+        scene: A floor, and blocks under what stands or sits higher.
+        recording: The recorded centre of mass on the stances.
+        recorded: The recorded motion, smoothed, its time 0 at the first instant.
+        com: The planned centre of mass.
+        adapted: The recorded postures on the planned centre of mass.
+        execution: In the physics engine.
+    """
+
+    method: Method
+    body: BodyModel
+    scene: Scene
+    recording: RecordedCom
+    recorded: Motion
+    com: CentroidalResult
+    adapted: AdaptedMotion | None = None
+    execution: Execution | None = None
+
+    @property
+    def planned(self) -> Motion | None:
+        """The planned whole-body motion."""
+        return None if self.adapted is None else self.adapted.motion
+
+    @property
+    def executed(self) -> Motion | None:
+        """The executed motion."""
+        return None if self.execution is None else self.execution.motion
+
+    @property
+    def schedule(self) -> ContactSchedule:
+        """Contacts of the plan in time; as recorded when there is none."""
+        found = self.com.trajectory
+        return self.recording.schedule if found is None else found.schedule
+
+    @property
+    def content(self) -> MotionFile:
+        """What a motion file holds of it."""
+        return MotionFile(self.planned, self.executed, self.body, self.scene, self.schedule)
+
+    @cached_property
+    def distance(self) -> FloatArray | None:
+        """(n,) of the planned centre of mass from the recorded one, at equal shares of each phase [m]."""
+        found = self.com.trajectory
+        if found is None:
+            return None
+        instants = np.interp(self.recording.time, self.recording.key_times, found.schedule.instants)
+        return np.linalg.norm(found.position(instants) - self.recording.com, axis=1)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, in SI units."""
+        failure, distance = self.com.failure, self.distance
+        near = self.com if isinstance(self.com, NearKeyFramesResult) else None
+        return {
+            "method": self.method,
+            "succeeded": self.com.succeeded,
+            "failure": None if failure is None else failure.reason,
+            "recorded_duration_s": float(self.recording.time[-1]),
+            "duration_s": None if distance is None else float(self.schedule.instants[-1]),
+            "recorded_phase_durations_s": self.recording.schedule.durations.tolist(),
+            "phase_durations_s": None if distance is None else self.schedule.durations.tolist(),
+            "supports": [list(phase.stance.effectors) for phase in self.schedule.sequence],
+            "com_rms_m": None if distance is None else float(np.sqrt(np.mean(distance**2))),
+            "com_max_m": None if distance is None else float(distance.max()),
+            "min_margin": None if distance is None else self.com.d_min,
+            "margin_unit": self.com.problem.margin_unit,
+            "key_frames": None if near is None else len(near.frames),
+            "added_key_frames": None if near is None else len(near.added),
+            "wholebody": self._adapted_block(),
+            "execution": self._execution_block(),
+        }
+
+    def _adapted_block(self) -> dict[str, Any] | None:
+        if self.adapted is None:
+            return None
+        measured = self.adapted.certificate
+        names = ("max_support_error_m", "max_com_error_m", "min_clearance_m", "max_torque_share")
+        return {
+            **{name: float(getattr(measured, name)) for name in names},
+            "closest_pair": list(measured.closest_pair),
+            "posture_rms_rad": self.adapted.posture_rms,
+            "share_positive_margin": float(np.mean(self.adapted.motion.margin > 0.0)),
+        }
+
+    def _execution_block(self) -> dict[str, Any] | None:
+        found = self.execution
+        if found is None:
+            return None
+        block = found.summary()
+        return {
+            "failure": found.failure or None,
+            "executed_s": found.motion.duration,
+            "share_positive_margin": float(np.mean(found.motion.margin > 0.0)),
+            **{name: value for name, value in block.items() if name not in ("push", "peak_torque_Nm")},
+        }
+
+
+def adapt_recording(
+    found: Reconstruction,
+    supports: RecordedSupports,
+    *,
+    method: Method = "keyframes",
+    execute: bool = False,
+    rolling: bool = True,
+    required_margin: float = 0.0,
+    friction: float = FRICTION,
+) -> Replan:
+    """Plan a recorded motion anew on the stances it was recorded on, and execute it if asked to.
+
+    Args:
+        found: The postures, not yet smoothed.
+        supports: Found from them.
+        method: How the centre of mass is planned.
+        execute: Whether the recorded postures are adapted to the plan and executed.
+        rolling: Whether a foot may stand on its toes alone; without, it stands on its whole sole.
+        required_margin: Of the planned point mass, to keep all along [N.m].
+        friction: Coefficient of feet and seat.
+
+    Raises:
+        InputError: If the method is unknown, or the recording has no support at some time.
+    """
+    if method not in METHODS:
+        raise InputError(f"replan method is {method!r}; valid: {', '.join(METHODS)}")
+    even, recorded = smoothed(found), motion_of(found)
+    stances = recorded_schedule(even, supports, friction=friction, rolling=rolling)
+    stances = on_one_seat(landing_flat(stances, found.body))
+    stances = leaving_with_the_hinge(stances, found.body, supports.start + found.time, even.q)
+    stances = rising_at_once(stances, found.body, supports.start + found.time, even.q)
+    stances = within_toe_strength(without_remnants(stances), found.body)
+    time = supports.start + found.time
+    recording = RecordedCom(time, recorded.com, stances.sequence, stances.instants)
+    velocity = np.gradient(recorded.com, recorded.time, axis=0, edge_order=2)[[0, -1]]
+    scene = scene_under(stances, supports.surfaces[0] if supports.surfaces else 0.0)
+    if method == "keyframes":
+        recording = _with_turning(found.body, scene, recording, (even.time, even.q), required_margin)
+    com = plan_recorded_com(found.body.mass, recording, velocity, method, required_margin)
+    result = Replan(method, found.body, scene, recording, recorded, com)
+    return _executed(result, even) if execute and com.trajectory is not None else result
+
+
+def _with_turning(
+    body: BodyModel,
+    scene: Scene,
+    recording: RecordedCom,
+    recorded: tuple[FloatArray, FloatArray],
+    margin: float,
+) -> RecordedCom:
+    """The same with a rate of the angular momentum that the body can follow.
+
+    First that of the recorded postures on their contacts; and then that of the postures which are fitted to
+    the plan it leads to, for the fit gives way between both.
+    """
+    recording = recording.with_angular_momentum_rate(rate_on_contacts(body, scene, recording, recorded))
+    com = plan_near_recorded_com(body.mass, recording, margin)
+    if com.trajectory is None:
+        return recording
+    rate = rate_on_plan(body, scene, com.trajectory, recorded, recording)
+    return recording.with_angular_momentum_rate(rate)
+
+
+def _executed(result: Replan, even: Reconstruction) -> Replan:
+    body, scene, trajectory = result.body, result.scene, result.com.trajectory
+    if trajectory is None:
+        return result
+    schedule = trajectory.schedule
+    clock = schedule.instants, result.recording.key_times
+    adapted = adapt_postures(body, scene, trajectory, result.com.polytopes, (even.time, even.q), clock)
+    execution = execute(body, scene, adapted.motion, schedule, settings=SETTINGS, hold=0.0)
+    return Replan(
+        result.method, body, scene, result.recording, result.recorded, result.com, adapted, execution
+    )  # fmt: skip

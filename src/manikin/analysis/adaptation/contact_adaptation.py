@@ -1,0 +1,305 @@
+"""Stances and surfaces of a recorded person as a planned body can use them.
+
+Also here. Where effectors are in given postures.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.body import BodyModel
+from manikin.body.limbs import hanging_segment, hinge_line
+from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance, StanceSequence
+from manikin.contact.contact import sole
+from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
+from manikin.recordings.supports.body_supports import SEAT
+from manikin.scene import Box, Obstacle, Scene
+
+
+def effector_placements(body: BodyModel, q: FloatArray, name: str) -> tuple[FloatArray, FloatArray]:
+    """(n, 3) positions [m] and (n, 3, 3) rotations of an effector in the world, in postures (n, nq)."""
+    data, frame = body.pinocchio.createData(), body.effector_frame(name)
+    position, rotation = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+    for row, one in enumerate(q):
+        pin.framesForwardKinematics(body.pinocchio, data, one)
+        position[row], rotation[row] = data.oMf[frame].translation, data.oMf[frame].rotation
+    return position, rotation
+
+
+def toe_hinge(body: BodyModel, name: str) -> FloatArray | None:
+    """(3,) middle of the hinge of a foot's toes in the frame of its sole [m]; None without toes."""
+    toes = hanging_segment(body, body.effector(name).segment)
+    if toes is None:
+        return None
+    frame = body.effector(name)
+    return frame.rotation.T @ (toes.origin - frame.translation)
+
+
+RAISED = 0.02
+"""A contact this far above the floor has a block under it [m]."""
+
+RISEN = 0.015
+"""Height of the buttocks over a seat from which it carries nothing [m]."""
+
+SAME_SEAT = 0.15
+"""Seats nearer to each other are one [m]."""
+
+ROLLED = 0.02
+"""Way of the hinge of the toes from which a foot counts as rolling over their tips [m]."""
+
+EARLY = 0.1
+"""Time by which such a foot leaves earlier than recorded at most: one whose hinge has moved for longer
+carries, as a stealthy walker's does for most of a second [s]."""
+
+SHORTEST = 0.06
+"""What is left at least of a phase whose foot or seat is left earlier: the controller takes some 40 ms to
+load a foot [s]."""
+
+REMNANT = 0.08
+"""A part of a contact at a clip's end that lasts less is none of its own: a foot's tilt takes as long to set
+in [s]."""
+
+TOE_LOAD = 1.4
+"""Load of a foot on its toes: above the second peak of a brisk walk's vertical force [body weights]."""
+
+ROOM = 0.03
+"""How far a block reaches beyond its contact [m]."""
+
+THICKNESS = 0.05
+"""Of a block: legs pass below a seat [m]."""
+
+
+def landing_flat(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
+    """The same with the whole sole where only the heel touches.
+
+    A recorded heel rolls down within some sixty milliseconds, on a round edge and a soft shoe; a stiff
+    sole lands flat. Phases that do not differ any more are one.
+    """
+    flat = _with_contacts(schedule, lambda contact: _whole(contact, body))
+    return _joined(list(flat.sequence), flat.instants)
+
+
+def without_remnants(schedule: ContactSchedule) -> ContactSchedule:
+    """The same with no part of a foot at either end that a clip cuts to an instant.
+
+    Who lifts the heel 40 ms after a clip begins has it almost up by then, and 40 ms before it ends hardly:
+    the foot stands there as it does beside. Phases that do not differ any more are one.
+    """
+    phases = list(schedule.sequence)
+    durations = np.array(schedule.durations)
+    _without_first_remnants(phases, durations)
+    phases.reverse()
+    _without_first_remnants(phases, durations[::-1])
+    return _joined(phases[::-1], schedule.instants)
+
+
+def leaving_with_the_hinge(
+    schedule: ContactSchedule, body: BodyModel, time: FloatArray, q: FloatArray
+) -> ContactSchedule:
+    """The same with every foot that leaves from its toes off as soon as their hinge has moved away.
+
+    A recorded foot rolls over the tips of its toes in the last hundredths of a second, hardly loaded; a stiff
+    toe segment lies flat up to the end, and would hold the leg back.
+
+    Args:
+        schedule: Contacts in time.
+        body: Whose.
+        time: (n,) [s], on the schedule's clock.
+        q: (n, nq) recorded postures then.
+    """
+    instants = np.array(schedule.instants)
+    phases = list(schedule.sequence)
+    for name in schedule.sequence.effectors:
+        hinge = toe_hinge(body, name)
+        if hinge is None:
+            continue
+        position, rotation = effector_placements(body, q, name)
+        path = position + rotation @ hinge
+        for index in range(len(phases) - 1):
+            stance = phases[index].stance
+            following = set(phases[index + 1].stance.effectors)
+            # Nothing that lands at the same instant shall land earlier.
+            if name not in stance or not following <= set(stance.effectors) - {name}:
+                continue
+            contact = stance[name]
+            place = contact.position + contact.rotation_contact_to_world @ hinge
+            rows = np.flatnonzero((time > instants[index]) & (time < instants[index + 1]))
+            near = rows[np.linalg.norm(path[rows] - place, axis=1) <= ROLLED]
+            left = instants[index] if len(near) == 0 else time[near[-1]]
+            if contact.part is SolePart.TOES and left < instants[index + 1]:
+                shortest = min(max(SHORTEST, time[1] - time[0]), instants[index + 1] - instants[index])
+                earliest = max(instants[index] + shortest, instants[index + 1] - EARLY)
+                instants[index + 1] = max(left, earliest)
+    return _timed(phases, instants)
+
+
+def rising_at_once(
+    schedule: ContactSchedule, body: BodyModel, time: FloatArray, q: FloatArray
+) -> ContactSchedule:
+    """The same with a seat that is left as soon as the buttocks have risen from it.
+
+    Flesh and cushion follow a person up by some centimetres; a stiff seat does not, and would hold the
+    pelvis back while the rest of the body rises.
+
+    Args:
+        schedule: Contacts in time, a seat at one place.
+        body: Whose.
+        time: (n,) [s], on the schedule's clock.
+        q: (n, nq) recorded postures then.
+    """
+    if SEAT not in schedule.sequence.effectors:
+        return schedule
+    height = effector_placements(body, q, SEAT)[0][:, 2]
+    instants, phases = np.array(schedule.instants), list(schedule.sequence)
+    for index, (before, after) in enumerate(pairwise(phases)):
+        if set(before.stance.effectors) - set(after.stance.effectors) != {SEAT}:
+            continue
+        if not set(after.stance.effectors) <= set(before.stance.effectors):
+            continue
+        start, end = instants[index : index + 2]
+        seated = (time > start) & (time < end)
+        low = height[seated] < before.stance[SEAT].position[2] + RISEN
+        if np.any(low) and not low[-1]:
+            instants[index + 1] = min(max(float(time[seated][low][-1]), start + SHORTEST), end)
+    return _timed(phases, instants)
+
+
+def within_toe_strength(schedule: ContactSchedule, body: BodyModel) -> ContactSchedule:
+    """The same with toes that carry no farther from their hinge than their strength allows.
+
+    Whoever stands on the toes of one foot has the centre of pressure at most the toes' torque limit over the
+    load ahead of the hinge; the rest of their length is no support.
+    """
+    return _with_contacts(schedule, lambda contact: _strong_part(contact, body))
+
+
+def on_one_seat(schedule: ContactSchedule) -> ContactSchedule:
+    """The same with all contacts of a seat that lie near each other at one place: chairs do not move."""
+    seats = [
+        (index, contact)
+        for index, phase in enumerate(schedule.sequence)
+        for contact in phase.stance
+        if contact.effector == SEAT
+    ]
+    changed: dict[int, Contact] = {}
+    while seats:
+        near = [one for one in seats if np.linalg.norm(one[1].position - seats[0][1].position) < SAME_SEAT]
+        place = frozen_array(np.median([contact.position for _, contact in near], axis=0), "seat place [m]")
+        turn = seats[0][1].rotation_contact_to_world
+        for index, contact in near:
+            changed[index] = replace(contact, position=place, rotation_contact_to_world=turn)
+        seats = [one for one in seats if one[0] not in changed]
+    phases = [
+        replace(phase, stance=phase.stance.with_contacts(
+            changed[index] if contact.effector == SEAT else contact for contact in phase.stance
+        ))
+        for index, phase in enumerate(schedule.sequence)
+    ]  # fmt: skip
+    return ContactSchedule(StanceSequence(phases), schedule.instants)
+
+
+def scene_under(schedule: ContactSchedule, floor: float) -> Scene:
+    """A floor, and a block under every contact above it; grasps hold on to nothing that is in the way.
+
+    Args:
+        schedule: The contacts.
+        floor: Height of the floor [m].
+    """
+    blocks: list[Obstacle] = []
+    known: set[tuple[float, ...]] = set()
+    for phase in schedule.sequence:
+        for contact in phase.stance:
+            place = tuple(np.round(contact.position, 6).tolist())
+            if contact.position[2] - floor < RAISED or place in known:
+                continue
+            known.add(place)
+            blocks.append(_block(contact, f"{contact.effector} {len(blocks) + 1}"))
+    return Scene(blocks, floor_height=floor)
+
+
+def _without_first_remnants(phases: list[Phase], durations: FloatArray) -> None:
+    """Replace what is cut by the beginning of a clip, or by the end of one whose phases come last first."""
+    for first in phases[0].stance:
+        name = first.effector
+        held = next((k for k, phase in enumerate(phases) if name not in phase.stance), len(phases))
+        parts = [phase.stance[name] for phase in phases[:held]]
+        count = next((k for k, part in enumerate(parts) if part.part is not first.part), None)
+        if count is None or durations[:count].sum() >= REMNANT:
+            continue
+        for index in range(count):
+            stance = phases[index].stance
+            contacts = [parts[count] if c.effector == name else c for c in stance]
+            phases[index] = replace(phases[index], stance=stance.with_contacts(contacts))
+
+
+def _with_contacts(schedule: ContactSchedule, change: Callable[[Contact], Contact]) -> ContactSchedule:
+    phases = [
+        replace(phase, stance=phase.stance.with_contacts(map(change, phase.stance)))
+        for phase in schedule.sequence
+    ]
+    return ContactSchedule(StanceSequence(phases), schedule.instants)
+
+
+def _timed(phases: Sequence[Phase], instants: FloatArray) -> ContactSchedule:
+    timed = [
+        replace(phase, min_duration=float(duration), max_duration=float(duration))
+        for phase, duration in zip(phases, np.diff(instants), strict=True)
+    ]
+    return ContactSchedule(StanceSequence(timed), instants)
+
+
+def _joined(phases: Sequence[Phase], ends: FloatArray) -> ContactSchedule:
+    """A schedule of phases between instants (phases + 1,), those that do not differ as one."""
+    joined: list[Phase] = []
+    instants = [float(ends[0])]
+    for phase, end in zip(phases, ends[1:], strict=True):
+        if joined and _alike(joined[-1].stance, phase.stance):
+            joined.pop()
+            instants.pop()
+        duration = float(end) - instants[-1]
+        joined.append(Phase(phase.stance, duration, duration))
+        instants.append(float(end))
+    return ContactSchedule(StanceSequence(joined), instants)
+
+
+def _strong_part(contact: Contact, body: BodyModel) -> Contact:
+    toes = hanging_segment(body, body.effector(contact.effector).segment)
+    line = hinge_line(body, contact.effector)
+    if contact.kind is not ContactKind.SOLE or contact.part is SolePart.HEEL or toes is None or line is None:
+        return contact
+    strength = -float(body.torque_lower[body.joint_index(toes.hinges[0].name)])
+    reach = line + strength / (TOE_LOAD * body.mass * GRAVITY)
+    points = np.array(contact.points)
+    points[:, 0] = np.minimum(points[:, 0], reach)
+    return replace(contact, points=frozen_array(points, "toe points", (None, 3)))
+
+
+def _whole(contact: Contact, body: BodyModel) -> Contact:
+    if contact.part is not SolePart.HEEL:
+        return contact
+    size = body.sole_length or contact.length, body.sole_width or contact.width
+    flat = sole(
+        contact.effector, contact.position, contact.yaw, length=size[0], width=size[1],
+        friction=contact.friction,
+    )  # fmt: skip
+    return replace(flat, normal_force_cap=contact.normal_force_cap)
+
+
+def _alike(first: Stance, second: Stance) -> bool:
+    if set(first.effectors) != set(second.effectors):
+        return False
+    return all(
+        first[name].part is second[name].part and np.array_equal(first[name].position, second[name].position)
+        for name in first.effectors
+    )
+
+
+def _block(contact: Contact, name: str) -> Obstacle:
+    size = [contact.length + 2.0 * ROOM, contact.width + 2.0 * ROOM, THICKNESS]
+    if contact.kind is not ContactKind.SOLE:
+        size[:2] = [2.0 * ROOM] * 2
+    centre = contact.position - 0.5 * THICKNESS * contact.normal
+    return Obstacle(name, Box(size), contact.rotation_contact_to_world, centre)

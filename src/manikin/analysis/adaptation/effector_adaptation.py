@@ -1,0 +1,250 @@
+"""Where each effector goes: on its contact while it holds one, and as recorded in between.
+
+A foot that only stands on its toes tilts about their hinge, as far as it was recorded to, within what
+toes can bend. In flight each effector goes smoothly from its contact to the recorded path and from there
+to its next contact, the tips of a foot kept off the surface. All this is our own.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manikin.analysis.adaptation.contact_adaptation import effector_placements, toe_hinge
+from manikin.body import BodyModel
+from manikin.body.limbs import hanging_segment
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.numerics.signals import mask_runs
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.whole_body.fit_targets import GRASP_ROTATION_WEIGHT, EffectorTarget, flight_weight
+from manikin.walking.gait.stance_foot import smooth_step
+
+LARGEST_TILT = float(np.deg2rad(64.0))
+"""Tilt of a foot that stands on its toes, approached but not reached: they bend up to 70 degrees [rad]."""
+
+TILT_BEND = float(np.deg2rad(3.0))
+"""Width of the bend of the tilt below it [rad]."""
+
+TILTING = 0.08
+"""Longest time over which the recorded tilt sets in [s]."""
+
+JOINING = 0.45
+"""Share of a flight at either end in which it leaves, or joins, the recorded path."""
+
+SIDEWAYS = 0.15
+"""Importance of a flying foot's place to the side, as a share of that ahead and upward: a recorded foot may
+pass nearer to the other leg than the body's soles and shanks can."""
+
+SHORTEST_JOINING = 0.2
+"""Time in which a foot in flight at a clip's end does so at least, as long as there is so much [s]."""
+
+LONGEST_JOINING = 0.25
+"""Time in which any effector does so at most: buttocks that lag behind a person who rises make the arms swing
+up [s]."""
+
+SWING_HEIGHT = 0.03
+"""Least height of a foot's lowest point in the middle of its flight [m]."""
+
+CUT_HEIGHT = 0.02
+"""The same at a clip's end that cuts a flight [m]."""
+
+ROUNDING = 0.005
+"""Width of the bend between a flight that is lifted to that height and one that is not [m]."""
+
+TOES_BACK = 0.5
+"""Share of the flight after which bent toes are straight again."""
+
+SAME_INSTANT = 1e-6
+"""Times nearer to each other are one [s]."""
+
+FLIGHT_POSITION, FLIGHT_ROTATION, FLIGHT_END = 0.2, 0.1, 0.25
+"""Importance of position and orientation in the middle of a flight, and the share at either end of it in
+which they matter more."""
+
+
+@dataclass(frozen=True, eq=False)
+class EffectorPaths:
+    """Targets of every effector of a schedule.
+
+    Attributes:
+        targets: By effector.
+        toes: (n,) angle of each joint of toes, by its index among the hinges [rad].
+    """
+
+    targets: dict[str, EffectorTarget]
+    toes: dict[int, FloatArray]
+
+
+def effector_paths(
+    body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray
+) -> EffectorPaths:
+    """Adapt the recorded paths of the effectors to their contacts.
+
+    Args:
+        body: The body.
+        schedule: Its contacts in time.
+        time: (n,) [s].
+        q: (n, nq) recorded postures then.
+    """
+    targets, toes = {}, {}
+    for name in schedule.sequence.effectors:
+        path = _Path(body, schedule, time, q, name)
+        targets[name] = path.target()
+        if path.toe_joint is not None:
+            toes[path.toe_joint] = path.toes
+    return EffectorPaths(targets, toes)
+
+
+class _Path:
+    """One effector; recorded first, and then changed in place."""
+
+    def __init__(
+        self, body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray, name: str
+    ) -> None:
+        self.body, self.schedule, self.time, self.name = body, schedule, time, name
+        self.phases = schedule.phase_at(time)
+        self.recorded = effector_placements(body, q, name)
+        self.position, self.rotation = (np.array(part) for part in self.recorded)
+        n = len(time)
+        self.weight, self.rotation_weight, self.toes = np.zeros(n), np.ones(n), np.zeros(n)
+        self.along = np.tile(np.eye(3), (n, 1, 1))
+        hanging = hanging_segment(body, body.effector(name).segment)
+        self.toe_joint = None if hanging is None else body.joint_index(hanging.hinges[0].name)
+        self.hinge = toe_hinge(body, name)
+
+    def target(self) -> EffectorTarget:
+        held = np.array([self.name in phase.stance for phase in self.schedule.sequence])
+        for first, stop in mask_runs(held):
+            self._hold(first, stop)
+        for first, stop in mask_runs(self.weight == 0.0):
+            self._fly(first, stop)
+        return EffectorTarget(self.position, self.rotation, self.weight, self.rotation_weight, self.along)
+
+    def _hold(self, first: int, stop: int) -> None:
+        """Place it on one of its contacts, which lasts from a phase up to another."""
+        tilt = _pitch(self.recorded[1])
+        contacts = [self.schedule.sequence[phase].stance[self.name] for phase in range(first, stop)]
+        flat = np.isin(self.phases, [first + i for i, c in enumerate(contacts) if c.part is SolePart.FULL])
+        rest = float(np.median(tilt[flat])) if np.any(flat) else 0.0
+        for part, begin, end in _parts(contacts):
+            # At the very instant of its lift-off it still is where it was.
+            left = np.abs(self.time - self.schedule.instants[first + end]) < SAME_INSTANT
+            rows = ((self.phases >= first + begin) & (self.phases < first + end)) | (
+                left & (end == len(contacts))
+            )
+            contact = contacts[begin]
+            place = np.tile(contact.position, (int(rows.sum()), 1))
+            turn = np.tile(contact.rotation_contact_to_world, (len(place), 1, 1))
+            if part is SolePart.TOES and self.hinge is not None:
+                start, over = self.schedule.instants[[first + begin, first + end]]
+                # A contact that a clip's end cuts goes on: there is no hurry.
+                lasting = over - start if first + end < len(self.schedule.sequence) else np.inf
+                share = (self.time[rows] - start) / min(TILTING, lasting)
+                angle = _up_to(LARGEST_TILT, np.maximum(tilt[rows] - rest, 0.0))
+                angle *= smooth_step(share) if begin > 0 else 1.0
+                turn = turn @ Rotation.from_rotvec(np.outer(angle, [0.0, 1.0, 0.0])).as_matrix()
+                place = place + contact.rotation_contact_to_world @ self.hinge - turn @ self.hinge
+                self.toes[rows] = angle
+            self.position[rows], self.rotation[rows], self.weight[rows] = place, turn, 1.0
+            if contact.kind is ContactKind.GRASP:
+                self.rotation_weight[rows] = 0.0
+
+    def _fly(self, first: int, stop: int) -> None:
+        """Join contact and recording in a flight of some samples; a clip's ends have no contact."""
+        rows = slice(first, stop)
+        leaves, lands = first > 0, stop < len(self.time)
+        start, end = self.time[max(first - 1, 0)], self.time[min(stop, len(self.time) - 1)]
+        share = (self.time[rows] - start) / max(end - start, 1e-9)
+        lasting = max(end - start, 1e-9)
+        joining = min(JOINING if leaves and lands else max(JOINING, SHORTEST_JOINING / lasting), 1.0)
+        joining = min(joining, LONGEST_JOINING / lasting)
+        # The hinge of the toes starts from rest, and the foot keeps turning about it.
+        arm = np.zeros(3) if self.hinge is None else self.hinge
+        points = self.position + self.rotation @ arm
+        place, turn = points[rows].copy(), np.zeros((stop - first, 3))
+        for there, at, along in ((leaves, first - 1, share), (lands, stop, 1.0 - share)):
+            if there:
+                rest = 1.0 - smooth_step(along / joining)
+                place += rest[:, None] * (points[at] - points[rows])
+                known = self.recorded[1][at] if at < first else self.rotation[rows]
+                away = self.rotation[at] @ np.swapaxes(known, -1, -2)
+                turn += rest[:, None] * Rotation.from_matrix(away).as_rotvec()
+        self.rotation[rows] = Rotation.from_rotvec(turn).as_matrix() @ self.rotation[rows]
+        self.position[rows] = place - self.rotation[rows] @ arm
+        if leaves:
+            self.toes[rows] = self._straightening(first, share, TOES_BACK * (end - start))
+        near = np.maximum(share, 0.5 if not leaves else 0.0)
+        near = np.clip(np.minimum(near, 0.5 if not lands else 1.0), 1e-6, 1.0 - 1e-6)
+        if self.hinge is not None:
+            self._lift(rows, np.minimum(near, 1.0 - near), share, (not leaves, not lands))
+        self.weight[rows] = flight_weight(near, FLIGHT_POSITION, FLIGHT_END, FLIGHT_END)
+        self.rotation_weight[rows] = flight_weight(near, FLIGHT_ROTATION, FLIGHT_END, FLIGHT_END)
+        if self.hinge is not None:
+            side = self.rotation[rows, :, 1] * [1.0, 1.0, 0.0]
+            side /= np.linalg.norm(side, axis=1, keepdims=True)
+            less = (1.0 - SIDEWAYS) * (1.0 - self.weight[rows]) / (1.0 - FLIGHT_POSITION)
+            self.along[rows] -= less[:, None, None] * side[:, :, None] * side[:, None, :]
+        if self._grasps():
+            self.rotation_weight[rows] = GRASP_ROTATION_WEIGHT
+
+    def _straightening(self, first: int, share: FloatArray, lasting: float) -> FloatArray:
+        """Angle of the toes after a lift-off: it goes on as it came, and then back to straight [rad]."""
+        before = max(first - 2, 0)
+        angle, since = self.toes[first - 1], max(self.time[first - 1] - self.time[before], 1e-9)
+        rate = (angle - self.toes[before]) / since
+        gone = np.clip(share / TOES_BACK, 0.0, 1.0)
+        found = angle * (1.0 - smooth_step(gone)) + rate * lasting * gone * (1.0 - gone) ** 2
+        return _up_to(LARGEST_TILT, np.maximum(found, 0.0))
+
+    def _lift(self, rows: slice, near: FloatArray, share: FloatArray, cut: tuple[bool, bool]) -> None:
+        """Keep heel, hinge and tips of a foot off the surface in flight.
+
+        At a clip's end that cuts a flight, a foot may be as near to it as it was recorded, about to land.
+
+        Args:
+            rows: Samples of the flight.
+            near: (n,) share of the flight to its nearer contact.
+            share: (n,) of the flight since its beginning.
+            cut: Whether the clip begins, or ends, within it.
+        """
+        tilt, half = _pitch(self.rotation[rows]), 0.5 * (self.body.sole_length or 0.0)
+        height, hinge = self.position[rows, 2], 0.0 if self.hinge is None else float(self.hinge[0])
+        ball = height - hinge * np.sin(tilt)
+        tips = ball - (half - hinge) * np.sin(tilt - self.toes[rows])
+        surface = min(c.position[2] for c in self._contacts())
+        low = np.minimum(np.minimum(height + half * np.sin(tilt), ball), tips) - surface
+        wanted = SWING_HEIGHT * np.minimum(1.0, 4.0 * near)
+        for is_cut, at, away in zip(cut, (0, -1), (share, 1.0 - share), strict=True):
+            if is_cut:
+                least = float(np.clip(low[at], CUT_HEIGHT, SWING_HEIGHT))
+                wanted = np.minimum(wanted, least + (SWING_HEIGHT - least) * np.minimum(1.0, 4.0 * away))
+        lift = ROUNDING * np.logaddexp(0.0, (wanted - low) / ROUNDING)
+        self.position[rows, 2] += lift * np.minimum(1.0, 8.0 * near)
+
+    def _contacts(self) -> Iterator[Contact]:
+        for phase in self.schedule.sequence:
+            if self.name in phase.stance:
+                yield phase.stance[self.name]
+
+    def _grasps(self) -> bool:
+        return all(contact.kind is ContactKind.GRASP for contact in self._contacts())
+
+
+def _pitch(rotation: FloatArray) -> FloatArray:
+    """(n,) of soles, heel up when positive [rad]."""
+    return np.arcsin(np.clip(-rotation[:, 2, 0], -1.0, 1.0))
+
+
+def _up_to(limit: float, angle: FloatArray) -> FloatArray:
+    """Angles (n,) >= 0 with a smooth bend below a limit [rad]."""
+    return np.maximum(limit - TILT_BEND * np.logaddexp(0.0, (limit - angle) / TILT_BEND), 0.0)
+
+
+def _parts(contacts: list[Contact]) -> Iterator[tuple[SolePart, int, int]]:
+    """Part of a contact with the first and the last but one phase in which it is the one."""
+    changes = [i for i in range(1, len(contacts)) if contacts[i].part is not contacts[i - 1].part]
+    bounds = [0, *changes, len(contacts)]
+    for begin, end in pairwise(bounds):
+        yield contacts[begin].part, begin, end

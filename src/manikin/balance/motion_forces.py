@@ -1,0 +1,407 @@
+"""Contact forces and joint torques that a planned motion needs.
+
+The generalised forces of inverse dynamics leave a six-dimensional wrench that the contacts
+must supply.  It is shared among the force-carrying points with the least squared force along
+the edges of their friction pyramids, in the friction model of each stance; contacts that have
+just been made, or are about to be left, cost more, so that load passes smoothly from one to the next.
+
+Also here. A motion complete with forces, torques, centre of mass and margin, from its states and contacts. A
+motion that is there already, made with a load in the hands.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import daqp
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from manikin.balance.contact_forces import ContactGenerators, share
+from manikin.balance.motion_margin import motion_margin
+from manikin.balance.wrench import WrenchPolytope, wrench_polytopes
+from manikin.body import BodyModel, carrying
+from manikin.body.limbs import carrying_segment, hinge_line
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
+from manikin.errors import InputError
+from manikin.motion import Motion
+from manikin.motion.dynamics import FreeDynamics, centroidal_motion
+from manikin.numerics.spatial import FloatArray
+from manikin.scene.distance import moves_by_joint
+
+
+def full_motion(
+    body: BodyModel,
+    schedule: ContactSchedule,
+    polytopes: Sequence[WrenchPolytope],
+    time: FloatArray,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+) -> tuple[Motion, FloatArray]:
+    """Share the contact forces of a motion and measure it.
+
+    Args:
+        body: The body.
+        schedule: Its contacts in time.
+        polytopes: Of each phase.
+        time: (n,) [s].
+        q: (n, nq) configurations.
+        v: (n, nv) velocities.
+        a: (n, nv) accelerations.
+
+    Returns:
+        The motion, and (n, 6) its whole-body pseudo-wrench about the world origin.
+    """
+    found = centroidal_motion(body, q, v, a)
+    forces = plan_forces(body, schedule, time, q, v, a)
+    stances = [phase.stance for phase in schedule.sequence]
+    margin = motion_margin(stances, schedule.phase_at(time), found.wrench, found.com, polytopes=polytopes)
+    names = schedule.sequence.effectors
+    motion = Motion(
+        time=time, q=q, v=v, a=a, tau=forces.tau, com=found.com, angular_momentum=found.angular_momentum,
+        margin=margin.margin, support=schedule.support(time, names),
+        contact_force=forces.contact_force, contact_names=names, joint_names=body.joint_names,
+    )  # fmt: skip
+    return motion, found.wrench
+
+
+def carried_motion(
+    body: BodyModel, motion: Motion, schedule: ContactSchedule, mass: float, hand: str = "both"
+) -> tuple[BodyModel, Motion]:
+    """The same postures with a load in the hands: what they need of contacts and joints is computed anew.
+
+    Centre of mass, momentum, contact forces, torques and the margin (about the centre of mass) are those of
+    the loaded body on the planned contacts. Nothing is planned again: a negative margin says that nobody
+    would move so with that load.
+
+    Args:
+        body: Who moves, with empty hands.
+        motion: Its motion.
+        schedule: Its contacts in time.
+        mass: Of the load [kg].
+        hand: ``"left"``, ``"right"`` or ``"both"``.
+
+    Returns:
+        The body with the load, and the motion.
+
+    Raises:
+        InputError: If the body carries something already, or has no such hand.
+    """
+    if body.loads:
+        raise InputError(
+            f"the motion was made with {sum(body.loads.values()):g} kg in the hands; valid: a motion without"
+        )
+    loaded = carrying(body, mass, hand)
+    stances = [phase.stance.bounded(loaded.mass) for phase in schedule.sequence]
+    states = motion.time, motion.q, motion.v, motion.a
+    measured, _ = full_motion(loaded, schedule, wrench_polytopes(stances), *states)
+    return loaded, measured
+
+
+_RAMP = 0.08
+"""Time over which a contact takes or loses its share of the load [s]."""
+
+_SUDDEN_RAMP = 0.02
+"""The same for a contact that is made at speed [s]."""
+
+TORQUE_SHARE = 0.98
+"""Share of the joints' strength that the forces are shared for where it does not suffice at once."""
+
+_MISSING_COST = 1.0e-6
+"""Square of the cost of force relative to that of missing the wrench."""
+
+_ARM = 0.1
+"""Length that makes moments comparable with forces [m]."""
+
+_RAISED = 0.005
+"""Height above the lowest point of a contact that still settles at which a force costs twice as much [m]."""
+
+_HANGING_COST = 3.0
+"""Cost of a force on a hanging segment (toes) relative to one on the effector's own."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForces:
+    """Forces of a planned motion.
+
+    Attributes:
+        tau: (n, nv) generalised forces; the first six are what no contact force could
+            supply (zero for a motion in balance) [N, N.m].
+        contact_force: (n, c, 6) force and moment about the contact's origin, in world
+            axes [N, N.m].
+        missing_wrench: (n,) norm of the first six entries of ``tau``.
+    """
+
+    tau: FloatArray
+    contact_force: FloatArray
+    missing_wrench: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Generators:
+    """Force directions of one stance.
+
+    Attributes:
+        point: (g, 3) where each acts [m].
+        direction: (g, 3) unit normal force plus friction.
+        contact: (g,) index into the contact names.
+        carrier: (g,) joint of the segment that it acts on.
+        cost: (g,) cost of its magnitude, more where it bends the toes.
+        limit: (g,) largest magnitude: the force limit of a grasp, infinite for the others [N].
+        moves: (joints, nv) 1 where a velocity coordinate moves a joint, else 0.
+    """
+
+    point: FloatArray
+    direction: FloatArray
+    contact: np.ndarray
+    carrier: np.ndarray
+    cost: FloatArray
+    limit: FloatArray
+    moves: FloatArray
+
+    @cached_property
+    def wrenches(self) -> FloatArray:
+        """(6, g) wrench of each unit magnitude about the world origin."""
+        return np.vstack([self.direction.T, np.cross(self.point, self.direction).T])
+
+    @cached_property
+    def balance(self) -> tuple[FloatArray, FloatArray]:
+        """Mean contact point (3,) and the (6, g) wrenches about it, moments in units of force."""
+        centre = self.point.mean(axis=0)
+        moment = np.cross(self.point - centre, self.direction) / _ARM
+        return centre, np.vstack([self.direction.T, moment.T])
+
+    def settling(
+        self, number: int, contact: Contact, position: FloatArray, rotation: FloatArray
+    ) -> "_Generators":
+        """The same forces with those of one contact where its effector is now, most of them where it is low.
+
+        Args:
+            number: Index of the contact's effector among the contact names.
+            contact: The contact that is still settling.
+            position: (3,) of its effector [m].
+            rotation: (3, 3) effector-to-world.
+        """
+        own = self.contact == number
+        point, cost = self.point.copy(), self.cost.copy()
+        local = (self.point[own] - contact.position) @ contact.rotation_contact_to_world
+        point[own] = position + local @ rotation.T
+        height = point[own] @ contact.normal
+        cost[own] *= 1.0 + ((height - height.min()) / _RAISED) ** 2
+        return replace(self, point=point, cost=cost)
+
+    @cached_property
+    def by_carrier(self) -> tuple[tuple[FloatArray, FloatArray], ...]:
+        """For each joint that carries generators: which velocities move it, and the (6, g) wrenches on it.
+
+        The first is (nv,), 1 or 0; the wrenches of the generators on other joints are zero.
+        """
+        return tuple(
+            (self.moves[joint], self.wrenches * (self.carrier == joint)) for joint in np.unique(self.carrier)
+        )
+
+    @cached_property
+    def by_contact(self) -> dict[int, FloatArray]:
+        """(6, g) wrenches of the generators of each contact, zero for the others."""
+        return {int(index): self.wrenches * (self.contact == index) for index in np.unique(self.contact)}
+
+
+def plan_forces(
+    body: BodyModel,
+    schedule: ContactSchedule,
+    time: FloatArray,
+    q: FloatArray,
+    v: FloatArray,
+    a: FloatArray,
+) -> ContactForces:
+    """Distribute the contact forces of a motion and compute its joint torques.
+
+    Args:
+        body: The body.
+        schedule: Its contacts in time.
+        time: (n,) [s].
+        q: (n, nq) configurations.
+        v: (n, nv) velocities.
+        a: (n, nv) accelerations.
+    """
+    dynamics = FreeDynamics.of(body, q, v, a)
+    names = schedule.sequence.effectors
+    shares = load_shares(schedule, time, names)
+    tau = np.zeros((len(time), body.nv))
+    forces = np.zeros((len(time), len(names), 6))
+    for rows, generators, stance in _alike(body, schedule, time, q):
+        part = dynamics.part(rows)
+        if not len(stance):
+            tau[rows] = part.needed  # in the air nothing pushes
+            continue
+        cost = generators.cost / shares[rows][:, generators.contact]
+        matrix, target = _centred(generators, part.wrench)
+        magnitude = share(matrix, target, cost**-2.0, _MISSING_COST).magnitude
+        tau[rows] = part.needed - _apply(part.jacobians, generators, magnitude)
+        over = np.any(body.torque_share(tau[rows, 6:]) > 1.0, axis=1)
+        over |= np.any(magnitude > generators.limit, axis=1)
+        for k in np.flatnonzero(over):
+            joint_map = _joint_map(part.jacobians[k], generators)
+            other = _share_within_limits(
+                generators, matrix, target[k], cost[k], part.needed[k, 6:], joint_map[6:],
+                TORQUE_SHARE * body.torque_lower, TORQUE_SHARE * body.torque_upper,
+            )  # fmt: skip
+            if other is not None:
+                magnitude[k] = other
+                tau[rows[k]] = part.needed[k] - joint_map @ other
+        forces[rows] = _by_contact(generators, magnitude, stance, names)
+    return ContactForces(tau, forces, np.linalg.norm(tau[:, :6], axis=1))
+
+
+def _alike(
+    body: BodyModel, schedule: ContactSchedule, time: FloatArray, q: FloatArray
+) -> Iterator[tuple[NDArray[np.int64], _Generators, Stance]]:
+    """Indices of the samples that have the same force directions, with these and the stance."""
+    names = schedule.sequence.effectors
+    data = body.pinocchio.createData()
+    phases = schedule.phase_at(time)
+    settling = {name: schedule.settling(time, name) for name in names}
+    for number, phase in enumerate(schedule.sequence):
+        generators, rows = _generators(body, phase.stance, names), phases == number
+        sliding = np.any([settling[name] for name in names], axis=0) & rows
+        if np.any(rows & ~sliding):
+            yield np.flatnonzero(rows & ~sliding), generators, phase.stance
+        for k in np.flatnonzero(sliding):
+            moved = generators
+            for index, name in enumerate(names):
+                if settling[name][k]:
+                    pin.forwardKinematics(body.pinocchio, data, q[k])
+                    place = pin.updateFramePlacement(body.pinocchio, data, body.effector_frame(name))
+                    moved = moved.settling(index, phase.stance[name], place.translation, place.rotation)
+            yield np.array([k]), moved, phase.stance
+
+
+def load_shares(schedule: ContactSchedule, time: FloatArray, names: tuple[str, ...]) -> FloatArray:
+    """(n, c) readiness of each contact to carry load, ramping from 0.05 to 1 at its ends."""
+    shares = np.ones((len(time), len(names)))
+    held = np.array([[name in phase.stance for name in names] for phase in schedule.sequence])
+    for column in range(len(names)):
+        for phase in range(1, len(held)):
+            instant = schedule.instants[phase]
+            if held[phase, column] and not held[phase - 1, column]:
+                after = time >= instant
+                settles = schedule.sequence[phase].stance[names[column]].settle > 0.0
+                ramp = _SUDDEN_RAMP if settles else _RAMP
+                shares[after, column] = np.minimum(shares[after, column], (time[after] - instant) / ramp)
+            if held[phase - 1, column] and not held[phase, column]:
+                before = time < instant
+                shares[before, column] = np.minimum(shares[before, column], (instant - time[before]) / _RAMP)
+    return np.clip(shares, 0.05, 1.0)
+
+
+def _generators(body: BodyModel, stance: Stance, names: tuple[str, ...]) -> _Generators:
+    points = [_force_points(body, contact) for contact in stance]
+    found = ContactGenerators.of(stance, points, grasp_moments=False)
+    contacts = [names.index(contact.effector) for contact in stance]
+    carriers, costs = [], []
+    for number, contact in enumerate(stance):
+        count = int(np.sum(found.contact == number)) // len(points[number])
+        for local in points[number]:
+            segment = carrying_segment(body, contact.effector, local)
+            hanging = segment != body.effector(contact.effector).segment
+            carriers += [body.pinocchio.frames[body.segment_frame(segment)].parentJoint] * count
+            costs += [_HANGING_COST if hanging else 1.0] * count
+    return _Generators(
+        found.point, found.force, np.array(contacts, dtype=np.int64)[found.contact], np.array(carriers),
+        np.array(costs), found.upper, moves_by_joint(body.pinocchio),
+    )  # fmt: skip
+
+
+def _force_points(body: BodyModel, contact: Contact) -> FloatArray:
+    """(k, 3) points of the contact frame that carry force: corners, and the ends of the toes' hinge."""
+    line = hinge_line(body, contact.effector)
+    inside = line is not None and abs(line) < 0.5 * contact.length
+    if (
+        contact.kind is not ContactKind.SOLE
+        or contact.part is not SolePart.FULL
+        or line is None
+        or not inside
+    ):
+        return contact.points
+    half = 0.5 * contact.width
+    return np.vstack([contact.points, [[line, half, 0.0], [line, -half, 0.0]]])
+
+
+def _centred(generators: _Generators, wrench: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Wrenches (6, g) of the generators and the wanted ones (n, 6) about the mean contact point.
+
+    In units of force, for conditioning.
+    """
+    centre, matrix = generators.balance
+    force, moment = wrench[:, :3], wrench[:, 3:]
+    return matrix, np.hstack([force, (moment - np.cross(centre, force)) / _ARM])
+
+
+def _share_within_limits(
+    generators: _Generators,
+    matrix: FloatArray,
+    target: FloatArray,
+    cost: FloatArray,
+    needed: FloatArray,
+    joint_map: FloatArray,
+    torque_lower: FloatArray,
+    torque_upper: FloatArray,
+) -> FloatArray | None:
+    """Magnitudes (g,) that keep the joints' torques and the grasps' forces within their limits, or None.
+
+    Args:
+        generators: Force directions of the stance.
+        matrix: (6, g) their wrenches about the mean contact point.
+        target: (6,) wrench to supply, about that point.
+        cost: (g,) cost of each magnitude.
+        needed: (nv - 6,) joint torques without contacts [N.m].
+        joint_map: (nv - 6, g) torque that a unit magnitude takes from each joint.
+        torque_lower: (nv - 6,) most negative joint torques [N.m].
+        torque_upper: (nv - 6,) largest ones [N.m].
+    """
+    cost = cost**2
+    count = len(cost)
+    limit = np.where(np.isfinite(generators.limit), generators.limit, 1e6)
+    solution, _, flag, _ = daqp.solve(
+        np.diag(cost / cost.mean()),
+        np.zeros(count),
+        np.ascontiguousarray(np.vstack([matrix, joint_map])),
+        np.concatenate([limit, target, needed - torque_lower]),
+        np.concatenate([np.zeros(count), target, needed - torque_upper]),
+        np.concatenate([np.zeros(count), np.full(6, _EQUALITY), np.zeros(len(needed))]).astype(np.int32),
+    )
+    return np.maximum(np.asarray(solution, dtype=np.float64), 0.0) if flag > 0 else None
+
+
+_EQUALITY = 5
+"""DAQP's mark of an equality."""
+
+
+def _joint_map(jacobians: FloatArray, generators: _Generators) -> FloatArray:
+    """(nv, g) generalised force of a unit magnitude of each generator, from joint Jacobians (6, nv)."""
+    return sum((jacobians * moved).T @ wrenches for moved, wrenches in generators.by_carrier) + np.zeros(
+        (jacobians.shape[1], len(generators.cost))
+    )
+
+
+def _apply(jacobians: FloatArray, generators: _Generators, magnitude: FloatArray) -> FloatArray:
+    """(n, nv) generalised forces of contact forces (n, g), from joint Jacobians (n, 6, nv)."""
+    total = np.zeros((len(jacobians), jacobians.shape[2]))
+    for moved, wrenches in generators.by_carrier:
+        total += moved * ((magnitude @ wrenches.T)[:, None, :] @ jacobians)[:, 0]
+    return total
+
+
+def _by_contact(
+    generators: _Generators, magnitude: FloatArray, stance: Stance, names: tuple[str, ...]
+) -> FloatArray:
+    """(n, c, 6) force and moment about each contact's origin of magnitudes (n, g)."""
+    out = np.zeros((len(magnitude), len(names), 6))
+    for contact in stance:
+        index = names.index(contact.effector)
+        resultant = magnitude @ generators.by_contact[index].T
+        out[:, index, :3] = resultant[:, :3]
+        out[:, index, 3:] = resultant[:, 3:] - np.cross(contact.position, resultant[:, :3])
+    return out

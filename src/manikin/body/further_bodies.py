@@ -1,0 +1,430 @@
+"""The person of 15 rigid segments and 34 joint angles of [Kudoh2002]_ 2.2.
+
+Masses, lengths and the widths of shoulders and hips are printed ([Kudoh2002]_ Table 3.1 and 3.2), and so
+is which joints are pins and which are balls. All else is ours: inertias are those of cylinders of the
+density of water (3.2 says "approximation cylinder" and no radius), the foot stands on a sole as long as
+itself, and axes, ranges and speeds are those of :mod:`manikin.body.human_parts`, carried by
+the joints that this body has: the waist bends as far as lumbar and thorax together, the wrist turns as the
+forearm does, and the ankle as the shank. The thesis prints no torque limits (2.31-2.33 name them only);
+:data:`TORQUES` are ours, symmetric, and larger than people's, so that its printed pushes can be held.
+
+Also here. An insect of six legs, to try creatures other than the human. A body without limbs: all its mass in
+one small ball, on feet that weigh nothing ([Qiu2012]_ 5.4.4).
+
+The thesis prints 4 degrees of freedom per leg and 33 in all in one place and 5 per leg in another;
+33 fits neither with a free root. We take the insect of the results: six legs of five hinges and a
+free root, 36 degrees of freedom ([Tonneau2015]_ Fig. 8.1). It prints no dimension, so proportions,
+ranges, speeds and strengths are our own choice.
+
+It can be planned for, but has no joints to move and nothing to execute.  Its feet are where
+the contact schedule has them, see :func:`manikin.motion.motion.foot_positions`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from manikin.body.anthropometry import ANKLE_FROM_HEEL
+from manikin.body.human import standing_angles
+from manikin.body.human_parts import (
+    ALONG_X,
+    across,
+    arms_and_legs,
+    cylinder_inertia,
+    human_hinges,
+    palm_rotation,
+    upright_capsule,
+)
+from manikin.body.model import BodyModel
+from manikin.body.segments import Effector, Hinge, Limb, Segment, Shape, ShapeKind
+from manikin.contact import ContactKind
+from manikin.errors import BodyError
+from manikin.numerics.spatial import FloatArray, finite_number
+
+_PAIRS = ("front", "middle", "rear")
+_HIP_X = {"front": 0.24, "middle": 0.0, "rear": -0.24}
+"""Place of the hips along the trunk, as a share of its length."""
+_HEADING_DEG = {"front": 40.0, "middle": 0.0, "rear": -40.0}
+"""Direction in which a leg stands, forward of straight sideways [deg]."""
+_HIP_Y = 0.13
+_LENGTHS = {"femur": 0.34, "tibia": 0.42, "tarsus": 0.14}
+_RADII = {"femur": 0.035, "tibia": 0.025, "tarsus": 0.012}
+_TIP_FREE = 0.4
+"""Distance of the tarsus' shape to its tip in radii, so that a tip may lean by 45 degrees where it stands."""
+_MASS_SHARES = {"femur": 0.025, "tibia": 0.015, "tarsus": 0.005}
+_TRUNK_RADIUS = 0.11
+_SPEED = 12.0
+_HINGES = {
+    # Segment: name, axis of the left leg, range [deg], strength in units of weight times length.
+    "femur": (
+        ("sweep", (0.0, 0.0, 1.0), -75.0, 75.0, 0.3),
+        ("lift", (1.0, 0.0, 0.0), -45.0, 90.0, 0.5),
+        ("twist", (0.0, 1.0, 0.0), -40.0, 40.0, 0.2),
+    ),
+    "tibia": (("knee", (-1.0, 0.0, 0.0), 0.0, 150.0, 0.4),),
+    "tarsus": (("ankle", (-1.0, 0.0, 0.0), -70.0, 70.0, 0.1),),
+}
+_STANDING_DEG = {"lift": 25.0, "knee": 105.0, "ankle": 10.0}
+
+
+def insect(length: float = 0.4, mass: float = 2.0) -> BodyModel:
+    """Make an insect: a trunk and six legs of five hinges each.
+
+    Segment frames are parallel to the world in the zero posture, in which all legs point straight
+    to the side. A hip sweeps backward, lifts and twists about the leg; knee and ankle bend
+    down. Effectors ``left_front_tip`` ... ``right_rear_tip`` are the ends of the tarsi, their z
+    axes along the tarsus towards the body; limbs are ``left_front_leg`` ... ``right_rear_leg``.
+
+    Args:
+        length: Of the trunk [m], > 0.
+        mass: Of the whole insect [kg], > 0.
+
+    Raises:
+        BodyError: If a value is not positive.
+    """
+    length = finite_number(length, "insect length [m]", above=0.0, error=BodyError)
+    mass = finite_number(mass, "insect mass [kg]", above=0.0, error=BodyError)
+    legs = [(f"{side}_{pair}", pair, side) for pair in _PAIRS for side in ("left", "right")]
+    segments = [_insect_trunk(length, mass)]
+    for name, pair, side in legs:
+        segments += _insect_leg(name, pair, 1.0 if side == "left" else -1.0, length, mass)
+    return BodyModel(
+        name="insect",
+        segments=tuple(segments),
+        effectors={f"{name}_tip": _tip(name, side, length) for name, _, side in legs},
+        standing_angles={key: angle for name, pair, _ in legs for key, angle in _standing(name, pair)},
+        limbs=tuple(_limb(name, pair, side) for name, pair, side in legs),
+    )
+
+
+def _insect_trunk(length: float, mass: float) -> Segment:
+    share = 1.0 - 6.0 * sum(_MASS_SHARES.values())
+    radius = _TRUNK_RADIUS * length
+    turn = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    shape = Shape("trunk", ShapeKind.CAPSULE, (radius, length - 2.0 * radius), rotation=turn)
+    inertia = _rod(share * mass, radius, length, axis=0)
+    return Segment("trunk", None, np.zeros(3), (), share * mass, np.zeros(3), inertia, (shape,))
+
+
+def _insect_leg(name: str, pair: str, sign: float, length: float, mass: float) -> list[Segment]:
+    """Femur, tibia and tarsus, each along y in the zero posture."""
+    origin = np.array([_HIP_X[pair] * length, sign * _HIP_Y * length, 0.0])
+    parent, found = "trunk", []
+    for part, share in _LENGTHS.items():
+        reach = np.array([0.0, sign * share * length, 0.0])
+        part_mass, radius = _MASS_SHARES[part] * mass, _RADII[part] * length
+        found.append(
+            Segment(
+                f"{name}_{part}", parent, origin, _insect_hinges(name, part, sign, 9.81 * mass * length),
+                part_mass, 0.5 * reach, _rod(part_mass, radius, share * length, axis=1),
+                (_rod_shape(part, radius, reach),),
+            )
+        )  # fmt: skip
+        parent, origin = f"{name}_{part}", reach
+    return found
+
+
+def _insect_hinges(name: str, part: str, sign: float, strength: float) -> tuple[Hinge, ...]:
+    """Hinges of one segment; those of the right side are the reflection of the left ones."""
+    reflection = np.ones(3) if sign > 0.0 else np.array([-1.0, 1.0, -1.0])
+    return tuple(
+        Hinge(
+            f"{name}_{joint}", reflection * np.array(axis), float(np.deg2rad(lower)),
+            float(np.deg2rad(upper)), _SPEED, -torque * strength, torque * strength,
+        )
+        for joint, axis, lower, upper, torque in _HINGES[part]
+    )  # fmt: skip
+
+
+def _rod_shape(part: str, radius: float, reach: FloatArray) -> Shape:
+    """Capsule from the joint to the next, ending at it; a tarsus ends a little before its tip."""
+    span = float(np.abs(reach[1])) - radius * (1.0 + (_TIP_FREE if part == "tarsus" else 0.0))
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    centre = 0.5 * span * np.sign(reach)
+    return Shape(part, ShapeKind.CAPSULE, (radius, span), centre, turn)
+
+
+def _rod(mass: float, radius: float, length: float, axis: int) -> FloatArray:
+    """Inertia (3, 3) of a solid cylinder along one axis about its centre."""
+    moments = np.full(3, mass * (3.0 * radius**2 + length**2) / 12.0)
+    moments[axis] = 0.5 * mass * radius**2
+    return np.diag(moments)
+
+
+def _tip(name: str, side: str, length: float) -> Effector:
+    sign = 1.0 if side == "left" else -1.0
+    x, z = np.array([1.0, 0.0, 0.0]), np.array([0.0, -sign, 0.0])
+    turn = np.column_stack([x, np.cross(z, x), z])
+    return Effector(
+        f"{name}_tip", f"{name}_tarsus", np.array([0.0, sign * _LENGTHS["tarsus"] * length, 0.0]), turn
+    )
+
+
+def _standing(name: str, pair: str) -> list[tuple[str, float]]:
+    angles = {"sweep": -_HEADING_DEG[pair], **_STANDING_DEG}
+    return [(f"{name}_{joint}", float(np.deg2rad(value))) for joint, value in angles.items()]
+
+
+def _limb(name: str, pair: str, side: str) -> Limb:
+    other = "right" if side == "left" else "left"
+    chain = tuple(f"{name}_{part}" for part in _LENGTHS)
+    return Limb(f"{name}_leg", f"{name}_tip", chain, ContactKind.POINT, f"{other}_{pair}_leg")
+
+
+RADIUS = 0.1
+"""Radius of the ball that stands for the point [m]."""
+
+
+def point_mass(mass: float) -> BodyModel:
+    """Make a point mass.
+
+    Args:
+        mass: [kg], > 0.
+
+    Raises:
+        BodyError: If the mass is not a positive number.
+    """
+    mass = finite_number(mass, "mass [kg]", above=0.0, error=BodyError)
+    ball = Shape("ball", ShapeKind.SPHERE, np.array([RADIUS]), np.zeros(3), np.eye(3))
+    root = Segment(
+        name="body",
+        parent=None,
+        origin=np.zeros(3),
+        hinges=(),
+        mass=mass,
+        com=np.zeros(3),
+        inertia=0.4 * mass * RADIUS**2 * np.eye(3),
+        shapes=(ball,),
+    )
+    return BodyModel(name="point mass", segments=(root,), effectors={}, nominal_mass=mass)
+
+
+@dataclass(frozen=True)
+class PartSize:
+    """One row of [Kudoh2002]_ Table 3.1.
+
+    Attributes:
+        mass: [kg].
+        length: [m].
+    """
+
+    mass: float
+    length: float
+
+    @property
+    def radius(self) -> float:
+        """Radius of the cylinder of the density of water [m]; ours."""
+        return float(np.sqrt(self.mass / (DENSITY * np.pi * self.length)))
+
+    @property
+    def inertia(self) -> FloatArray:
+        """(3, 3) about the centre of the upright cylinder [kg.m^2]."""
+        return cylinder_inertia(self.mass, self.radius, self.length)
+
+
+DENSITY = 1000.0
+"""Of the cylinders [kg/m^3]; ours."""
+
+PARTS: Mapping[str, PartSize] = MappingProxyType({
+    "head": PartSize(4.90, 0.25),
+    "chest": PartSize(18.06, 0.40),
+    "loins": PartSize(12.04, 0.20),
+    "upper_arm": PartSize(2.52, 0.25),
+    "forearm": PartSize(1.54, 0.25),
+    "hand": PartSize(0.49, 0.10),
+    "thigh": PartSize(7.98, 0.40),
+    "shank": PartSize(3.71, 0.40),
+    "foot": PartSize(1.26, 0.25),
+})  # fmt: skip
+"""Mass and length of each rigid part, limbs of one side ([Kudoh2002]_ Table 3.1)."""
+
+SHOULDER_WIDTH, HIP_WIDTH = 0.40, 0.30
+"""Distances between the shoulder joints and between the hip joints [m] ([Kudoh2002]_ 3.2)."""
+
+MASS = 70.0
+"""Of the whole body [kg]."""
+
+ANKLE_HEIGHT, SOLE_WIDTH = 0.07, 0.10
+"""Height of the ankle above the sole and width of the sole [m]; ours, the thesis has neither."""
+
+STATURE = sum(PARTS[name].length for name in ("head", "chest", "loins", "thigh", "shank")) + ANKLE_HEIGHT
+"""Sole to vertex [m]."""
+
+_ARMS = ("upper_arm", "forearm", "hand")
+_LEGS = ("thigh", "shank", "foot")
+_SIDES = (("left", 1.0), ("right", -1.0))
+
+
+TORQUES: Mapping[str, float] = MappingProxyType({
+    "lumbar_flexion": 350, "lumbar_side_bend": 250, "lumbar_rotation": 150,
+    "thorax_flexion": 250, "thorax_side_bend": 180, "thorax_rotation": 120,
+    "neck_flexion": 60, "neck_side_bend": 50, "neck_rotation": 30,
+    "shoulder_flexion": 110, "shoulder_abduction": 100, "shoulder_rotation": 60,
+    "elbow_flexion": 80, "forearm_pronation": 20, "wrist_flexion": 20, "wrist_radial_deviation": 20,
+    "hip_flexion": 260, "hip_abduction": 200, "hip_rotation": 100,
+    "knee_flexion": 260, "knee_rotation": 80, "ankle_dorsiflexion": 200, "ankle_inversion": 80,
+})  # fmt: skip
+"""Largest torque of each hinge of the human either way for :data:`TORQUES_FOR` [N.m]; ours."""
+
+TORQUES_FOR = 79.0 * 1.75
+"""Mass times stature for which :data:`TORQUES` are given; they scale with it [kg.m]."""
+
+
+def kudoh() -> BodyModel:
+    """Make the body of [Kudoh2002]_: 15 segments, 34 joint angles and the free loins, 70 kg.
+
+    Neck, waist, shoulders, wrists, hips and ankles are balls of three hinges, elbows and knees pins.
+    Frames, postures and effectors are those of :func:`manikin.body.human`: the loins' frame lies midway
+    between the hip joints and every other one in its proximal joint, and effectors are ``left_foot``,
+    ``right_foot``, ``left_hand``, ``right_hand``, ``head`` and ``pelvis`` (the loins).
+    """
+    limbs = [part for make in (_arm, _leg) for side, sign in _SIDES for part in make(side, sign)]
+    return BodyModel(
+        name="kudoh",
+        segments=(*_trunk(), *limbs),
+        effectors={effector.name: effector for effector in _effectors()},
+        standing_angles=standing_angles(),
+        stature=STATURE,
+        sole_length=PARTS["foot"].length,
+        sole_width=SOLE_WIDTH,
+        nominal_mass=MASS,
+        limbs=arms_and_legs(_ARMS, _LEGS),
+    )
+
+
+def _hinges(segment: str, side: str = "") -> tuple[Hinge, ...]:
+    """Hinges of the human's segment at this body's strength."""
+    return human_hinges(segment, side, _torques)
+
+
+def _torques(hinge: str) -> tuple[float, float]:
+    torque = TORQUES[hinge] * MASS * STATURE / TORQUES_FOR
+    return torque, torque
+
+
+def _waist() -> tuple[Hinge, ...]:
+    """One ball for two: ranges of lumbar and thorax added."""
+    return tuple(
+        replace(
+            low, name=low.name.replace("lumbar", "waist"), lower=low.lower + high.lower,
+            upper=low.upper + high.upper,
+        )
+        for low, high in zip(_hinges("lumbar"), _hinges("thorax"), strict=True)
+    )  # fmt: skip
+
+
+def _joint(segment: str, side: str) -> tuple[Hinge, ...]:
+    """Hinges of a limb's segment to its parent: 3, 1 and 3 of an arm or a leg."""
+    elbow, forearm_turn = _hinges("forearm", side)
+    knee, shank_turn = _hinges("leg", side)
+    return {
+        "upper_arm": _hinges("upper_arm", side),
+        "forearm": (elbow,),
+        "hand": (replace(forearm_turn, name=f"{side}_wrist_rotation"), *_hinges("hand", side)),
+        "thigh": _hinges("thigh", side),
+        "shank": (knee,),
+        "foot": (*_hinges("foot", side), replace(shank_turn, name=f"{side}_ankle_rotation")),
+    }[segment]
+
+
+# --- segments ------------------------------------------------------------------------------------
+
+
+def _trunk() -> tuple[Segment, ...]:
+    loins, chest, head = (PARTS[name] for name in ("loins", "chest", "head"))
+    ribs = chest.radius
+    return (
+        _upright("loins", None, 0.0, (), across("hips", 0.10, HIP_WIDTH, 0.5 * loins.length)),
+        _upright("chest", "loins", loins.length, _waist(),
+                 upright_capsule("chest", ribs, (0.0, 0.0, ribs), (0.0, 0.0, chest.length - ribs))),
+        _upright("head", "chest", chest.length, _hinges("neck"),
+                 upright_capsule("head", head.radius, (0.0, 0.0, head.radius),
+                                 (0.0, 0.0, head.length - head.radius))),
+    )  # fmt: skip
+
+
+def _upright(
+    name: str, parent: str | None, height: float, hinges: tuple[Hinge, ...], shape: Shape
+) -> Segment:
+    """Part of the trunk that stands on its joint."""
+    part = PARTS[name]
+    origin, com = np.array([0.0, 0.0, height]), np.array([0.0, 0.0, 0.5 * part.length])
+    return Segment(name, parent, origin, hinges, part.mass, com, part.inertia, (shape,))
+
+
+def _arm(side: str, sign: float) -> list[Segment]:
+    shoulder = np.array([0.0, 0.5 * sign * SHOULDER_WIDTH, PARTS["chest"].length])
+    return [
+        _hanging(side, "upper_arm", "chest", shoulder),
+        _hanging(side, "forearm", f"{side}_upper_arm", _below("upper_arm")),
+        _hanging(side, "hand", f"{side}_forearm", _below("forearm")),
+    ]
+
+
+def _leg(side: str, sign: float) -> list[Segment]:
+    return [
+        _hanging(side, "thigh", "loins", np.array([0.0, 0.5 * sign * HIP_WIDTH, 0.0])),
+        _hanging(side, "shank", f"{side}_thigh", _below("thigh")),
+        _foot(side),
+    ]
+
+
+def _below(name: str) -> FloatArray:
+    """Where the next joint of a hanging part is, in its frame [m]."""
+    return np.array([0.0, 0.0, -PARTS[name].length])
+
+
+def _hanging(side: str, name: str, parent: str, origin: FloatArray) -> Segment:
+    """Part of a limb that hangs on its joint; its shape stops short of what it carries."""
+    part = PARTS[name]
+    radius = min(part.radius, 0.49 * part.length)
+    start = -radius if name == "hand" else 0.0
+    shape = upright_capsule(name, radius, (0.0, 0.0, start), (0.0, 0.0, radius - part.length))
+    return Segment(
+        f"{side}_{name}",
+        parent,
+        origin,
+        _joint(name, side),
+        part.mass,
+        0.5 * _below(name),
+        part.inertia,
+        (shape,),
+    )
+
+
+def _foot(side: str) -> Segment:
+    """A cylinder that lies along the sole, whose middle is that of the sole."""
+    part = PARTS["foot"]
+    middle = np.array([(0.5 - ANKLE_FROM_HEEL) * part.length, 0.0, -0.5 * ANKLE_HEIGHT])
+    box = np.array([part.length, SOLE_WIDTH, 0.75 * ANKLE_HEIGHT])
+    sole = Shape("sole", ShapeKind.BOX, box, (middle[0], 0.0, 0.5 * box[2] - ANKLE_HEIGHT))
+    inertia = ALONG_X @ part.inertia @ ALONG_X.T
+    return Segment(
+        f"{side}_foot",
+        f"{side}_shank",
+        _below("shank"),
+        _joint("foot", side),
+        part.mass,
+        middle,
+        inertia,
+        (sole,),
+    )
+
+
+# --- what it touches with --------------------------------------------------------------------------
+
+
+def _effectors() -> list[Effector]:
+    found = [
+        Effector("pelvis", "loins", np.zeros(3)),
+        Effector("head", "head", np.array([0.0, 0.0, PARTS["head"].length])),
+    ]
+    hand = PARTS["hand"]
+    for side, sign in _SIDES:
+        sole = np.array([(0.5 - ANKLE_FROM_HEEL) * PARTS["foot"].length, 0.0, -ANKLE_HEIGHT])
+        palm = np.array([0.0, -sign * hand.radius, -0.5 * hand.length])
+        found.append(Effector(f"{side}_foot", f"{side}_foot", sole))
+        found.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
+    return found

@@ -1,0 +1,8 @@
+"""What the commands of the command line share, and the larger ones of them.
+
+Nothing here loads numpy before a command runs: :func:`manikin.cli.app.main` limits its threads first.
+"""
+
+from manikin.cli.app import main
+
+__all__ = ["main"]

@@ -1,0 +1,268 @@
+"""``manikin analyze``: what a recorded person did, measured with the yardsticks of the plans.
+
+Also here. Processes that are ready by the time this one knows what they shall do.
+"""
+
+import multiprocessing
+import time as clock
+from collections.abc import Sequence
+from multiprocessing import forkserver
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from manikin.cli.console import (
+    BAD_INPUT,
+    DONE,
+    FAILED,
+    JsonOption,
+    complain,
+    print_json,
+    print_table,
+    refuse,
+    stdout_kept_clean,
+)
+from manikin.errors import InputError
+from manikin.runtime.progress import Interruption
+
+if TYPE_CHECKING:
+    from manikin.analysis.adaptation import Method
+
+
+def preload(module: str) -> None:
+    """Let a server of processes import a module while this process goes on.
+
+    Importing takes seconds, and the processes that the server starts have it done already. Nothing happens on
+    systems without such servers.
+    """
+    if "forkserver" in multiprocessing.get_all_start_methods():
+        forkserver.set_forkserver_preload([module])
+        forkserver.ensure_running()
+
+
+def analyze(
+    context: typer.Context,
+    sources: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE|DIR...", help="Recordings (.c3d .trc .bvh .amc), or folders of them."),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Default: runs/analysis/NAME or runs/analysis; none with --json."),
+    ] = None,
+    frames: Annotated[
+        tuple[int, int] | None,
+        typer.Option(metavar="FIRST STOP", help="Frames from FIRST up to, not with, STOP; counted from 0."),
+    ] = None,
+    mass: Annotated[
+        float | None,
+        typer.Option(metavar="KG", help="Mass of the person. Default: the file's, or the plates'."),
+    ] = None,
+    sex: Annotated[str, typer.Option(metavar="male|female", help="Table of segment masses.")] = "male",
+    friction: Annotated[float, typer.Option(metavar="MU", help="Of soles on the ground.")] = 0.8,
+    load: Annotated[
+        float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands, as a mass.")
+    ] = 0.0,
+    load_hand: Annotated[
+        str, typer.Option(metavar="left|right|both", help="Hand that carries --load-kg.")
+    ] = "both",
+    as_recorded: Annotated[
+        bool,
+        typer.Option("--as-recorded", help="Look for no shifted motion to stand beside the recorded one."),
+    ] = False,
+    plan: Annotated[
+        str | None,
+        typer.Option(metavar="keyframes|timing-free", help="Plan the recording anew on its own stances."),
+    ] = None,
+    execute: Annotated[
+        bool,
+        typer.Option("--execute", help="With --plan: the whole body, executed in the physics engine."),
+    ] = False,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Files at a time; default: one per core.")
+    ] = None,
+    figures: Annotated[bool, typer.Option(help="Draw the figure of the report.")] = True,
+    json: JsonOption = False,
+) -> int:
+    """Measure recorded people: supports, timing, balance, forces, effort; one report for each file."""
+    single = len(sources) == 1 and not sources[0].is_dir()
+    if not single:
+        refuse(plan is not None or execute, "--plan", "there are several files")
+        refuse(frames is not None, "--frames", "there are several files")
+        if jobs != 1:
+            preload("manikin.reports.analysis_directory")
+    from manikin.analysis import AnalysisOptions, recordings_in
+
+    options = AnalysisOptions(
+        frames=frames,
+        mass=mass,
+        sex=sex,
+        friction=friction,
+        load=load,
+        load_hand=load_hand,
+        as_recorded=as_recorded,
+    )
+    paths = recordings_in(sources)
+    if single:
+        refuse(jobs is not None, "--jobs", "there is one file")
+        directory = out if out is not None else None if json else Path("runs/analysis") / paths[0].stem
+        refuse(execute and plan is None, "--execute", "it needs --plan")
+        return _one(paths[0], directory, options, (plan, execute), draw=figures, json=json)
+    directory = out if out is not None else None if json else Path("runs/analysis")
+    return _several(paths, directory, options, context.obj, jobs, draw=figures, json=json)
+
+
+def _one(
+    path: Path, directory: Path | None, options: Any, plan: tuple[str | None, bool], *, draw: bool, json: bool
+) -> int:
+    method, execute = plan
+    with stdout_kept_clean():
+        from manikin.analysis import analyze_file
+        from manikin.reports.analysis_directory import AnalysisDirectory, summary_of, write_analysis
+
+        chosen = None if method is None else _method(method)
+        if directory is not None:
+            AnalysisDirectory(directory)
+        found, planned = analyze_file(path, options), None
+        if chosen is not None:
+            from manikin.analysis.adaptation import adapt_recording as replan
+
+            planned = replan(
+                found.found, found.supports, method=chosen, execute=execute, friction=options.friction
+            )
+        if directory is not None:
+            write_analysis(found, directory, draw=draw, plan=planned)
+    summary = summary_of(found, planned)
+    failure = None if planned is None else summary["plan"]["failure"]
+    if json:
+        print_json(summary)
+        return FAILED if failure else DONE
+    print_table(_shown(summary))
+    for remark in summary["remarks"]:
+        typer.echo(f"note: {remark}", err=True)
+    if failure:
+        typer.echo(f"no plan: {failure}", err=True)
+    typer.echo(f"report in {directory}/report.html; see the motion with: manikin view {directory}", err=True)
+    return FAILED if failure else DONE
+
+
+def _method(name: str) -> "Method":
+    from manikin.analysis.adaptation import METHODS
+
+    for method in METHODS:
+        if name == method:
+            return method
+    raise InputError(f"--plan is {name!r}; valid: {', '.join(METHODS)}")
+
+
+def _shown(summary: dict[str, Any]) -> dict[str, Any]:
+    """What people are told about a recording; everything is in the JSON."""
+    margin, residual, effort = summary["margin"], summary["reconstruction_residual_m"], summary["ergonomics"]
+    shown = {
+        "duration": f"{summary['duration_s']:.2f} s, {summary['frames']} frames",
+        "person": f"{summary['stature_m']:.2f} m, {summary['mass_kg']:.1f} kg",
+        "residual": f"{1e3 * residual['median']:.1f} mm (median), {1e3 * residual['max']:.1f} mm (largest)",
+        "touch-downs": ", ".join(summary["sequence"]) or "none",
+        "phases [s]": " ".join(f"{duration:.2f}" for duration in summary["phase_durations_s"]),
+        "lowest CoM": f"{summary['com_height_min_m']:.3f} m at {summary['com_height_min_at_s']:.2f} s",
+    }
+    share = margin["share_positive_in_contact"]
+    if margin["min"] is not None:
+        shown["lowest margin"] = (
+            f"{margin['min']:.1f} N.m at {margin['at_s']:.2f} s ({margin['limiting'] or 'in flight'}), "
+            "as recorded; "
+            + ("never in contact" if share is None else f"positive in {share:.1%} of the frames in contact")
+        )
+    if share is not None and (shifted := margin["shifted"]) is not None:
+        shown["shifted"] = _shifted(shifted)
+    for name in ("rula", "reba"):
+        if effort[name] is not None:
+            one = effort[name]
+            shown[name.upper()] = f"{one['max']} at {one['max_at_s']:.2f} s, {one['mean']:.1f} on average"
+    if effort["strength"] is not None:
+        one = effort["strength"]
+        shown["largest torque"] = (
+            f"{100.0 * one['max_share']:.0f} % of strength, {one['max_joint']} at {one['max_at_s']:.2f} s"
+        )
+    if summary["plan"] is not None and summary["plan"]["duration_s"] is not None:
+        one = summary["plan"]
+        shown["plan"] = (
+            f"{one['duration_s']:.2f} s, CoM {1e3 * one['com_rms_m']:.1f} mm from the recorded one (RMS), "
+            f"margin at least {one['min_margin']:.2f} {one['margin_unit']}"
+        )
+    plates = summary["force_plates"]
+    if plates is not None and plates["timing_median_s"] is not None:
+        shown["plates: instants"] = f"{1e3 * plates['timing_median_s']:.0f} ms (median of {plates['events']})"
+    if plates is not None and plates["cop_rms_m"] is not None:
+        shown["plates: forces"] = (
+            f"vertical {100.0 * plates['vertical_rms_body_weight']:.1f} % of body weight, "
+            f"CoP {1e3 * plates['cop_rms_m']:.0f} mm (RMS)"
+        )
+    if plates is not None and plates["torques"]:
+        apart = ", ".join(
+            f"{joint.replace('_', ' ')} {one['rms_Nm']:.0f}" for joint, one in plates["torques"].items()
+        )
+        shown["plates: torques"] = f"{apart} N.m (RMS)"
+    return shown
+
+
+def _shifted(shifted: dict[str, Any]) -> str:
+    """The shifted motion in a line."""
+    words = f"by {1e3 * shifted['rms_m']:.1f} mm (RMS), {1e3 * shifted['max_m']:.1f} mm (largest), " + (
+        "to be believed" if shifted["believed"] else "not to be believed"
+    )
+    words += f": positive in {shifted['share_positive_in_contact']:.1%}"
+    floor = f"the imposed floor ({shifted['floor_m']:g} m x weight = {shifted['floor_Nm']:.1f} N.m)"
+    return f"{words}, in {shifted['share_at_floor_in_contact']:.1%} at {floor}"
+
+
+def _several(
+    paths: Sequence[Path], directory: Path | None, options: Any, interruption: Interruption,
+    jobs: int | None, *, draw: bool, json: bool,
+) -> int:  # fmt: skip
+    from manikin.analysis import AnalysisJob
+    from manikin.pipeline.batch import usable_cores
+    from manikin.reports.analysis_directory import (
+        AnalysisDirectory,
+        analyze_files,
+        directories_for,
+        write_overview,
+    )
+    from manikin.runtime.progress import StageProgress
+
+    if directory is not None:
+        AnalysisDirectory(directory)
+    folders = [None] * len(paths) if directory is None else directories_for(paths, directory)
+    work = [AnalysisJob(path, folder, draw) for path, folder in zip(paths, folders, strict=True)]
+    began, entries = clock.perf_counter(), {}
+    with stdout_kept_clean(), StageProgress() as bars:
+        for entry in analyze_files(work, options, workers=jobs or usable_cores()):
+            interruption.check()
+            entries[entry.job.path] = entry
+            if entry.summary is None:
+                complain(entry.refusal, BAD_INPUT)
+            bars("analyze", len(entries) / len(work), entry.job.path.name)
+    wall = clock.perf_counter() - began
+    ordered = [entries[path] for path in paths]
+    recorded = sum(entry.summary["duration_s"] for entry in ordered if entry.summary is not None)
+    refused = [entry for entry in ordered if entry.summary is None]
+    overview: dict[str, Any] = {
+        "files": [entry.summary for entry in ordered if entry.summary is not None],
+        "refused": [{"file": str(entry.job.path), "reason": entry.refusal} for entry in refused],
+        "duration_s": recorded, "wall_s": wall, "realtime_factor": recorded / wall,
+    }  # fmt: skip
+    if directory is not None:
+        write_overview(ordered, overview, directory)
+    if json:
+        print_json(overview)
+    else:
+        typer.echo(
+            f"{len(ordered) - len(refused)} recordings of {recorded:.0f} s measured in {wall:.1f} s, "
+            f"{len(refused)} refused"
+        )
+        if directory is not None:
+            typer.echo(f"overview in {directory}/index.html", err=True)
+    if len(refused) == len(ordered):
+        raise InputError(f"none of the {len(ordered)} files could be measured; valid: recordings, see above")
+    return BAD_INPUT if refused else DONE

@@ -1,0 +1,144 @@
+"""``manikin ergonomics``: RULA and REBA, torques against strength, effort and lowest margin of a motion."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from manikin.cli.console import DONE, JsonOption, flattened, print_json, print_table, stdout_kept_clean
+from manikin.errors import InputError
+
+if TYPE_CHECKING:
+    from manikin.body import BodyModel
+    from manikin.motion import Motion
+    from manikin.motion.file import MotionFile
+
+
+SHOWN = {
+    "rula": ("max", "max_at_s", "max_side", "mean", "action_level", "action", "share_of_time"),
+    "reba": ("max", "max_at_s", "max_side", "mean", "action_level", "action", "share_of_time"),
+    "strength": ("max_share", "max_joint", "max_at_s"),
+    "effort": ("squared_share_s", "rms_share", "positive_work_J", "negative_work_J"),
+    "margin": ("min", "unit", "at_s", "limiting_contact"),
+}
+"""What people are told of each part; everything is in the JSON."""
+
+
+def ergonomics(
+    source: Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Run directory or motion file (.h5).")],
+    planned: Annotated[bool, typer.Option("--planned", help="The planned motion.")] = False,
+    executed: Annotated[
+        bool, typer.Option("--executed", help="The executed motion; the default if there is one.")
+    ] = False,
+    json: JsonOption = False,
+    csv: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write scores, angles and torque shares over time.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw scores and torque shares as PNG.")
+    ] = None,
+    load_kg: Annotated[
+        float | None,
+        typer.Option(metavar="KG", help="Load in the hands, as a mass. Default: that of the motion."),
+    ] = None,
+    load_hand: Annotated[
+        str, typer.Option(metavar="left|right|both", help="Hand that carries --load-kg.")
+    ] = "both",
+    load_pattern: Annotated[
+        str, typer.Option(metavar="intermittent|static|shock", help="How the load acts.")
+    ] = "intermittent",
+    coupling: Annotated[
+        str, typer.Option(metavar="good|fair|poor|unacceptable", help="Hold on the load, for REBA.")
+    ] = "good",
+    static: Annotated[
+        bool, typer.Option("--static", help="The posture is held for more than a minute.")
+    ] = False,
+    repeated: Annotated[
+        bool, typer.Option("--repeated", help="It is done more than four times a minute.")
+    ] = False,
+    rapid: Annotated[
+        bool, typer.Option("--rapid", help="Rapid large changes or an unstable base, for REBA.")
+    ] = False,
+    raised: Annotated[bool, typer.Option("--shoulder-raised", help="A shoulder is raised.")] = False,
+    supported: Annotated[
+        bool, typer.Option("--trunk-supported", help="The trunk of a seated person is well supported.")
+    ] = False,
+    fraction: Annotated[
+        float, typer.Option(metavar="X", help="Share of the strength above which a joint counts as loaded.")
+    ] = 0.5,
+    neck: Annotated[
+        float, typer.Option("--neck-deg", metavar="DEG", help="Flexion of the neck when it is upright.")
+    ] = 0.0,
+) -> int:
+    """Judge a motion: RULA and REBA over time, torques against strength, effort, lowest margin."""
+    if planned and executed:
+        raise InputError("--planned and --executed exclude each other; valid: one of them or none")
+    from manikin.ergonomics import Circumstances, ergonomics_of
+    from manikin.motion.file import read_motions
+
+    content = read_motions(source)
+    which = "planned" if planned else "executed" if executed else list(content.motions)[-1]
+    if which not in content.motions:
+        raise InputError(f"{source}: holds no {which} motion; valid: {', '.join(content.motions)}")
+    body, moved = _body(content, source), content.motions[which]
+    if load_kg:
+        body, moved = _loaded(content, source, moved, load_kg, load_hand)
+    given = Circumstances(
+        sum(body.loads.values()), load_pattern, coupling, static, repeated, rapid, raised, supported,
+        neck_upright_deg=neck,
+    )  # fmt: skip
+    with stdout_kept_clean():
+        found = ergonomics_of(
+            body, moved, schedule=content.schedule, given=given,
+            fraction=fraction,
+        )  # fmt: skip
+    if csv is not None or figure is not None:
+        from manikin.reports.write_outputs import write_ergonomics_csv, write_ergonomics_figure
+
+        if csv is not None:
+            write_ergonomics_csv(found, csv)
+        if figure is not None:
+            write_ergonomics_figure(found, figure, f"Ergonomics of {source.resolve().stem}, {which}")
+    report = {"motion": which} | found.as_dict()
+    if json:
+        print_json(report)
+    else:
+        _print(report)
+    return DONE
+
+
+def _body(content: "MotionFile", source: Path) -> Any:
+    """The body of a motion file.
+
+    Raises:
+        InputError: If the file does not hold it.
+    """
+    if content.body is None:
+        raise InputError(f"{source}: holds no body; valid: a motion file with one, as manikin run writes it")
+    return content.body
+
+
+def _loaded(
+    content: "MotionFile", source: Path, motion: "Motion", mass: float, hand: str
+) -> "tuple[BodyModel, Motion]":
+    """The motion made with a load.
+
+    Raises:
+        InputError: If the file does not hold its contacts, or the body cannot carry it.
+    """
+    from manikin.balance.motion_forces import carried_motion
+
+    if content.schedule is None:
+        raise InputError(f"{source}: holds no contacts for --load-kg; valid: a motion of manikin run")
+    return carried_motion(_body(content, source), motion, content.schedule, mass, hand)
+
+
+def _print(report: dict[str, Any]) -> None:
+    """The main values of each part, then what could not be told and why."""
+    rows: dict[str, Any] = {key: report[key] for key in ("motion", "duration_s", "frames")}
+    for part, keys in SHOWN.items():
+        values = report[part]
+        rows |= {part: None} if values is None else flattened({part: {key: values[key] for key in keys}})
+    print_table(rows)
+    for part, reason in report["missing"].items():
+        typer.echo(f"{part}: {reason}", err=True)

@@ -1,0 +1,240 @@
+"""``manikin statistics``: timing, supports and centre of mass of recordings, or of the published ones."""
+
+from collections.abc import Mapping
+from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from manikin.cli.console import BAD_INPUT, DONE, JsonOption, complain, print_json, refuse, stdout_kept_clean
+from manikin.errors import InputError
+from manikin.runtime.progress import Interruption
+
+if TYPE_CHECKING:
+    from manikin.recordings.statistics.clip_statistics import From, GroupStatistics, StatisticsSettings
+    from manikin.recordings.statistics.clips import ClipFiles
+    from manikin.recordings.statistics.phases import By
+
+
+STAGE = "recordings"
+SEXES = ("male", "female")
+
+Box = tuple[float, float, float, float, float]
+
+
+def statistics(
+    context: typer.Context,
+    files: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[GROUP=]FILE|DIR|PATTERN",
+            help="Recordings (.bvh .amc .c3d .trc); the group is the folder's name unless given.",
+        ),
+    ] = None,
+    published: Annotated[
+        bool, typer.Option("--published", help="The motions under a beam of Qiu (2012) instead.")
+    ] = False,
+    bar: Annotated[
+        float | None, typer.Option(metavar="M", help="Height of a bar that is passed under [m].")
+    ] = None,
+    box: Annotated[
+        Box | None,
+        typer.Option(metavar="X0 X1 Y0 Y1 M", help="Place and height of the underside of a box [m]."),
+    ] = None,
+    limit: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Distance from the centre of mass to a support. Default: 1.08."),
+    ] = None,
+    effectors: Annotated[
+        str, typer.Option(metavar="all|feet", help="Whose supports tell phases and sequences.")
+    ] = "all",
+    phases: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Compare the first N phases of sequences only.")
+    ] = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="KIND", help="Compare sequences from the first such phase on: DS.")
+    ] = None,
+    origin: Annotated[
+        str,
+        typer.Option(metavar="stance|lowest|highest", help="From where placements are seen: stance, or CoM."),
+    ] = "stance",
+    by: Annotated[
+        str, typer.Option(metavar="number|kind|effectors", help="What phases have in common.")
+    ] = "kind",
+    sex: Annotated[str, typer.Option(metavar="male|female", help="Sex, for the segments' masses.")] = "male",
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write statistics.json, phases.csv and figures there.")
+    ] = None,
+    json: JsonOption = False,
+) -> int:
+    """Phase durations, sequences, placements, centre of mass over sets of recordings."""
+    if published:
+        options = {
+            "FILE": files,
+            "--bar": bar,
+            "--box": box,
+            "--limit": limit,
+            "--phases": phases,
+            "--start": start,
+        }
+        for option, value in options.items():
+            refuse(value is not None, option, "the published motions are numbers already")
+        return _published(out, by, json=json)
+    if not files:
+        raise InputError("no FILE is given; valid: recordings, folders or patterns, or --published")
+    settings = _settings(bar, box, limit, effectors, phases, start, origin)
+    _check_by(by)
+    if sex not in SEXES:
+        raise InputError(f"--sex is {sex!r}; valid: {', '.join(SEXES)}")
+    return _recorded(files, settings, cast("By", by), sex, out, context.obj, json=json)
+
+
+def _recorded(
+    files: list[str], settings: "StatisticsSettings", by: "By", sex: str, out: Path | None,
+    interruption: Interruption, *, json: bool,
+) -> int:  # fmt: skip
+    from manikin.recordings.statistics.clip_statistics import clip_as_dict, statistics_of
+    from manikin.recordings.statistics.clips import grouped_files, read_clips
+    from manikin.runtime.progress import StageProgress
+
+    chosen = grouped_files(files)
+    with stdout_kept_clean(), StageProgress() as bars:
+
+        def report(share: float, remark: str) -> None:
+            interruption.check()
+            bars(STAGE, share, remark)
+
+        read = read_clips(chosen, sex=sex, report=report)
+        found = statistics_of(read.clips, settings)
+        content: dict[str, Any] = {
+            "limit_m": settings.limit,
+            "overhead_m": None if settings.overhead is None else settings.overhead.height,
+            "groups": {group: one.as_dict() for group, one in found.items()},
+            "clips": [clip_as_dict(clip, settings) for clip in read.clips],
+            "refused": [{"file": str(path), "reason": reason} for path, reason in read.refused.items()],
+        }
+        if out is not None and read.clips:
+            from manikin.reports.directories import clip_figures, write_statistics
+
+            sequences = [settings.phases_of(clip) for clip in read.clips]
+            write_statistics(out, content, sequences, clip_figures(read.clips, found, settings, by))
+    if json:
+        print_json(content)
+    else:
+        _print(found, by, settings.limit)
+    return _ending(read, out)
+
+
+def _ending(read: "ClipFiles", out: Path | None) -> int:
+    """Say what was refused, each in one line, and where the files are."""
+    for reason in read.refused.values():
+        complain(reason, BAD_INPUT)
+    if out is not None and read.clips:
+        typer.echo(f"files in {out}", err=True)
+    return BAD_INPUT if read.refused else DONE
+
+
+def _published(out: Path | None, by: str, *, json: bool) -> int:
+    from manikin.recordings.statistics.clip_statistics import published_statistics
+    from manikin.recordings.statistics.phases import published_heights, published_phases
+
+    _check_by(by)
+    found, heights = published_statistics(), published_heights()
+    content = {
+        "groups": {group: one.as_dict() for group, one in found.items()},
+        "com_standing_m": heights.standing,
+        "com_lowest_m": dict(heights.lowest),
+        "overhead_m": dict(heights.beams),
+    }
+    if out is not None:
+        from manikin.reports.directories import published_figures, write_statistics
+
+        write_statistics(out, content, published_phases(), published_figures())
+        typer.echo(f"files in {out}", err=True)
+    if json:
+        print_json(content)
+    else:
+        _print(found, cast("By", "number"), None)
+    return DONE
+
+
+def _check_by(by: str) -> None:
+    from manikin.recordings.statistics.phases import BYS
+
+    if by not in BYS:
+        raise InputError(f"--by is {by!r}; valid: {', '.join(BYS)}")
+
+
+def _settings(
+    bar: float | None, box: Box | None, limit: float | None, effectors: str, phases: int | None,
+    start: str | None, origin: str,
+) -> "StatisticsSettings":  # fmt: skip
+    """What is measured.
+
+    Raises:
+        InputError: If a word is unknown, a number does not fit, or both a bar and a box are given.
+    """
+    from manikin.numerics.spatial import finite_number
+    from manikin.recordings.statistics.clip_statistics import FROMS, StatisticsSettings
+    from manikin.recordings.statistics.passages import LIMIT, Overhead
+    from manikin.recordings.supports.supports import FEET
+
+    if effectors not in ("all", "feet"):
+        raise InputError(f"--effectors is {effectors!r}; valid: all, feet")
+    if origin not in FROMS:
+        raise InputError(f"--origin is {origin!r}; valid: {', '.join(FROMS)}")
+    refuse(bar is not None and box is not None, "--bar", "a box is given")
+    overhead = None
+    if bar is not None:
+        overhead = Overhead(bar)
+    elif box is not None:
+        overhead = Overhead(box[4], (box[0], box[1]), (box[2], box[3]))
+    within = LIMIT if limit is None else finite_number(limit, "--limit [m]", above=0.0)
+    active = None if effectors == "all" else FEET
+    return StatisticsSettings(overhead, within, active, phases, start, origin=cast("From", origin))
+
+
+def _print(groups: Mapping[str, "GroupStatistics"], by: "By", limit: float | None) -> None:
+    for group, one in groups.items():
+        typer.echo(f"{group}: {len(one.motions)} motions")
+        spreads = one.durations[by]
+        width = max((len(name) for name in spreads), default=0)
+        for name, s in spreads.items():
+            typer.echo(
+                f"  {name:{width}}  n {s.count:3d}  mean {s.mean:.3f} s  SD {_known(s.deviation)}"
+                f"  CV {_known(s.variation)}  {s.smallest:.3f} to {s.largest:.3f}"
+            )
+        _print_sequence(one)
+        for effector, s in one.distances.items():
+            within = f"; {100 * one.within[effector]:.1f} % within {limit:g} m" if one.within else ""
+            typer.echo(
+                f"  largest distance to {effector}: {s.mean:.3f} m, SD {_known(s.deviation)}, "
+                f"{s.smallest:.3f} to {s.largest:.3f}{within}"
+            )
+        for motion, low in one.whole.items():
+            tops = "".join(f", {part} {top:.2f}" for part, top in low.tops.items())
+            typer.echo(f"  {motion}: lowest CoM {low.com_lowest:.2f} m at {low.com_lowest_at:.2f} s{tops}")
+        for motion, under in one.under:
+            room = "" if under.room is None else f", room {under.room:.2f}"
+            typer.echo(
+                f"  {motion}: under it {under.start:.2f} to {under.end:.2f} s, CoM {under.com_lowest:.2f} m, "
+                f"{under.below:.2f} below it{room}"
+            )
+
+
+def _print_sequence(one: "GroupStatistics") -> None:
+    from manikin.recordings.statistics.phases import initials
+
+    known = one.consistency
+    steps = ", ".join(f"{name} {count}" for name, count in known.first_steps.items()) or "none"
+    typer.echo(
+        f"  sequence of {known.counts.get(known.modal, 0)} of {known.motions}"
+        f" ({known.mirrored_share:.0%} with mirror images): {initials(known.modal)}"
+    )
+    typer.echo(f"  first steps: {steps}")
+
+
+def _known(value: float) -> str:
+    """A number, or a dash for what one motion does not tell."""
+    return "-" if isnan(value) else f"{value:.3f}"

@@ -1,0 +1,256 @@
+"""Contact forces as non-negative combinations of the edges of friction pyramids."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.balance.friction import pyramid_edges
+from manikin.body import BodyModel
+from manikin.body.limbs import hanging_segment
+from manikin.contact import Contact, ContactKind, FrictionModel, SolePart
+from manikin.control.dynamics import DynamicsState
+from manikin.numerics.spatial import FloatArray, skew
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPatch:
+    """Points of one segment that carry force.
+
+    Attributes:
+        segment: Name of the segment.
+        points: (k, 3) in the segment's frame [m].
+    """
+
+    segment: str
+    points: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ContactGeometry:
+    """Force-carrying points of one effector, on its segment and on what hangs from it.
+
+    A foot carries force at its heel corners and at the two ends of the line of its toe
+    hinge; the tips belong to the toes, so that a load there is paid for by the toe hinge.
+
+    Attributes:
+        effector: Name of the effector.
+        patches: The effector's own segment first.
+    """
+
+    effector: str
+    patches: tuple[ContactPatch, ...]
+
+    @property
+    def segments(self) -> tuple[str, ...]:
+        """Names of the segments that carry force."""
+        return tuple(patch.segment for patch in self.patches)
+
+    @cached_property
+    def point_count(self) -> int:
+        """Number of points of all patches."""
+        return sum(len(patch.points) for patch in self.patches)
+
+
+def contact_geometry(body: BodyModel, contact: Contact, inset: float) -> ContactGeometry:
+    """Find the points of the body that carry the forces of a contact.
+
+    Args:
+        body: The body.
+        contact: A contact of one of its effectors.
+        inset: Distance kept from the edge of the sole [m].
+
+    Raises:
+        BodyError: If the body has no such effector.
+    """
+    effector = body.effector(contact.effector)
+    if contact.part is not SolePart.FULL:
+        return _part_geometry(body, contact, inset)
+    if contact.kind is not ContactKind.SOLE:
+        local = effector.translation + contact.points @ effector.rotation.T
+        return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
+    half_length = 0.5 * contact.length - inset
+    half_width = 0.5 * contact.width - inset
+    toes = hanging_segment(body, effector.segment)
+    if toes is None:
+        corners = _rectangle((-half_length, half_length), half_width)
+        local = effector.translation + corners @ effector.rotation.T
+        return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
+    line = float((effector.rotation.T @ (toes.origin - effector.translation))[0])
+    line = float(np.clip(line, -half_length + 0.01, half_length - 0.01))
+    heel = effector.translation + _rectangle((-half_length, line), half_width) @ effector.rotation.T
+    tips = effector.translation + _rectangle((half_length,), half_width) @ effector.rotation.T
+    return ContactGeometry(
+        contact.effector,
+        (ContactPatch(effector.segment, heel), ContactPatch(toes.name, tips - toes.origin)),
+    )
+
+
+def _part_geometry(body: BodyModel, contact: Contact, inset: float) -> ContactGeometry:
+    """Points of a heel's edge on the foot; of toes, the hinge's ends on the foot and the tips on the toes."""
+    effector, toes = (
+        body.effector(contact.effector),
+        hanging_segment(body, body.effector(contact.effector).segment),
+    )
+    points = contact.points.copy()
+    points[:, 1] -= inset * np.sign(points[:, 1])
+    if contact.part is SolePart.TOES:
+        points[points[:, 0] >= points[:, 0].max(), 0] -= inset
+    local = effector.translation + points @ effector.rotation.T
+    if contact.part is SolePart.HEEL or toes is None:
+        return ContactGeometry(contact.effector, (ContactPatch(effector.segment, local),))
+    return ContactGeometry(contact.effector, (ContactPatch(toes.name, local - toes.origin),))
+
+
+def points_along(body: BodyModel, geometry: ContactGeometry) -> FloatArray:
+    """(k,) place of each force-carrying point along the effector's x axis, toes straight [m]."""
+    effector = body.effector(geometry.effector)
+    places = []
+    for patch in geometry.patches:
+        offset = np.zeros(3) if patch.segment == effector.segment else body.segment(patch.segment).origin
+        places.append(((patch.points + offset - effector.translation) @ effector.rotation)[:, 0])
+    return np.concatenate(places)
+
+
+def touches(part: SolePart, along: FloatArray) -> NDArray[np.bool_]:
+    """(k,) whether points at these places along a sole belong to a part (heel: behind its middle)."""
+    if part is SolePart.FULL:
+        return np.ones(len(along), dtype=np.bool_)
+    return along < 0 if part is SolePart.HEEL else along > 0
+
+
+def segment_key(segment: str) -> str:
+    """Name of a segment among the frames of a :class:`DynamicsState`, apart from effectors."""
+    return f"segment/{segment}"
+
+
+def _rectangle(lengths: tuple[float, ...], half_width: float) -> FloatArray:
+    return np.array([[x, y, 0.0] for x in lengths for y in (half_width, -half_width)])
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForceBasis:
+    """Linear map from the force variables of one effector to forces on the body.
+
+    A sole or a point has a variable for each edge of the friction pyramid at each point,
+    none of which may be negative, each with unit normal force. A grasp has three forces
+    along the world axes and, where it can hold one, three moments.
+
+    Attributes:
+        contact: The contact.
+        generalised: (nv, m) forces on the generalised coordinates per variable.
+        wrench: (6, m) force and moment about the effector frame's origin per variable.
+        normal: (m,) normal force per variable; zero for a grasp.
+        lower: (m,) bound of each variable at full load [N, N.m].
+        upper: (m,) bound of each variable at full load [N, N.m].
+    """
+
+    contact: Contact
+    generalised: FloatArray
+    wrench: FloatArray
+    normal: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+
+
+def contact_force_basis(
+    contact: Contact,
+    geometry: ContactGeometry,
+    state: DynamicsState,
+    *,
+    sliding: bool = False,
+    friction_share: float = 1.0,
+    friction_model: FrictionModel = "inner",
+) -> ContactForceBasis:
+    """Build the force map of a contact at the current state.
+
+    Args:
+        contact: The contact; its planned rotation gives the normal and the friction its slope.
+        geometry: Points of the body, from :func:`contact_geometry`.
+        state: Current dynamics with a frame for each segment of the geometry and the effector.
+        sliding: Whether the contact may slide; where it does, friction acts against the motion.
+        friction_share: Share of the friction that is made use of.
+        friction_model: Pyramid that stands for the friction cone.
+    """
+    if contact.kind is ContactKind.GRASP:
+        return _grasp_basis(contact, state)
+    edges = edges_in_world(contact, friction_share, friction_model)
+    if sliding:
+        edges = sliding_edges(contact, state.frames[contact.effector].twist[:3], edges)
+    origin = state.frames[contact.effector].position
+    count = len(edges) * geometry.point_count
+    generalised = np.empty((len(state.v), count))
+    wrench = np.empty((6, count))
+    start = 0
+    for patch in geometry.patches:
+        frame = state.frames[segment_key(patch.segment)]
+        end = start + len(edges) * len(patch.points)
+        wrench[:, start:end] = _edge_wrenches(edges, patch.points @ frame.rotation.T)
+        generalised[:, start:end] = frame.jacobian.T @ wrench[:, start:end]
+        wrench[3:, start:end] += skew(frame.position - origin) @ wrench[:3, start:end]
+        start = end
+    return ContactForceBasis(
+        contact,
+        generalised,
+        wrench,
+        np.ones(count),
+        np.zeros(count),
+        np.full(count, np.inf),
+    )
+
+
+def _edge_wrenches(edges: FloatArray, arms: FloatArray) -> FloatArray:
+    """(6, e k) force and moment of each of the edges (e, 3) at each of the arms (k, 3)."""
+    wrench = np.empty((6, len(arms), len(edges)))
+    force = edges.T[:, None, :]
+    arm = arms.T[:, :, None]
+    wrench[:3] = force
+    wrench[3] = arm[1] * force[2] - arm[2] * force[1]
+    wrench[4] = arm[2] * force[0] - arm[0] * force[2]
+    wrench[5] = arm[0] * force[1] - arm[1] * force[0]
+    return wrench.reshape(6, -1)
+
+
+@lru_cache(maxsize=256)
+def edges_in_world(
+    contact: Contact, share: float = 1.0, friction_model: FrictionModel = "inner"
+) -> FloatArray:
+    """(e, 3) edges of the friction pyramid in the world, each with unit normal force.
+
+    Edges of ``inner`` and ``cone`` lie on the friction cone, or inside it: their tangential part is
+    ``share mu`` long.
+    """
+    local = pyramid_edges(contact, friction_model) * [share, share, 1.0]
+    edges = local @ contact.rotation_contact_to_world.T
+    edges.setflags(write=False)
+    return edges
+
+
+SLIDING_SPEED = 0.03
+"""Slower than this a contact is not said to slide [m/s]."""
+
+
+def sliding_edges(contact: Contact, velocity: FloatArray, edges: FloatArray) -> FloatArray:
+    """(e, 3) edges of a contact that slides: all of them the kinetic friction with unit normal force.
+
+    That is on the friction cone, so outside the inner pyramid: what slides has no other friction.
+
+    Args:
+        contact: The contact.
+        velocity: (3,) of the effector [m/s].
+        edges: (e, 3) what holds when it does not slide.
+    """
+    along = velocity - (velocity @ contact.normal) * contact.normal
+    speed = float(np.linalg.norm(along))
+    if speed < SLIDING_SPEED:
+        return edges
+    return np.tile(contact.normal - contact.friction / speed * along, (len(edges), 1))
+
+
+def _grasp_basis(contact: Contact, state: DynamicsState) -> ContactForceBasis:
+    size = 6 if contact.max_moment > 0 else 3
+    wrench = np.eye(6)[:, :size]
+    limit = np.array([contact.max_force] * 3 + [contact.max_moment] * (size - 3))
+    jacobian = state.frames[contact.effector].jacobian
+    return ContactForceBasis(contact, jacobian.T @ wrench, wrench, np.zeros(size), -limit, limit)

@@ -1,0 +1,396 @@
+"""The controller that keeps a pushed body on its feet without a motion given beforehand ([Kudoh2002]_ 2).
+
+Also here. Muscles that do not react yet: they hold the posture as springs and dampers do.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.body import BodyModel, Configuration
+from manikin.body.limbs import end_segments
+from manikin.contact import Contact
+from manikin.control.build_qp import joint_acceleration_bounds
+from manikin.control.dynamics import Dynamics, DynamicsState
+from manikin.control.edge_forces import ContactForceBasis, contact_force_basis, contact_geometry, segment_key
+from manikin.control.recovery.recovery_problem import (
+    ROOT,
+    ArmSwing,
+    Objective,
+    Objectives,
+    RecoveryJointBounds,
+    RecoveryProblem,
+    build_recovery_qp,
+    leg_symmetry,
+)
+from manikin.control.recovery.standing import (
+    ClosedLoop,
+    FeltPush,
+    JointGroups,
+    LinearMap,
+    Standing,
+    SupportArea,
+    close_loop,
+    joint_groups,
+    load_row,
+    zmp_rows,
+)
+from manikin.control.recovery.strategy import (
+    ComLaw,
+    PostureControl,
+    RecoverySettings,
+    Strategy,
+    StrategySwitch,
+    com_law,
+    fall_momentum,
+    posture_control,
+)
+from manikin.control.reference import EffectorReference
+from manikin.errors import InputError
+from manikin.numerics.qp import QPSolution, make_solver
+from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
+
+LEG_STIFFNESS = 3.0
+"""Stiffness of hips and knees before they react, at least, in ``m g h`` per radian."""
+
+
+def held_posture(
+    state: DynamicsState,
+    standing: Standing,
+    groups: JointGroups,
+    settings: RecoverySettings,
+    resting: FloatArray,
+) -> FloatArray:
+    """Joint torques that hold a posture without asking what the ground can give.
+
+    A spring has the gains of :attr:`RecoverySettings.stiffness` on the inertia of what hangs on its joint;
+    hips and knees have :data:`LEG_STIFFNESS` at least, ankles :attr:`RecoverySettings.ankle_stiffness`. The
+    springs act on the state at the end of the period, so that stiff ones on light segments do not swing up
+    ("stable PD", Tan et al. 2011).
+
+    Args:
+        state: Of the body.
+        standing: Whose posture is held.
+        groups: Of the joints.
+        settings: Stiffnesses and the period.
+        resting: (nv - 6,) torques at rest [N.m].
+
+    Returns:
+        (nv - 6,) [N.m].
+    """
+    period, joints = settings.period, groups.joints
+    inertia = np.diag(state.mass_matrix)[6:]
+    toppling = state.mass * GRAVITY * standing.height
+    stiffness = settings.stiffness.stiffness * inertia
+    legs = np.concatenate((joints["hip"], joints["knee"]))
+    stiffness[legs] = np.maximum(stiffness[legs], LEG_STIFFNESS * toppling)
+    stiffness[joints["ankle"]] = 0.5 * settings.ankle_stiffness * toppling
+    damping = 2.0 * np.sqrt(stiffness * inertia)
+    pull = np.zeros(len(state.v))
+    ahead = state.q[7:] + period * state.v[6:]
+    pull[6:] = stiffness * (standing.posture - ahead) - damping * state.v[6:]
+    matrix = state.mass_matrix.copy()
+    matrix[np.arange(6, len(pull)), np.arange(6, len(pull))] += period * damping
+    slowed = np.linalg.solve(matrix, pull)[6:]
+    return resting + pull[6:] - period * damping * slowed
+
+
+SETTLING = 20.0
+"""Rate at which the controller damps what the feet move all the same [1/s]."""
+
+ALIKE = 0.02
+"""Angles of two legs that differ by less are equal [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecoveryOutput:
+    """What one step decided, and why.
+
+    Attributes:
+        tau: (nv - 6,) joint torques to hold until the next step [N.m].
+        strategy: What decided them.
+        gain_share: Share of the largest posture gains that was used; 0 with another strategy.
+        wrenches: Expected force [N] and moment about the sole's centre [N.m] (6,) of each foot that carries.
+        fallback: Empty when the program was solved; otherwise what was done instead.
+        state: Dynamics at the measured state.
+        problem: The program; None before the control reacts.
+        standing: About which the balance was kept.
+    """
+
+    tau: FloatArray
+    strategy: Strategy
+    gain_share: float
+    wrenches: dict[str, FloatArray]
+    fallback: str
+    state: DynamicsState
+    problem: RecoveryProblem | None
+    standing: Standing
+
+
+class BalanceRecovery:
+    """Keeps a standing body upright; holds the choice of strategy and the solver's start."""
+
+    def __init__(
+        self,
+        body: BodyModel,
+        q: ArrayLike,
+        settings: RecoverySettings | None = None,
+        *,
+        support: Sequence[str] | None = None,
+        friction: float = 0.7,
+        joint_damping: ArrayLike | None = None,
+    ) -> None:
+        """Prepare the controller for a posture on both feet or on one.
+
+        Args:
+            body: A body with two legs.
+            q: (nq,) the posture to keep, soles on one level plane.
+            settings: Weights, gains and limits; the defaults when omitted.
+            support: Effectors of the feet that carry; both when omitted.
+            friction: Of the soles.
+            joint_damping: (nv - 6,) passive damping of the controlled body's joints [N.m.s/rad].
+
+        Raises:
+            BodyError: If the body does not stand on two legs.
+            InputError: If its soles are not level, or the support is not of its feet.
+        """
+        self.body, self.settings = body, settings or RecoverySettings()
+        self.groups = joint_groups(body)
+        self.friction = friction
+        joints = body.nv - 6
+        damping = np.zeros(joints) if joint_damping is None else joint_damping
+        self._damping = frozen_array(damping, "joint_damping [N.m.s/rad]", (joints,))
+        feet = self.groups.feet if support is None else tuple(support)
+        for name in feet:
+            if name not in self.groups.feet:
+                raise InputError(f"support has {name!r}; valid: {', '.join(self.groups.feet)}")
+        self._dynamics = Dynamics(body, _frames(body, self.groups.feet))
+        self._solvers = {name: make_solver(self.settings.solver) for name in ("full", "relaxed", "loose")}
+        self._previous = self._resting = np.zeros(joints)
+        self._arms = ArmSwing(body, self.groups)
+        self.stand(Standing.of(body, q, feet, friction))
+        rotation, position = Configuration(body, q).effector_placement(ROOT)
+        upright = EffectorReference(rotation, position, np.zeros(6), np.zeros(6))
+        self._ahead = rotation[:2, 0] / np.linalg.norm(rotation[:2, 0])
+        self._objectives = Objectives(self.settings, self.groups, self._arms, upright)
+        self.step(np.array(q, dtype=np.float64), np.zeros(body.nv))
+
+    def stand(self, standing: Standing) -> None:
+        """Keep the balance about another way to stand from now on."""
+        self._begin_anew()
+        self.standing = standing
+        self._calm = standing.area.shrunk(self.settings.posture_area)
+        self._geometry = tuple(contact_geometry(self.body, contact, 0.0) for contact in standing.soles)
+        self._switch = StrategySwitch(self.settings)
+        self._alike = [
+            (left, right)
+            for left, right in _leg_joints(self.body)
+            if len(standing.soles) > 1 and abs(standing.posture[left] - standing.posture[right]) < ALIKE
+        ]
+
+    @property
+    def posture(self) -> FloatArray:
+        """(nv - 6,) joint angles that are kept [rad]."""
+        return self.standing.posture
+
+    @property
+    def com(self) -> FloatArray:
+        """(3,) centre of mass that is kept [m]."""
+        return self.standing.com
+
+    @property
+    def soles(self) -> tuple[Contact, ...]:
+        """Soles that carry."""
+        return self.standing.soles
+
+    @property
+    def area(self) -> SupportArea:
+        """Where the ZMP may be."""
+        return self.standing.area
+
+    @property
+    def locked(self) -> NDArray[np.int64]:
+        """Hinges that hold the posture whatever happens."""
+        return self._objectives.locked
+
+    def evaluate(self, q: FloatArray, v: FloatArray) -> DynamicsState:
+        """Dynamics at a configuration (nq,) and velocity (nv,)."""
+        return self._dynamics.evaluate(q, v)
+
+    def problem_at(self, state: DynamicsState) -> RecoveryProblem:
+        """The program of a step at a state, with nothing pushing and an objective of no use."""
+        felt = FeltPush.none(self.body.nv)
+        loop = close_loop(state, self.standing.feet, felt)
+        rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
+        law = com_law(state, self.com, self.area, self.settings, self._turned)
+        objective = self._objectives.balancing(state, self.posture, law, self._time)
+        return build_recovery_qp(
+            state, loop, self._contacts(state), felt, self._bounds(state), rows,
+            LinearMap.none(loop.size), objective,
+        )  # fmt: skip
+
+    def step(
+        self,
+        q: FloatArray,
+        v: FloatArray,
+        push: FeltPush | None = None,
+        *,
+        reacting: bool = True,
+        swing: tuple[str, EffectorReference] | None = None,
+    ) -> RecoveryOutput:
+        """Decide the joint torques of the next period.
+
+        Args:
+            q: (nq,) measured configuration.
+            v: (nv,) measured velocity.
+            push: What pushes the body and is felt.
+            reacting: Whether the reaction delay is over.
+            swing: Effector of a foot that is on its way to another place, and where it should be now.
+        """
+        state = self._dynamics.evaluate(q, v)
+        if not reacting:
+            tau = held_posture(state, self.standing, self.groups, self.settings, self._resting)
+            return self._output(state, Strategy.STIFF, np.clip(tau, *self._torque_limits))
+        felt = push if push is not None else FeltPush.none(self.body.nv)
+        loop = close_loop(state, self.standing.feet, felt, settling=SETTLING)
+        law = self._law(state, may_turn=swing is None)
+        strategy = self._switch.choose(state.com, law.settled, self.area)
+        rows = zmp_rows(self.area, loop, state.com, self.settings.sole_inset)
+        share, leaving = 0.0, False
+        objective: Objective | None = None
+        if swing is not None:
+            strategy, objective = Strategy.STEP, self._objectives.stepping(state, self.posture, law, *swing)
+        elif strategy is Strategy.POSTURE:
+            found = self._posture_control(state, loop)
+            if found is not None:
+                objective = self._objectives.held(state, self.posture, found.joints)
+                share, leaving = found.share, not found.inside
+                self._arms.reset()
+        if objective is None:
+            strategy, objective = (
+                Strategy.PROGRAM,
+                self._objectives.balancing(state, self.posture, law, self._time),
+            )
+        contacts = self._contacts(state)
+        problem = build_recovery_qp(
+            state, loop, contacts, felt, self._bounds(state), LinearMap.none(loop.size) if leaving else rows,
+            self._wished(state, loop), objective, pulling=leaving,
+        )  # fmt: skip
+        solution, fallback = self._solve(problem)
+        tau = self._previous if solution is None else self._torque(problem, solution, state)
+        self._resting = tau
+        wrenches = dict(zip(self.standing.feet, _wrenches(contacts, solution, loop.size), strict=True))
+        return self._output(state, strategy, tau, problem, share, wrenches, fallback)
+
+    def _output(
+        self,
+        state: DynamicsState,
+        strategy: Strategy,
+        tau: FloatArray,
+        problem: RecoveryProblem | None = None,
+        share: float = 0.0,
+        wrenches: dict[str, FloatArray] | None = None,
+        fallback: str = "",
+    ) -> RecoveryOutput:
+        self._previous = tau
+        return RecoveryOutput(tau, strategy, share, wrenches or {}, fallback, state, problem, self.standing)
+
+    def _law(self, state: DynamicsState, *, may_turn: bool) -> ComLaw:
+        """The law of the centre of mass one period later, with what has been turned meanwhile."""
+        self._time += self.settings.period
+        self._turned = self._turned + self.settings.period * fall_momentum(state)
+        law = com_law(state, self.com, self.area, self.settings, self._turned, may_turn=may_turn)
+        if law.need > 0.0:
+            self._arms.begin(self._time, law.settled - self.area.centre, law.reach, self._ahead)
+        return law
+
+    def _begin_anew(self) -> None:
+        """Nothing has been turned yet."""
+        self._time, self._turned = 0.0, np.zeros(2)
+        self._arms.reset()
+
+    def _posture_control(self, state: DynamicsState, loop: ClosedLoop) -> PostureControl | None:
+        """Posture control with the ZMP well inside; None where it would leave."""
+        calm = zmp_rows(self._calm, loop, state.com, 0.0)
+        gains = self.settings.posture
+        stiff = gains.stiffness * (self.posture - state.q[7:])
+        damped = -gains.damping * state.v[6:]
+        return posture_control(loop, calm, stiff, damped, always=self.settings.posture_control_only)
+
+    # --- limits ------------------------------------------------------------------------------
+
+    def _wished(self, state: DynamicsState, loop: ClosedLoop) -> LinearMap:
+        """Rows that hold where they can: alike legs and a loaded ground."""
+        alike = leg_symmetry(loop, state.q[7:], self._alike, ALIKE)
+        return alike.joined(load_row(loop, self.settings.least_load * state.mass * GRAVITY))
+
+    def _contacts(self, state: DynamicsState) -> list[ContactForceBasis]:
+        share = self.settings.friction_share
+        return [
+            contact_force_basis(contact, geometry, state, friction_share=share)
+            for contact, geometry in zip(self.soles, self._geometry, strict=True)
+        ]
+
+    def _bounds(self, state: DynamicsState) -> RecoveryJointBounds:
+        body, settings = self.body, self.settings
+        lower, upper = joint_acceleration_bounds(
+            state.q[7:], state.v[6:], body.lower, body.upper, settings.strength * body.velocity_limit,
+            settings.joint_limit_horizon, settings.max_joint_acceleration,
+        )  # fmt: skip
+        return RecoveryJointBounds(*self._torque_limits, lower, upper)
+
+    @property
+    def _torque_limits(self) -> tuple[FloatArray, FloatArray]:
+        """(nv - 6,) most negative and largest joint torques [N.m]."""
+        strength = self.settings.strength
+        return strength * self.body.torque_lower, strength * self.body.torque_upper
+
+    # --- solution ----------------------------------------------------------------------------
+
+    def _torque(self, problem: RecoveryProblem, solution: QPSolution, state: DynamicsState) -> FloatArray:
+        """Torques of the solution, with what overcomes the passive damping."""
+        return np.clip(problem.torque(solution.x) + self._damping * state.v[6:], *self._torque_limits)
+
+    def _solve(self, problem: RecoveryProblem) -> tuple[QPSolution | None, str]:
+        solution = self._solvers["full"].solve(problem.program)
+        if solution.found:
+            return solution, ""
+        relaxed = self._solvers["relaxed"].solve(problem.relaxed())
+        if relaxed.found:
+            return relaxed, f"without stops: {solution.status}"
+        loose = self._solvers["loose"].solve(problem.loose())
+        if loose.found:
+            return loose, f"as on any ground: {solution.status}, then {relaxed.status}"
+        return None, f"previous torques: {solution.status}, {relaxed.status}, {loose.status}"
+
+
+def _wrenches(contacts: list[ContactForceBasis], solution: QPSolution | None, start: int) -> FloatArray:
+    """(k, 6) wrench of each foot in a solution, zero without one."""
+    if solution is None:
+        return np.zeros((len(contacts), 6))
+    ends = np.cumsum([start, *(basis.wrench.shape[1] for basis in contacts)])
+    return np.array(
+        [b.wrench @ solution.x[i:j] for b, i, j in zip(contacts, ends[:-1], ends[1:], strict=True)]
+    )
+
+
+def _frames(body: BodyModel, feet: Sequence[str]) -> dict[str, int]:
+    """Frames of feet and pelvis, and of the segments of the soles."""
+    found = {name: body.effector_frame(name) for name in (*feet, ROOT)}
+    segments = {name for foot in feet for name in end_segments(body, foot)}
+    return found | {segment_key(name): body.segment_frame(name) for name in sorted(segments)}
+
+
+def _leg_joints(body: BodyModel) -> list[tuple[int, int]]:
+    """Left and right knee flexion and ankle flexion ([Kudoh2002]_ 2.49-2.50)."""
+    names = [
+        ("left_knee_flexion", "right_knee_flexion"),
+        ("left_ankle_dorsiflexion", "right_ankle_dorsiflexion"),
+    ]
+    return [
+        (body.joint_index(left), body.joint_index(right))
+        for left, right in names
+        if left in body.joint_names and right in body.joint_names
+    ]

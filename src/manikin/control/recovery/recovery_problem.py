@@ -1,0 +1,383 @@
+"""The quadratic program of one step of the recovery ([Kudoh2002]_ 2.54-2.64).
+
+Unknowns are the accelerations ``phi''`` of the closed loops and the forces at the corners of the soles. The
+thesis has the former alone: without the latter, which pull no foot down (``f_z > 0``) and keep to friction,
+joint torques cannot be limited, since two feet on the ground share their load in many ways.
+
+Also here. What the program of a step minimises: to hold a posture, to keep the balance, or to step. Arms that
+are raised and swung: what arms can do against a fall ahead.
+
+Of hanging arms that swing back, the angular momentum about the centre of mass is next to nothing: that of
+their turning is undone by that of their centres, which are as high as the centre of mass and move back. Of
+arms overhead that swing forward and down both go with the fall, over a range of half a turn and more. A
+program that looks at one instant cannot find that out. So arms go up first, sideways to begin with, where
+raising them costs little, and are then swung; meanwhile the trunk turns. This part is ours.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel
+from manikin.control.dynamics import DynamicsState
+from manikin.control.edge_forces import ContactForceBasis
+from manikin.control.recovery.standing import ClosedLoop, FeltPush, JointGroups, LinearMap
+from manikin.control.recovery.strategy import ComLaw, RecoverySettings
+from manikin.control.reference import EffectorReference
+from manikin.control.settings import Impedance
+from manikin.control.tasks import AccelerationTask, orientation_task, swing_task
+from manikin.numerics.qp import QuadraticProgram
+from manikin.numerics.spatial import FloatArray
+
+APART = 0.183
+"""Time for which arms that go up go sideways too [s]."""
+
+RAISED = 0.246
+"""Time after which raised arms are swung [s]: about as long as raising them takes."""
+
+SWUNG = 1.25
+"""Time after which the swing is over [s]."""
+
+PULL = Impedance(112.4, 21.2)
+"""Of shoulders and elbows: critically damped, in some 0.3 s at the angle wanted."""
+
+RAISING, SWINGING = 0.07, 0.3
+"""Weights of their accelerations while they are raised and swung, against 1 of the other joints."""
+
+UP, SIDEWAYS, BENT, DOWN = 3.057, 1.39, 0.63, -1.04
+"""Angles of shoulders and elbows: flexion and abduction at most, the elbow on the way up, the end [rad]."""
+
+CLEAR = 0.2
+"""Abduction of swung arms: their hands pass by the thighs [rad]."""
+
+FAR = 1.3
+"""Reach of the settled point over the soles from which on arms are raised; the trunk alone does for less."""
+
+AHEAD = np.cos(np.radians(60.0))
+"""Cosine of the largest angle between straight ahead and a fall that is one ahead."""
+
+
+class ArmSwing:
+    """Raises and swings the arms once, where a body falls ahead and the trunk alone may not do."""
+
+    def __init__(self, body: BodyModel, groups: JointGroups) -> None:
+        """Find the joints.
+
+        Args:
+            body: The body; one whose shoulders are not as a person's is left alone.
+            groups: Its joints by group.
+        """
+        arms = {int(index): body.joint_names[index] for index in groups.joints["arm"]}
+        flexion, abduction, elbow = (
+            [index for index, name in arms.items() if name.endswith(end)]
+            for end in ("shoulder_flexion", "shoulder_abduction", "elbow_flexion")
+        )
+        whole = len(flexion) == len(abduction) == len(elbow)
+        self._joints = np.array(flexion + abduction + elbow if whole else [], dtype=np.int64)
+        self._arms = len(flexion)
+        self._began: float | None = None
+
+    @property
+    def joints(self) -> NDArray[np.int64]:
+        """Hinge indices: flexion, then abduction of the shoulders, then elbows."""
+        return self._joints
+
+    def begin(self, time: float, fall: FloatArray, reach: float, ahead: FloatArray) -> None:
+        """Begin where the body falls far ahead, unless the arms are on their way or have been.
+
+        Args:
+            time: Of the control [s].
+            fall: (2,) direction of the fall, of any length.
+            reach: Of its settled point over the soles.
+            ahead: (2,) unit vector to where the body looks.
+        """
+        if self._began is None and reach > FAR and fall @ ahead > AHEAD * np.linalg.norm(fall):
+            self._began = time
+
+    def reset(self) -> None:
+        """Forget the swing, so that another can begin."""
+        self._began = None
+
+    def wish(self, state: DynamicsState, time: float) -> tuple[FloatArray, float] | None:
+        """Accelerations (k,) wanted of the joints [rad/s^2] and their weight; None when nothing is.
+
+        Args:
+            state: Of the body.
+            time: Of the control [s].
+        """
+        since = np.inf if self._began is None else time - self._began
+        if since >= SWUNG:
+            return None
+        angles = (UP, SIDEWAYS if since < APART else 0.0, BENT) if since < RAISED else (DOWN, CLEAR, 0.0)
+        error = np.repeat(angles, self._arms) - state.q[7 + self._joints]
+        pull = PULL.stiffness * error - PULL.damping * state.v[6 + self._joints]
+        return pull, RAISING if since < RAISED else SWINGING
+
+
+FORCE_WEIGHT = 1e-5
+"""Regularisation of the forces at the corners [1/N^2]: shares the load between the feet."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecoveryJointBounds:
+    """Limits of the joints at one step, (nv - 6,) each.
+
+    Attributes:
+        torque_lower: [N.m].
+        torque_upper: [N.m].
+        acceleration_lower: [rad/s^2].
+        acceleration_upper: [rad/s^2].
+    """
+
+    torque_lower: FloatArray
+    torque_upper: FloatArray
+    acceleration_lower: FloatArray
+    acceleration_upper: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """What one step minimises.
+
+    ``sum weight (theta'' - wanted)^2 + com_weight (s'' - law)^2 - upward s''_z``, half of each square.
+
+    Attributes:
+        weight: (nv - 6,) diagonal of ``C_theta`` ([Kudoh2002]_ 2.27).
+        wanted: (nv - 6,) joint accelerations from which the objective is measured [rad/s^2].
+        law: (3,) wanted acceleration of the centre of mass [m/s^2].
+        com_weight: (3,) of its squared error; 0 leaves it free.
+        upward: Slope of the upward acceleration.
+        tasks: Further squares, of generalised accelerations.
+    """
+
+    weight: FloatArray
+    wanted: FloatArray
+    law: FloatArray
+    com_weight: FloatArray = field(default_factory=lambda: np.zeros(3))
+    upward: float = 0.0
+    tasks: tuple[AccelerationTask, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class RecoveryProblem:
+    """The quadratic program of one step with the meaning of its variables.
+
+    Attributes:
+        program: On ``x = [phi'' (k,), forces at the corners]``.
+        loop: Maps of ``phi''``.
+        torque: (nv - 6,) joint torques, linear in ``x`` [N.m].
+        relaxable: First and last (exclusive) row that may be left out when there is no solution: the stops
+            of the joints and the symmetry of the legs.
+    """
+
+    program: QuadraticProgram
+    loop: ClosedLoop
+    torque: LinearMap
+    relaxable: tuple[int, int]
+
+    def relaxed(self) -> QuadraticProgram:
+        """Return the program without the stops of the joints and the symmetry of the legs."""
+        lower, upper = self.program.rows_lower.copy(), self.program.rows_upper.copy()
+        rows = slice(*self.relaxable)
+        lower[rows], upper[rows] = -np.inf, np.inf
+        return replace(self.program, rows_lower=lower, rows_upper=upper)
+
+    def loose(self) -> QuadraticProgram:
+        """Return the program with the torque limits alone: the ground may pull, the ZMP may be anywhere."""
+        program = self.relaxed()
+        first, _ = self.relaxable
+        lower, upper = program.rows_lower.copy(), program.rows_upper.copy()
+        after_torques = 6 + len(self.torque.offset)
+        lower[after_torques:first], upper[after_torques:first] = -np.inf, np.inf
+        lowest = np.full_like(program.lower, -np.inf)
+        return replace(program, rows_lower=lower, rows_upper=upper, lower=lowest)
+
+
+def build_recovery_qp(
+    state: DynamicsState,
+    loop: ClosedLoop,
+    contacts: Sequence[ContactForceBasis],
+    push: FeltPush,
+    bounds: RecoveryJointBounds,
+    zmp: LinearMap,
+    symmetry: LinearMap,
+    objective: Objective,
+    *,
+    pulling: bool = False,
+) -> RecoveryProblem:
+    """Build the program of one step.
+
+    Args:
+        state: Current dynamics.
+        loop: Maps of the accelerations.
+        contacts: Force maps of the feet.
+        push: What pushes besides the ground.
+        bounds: Torque limits and the stops of the joints ([Kudoh2002]_ 2.55-2.56).
+        zmp: Rows that are not positive when the ZMP is inside (2.57-2.60).
+        symmetry: Rows that are not positive when the legs grow no less alike (2.63-2.64).
+        objective: What is minimised.
+        pulling: Whether the ground may pull as well.
+    """
+    k, joints = loop.size, len(state.v) - 6
+    generalised = np.concatenate([basis.generalised for basis in contacts], axis=1)
+    basis, drift = loop.acceleration.matrix, loop.acceleration.offset
+    motion = np.concatenate((state.mass_matrix @ basis, -generalised), axis=1)
+    still = state.mass_matrix @ drift + state.bias - push.generalised
+    torque = LinearMap(motion[6:], still[6:])
+    size, forces = k + generalised.shape[1], generalised.shape[1]
+
+    rows = np.zeros((6 + 2 * joints + len(symmetry.offset) + len(zmp.offset), size))
+    lower, upper = np.full(len(rows), -np.inf), np.full(len(rows), np.inf)
+    rows[:6], lower[:6], upper[:6] = motion[:6], -still[:6], -still[:6]
+    part = slice(6, 6 + joints)
+    rows[part] = torque.matrix
+    lower[part], upper[part] = bounds.torque_lower - torque.offset, bounds.torque_upper - torque.offset
+    part = slice(part.stop, part.stop + len(zmp.offset))
+    rows[part, :k], upper[part] = zmp.matrix, -zmp.offset
+    first = part.stop
+    part = slice(first, first + joints)
+    rows[part, :k] = loop.joints.matrix
+    lower[part] = bounds.acceleration_lower - loop.joints.offset
+    upper[part] = bounds.acceleration_upper - loop.joints.offset
+    part = slice(part.stop, part.stop + len(symmetry.offset))
+    rows[part, :k], upper[part] = symmetry.matrix, -symmetry.offset
+
+    least = -np.inf if pulling else 0.0
+    variable_lower = np.concatenate((np.full(k, -np.inf), np.full(forces, least)))
+    hessian, gradient = _cost(loop, objective, size)
+    program = QuadraticProgram(
+        hessian, gradient, rows, lower, upper, variable_lower, np.full(size, np.inf), 6
+    )
+    return RecoveryProblem(program, loop, torque, (first, len(rows)))
+
+
+def leg_symmetry(
+    loop: ClosedLoop, angles: FloatArray, pairs: Sequence[tuple[int, int]], tolerance: float
+) -> LinearMap:
+    """Rows that let no pair of joints grow less alike ([Kudoh2002]_ 2.49-2.53).
+
+    Where the right angle is the larger one its acceleration is at most the left one's, and the other way
+    round (the print has lost the signs of one of the two branches).
+
+    Args:
+        loop: Maps of the accelerations.
+        angles: (nv - 6,) [rad].
+        pairs: Left and right hinge indices.
+        tolerance: Angles that differ by less count as equal, which leaves the pair free [rad].
+    """
+    rows, offsets = [], []
+    for left, right in pairs:
+        gap = angles[right] - angles[left]
+        if abs(gap) > tolerance:
+            sign = np.sign(gap)
+            rows.append(sign * (loop.joints.matrix[right] - loop.joints.matrix[left]))
+            offsets.append(sign * (loop.joints.offset[right] - loop.joints.offset[left]))
+    return LinearMap(np.array(rows).reshape(-1, loop.size), np.array(offsets))
+
+
+def _cost(loop: ClosedLoop, objective: Objective, size: int) -> tuple[FloatArray, FloatArray]:
+    k = loop.size
+    weighted = loop.joints.matrix * objective.weight[:, None]
+    hessian, gradient = np.zeros((size, size)), np.zeros(size)
+    hessian[:k, :k] = weighted.T @ loop.joints.matrix
+    gradient[:k] = (loop.joints.offset - objective.wanted) @ weighted
+    pulled = loop.com.matrix * objective.com_weight[:, None]
+    hessian[:k, :k] += pulled.T @ loop.com.matrix
+    gradient[:k] += (loop.com.offset - objective.law) @ pulled
+    gradient[:k] -= objective.upward * loop.com.matrix[2]
+    for task in objective.tasks:
+        moved = task.matrix @ loop.acceleration.matrix
+        weighted = moved * task.weight[:, None]
+        hessian[:k, :k] += weighted.T @ moved
+        gradient[:k] += (task.matrix @ loop.acceleration.offset - task.target) @ weighted
+    hessian[np.arange(k, size), np.arange(k, size)] = FORCE_WEIGHT
+    return hessian, gradient
+
+
+FIRM = 100.0
+"""Weight of joints that hold an angle, against 1 of those that need not."""
+
+STEPPING_JOINTS = 0.1
+"""Weight of the joints while a foot steps."""
+
+ROOT = "pelvis"
+"""Effector that is kept upright while a foot steps."""
+
+
+class Objectives:
+    """The objectives of a body, of which some joints may be locked."""
+
+    def __init__(
+        self, settings: RecoverySettings, groups: JointGroups, arms: ArmSwing, upright: EffectorReference
+    ) -> None:
+        """Keep what all objectives have in common.
+
+        Args:
+            settings: Weights and gains.
+            groups: Joints of the body.
+            arms: Their swing.
+            upright: How the pelvis is kept while a foot steps.
+        """
+        self._settings, self._groups, self._arms, self._upright = settings, groups, arms, upright
+        self._locked = groups.locked(settings.locked)
+
+    @property
+    def locked(self) -> NDArray[np.int64]:
+        """Hinges that hold the posture whatever happens."""
+        return self._locked
+
+    def held(self, state: DynamicsState, posture: FloatArray, wanted: FloatArray) -> Objective:
+        """Joint accelerations as wanted, and of locked joints what holds them."""
+        weight = np.full(len(wanted), FIRM)
+        return Objective(weight, self._with_locked(state, posture, wanted, weight), np.zeros(3))
+
+    def balancing(self, state: DynamicsState, posture: FloatArray, law: ComLaw, time: float) -> Objective:
+        """The objective of the quadratic program (2.54) with the law of the centre of mass."""
+        settings = self._settings
+        weight = np.ones(len(posture))
+        weight[self._groups.joints["arm"]] = settings.arm_weight
+        weight[self._groups.joints["trunk"]] = settings.trunk_weight
+        gains = settings.unwinding
+        damping = gains.damping + (1.0 - law.need) * settings.stopping
+        wanted = pull(Impedance(gains.stiffness, damping), state, posture)
+        swing = self._arms.wish(state, time)
+        if swing is not None:
+            wanted[self._arms.joints], weight[self._arms.joints] = swing
+        wanted = self._with_locked(state, posture, wanted, weight)
+        return Objective(weight, wanted, law.acceleration, self._com_weight, settings.upward)
+
+    def stepping(
+        self, state: DynamicsState, posture: FloatArray, law: ComLaw, foot: str, way: EffectorReference
+    ) -> Objective:
+        """A foot follows its way, the trunk stays upright and the centre of mass keeps its law."""
+        settings = self._settings
+        weight = np.full(len(posture), STEPPING_JOINTS)
+        joints = self._with_locked(state, posture, pull(settings.posture, state, posture), weight)
+        tasks = (
+            swing_task(foot, state.frames[foot], way, settings.swing, settings.swing_weight),
+            orientation_task(
+                ROOT, state.frames[ROOT], self._upright, settings.posture, settings.swing_weight
+            ),
+        )
+        return Objective(weight, joints, law.acceleration, self._com_weight, tasks=tasks)
+
+    @property
+    def _com_weight(self) -> FloatArray:
+        settings = self._settings
+        return np.array([settings.com_weight, settings.com_weight, settings.height_weight])
+
+    def _with_locked(
+        self, state: DynamicsState, posture: FloatArray, wanted: FloatArray, weight: FloatArray
+    ) -> FloatArray:
+        """Wanted accelerations with those that hold the locked joints; their weights are set."""
+        result = wanted.copy()
+        result[self._locked] = pull(self._settings.stiffness, state, posture)[self._locked]
+        weight[self._locked] = FIRM * 10.0
+        return result
+
+
+def pull(gains: Impedance, state: DynamicsState, posture: FloatArray) -> FloatArray:
+    """(nv - 6,) joint accelerations back to a posture (nv - 6,) [rad/s^2]."""
+    return gains.stiffness * (posture - state.q[7:]) - gains.damping * state.v[6:]

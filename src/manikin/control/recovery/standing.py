@@ -1,0 +1,392 @@
+"""A way to stand: which feet carry, where they are, and the posture to come back to.
+
+Also here. Which joints and segments of a standing body are its ankles, hips, arms and so on. The area in
+which the ZMP may be: the hull of the soles, a rectangle for parallel feet. Degrees of freedom of a body whose
+feet are held, and what is linear in their accelerations.
+
+With both feet on the ground the generalised acceleration is ``a = basis phi'' + drift`` ([Kudoh2002]_ 2.2):
+``basis`` spans the accelerations that leave the feet where they are and ``drift`` is what their centripetal
+accelerations ask for. The thesis takes coordinates ``phi`` of the loops and finds the maps by evaluating the
+inverse dynamics at unit vectors (Fig. 2.6); an orthonormal basis gives the same maps at once, and since the
+objective and all limits are written in joint accelerations, forces and moments, it does not matter which
+basis is taken.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.body import BodyModel, Configuration
+from manikin.body.limbs import end_segments
+from manikin.contact import Contact, ContactKind, sole
+from manikin.control.dynamics import DynamicsState
+from manikin.errors import BodyError, InputError
+from manikin.numerics.polygon import convex_polygon, signed_distance
+from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, skew
+
+
+@dataclass(frozen=True, eq=False)
+class JointGroups:
+    """Parts of a body that stands on two soles.
+
+    Attributes:
+        feet: Effectors of the two legs, the left one first.
+        joints: Hinge indices by group: ``"ankle"`` (with what hangs on the foot), ``"knee"``, ``"hip"``,
+            ``"trunk"`` and ``"arm"``; each hinge is in one group.
+        segments: Segment names by group: ``"arms"``, ``"trunk"`` and ``"legs"``; each is in one group.
+    """
+
+    feet: tuple[str, str]
+    joints: dict[str, NDArray[np.int64]]
+    segments: dict[str, tuple[str, ...]]
+
+    def locked(self, names: tuple[str, ...]) -> NDArray[np.int64]:
+        """Hinge indices of ``"arms"`` and of ``"hips"``, which are hips and trunk together."""
+        chosen = {"arms": ("arm",), "hips": ("hip", "trunk")}
+        parts = [self.joints[group] for name in names for group in chosen[name]]
+        return np.sort(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int64)
+
+
+def joint_groups(body: BodyModel) -> JointGroups:
+    """Sort the joints and segments of a body with two legs.
+
+    Raises:
+        BodyError: If it has not two legs of three segments that end in soles.
+    """
+    legs = [limb for limb in body.limbs if limb.kind is ContactKind.SOLE]
+    if len(legs) != 2 or any(len(leg.segments) != 3 for leg in legs) or body.sole_length is None:
+        raise BodyError(f"body {body.name!r} does not stand on two legs; valid: human, kudoh")
+    arms = [limb for limb in body.limbs if limb.kind is not ContactKind.SOLE]
+    toes = {leg.effector: end_segments(body, leg.effector)[1:] for leg in legs}
+    parts = {
+        "ankle": [name for leg in legs for name in (leg.segments[2], *toes[leg.effector])],
+        "knee": [leg.segments[1] for leg in legs],
+        "hip": [leg.segments[0] for leg in legs],
+        "arm": [name for arm in arms for name in arm.segments],
+    }
+    sorted_out = {name for names in parts.values() for name in names}
+    parts["trunk"] = [segment.name for segment in body.segments if segment.name not in sorted_out]
+    joints = {
+        group: np.array(
+            [body.joint_index(hinge.name) for name in names for hinge in body.segment(name).hinges],
+            dtype=np.int64,
+        )
+        for group, names in parts.items()
+    }
+    segments = {
+        "arms": tuple(parts["arm"]),
+        "trunk": tuple(parts["trunk"]),
+        "legs": (*parts["hip"], *parts["knee"], *parts["ankle"]),
+    }
+    return JointGroups((legs[0].effector, legs[1].effector), joints, segments)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearMap:
+    """A value ``matrix @ phi'' + offset``.
+
+    Attributes:
+        matrix: (m, k).
+        offset: (m,).
+    """
+
+    matrix: FloatArray
+    offset: FloatArray
+
+    @classmethod
+    def none(cls, size: int) -> "LinearMap":
+        """No value at all, of ``size`` accelerations."""
+        return cls(np.zeros((0, size)), np.zeros(0))
+
+    def joined(self, other: "LinearMap") -> "LinearMap":
+        """Both values, one after the other."""
+        return LinearMap(
+            np.concatenate((self.matrix, other.matrix)), np.concatenate((self.offset, other.offset))
+        )
+
+    def __call__(self, phi: FloatArray) -> FloatArray:
+        """(m,) value at the accelerations (k,)."""
+        return self.matrix @ phi + self.offset
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """Linear maps of the accelerations ``phi''`` (k,) at one state ([Kudoh2002]_ 2.4-2.6).
+
+    Attributes:
+        acceleration: (nv,) generalised acceleration.
+        joints: (nv - 6,) joint accelerations, ``J phi'' + k``.
+        com: (3,) acceleration of the centre of mass [m/s^2].
+        force: (3,) force of the ground, ``C_f phi'' + d_f`` [N].
+        moment: (3,) moment of the ground about the centre of mass, ``C_n phi'' + d_n`` [N.m].
+    """
+
+    acceleration: LinearMap
+    joints: LinearMap
+    com: LinearMap
+    force: LinearMap
+    moment: LinearMap
+
+    @property
+    def size(self) -> int:
+        """Number k of degrees of freedom."""
+        return self.acceleration.matrix.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class FeltPush:
+    """What pushes the body besides the ground.
+
+    Attributes:
+        wrench: (6,) force [N] and moment about the world's origin [N.m].
+        generalised: (nv,) the same on the generalised coordinates.
+    """
+
+    wrench: FloatArray
+    generalised: FloatArray
+
+    @classmethod
+    def none(cls, nv: int) -> "FeltPush":
+        """Nothing pushes."""
+        return cls(np.zeros(6), np.zeros(nv))
+
+
+def close_loop(
+    state: DynamicsState, feet: tuple[str, ...], push: FeltPush, *, settling: float = 0.0
+) -> ClosedLoop:
+    """Find the maps at a state.
+
+    Args:
+        state: With a frame for each foot.
+        feet: Effectors that do not move.
+        push: What pushes besides the ground.
+        settling: Rate at which what the feet move all the same is damped [1/s].
+    """
+    jacobian = np.concatenate([state.frames[name].jacobian for name in feet])
+    wanted = np.concatenate(
+        [-state.frames[name].drift - settling * state.frames[name].twist for name in feet]
+    )
+    held = len(wanted)
+    factors = np.linalg.qr(jacobian.T, mode="complete")
+    full: FloatArray = factors.Q
+    upper: FloatArray = factors.R
+    drift = full[:, :held] @ np.linalg.solve(upper[:held].T, wanted)
+    basis = full[:, held:]
+    momentum_rate = state.centroidal_map @ basis
+    offset = state.centroidal_map @ drift + state.momentum_drift
+    weight = np.array([0.0, 0.0, state.mass * GRAVITY])
+    push_force = push.wrench[:3]
+    push_moment = push.wrench[3:] - skew(state.com) @ push_force
+    return ClosedLoop(
+        acceleration=LinearMap(basis, drift),
+        joints=LinearMap(basis[6:], drift[6:]),
+        com=LinearMap(momentum_rate[:3] / state.mass, offset[:3] / state.mass),
+        force=LinearMap(momentum_rate[:3], offset[:3] + weight - push_force),
+        moment=LinearMap(momentum_rate[3:], offset[3:] - push_moment),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SupportArea:
+    """A convex area of the ground.
+
+    Attributes:
+        corners: (k, 2) counter-clockwise [m].
+        height: Of the ground [m].
+    """
+
+    corners: FloatArray
+    height: float
+
+    @classmethod
+    def of(cls, soles: Sequence[Contact]) -> "SupportArea":
+        """Hull of soles that lie on one level plane.
+
+        Raises:
+            InputError: If they do not.
+        """
+        points = np.concatenate([contact.points_in_world for contact in soles])
+        if np.ptp(points[:, 2]) > 1e-6:
+            raise InputError(
+                f"soles lie at heights from {points[:, 2].min():.3g} to {points[:, 2].max():.3g} m; "
+                "valid: both on one level plane"
+            )
+        return cls(convex_polygon(points[:, :2]), float(points[:, 2].mean()))
+
+    @cached_property
+    def centre(self) -> FloatArray:
+        """(2,) mean of the corners [m]."""
+        return frozen_array(self.corners.mean(axis=0), "centre")
+
+    def reach(self, point: FloatArray) -> float:
+        """How far out a point (2,) is: 0 in the centre, 1 on the edge, more outside."""
+        normals, _ = self._edges
+        return float(np.max((normals @ (point - self.centre)) / self._room))
+
+    def inside(self, points: FloatArray) -> FloatArray:
+        """Distance of points (..., 2) to the edge, negative outside [m]."""
+        return signed_distance(points, self.corners)
+
+    def shrunk(self, share: float) -> "SupportArea":
+        """Share of the area about its centre."""
+        return SupportArea(self.centre + share * (self.corners - self.centre), self.height)
+
+    def nearest(self, point: FloatArray, inset: float) -> FloatArray:
+        """Point (2,) drawn towards the centre until it is inside by ``inset`` [m]."""
+        normals, offsets = self.half_planes(inset)
+        along = normals @ (point - self.centre)
+        room = offsets - normals @ self.centre
+        return self.centre + (point - self.centre) / max(1.0, float(np.max(along / room)))
+
+    def closest(self, point: FloatArray, inset: float = 0.0) -> FloatArray:
+        """Point (2,) of the area, less ``inset`` [m] along its edge, that is nearest to a point (2,)."""
+        normals, offsets = self.half_planes(inset)
+        if np.all(normals @ point <= offsets):
+            return point.copy()
+        # Corner i of the smaller area is where the edges that meet in corner i of the area come to.
+        before = np.roll(normals, 1, axis=0), np.roll(offsets, 1)
+        corners = np.linalg.solve(
+            np.stack((before[0], normals), axis=1), np.stack((before[1], offsets), axis=1)[..., None]
+        )[..., 0]
+        edges = np.roll(corners, -1, axis=0) - corners
+        along = np.sum((point - corners) * edges, axis=1) / np.sum(edges**2, axis=1)
+        nearest = corners + np.clip(along, 0.0, 1.0)[:, None] * edges
+        return nearest[np.argmin(np.linalg.norm(nearest - point, axis=1))]
+
+    def half_planes(self, inset: float = 0.0) -> tuple[FloatArray, FloatArray]:
+        """Unit outward normals (k, 2) and offsets (k,) with ``normals @ p <= offsets`` inside."""
+        normals, offsets = self._edges
+        return normals, offsets - inset
+
+    @cached_property
+    def _edges(self) -> tuple[FloatArray, FloatArray]:
+        """Normals (k, 2) and offsets (k,) of the edges."""
+        along = np.roll(self.corners, -1, axis=0) - self.corners
+        normals = np.column_stack((along[:, 1], -along[:, 0]))
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        return frozen_array(normals, "normals"), frozen_array(
+            np.sum(normals * self.corners, axis=1), "offsets"
+        )
+
+    @cached_property
+    def _room(self) -> FloatArray:
+        """(k,) distances of the edges from the centre [m]."""
+        normals, offsets = self._edges
+        return offsets - normals @ self.centre
+
+
+def zmp_rows(area: SupportArea, loop: ClosedLoop, com: FloatArray, inset: float) -> LinearMap:
+    """Rows that are not positive when the ZMP is inside ([Kudoh2002]_ 2.39-2.44, z up).
+
+    With the force ``f`` of the ground and its moment ``n`` about the centre of mass ``s``, the ZMP ``p`` on
+    the ground at the height ``z`` has ``p_x f_z = s_x f_z + (z - s_z) f_x - n_y`` and
+    ``p_y f_z = s_y f_z + (z - s_z) f_y + n_x``; the rows are ``normal . p f_z - offset f_z``, which is right
+    where ``f_z > 0``.
+
+    Args:
+        area: Where it may be.
+        loop: Maps of the force and the moment.
+        com: (3,) [m].
+        inset: Kept from the edge [m].
+    """
+    normals, offsets = area.half_planes(inset)
+    moments = _turned(loop.force.matrix, loop.moment.matrix, com, area.height)
+    constant = _turned(loop.force.offset, loop.moment.offset, com, area.height)
+    return LinearMap(
+        normals @ moments - offsets[:, None] * loop.force.matrix[2],
+        normals @ constant - offsets * loop.force.offset[2],
+    )
+
+
+def load_row(loop: ClosedLoop, least: float) -> LinearMap:
+    """Row that is not positive when the ground carries at least a force; the thesis has no such limit.
+
+    Args:
+        loop: Maps of the force.
+        least: Vertical force [N].
+    """
+    return LinearMap(-loop.force.matrix[2:], least - loop.force.offset[2:])
+
+
+def zmp_of(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:
+    """(2,) ZMP of a force (3,) and its moment (3,) about the centre of mass [m]; NaN without load."""
+    if force[2] <= 0.0:
+        return np.full(2, np.nan)
+    return _turned(force, moment, com, height) / force[2]
+
+
+def _turned(force: FloatArray, moment: FloatArray, com: FloatArray, height: float) -> FloatArray:
+    """(2, ...) ``p f_z`` for the ZMP ``p``."""
+    drop = height - com[2]
+    turned: FloatArray = np.stack((
+        com[0] * force[2] + drop * force[0] - moment[1],
+        com[1] * force[2] + drop * force[1] + moment[0],
+    ))  # fmt: skip
+    return turned
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """What the balance is kept about.
+
+    Attributes:
+        soles: The soles that carry; their effectors are the feet on the ground.
+        area: Their hull, in which the ZMP may be.
+        posture: (nv - 6,) joint angles to come back to [rad].
+        com: (3,) centre of mass of that posture [m].
+    """
+
+    soles: tuple[Contact, ...]
+    area: SupportArea
+    posture: FloatArray
+    com: FloatArray
+
+    @classmethod
+    def of(cls, body: BodyModel, q: ArrayLike, feet: Sequence[str], friction: float) -> "Standing":
+        """Stand as in a posture.
+
+        Args:
+            body: The body.
+            q: (nq,) the posture, the soles of the feet on one level plane.
+            feet: Effectors of the feet that carry.
+            friction: Of their soles.
+
+        Raises:
+            InputError: If no foot carries or the soles are not level.
+        """
+        if not feet:
+            raise InputError("no foot is on the ground; valid: one foot or two")
+        state = Configuration(body, np.array(q, dtype=np.float64))
+        soles = tuple(sole_at(body, name, *state.effector_placement(name), friction) for name in feet)
+        return cls(soles, SupportArea.of(soles), state.q[7:].copy(), state.com.copy())
+
+    @property
+    def feet(self) -> tuple[str, ...]:
+        """Effectors of the feet that carry."""
+        return tuple(contact.effector for contact in self.soles)
+
+    @property
+    def height(self) -> float:
+        """Of the centre of mass above the ground [m]."""
+        return float(self.com[2] - self.area.height)
+
+
+def sole_at(
+    body: BodyModel, effector: str, rotation: FloatArray, position: FloatArray, friction: float
+) -> Contact:
+    """Whole sole of a foot.
+
+    Args:
+        body: The body.
+        effector: Of the foot.
+        rotation: (3, 3) sole to world.
+        position: (3,) middle of the sole [m].
+        friction: Of the sole.
+    """
+    return sole(
+        effector, position, rotation=rotation, length=float(body.sole_length or 0.0),
+        width=float(body.sole_width or 0.0), friction=friction,
+    )  # fmt: skip

@@ -1,0 +1,212 @@
+"""Which segments of a body are its trunk, head, arms and legs, and how they are turned, frame by frame.
+
+Also here. What carries the weight in each frame: legs, seat, hands.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel, limb_named
+from manikin.errors import BodyError
+from manikin.motion import Motion
+from manikin.motion.motion import com_velocity, effector_positions
+from manikin.numerics.spatial import GRAVITY, FloatArray
+
+Flags = NDArray[np.bool_]
+
+EVEN = 0.3
+"""A leg that carries at least this share of what both carry bears its part; ours."""
+
+NEAR_FLOOR = 0.05
+"""Of a motion without contacts: a sole this little above the lower one is on the ground [m]; ours."""
+
+WALKING_SPEED = 0.4
+"""Horizontal speed of the centre of mass of somebody who walks [m/s]; ours."""
+
+ARM_WEIGHT = 0.025
+"""Share of the body's weight, half that of an arm, from which on a hand's support carries the arm; ours."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bearing:
+    """What carries the weight, (n,) each.
+
+    Attributes:
+        balanced: Whether both legs carry, each at least :data:`EVEN` of what both do.
+        both_legs: Whether both feet are in contact.
+        seated: Whether the buttocks are in contact.
+        walking: Whether the centre of mass goes faster than :data:`WALKING_SPEED`.
+        arms: Whether a support of the hand carries the arm, by side.
+        source: ``"contacts"``, or ``"heights of the soles"`` of a motion that knows no contact.
+    """
+
+    balanced: Flags
+    both_legs: Flags
+    seated: Flags
+    walking: Flags
+    arms: Mapping[str, Flags]
+    source: str
+
+
+def bearing_of(body: BodyModel, motion: Motion) -> Bearing:
+    """Find what carries the weight.
+
+    Where the contacts of a motion are known, supports are its own, and the shares of the legs come from the
+    vertical forces; where the forces are not known, from the place of the centre of mass between the feet.
+    Of a motion without any contact a foot is on the ground when its sole is not more than :data:`NEAR_FLOOR`
+    above the other.
+    """
+    known = bool(motion.contact_names) and bool(np.any(motion.support))
+    feet = [f"{side}_foot" for side in SIDES]
+    places = effector_positions(body, motion, tuple(feet))
+    height = np.column_stack([places[name][:, 2] for name in feet])
+    if known:
+        on = np.column_stack([_support(motion, name) for name in feet])
+    else:
+        on = height <= height.min(axis=1, keepdims=True) + NEAR_FLOOR
+    load = np.column_stack([_vertical(motion, name) for name in feet])
+    total = load.sum(axis=1)
+    between = _place_between(motion.com, places[feet[0]], places[feet[1]])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        left = np.where(total > 0.0, load[:, 0] / total, between)
+    both = on.all(axis=1)
+    speed = np.linalg.norm(com_velocity(motion)[:, :2], axis=1)
+    weight = body.mass * GRAVITY
+    return Bearing(
+        balanced=both & (np.minimum(left, 1.0 - left) >= EVEN),
+        both_legs=np.asarray(both, dtype=bool),
+        seated=_support(motion, "buttocks"),
+        walking=speed > WALKING_SPEED,
+        arms={side: _vertical(motion, f"{side}_hand") >= ARM_WEIGHT * weight for side in SIDES},
+        source="contacts" if known else "heights of the soles",
+    )
+
+
+def _support(motion: Motion, effector: str) -> Flags:
+    if effector not in motion.contact_names:
+        return np.zeros(len(motion.time), dtype=bool)
+    return motion.support[:, motion.contact_names.index(effector)]
+
+
+def _vertical(motion: Motion, effector: str) -> FloatArray:
+    """(n,) upward force on an effector [N]; 0 where it is not known."""
+    if effector not in motion.contact_names:
+        return np.zeros(len(motion.time))
+    force = motion.contact_force[:, motion.contact_names.index(effector), 2]
+    return np.maximum(np.nan_to_num(force), 0.0)
+
+
+def _place_between(com: FloatArray, left: FloatArray, right: FloatArray) -> FloatArray:
+    """(n,) share of the way from the right foot to the left one that the centre of mass has gone."""
+    way = (left - right)[:, :2]
+    return np.einsum("ni,ni->n", (com - right)[:, :2], way) / np.maximum(np.sum(way**2, axis=1), 1e-9)
+
+
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Names of the segments that postures are judged by.
+
+    Attributes:
+        trunk: From the free root to the segment that carries the arms.
+        neck: From there to the head, without the former.
+        arms: Upper arm, forearm and hand of each side.
+        legs: Thigh, shank and foot of each side.
+    """
+
+    trunk: tuple[str, ...]
+    neck: tuple[str, ...]
+    arms: dict[str, tuple[str, str, str]]
+    legs: dict[str, tuple[str, str, str]]
+
+
+def parts_of(body: BodyModel) -> Parts:
+    """Find the parts of a human body.
+
+    Raises:
+        BodyError: If it has not two arms and two legs of three segments each, and a head.
+    """
+    limbs = {}
+    for name in (f"{side}_{limb}" for limb in ("arm", "leg") for side in SIDES):
+        segments = limb_named(body, name).segments
+        if len(segments) != 3:
+            raise BodyError(f"limb {name!r} has {len(segments)} segments; valid: 3, as a human's")
+        limbs[name] = (segments[0], segments[1], segments[2])
+    carriers = {body.segment(limbs[f"{side}_arm"][0]).parent for side in SIDES}
+    trunk = _chain(body, carriers.pop() or "")
+    head = _chain(body, body.effector("head").segment)
+    if carriers or head[: len(trunk)] != trunk or len(head) == len(trunk):
+        raise BodyError(f"body {body.name!r} has no trunk with both arms and a neck; valid: a human")
+    arms, legs = ({side: limbs[f"{side}_{kind}"] for side in SIDES} for kind in ("arm", "leg"))
+    return Parts(trunk, head[len(trunk) :], arms, legs)
+
+
+def _chain(body: BodyModel, name: str) -> tuple[str, ...]:
+    """Segments from the root to one of them."""
+    chain: list[str] = []
+    following: str | None = name
+    while following is not None:
+        chain.insert(0, following)
+        following = body.segment(following).parent
+    return tuple(chain)
+
+
+def joint_rotation(body: BodyModel, q: FloatArray, segment: str) -> FloatArray:
+    """(n, 3, 3) rotation of a segment in its parent, for all frames at once.
+
+    Each hinge turns about a constant axis, so that Rodrigues' formula needs only its sines and cosines.
+
+    Args:
+        body: The body.
+        q: (n, nq) configurations.
+        segment: Not the root.
+    """
+    found = np.broadcast_to(np.eye(3), (len(q), 3, 3))
+    for hinge in body.segment(segment).hinges:
+        angle = q[:, 7 + body.joint_index(hinge.name)][:, None, None]
+        x, y, z = hinge.axis
+        turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        found = found @ (np.eye(3) + np.sin(angle) * turn + (1.0 - np.cos(angle)) * (turn @ turn))
+    return found
+
+
+def root_rotation(q: FloatArray) -> FloatArray:
+    """(n, 3, 3) rotation of the root in the world."""
+    x, y, z, w = (q[:, 3:7] / np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def placements(
+    body: BodyModel, q: FloatArray, segments: Sequence[str], rotation: FloatArray, place: FloatArray
+) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Rotations (n, 3, 3) and origins (n, 3) [m] of a chain of segments.
+
+    Args:
+        body: The body.
+        q: (n, nq) configurations.
+        segments: Each the parent of the next.
+        rotation: (n, 3, 3) of the first one's parent, in the frame that is asked for.
+        place: (n, 3) or (3,) its origin there [m].
+    """
+    rotations, places = [], []
+    for name in segments:
+        place = place + rotation @ body.segment(name).origin
+        rotation = rotation @ joint_rotation(body, q, name)
+        rotations.append(rotation)
+        places.append(place)
+    return rotations, places
+
+
+def twist_about_z(rotation: FloatArray) -> FloatArray:
+    """(n,) turn about z that rotations (n, 3, 3) are left with without the shortest swing of z [rad]."""
+    return np.arctan2(rotation[:, 1, 0] - rotation[:, 0, 1], rotation[:, 0, 0] + rotation[:, 1, 1])

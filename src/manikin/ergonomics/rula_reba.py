@@ -1,0 +1,368 @@
+"""RULA, the rapid upper limb assessment ([McAtamney1993]_): step scores, tables and grand score.
+
+Also here. REBA, the rapid entire body assessment ([Hignett2000]_): step scores, tables and score.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.ergonomics.body_parts import SIDES, Bearing
+from manikin.ergonomics.postural_angles import ArmAngles, PosturalAngles
+from manikin.ergonomics.scoring import (
+    ABDUCTED,
+    COUPLINGS,
+    NEUTRAL,
+    TURNED,
+    WRIST_AT_END,
+    WRIST_BENT,
+    WRIST_NEUTRAL,
+    Circumstances,
+    Scores,
+    band,
+    checked,
+    degrees,
+    looked_up,
+    out_of_line,
+    rotated,
+    turned,
+)
+
+REBA_TABLE_A = np.array([
+    [[1, 2, 3, 4], [1, 2, 3, 4], [3, 3, 5, 6]],
+    [[2, 3, 4, 5], [3, 4, 5, 6], [4, 5, 6, 7]],
+    [[2, 4, 5, 6], [4, 5, 6, 7], [5, 6, 7, 8]],
+    [[3, 5, 6, 7], [5, 6, 7, 8], [6, 7, 8, 9]],
+    [[4, 6, 7, 8], [6, 7, 8, 9], [7, 8, 9, 9]],
+])  # fmt: skip
+"""Posture score of the body by trunk (5), neck (3) and legs (4)."""
+
+REBA_TABLE_B = np.array(
+    [
+        [[1, 2, 2], [1, 2, 3]],
+        [[1, 2, 3], [2, 3, 4]],
+        [[3, 4, 5], [4, 5, 5]],
+        [[4, 5, 5], [5, 6, 7]],
+        [[6, 7, 8], [7, 8, 8]],
+        [[7, 8, 8], [8, 9, 9]],
+    ]
+)
+"""Posture score of the arm by upper arm (6), lower arm (2) and wrist (3)."""
+
+REBA_TABLE_C = np.array(
+    [
+        [1, 1, 1, 2, 3, 3, 4, 5, 6, 7, 7, 7],
+        [1, 2, 2, 3, 4, 4, 5, 6, 6, 7, 7, 8],
+        [2, 3, 3, 3, 4, 5, 6, 7, 7, 8, 8, 8],
+        [3, 4, 4, 4, 5, 6, 7, 8, 8, 9, 9, 9],
+        [4, 4, 4, 5, 6, 7, 8, 8, 9, 9, 9, 9],
+        [6, 6, 6, 7, 8, 8, 9, 9, 10, 10, 10, 10],
+        [7, 7, 7, 8, 9, 9, 9, 10, 10, 11, 11, 11],
+        [8, 8, 8, 9, 10, 10, 10, 10, 10, 11, 11, 11],
+        [9, 9, 9, 10, 10, 10, 11, 11, 11, 12, 12, 12],
+        [10, 10, 10, 11, 11, 11, 11, 12, 12, 12, 12, 12],
+        [11, 11, 11, 11, 12, 12, 12, 12, 12, 12, 12, 12],
+        [12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12],
+    ]
+)
+"""Score C by score A of the body and score B of the arm, 1 to 12 each."""
+
+RISKS = {0: "negligible", 1: "low", 2: "medium", 3: "high", 4: "very high"}
+"""Risk by action level."""
+
+_LEVEL_BEGINS = (2, 4, 8, 11)
+_SLIGHT, _KNEE, _DEEP_KNEE, _HANGING = 20.0, 30.0, 60.0, 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class RebaSteps:
+    """Scores of the parts of the body, (n,) each or numbers; those of an arm are of one side.
+
+    Attributes:
+        trunk: 1 to 5.
+        neck: 1 to 3.
+        legs: 1 to 4.
+        upper_arm: 1 to 6.
+        lower_arm: 1 or 2.
+        wrist: 1 to 3.
+    """
+
+    trunk: ArrayLike
+    neck: ArrayLike
+    legs: ArrayLike
+    upper_arm: ArrayLike
+    lower_arm: ArrayLike
+    wrist: ArrayLike
+
+
+def reba_score(
+    steps: RebaSteps, *, load: ArrayLike = 0, coupling: ArrayLike = 0, activity: ArrayLike = 0
+) -> Scores:
+    """REBA score of postures, 1 to 15.
+
+    Args:
+        steps: Of the postures.
+        load: 0 to 3, see :func:`reba_load`.
+        coupling: 0 (good) to 3 (unacceptable).
+        activity: 0 to 3: 1 each for what is held for more than a minute, small movements repeated more than
+            four times a minute, and rapid large changes of posture or an unstable base.
+
+    Returns:
+        (n,), or of shape () for numbers.
+
+    Raises:
+        InputError: If a score is not among those of its part.
+    """
+    score_a = checked(load, 0, 3, "load") + looked_up(
+        REBA_TABLE_A, trunk=steps.trunk, neck=steps.neck, legs=steps.legs
+    )
+    score_b = checked(coupling, 0, 3, "coupling") + looked_up(
+        REBA_TABLE_B, upper_arm=steps.upper_arm, lower_arm=steps.lower_arm, wrist=steps.wrist
+    )
+    return looked_up(REBA_TABLE_C, score_a=score_a, score_b=score_b) + checked(activity, 0, 3, "activity")
+
+
+def reba_load(load_kg: float, pattern: str = "intermittent") -> int:
+    """Load score: 0 below 5 kg, 1 up to 10 kg, 2 above; one more for shocks."""
+    return int(load_kg >= 5.0) + int(load_kg > 10.0) + int(pattern == "shock")
+
+
+def reba_action_level(score: ArrayLike) -> Scores:
+    """Action level, 0 to 4, of scores 1 to 15."""
+    return np.searchsorted(_LEVEL_BEGINS, np.asarray(score), side="right")
+
+
+def reba_coupling(coupling: str) -> int:
+    """Coupling score of a grip by name, 0 to 3."""
+    return COUPLINGS.index(coupling)
+
+
+def reba_steps(
+    angles: PosturalAngles, bearing: Bearing, given: Circumstances | None = None
+) -> Mapping[str, RebaSteps]:
+    """Step scores of a motion, by side.
+
+    Where the paper gives no number (upright, twisted, abducted, rotated, gravity-assisted) those of
+    :mod:`manikin.ergonomics.scoring` are taken; an arm is assisted by gravity when it hangs, within 20
+    degrees of the vertical, from a trunk that is bent by more than that.
+
+    Args:
+        angles: (n,) each.
+        bearing: What carries the weight.
+        given: What the motion does not tell.
+    """
+    circumstances = given or Circumstances()
+    trunk, neck, legs = _reba_trunk(angles), _reba_neck(angles), _legs(angles, bearing)
+    return {
+        side: RebaSteps(
+            trunk, neck, legs, _upper_arm(angles, bearing, circumstances, side), *_fore(angles.arms[side])
+        )
+        for side in SIDES
+    }
+
+
+def _reba_trunk(angles: PosturalAngles) -> Scores:
+    flexion = degrees(angles.trunk_flexion)
+    score = np.maximum(band(flexion, NEUTRAL, 20.0, 60.0), band(-flexion, NEUTRAL, 20.0))
+    return score + (turned(angles.trunk_twist) | turned(angles.trunk_side_bend))
+
+
+def _reba_neck(angles: PosturalAngles) -> Scores:
+    flexion = degrees(angles.neck_flexion)
+    score = np.where((flexion > _SLIGHT) | (flexion < -NEUTRAL), 2, 1)
+    return score + (turned(angles.neck_twist) | turned(angles.neck_side_bend))
+
+
+def _legs(angles: PosturalAngles, bearing: Bearing) -> Scores:
+    """Both legs, walking or sitting 1, else 2; more for bent knees of those who do not sit.
+
+    Of somebody who walks the straighter knee counts, for a leg that swings is bent without carrying (ours).
+    """
+    score = np.where(bearing.balanced | bearing.walking | bearing.seated, 1, 2)
+    knees = np.array([degrees(angle) for angle in angles.knees.values()])
+    knee = np.where(bearing.walking, knees.min(axis=0), knees.max(axis=0))
+    bent = (knee >= _KNEE).astype(np.int64) + (knee > _DEEP_KNEE)
+    return score + np.where(bearing.seated, 0, bent)
+
+
+def _upper_arm(angles: PosturalAngles, bearing: Bearing, given: Circumstances, side: str) -> Scores:
+    arm = angles.arms[side]
+    raised = degrees(arm.raised)
+    score = np.where(raised < -_SLIGHT, 2, band(raised, _SLIGHT, 45.0, 90.0))
+    score = score + ((degrees(arm.abduction) > ABDUCTED) | rotated(arm)) + int(given.shoulder_raised)
+    hangs = (degrees(arm.from_vertical) <= _HANGING) & (degrees(angles.trunk_flexion) > _SLIGHT)
+    return np.clip(score - (bearing.arms[side] | hangs), 1, 6)
+
+
+def _fore(arm: ArmAngles) -> tuple[Scores, Scores]:
+    """Scores of lower arm and wrist."""
+    elbow = degrees(arm.elbow)
+    off_line = np.abs(degrees(arm.wrist_deviation)) > TURNED
+    twisted = np.abs(degrees(arm.wrist_twist)) > WRIST_AT_END
+    wrist = band(np.abs(degrees(arm.wrist_flexion)), WRIST_BENT) + (off_line | twisted)
+    return np.where((elbow >= 60.0) & (elbow <= 100.0), 1, 2), wrist
+
+
+TABLE_A = np.array([
+    [[1, 2, 2, 2, 2, 3, 3, 3], [2, 2, 2, 2, 3, 3, 3, 3], [2, 3, 3, 3, 3, 3, 4, 4]],
+    [[2, 3, 3, 3, 3, 4, 4, 4], [3, 3, 3, 3, 3, 4, 4, 4], [3, 4, 4, 4, 4, 4, 5, 5]],
+    [[3, 3, 4, 4, 4, 4, 5, 5], [3, 4, 4, 4, 4, 4, 5, 5], [4, 4, 4, 4, 4, 5, 5, 5]],
+    [[4, 4, 4, 4, 4, 5, 5, 5], [4, 4, 4, 4, 4, 5, 5, 5], [4, 4, 4, 5, 5, 5, 6, 6]],
+    [[5, 5, 5, 5, 5, 6, 6, 7], [5, 6, 6, 6, 6, 7, 7, 7], [6, 6, 6, 7, 7, 7, 7, 8]],
+    [[7, 7, 7, 7, 7, 8, 8, 9], [8, 8, 8, 8, 8, 9, 9, 9], [9, 9, 9, 9, 9, 9, 9, 9]],
+]).reshape(6, 3, 4, 2)  # fmt: skip
+"""Posture score of the arm by upper arm (6), lower arm (3), wrist (4) and wrist twist (2)."""
+
+TABLE_B = np.array(
+    [
+        [1, 3, 2, 3, 3, 4, 5, 5, 6, 6, 7, 7],
+        [2, 3, 2, 3, 4, 5, 5, 5, 6, 7, 7, 7],
+        [3, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 7],
+        [5, 5, 5, 6, 6, 7, 7, 7, 7, 7, 8, 8],
+        [7, 7, 7, 7, 7, 8, 8, 8, 8, 8, 8, 8],
+        [8, 8, 8, 8, 8, 8, 8, 9, 9, 9, 9, 9],
+    ]
+).reshape(6, 6, 2)
+"""Posture score of the body by neck (6), trunk (6) and legs (2)."""
+
+TABLE_C = np.array(
+    [
+        [1, 2, 3, 3, 4, 5, 5],
+        [2, 2, 3, 4, 4, 5, 5],
+        [3, 3, 3, 4, 4, 5, 6],
+        [3, 3, 3, 4, 5, 6, 6],
+        [4, 4, 4, 5, 6, 7, 7],
+        [4, 4, 5, 6, 6, 7, 7],
+        [5, 5, 6, 6, 7, 7, 7],
+        [5, 5, 6, 7, 7, 7, 7],
+    ]
+)
+"""Grand score by score C of the arm (1 to 8 and more) and score D of the body (1 to 7 and more)."""
+
+ACTIONS = {
+    1: "acceptable unless held or repeated for long",
+    2: "further investigation, changes may be required",
+    3: "investigation and changes soon",
+    4: "investigation and changes immediately",
+}
+"""What is to be done, by action level."""
+
+
+@dataclass(frozen=True, eq=False)
+class RulaSteps:
+    """Scores of the parts of the body, (n,) each or numbers; those of an arm are of one side.
+
+    Attributes:
+        upper_arm: 1 to 6.
+        lower_arm: 1 to 3.
+        wrist: 1 to 4.
+        wrist_twist: 1 or 2.
+        neck: 1 to 6.
+        trunk: 1 to 6.
+        legs: 1 or 2.
+    """
+
+    upper_arm: ArrayLike
+    lower_arm: ArrayLike
+    wrist: ArrayLike
+    wrist_twist: ArrayLike
+    neck: ArrayLike
+    trunk: ArrayLike
+    legs: ArrayLike
+
+
+def rula_score(
+    steps: RulaSteps, *, muscle_arm: ArrayLike = 0, muscle_body: ArrayLike = 0, force: ArrayLike = 0
+) -> Scores:
+    """Grand score of postures, 1 to 7.
+
+    Args:
+        steps: Of the postures.
+        muscle_arm: 1 where the arm is held for more than a minute or moves more than four times a minute.
+        muscle_body: The same of neck, trunk and legs.
+        force: 0 to 3, see :func:`rula_force`; it counts for both.
+
+    Returns:
+        (n,), or of shape () for numbers.
+
+    Raises:
+        InputError: If a score is not among those of its part.
+    """
+    added = checked(force, 0, 3, "force")
+    score_c = added + checked(muscle_arm, 0, 1, "muscle use") + looked_up(
+        TABLE_A, upper_arm=steps.upper_arm, lower_arm=steps.lower_arm, wrist=steps.wrist,
+        wrist_twist=steps.wrist_twist,
+    )  # fmt: skip
+    score_d = added + checked(muscle_body, 0, 1, "muscle use") + looked_up(
+        TABLE_B, neck=steps.neck, trunk=steps.trunk, legs=steps.legs
+    )  # fmt: skip
+    return looked_up(TABLE_C, score_c=np.minimum(score_c, 8), score_d=np.minimum(score_d, 7))
+
+
+def rula_force(load_kg: float, pattern: str = "intermittent") -> int:
+    """Force score: 0 below 2 kg, 1 up to 10 kg, 2 above; one more where static or repeated; 3 for shocks."""
+    if pattern == "shock":
+        return 3
+    return int(load_kg >= 2.0) + int(load_kg > 10.0) + int(pattern == "static" and load_kg >= 2.0)
+
+
+def rula_action_level(score: ArrayLike) -> Scores:
+    """Action level, 1 to 4, of grand scores 1 to 7."""
+    return (np.asarray(score) + 1) // 2
+
+
+def rula_steps(
+    angles: PosturalAngles, bearing: Bearing, given: Circumstances | None = None
+) -> Mapping[str, RulaSteps]:
+    """Step scores of a motion, by side.
+
+    Where the paper gives no number (upright, abducted, twisted, out to the side, end of range) those of
+    :mod:`manikin.ergonomics.scoring` are taken.
+
+    Args:
+        angles: (n,) each.
+        bearing: What carries the weight.
+        given: What the motion does not tell.
+    """
+    circumstances = given or Circumstances()
+    neck, trunk = _neck(angles), _trunk(angles, bearing, circumstances)
+    legs = np.where(bearing.balanced | (bearing.seated & bearing.both_legs), 1, 2)
+    return {side: _arm(angles, bearing, circumstances, side, neck, trunk, legs) for side in SIDES}
+
+
+def _neck(angles: PosturalAngles) -> Scores:
+    flexion = degrees(angles.neck_flexion)
+    score = np.where(flexion < -NEUTRAL, 4, band(flexion, 10.0, 20.0))
+    return score + turned(angles.neck_twist) + turned(angles.neck_side_bend)
+
+
+def _trunk(angles: PosturalAngles, bearing: Bearing, given: Circumstances) -> Scores:
+    flexion = degrees(angles.trunk_flexion)
+    forward, backward = band(flexion, NEUTRAL, 20.0, 60.0), band(-flexion, NEUTRAL, 20.0)
+    score = np.maximum(forward, backward)
+    unsupported = bearing.seated & (not given.trunk_supported)
+    supported = bearing.seated & given.trunk_supported & (flexion <= NEUTRAL)
+    score = np.where(supported, 1, np.where(unsupported, np.maximum(score, 2), score))
+    return score + turned(angles.trunk_twist) + turned(angles.trunk_side_bend)
+
+
+def _arm(
+    angles: PosturalAngles,
+    bearing: Bearing,
+    given: Circumstances,
+    side: str,
+    neck: Scores,
+    trunk: Scores,
+    legs: Scores,
+) -> RulaSteps:
+    arm = angles.arms[side]
+    raised, elbow = degrees(arm.raised), degrees(arm.elbow)
+    upper = np.where(raised < -20.0, 2, band(raised, 20.0, 45.0, 90.0)) + (degrees(arm.abduction) > ABDUCTED)
+    upper = upper + int(given.shoulder_raised) - bearing.arms[side]
+    lower = np.where((elbow >= 60.0) & (elbow <= 100.0), 1, 2) + out_of_line(arm)
+    bent = np.abs(degrees(arm.wrist_flexion))
+    wrist = band(bent, WRIST_NEUTRAL, WRIST_BENT) + (np.abs(degrees(arm.wrist_deviation)) > TURNED)
+    twist = np.where(np.abs(degrees(arm.wrist_twist)) > WRIST_AT_END, 2, 1)
+    return RulaSteps(np.clip(upper, 1, 6), lower, wrist, twist, neck, trunk, legs)

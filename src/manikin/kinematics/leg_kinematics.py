@@ -1,0 +1,212 @@
+"""A human's legs in closed form: where the feet are, and the angles that put them somewhere; many at once."""
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.body.limbs import REFLECTION, are_mirrored, limb_named
+from manikin.errors import BodyError
+from manikin.numerics.spatial import FloatArray, cross, dot, matrix
+
+HINGES = (
+    "hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "knee_rotation",
+    "ankle_dorsiflexion", "ankle_inversion",
+)  # fmt: skip
+
+LEAST_BEND = np.deg2rad(5.0)
+"""A leg that cannot reach its foot is stretched to this [rad]; nearly straight knees jerk."""
+
+_AXES = ((0, -1, 0), (1, 0, 0), (0, 0, -1), (0, 1, 0), (0, 0, -1), (0, -1, 0), (-1, 0, 0))
+"""Of the left leg's hinges; those of the right one are reflected."""
+
+_KNEE_ROTATION = HINGES.index("knee_rotation")
+_REFLECT = np.outer(REFLECTION, REFLECTION)
+
+
+class LegKinematics:
+    """Forward and inverse kinematics of both legs of :func:`manikin.body.human`, without iteration.
+
+    The chain is hip (flexion, abduction, rotation), knee (flexion about y, rotation about the shank), ankle
+    (dorsiflexion about y, inversion about x). The law of cosines gives the knee; the turn of the leg about
+    the line from hip to ankle and the two angles of the ankle give the foot its orientation, with the knee's
+    rotation kept as it is. The right leg is the left one of a reflected body.
+
+    Arrays of both legs have a first axis of length 2: left, right.
+    """
+
+    def __init__(self, body: BodyModel) -> None:
+        """Take the lengths from a body.
+
+        Args:
+            body: A human.
+
+        Raises:
+            BodyError: If its legs have other hinges or differ.
+        """
+        sides = [[body.segment(f"{side}_{name}") for name in ("thigh", "leg", "foot")]
+                 for side in ("left", "right")]  # fmt: skip
+        left = [hinge for part in sides[0] for hinge in part.hinges]
+        if tuple(h.name for h in left) != tuple(f"left_{name}" for name in HINGES) or not np.allclose(
+            [h.axis for h in left], _AXES
+        ):
+            raise BodyError(f"legs of body {body.name!r} have other hinges; valid: those of a human")
+        if not are_mirrored(body, limb_named(body, "left_leg"), limb_named(body, "right_leg")):
+            raise BodyError(f"legs of body {body.name!r} differ; valid: equal ones")
+        self.slots = np.array([
+            [body.joint_index(hinge.name) for part in parts for hinge in part.hinges] for parts in sides
+        ])  # fmt: skip
+        """(2, 7) places of the hinges among all hinges."""
+        self.hip = np.array([parts[0].origin for parts in sides])
+        """(2, 3) hip joints in the pelvis [m]."""
+        self.thigh, self.shank = (-float(part.origin[2]) for part in sides[0][1:])
+        self.length = float(self.length_at(np.array(LEAST_BEND)))
+        """Largest distance of the ankle from the hip [m]."""
+
+    def length_at(self, bend: FloatArray) -> FloatArray:
+        """(...) distance of the ankle from the hip [m] at (...) angles of the knee [rad]."""
+        a, b = self.thigh, self.shank
+        return np.sqrt(a**2 + b**2 + 2.0 * a * b * np.cos(bend))
+
+    def hips(self, pelvis: FloatArray, place: FloatArray) -> FloatArray:
+        """(2, n, 3) places of the hip joints of (n, 3, 3) turns and (n, 3) origins of the pelvis [m]."""
+        return place + np.einsum("nij,kj->kni", pelvis, self.hip)
+
+    def feet(
+        self, pelvis: FloatArray, place: FloatArray, angles: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Orientations and origins (ankles) of the feet.
+
+        Args:
+            pelvis: (n, 3, 3) from the pelvis' axes to the world's.
+            place: (n, 3) pelvis' origin [m].
+            angles: (n, h) of all hinges [rad].
+
+        Returns:
+            (2, n, 3, 3) from the feet's axes to the world's, and (2, n, 3) [m].
+        """
+        a = angles[:, self.slots].transpose(2, 1, 0)
+        thigh = _reflected(pelvis) @ _hip(a[0], a[1], a[2])
+        shank = thigh @ _about_y(a[3]) @ _about_z(-a[4])
+        foot = _reflect_right(shank @ _about_y(-a[5]) @ _about_x(-a[6]))
+        thigh, shank = _reflect_right(thigh), _reflect_right(shank)
+        ankle = self.hips(pelvis, place) - self.thigh * thigh[..., 2] - self.shank * shank[..., 2]
+        return foot, ankle
+
+    def angles(
+        self, pelvis: FloatArray, place: FloatArray, foot: FloatArray, ankle: FloatArray, angles: FloatArray
+    ) -> FloatArray:
+        """Angles, within limits or not, that put the feet there; out of reach, as near as a leg gets.
+
+        Args:
+            pelvis: (n, 3, 3) from the pelvis' axes to the world's.
+            place: (n, 3) pelvis' origin [m].
+            foot: (2, n, 3, 3) from the feet's axes to the world's.
+            ankle: (2, n, 3) the feet's origins [m].
+            angles: (n, h) of all hinges, of which the rotations of the knees are kept [rad].
+
+        Returns:
+            (n, h) with those of the legs replaced [rad].
+        """
+        line = ankle - self.hips(pelvis, place)
+        line[1] *= REFLECTION
+        pelvis, foot = _reflected(pelvis), _reflect_right(foot)
+        rotation = angles[:, self.slots[:, _KNEE_ROTATION]].T
+        size = np.sqrt(dot(line, line))
+        reach = np.clip(size, abs(self.thigh - self.shank) + 1e-6, self.length)
+        a, b = self.thigh, self.shank
+        bend = np.arccos(np.clip((reach**2 - a**2 - b**2) / (2.0 * a * b), -1.0, 1.0))
+        # Angle at the hip between the thigh and the line to the ankle, which lies behind it.
+        behind = np.arctan2(b * np.sin(bend), a + b * np.cos(bend))
+        plane = _plane(-line / size[..., None], pelvis[..., 1], foot[..., 0], rotation, bend - behind)
+        thigh = plane @ _about_y(-behind)
+        shank = thigh @ _about_y(bend) @ _about_z(-rotation)
+        hip, ankle_turn = np.swapaxes(pelvis, -1, -2) @ thigh, np.swapaxes(shank, -1, -2) @ foot
+        found = np.empty((*bend.shape, 7))
+        found[..., 0] = np.arctan2(-hip[..., 0, 2], hip[..., 2, 2])
+        found[..., 1] = np.arcsin(np.clip(-hip[..., 1, 2], -1.0, 1.0))
+        found[..., 2] = np.arctan2(-hip[..., 1, 0], hip[..., 1, 1])
+        found[..., 3], found[..., 4] = bend, rotation
+        found[..., 5] = np.arctan2(ankle_turn[..., 2, 0], ankle_turn[..., 0, 0])
+        found[..., 6] = np.arctan2(ankle_turn[..., 1, 2], ankle_turn[..., 1, 1])
+        result = angles.copy()
+        result[:, self.slots] = found.transpose(1, 0, 2)
+        return result
+
+
+def _plane(
+    up: FloatArray, aside: FloatArray, toes: FloatArray, rotation: FloatArray, lean: FloatArray
+) -> FloatArray:
+    """(..., 3, 3) axes (front, side, up) of the plane in which the leg bends.
+
+    It is turned about the line from hip to ankle so that the shank's left-right axis is perpendicular to the
+    foot's long axis, as the two axes of the ankle demand.
+
+    Args:
+        up: (..., 3) from the ankle to the hip, unit.
+        aside: (..., 3) to the left, roughly.
+        toes: (..., 3) the foot's long axis, unit.
+        rotation: (...) of the knee [rad].
+        lean: (...) of the shank from the line [rad].
+    """
+    side = aside - dot(aside, up)[..., None] * up
+    side /= np.sqrt(dot(side, side))[..., None]
+    front = cross(side, up)
+    # The shank's y axis in the frame (front, side, up).
+    sine = np.sin(rotation)
+    c1, c2, c3 = sine * np.cos(lean), np.cos(rotation), -sine * np.sin(lean)
+    f1, f2, f3 = dot(toes, front), dot(toes, side), dot(toes, up)
+    along, across = c1 * f1 + c2 * f2, c1 * f2 - c2 * f1
+    amount = np.maximum(np.hypot(along, across), 1e-9)
+    phase = np.arctan2(across, along)
+    offset = np.arccos(np.clip(-c3 * f3 / amount, -1.0, 1.0))
+    one, other = phase + offset, phase - offset
+    ahead = np.cos(one) * f1 + np.sin(one) * f2 >= np.cos(other) * f1 + np.sin(other) * f2
+    turn = np.where(ahead, one, other)
+    cos, sin = np.cos(turn)[..., None], np.sin(turn)[..., None]
+    plane = np.empty((*up.shape, 3))
+    plane[..., 0], plane[..., 1], plane[..., 2] = cos * front + sin * side, cos * side - sin * front, up
+    return plane
+
+
+def _reflected(turns: FloatArray) -> FloatArray:
+    """(2, n, 3, 3) turns (n, 3, 3), and what they are in the reflected body."""
+    return np.stack([turns, turns * _REFLECT])
+
+
+def _reflect_right(turns: FloatArray) -> FloatArray:
+    """(2, n, 3, 3) with the second half reflected, to and from the reflected body."""
+    found = turns.copy()
+    found[1] *= _REFLECT
+    return found
+
+
+def _hip(flexion: FloatArray, abduction: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Product of turns about -y, x and -z."""
+    cf, sf, ca, sa = np.cos(flexion), np.sin(flexion), np.cos(abduction), np.sin(abduction)
+    cr, sr = np.cos(rotation), np.sin(rotation)
+    return matrix([
+        [cf * cr + sf * sa * sr, cf * sr - sf * sa * cr, -sf * ca],
+        [-ca * sr, ca * cr, -sa],
+        [sf * cr - cf * sa * sr, sf * sr + cf * sa * cr, cf * ca],
+    ])  # fmt: skip
+
+
+def _about_x(angle: FloatArray) -> FloatArray:
+    return _turn(angle, 1, 2)
+
+
+def _about_y(angle: FloatArray) -> FloatArray:
+    return _turn(angle, 2, 0)
+
+
+def _about_z(angle: FloatArray) -> FloatArray:
+    return _turn(angle, 0, 1)
+
+
+def _turn(angle: FloatArray, first: int, second: int) -> FloatArray:
+    """(..., 3, 3) rotations that carry the first axis towards the second."""
+    turn = np.zeros((*angle.shape, 3, 3))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    turn[..., first, first] = turn[..., second, second] = cosine
+    turn[..., second, first], turn[..., first, second] = sine, -sine
+    turn[..., 3 - first - second, 3 - first - second] = 1.0
+    return turn

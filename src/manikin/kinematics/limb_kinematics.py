@@ -1,0 +1,281 @@
+"""Forward kinematics of one limb at many joint angles at once.
+
+Also here. Where the effector of a limb can get to: the convex hull of many sampled places.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+
+from manikin.body.limbs import limb_hinges, limb_origin, limb_slots, parent_segment
+from manikin.body.model import BodyModel
+from manikin.body.natural_range import NaturalRange
+from manikin.body.segments import Limb
+from manikin.errors import BodyError
+from manikin.numerics.spatial import FloatArray, frozen_array, skew
+
+MIN_COUNT = 100
+"""Fewest samples from which a hull is made; 10,000 are a fair picture ([Tonneau2015]_ 4.3.4)."""
+
+GIVE = 0.03
+"""Distance from what no joint moves at which a surface is still within its reach [m]; our choice."""
+
+_CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class ReachVolume:
+    """Convex hull of the places of an effector, in the frame of the segment the limb is fixed to.
+
+    Attributes:
+        limb: The limb.
+        segment: Name of the segment that carries it: the parent of the limb's first segment.
+        vertices: (n, 3) corners [m].
+        faces: (m, 3) triangles, counter-clockwise seen from outside.
+        A: (m, 3) unit normals of the faces, outward.
+        b: (m,) offsets [m]: inside is ``A x <= b``.
+    """
+
+    limb: Limb
+    segment: str
+    vertices: FloatArray
+    faces: NDArray[np.int64]
+    A: FloatArray
+    b: FloatArray
+
+    def residual(self, points: ArrayLike) -> FloatArray:
+        """(...) distance of (..., 3) points to the nearest face, negative outside [m].
+
+        The residual radius ``min(b - A s)`` of [Tonneau2015]_ algorithm 1.
+        """
+        return np.min(self.b - np.asarray(points, dtype=np.float64) @ self.A.T, axis=-1)
+
+    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
+        """(...) whether (..., 3) points are inside or at most ``tolerance`` [m] beyond a face."""
+        return self.residual(points) >= -tolerance
+
+    @cached_property
+    def inscribed_sphere(self) -> tuple[FloatArray, float]:
+        """Centre (3,) and radius [m] of the largest sphere inside, the Chebyshev sphere (4.1.2)."""
+        table = np.column_stack([self.A, np.ones(len(self.b))])
+        bounds = [(None, None)] * 3 + [(0.0, None)]
+        found = linprog([0.0, 0.0, 0.0, -1.0], A_ub=table, b_ub=self.b, bounds=bounds)
+        return frozen_array(found.x[:3], "centre"), float(found.x[3])
+
+
+def hull_of(limb: Limb, segment: str, points: FloatArray) -> ReachVolume:
+    """Convex hull of points (n, 3) in the frame of the carrying segment [m].
+
+    Raises:
+        BodyError: If the points lie in a plane, as those of a limb with one hinge do.
+    """
+    if np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-9) < 3:
+        raise BodyError(
+            f"limb {limb.name!r} reaches points of a plane only; valid: an effector that moves in space"
+        )
+    hull = ConvexHull(points)
+    used, numbers = np.unique(hull.simplices, return_inverse=True)
+    vertices, faces = points[used], numbers.reshape(hull.simplices.shape)
+    corners = vertices[faces]
+    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("fi,fi->f", turned, hull.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    faces.setflags(write=False)
+    return ReachVolume(
+        limb,
+        segment,
+        frozen_array(vertices, "vertices", (None, 3)),
+        faces,
+        frozen_array(hull.equations[:, :3], "A", (None, 3)),
+        frozen_array(-hull.equations[:, 3], "b", (None,)),
+    )
+
+
+def rigid_reach(limb: Limb, segment: str, place: FloatArray, rotation: FloatArray) -> ReachVolume:
+    """Reach of a limb without joints: a cube of :data:`GIVE` on each side of its effector.
+
+    The effector moves with the trunk alone; a surface that meets the cube is near enough to be touched.
+
+    Args:
+        limb: The limb.
+        segment: Name of the segment that carries it.
+        place: (3,) of the effector in that segment [m].
+        rotation: (3, 3) from the effector's axes to the segment's.
+    """
+    return hull_of(limb, segment, place + GIVE * _CORNERS @ rotation.T)
+
+
+def reach_volume(
+    body: BodyModel, limb: Limb, rng: np.random.Generator, count: int = 10_000, *, natural: bool = False
+) -> ReachVolume:
+    """Sample the reach of a limb within its joint ranges ([Tonneau2015]_ 4.3.4).
+
+    Args:
+        body: The body.
+        limb: One of its limbs.
+        rng: Source of randomness.
+        count: Number of samples, at least :data:`MIN_COUNT`; a limb without joints needs none.
+        natural: Whether hips and shoulders of the human keep to their learnt volumes (4.3.3).
+
+    Raises:
+        BodyError: If the count is too small or the effector moves in a plane only.
+    """
+    if count < MIN_COUNT:
+        raise BodyError(f"reach volume count is {count}; valid: at least {MIN_COUNT}")
+    chain = LimbKinematics(body, limb)
+    segment = parent_segment(body, limb)
+    if not len(chain):
+        return rigid_reach(limb, segment, limb_origin(body, limb) + chain.tip, chain.tip_rotation)
+    source = NaturalRange(body, limb) if natural else chain
+    places = chain.place(source.random_angles(rng, count)).positions
+    return hull_of(limb, segment, places + limb_origin(body, limb))
+
+
+_IDENTITY = np.eye(3)
+_BLOCK = 1024  # samples whose temporary arrays fit in the cache
+
+
+@dataclass(frozen=True, eq=False)
+class EffectorPlacements:
+    """The effector of a limb at n samples, in the limb's frame.
+
+    Attributes:
+        positions: (n, 3) [m].
+        rotations: (n, 3, 3) from the effector's axes to the limb frame's.
+        jacobians: (n, 3, k) velocity of the effector per joint speed [m/rad].
+        axes: (n, 3, k) unit axes of the joints: its angular velocity per joint speed.
+    """
+
+    positions: FloatArray
+    rotations: FloatArray
+    jacobians: FloatArray
+    axes: FloatArray
+
+
+class LimbKinematics:
+    """A limb as a chain of hinges on fixed offsets, in the limb's frame.
+
+    Attributes:
+        limb: The limb.
+        slots: (k,) places of its hinges in the configuration vector.
+        lower: (k,) smallest angles [rad].
+        upper: (k,) largest angles [rad].
+        torque_lower: (k,) most negative torques [N.m].
+        torque_upper: (k,) largest torques [N.m].
+        axes: (k, 3) unit axes of the hinges, each in the axes of the one before it.
+        offsets: (k, 3) translations before each hinge [m].
+        tip: (3,) translation from the last hinge to the effector [m]; from the limb's origin without any.
+        tip_rotation: (3, 3) from the effector's axes to those of the last hinge.
+    """
+
+    def __init__(self, body: BodyModel, limb: Limb) -> None:
+        self.limb = limb
+        self.slots = limb_slots(body, limb)
+        hinges = limb_hinges(body, limb)
+        self._hinges = [(name, len(body.segment(name).hinges)) for name in limb.segments]
+        self.lower = frozen_array([hinge.lower for hinge in hinges], "lower")
+        self.upper = frozen_array([hinge.upper for hinge in hinges], "upper")
+        self.torque_lower = frozen_array([hinge.torque_lower for hinge in hinges], "torque_lower")
+        self.torque_upper = frozen_array([hinge.torque_upper for hinge in hinges], "torque_upper")
+        self.axes = frozen_array(np.reshape([hinge.axis for hinge in hinges], (-1, 3)), "axes")
+        offsets, tip = _offsets(body, limb)
+        self.offsets, self.tip = frozen_array(offsets, "offsets"), frozen_array(tip, "tip")
+        self.tip_rotation = frozen_array(body.effector(limb.effector).rotation, "tip_rotation")
+        self._crosses = skew(self.axes)
+        self._squares = self._crosses @ self._crosses
+
+    def __len__(self) -> int:
+        """Number of hinges."""
+        return len(self.axes)
+
+    def random_angles(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """(count, k) angles, uniform within the joint ranges [rad]."""
+        return rng.uniform(self.lower, self.upper, (count, len(self)))
+
+    def place(self, angles: ArrayLike) -> EffectorPlacements:
+        """Place the effector at many joint angles.
+
+        Args:
+            angles: (n, k) [rad].
+
+        Raises:
+            BodyError: If the angles are not (n, k).
+        """
+        q = np.asarray(angles, dtype=np.float64)
+        if q.ndim != 2 or q.shape[1] != len(self):
+            raise BodyError(f"limb {self.limb.name!r} angles have shape {q.shape}; valid: (n, {len(self)})")
+        count = len(q)
+        shape = (count, 3, len(self))
+        found = EffectorPlacements(
+            np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(shape), np.empty(shape)
+        )
+        for rows in _blocks(count):
+            self._place_block(q[rows], found, rows)
+        return found
+
+    def segment_placements(self, angles: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+        """Name, axes (n, 3, 3) and origin (n, 3) of moving segments in the frame of the limb."""
+        if not len(self):
+            return
+        frames, places = self._frames(np.asarray(angles, dtype=np.float64))
+        last = 0
+        for name, count in self._hinges:
+            yield name, frames[:, last + count], places[:, last]
+            last += count
+
+    def _frames(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Axes before each hinge and after the last (n, k + 1, 3, 3), and places of the hinges (n, k, 3).
+
+        Turn by turn: ``I + sin a [k] + (1 - cos a) [k]^2`` about each unit axis ``k``.
+        """
+        turns = np.sin(q)[..., None, None] * self._crosses
+        turns += (1.0 - np.cos(q))[..., None, None] * self._squares
+        turns += _IDENTITY
+        frames = np.empty((len(q), len(self) + 1, 3, 3))
+        frames[:, 0] = _IDENTITY
+        for hinge in range(len(self)):
+            np.matmul(frames[:, hinge], turns[:, hinge], out=frames[:, hinge + 1])
+        return frames, np.cumsum((frames[:, :-1] @ self.offsets[..., None])[..., 0], axis=1)
+
+    def _place_block(self, q: FloatArray, out: EffectorPlacements, rows: slice) -> None:
+        frames, places = self._frames(q)
+        turn, before = frames[:, -1], frames[:, :-1]
+        axes = (before @ self.axes[..., None])[..., 0]
+        point = turn @ self.tip
+        if len(self):
+            point += places[:, -1]
+        out.positions[rows] = point
+        out.rotations[rows] = turn @ self.tip_rotation
+        out.axes[rows] = axes.transpose(0, 2, 1)
+        out.jacobians[rows] = _cross(axes, point[:, None] - places).transpose(0, 2, 1)
+
+
+def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:
+    """Translations before each hinge (k, 3), and from the last hinge to the effector (3,) [m]."""
+    found: list[FloatArray] = []
+    offset = np.zeros(3)
+    for number, name in enumerate(limb.segments):
+        segment = body.segment(name)
+        # The limb's frame is at the origin of its first segment.
+        offset = offset + (segment.origin if number else 0.0)
+        for _ in segment.hinges:
+            found.append(offset)
+            offset = np.zeros(3)
+    return np.reshape(found, (-1, 3)), offset + body.effector(limb.effector).translation
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products of (..., 3) by (..., 3), without the overhead of ``np.cross``."""
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return out
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    return (slice(start, start + _BLOCK) for start in range(0, count, _BLOCK))

@@ -1,0 +1,282 @@
+"""What a posture must satisfy and what it should look like.
+
+Also here. Hips and shoulders within the volumes that were learnt for them, as a requirement of a posture.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.body.configuration import Configuration
+from manikin.body.model import BodyModel
+from manikin.body.natural_range import LearntJoint, learnt_joints
+from manikin.contact import Contact, ContactKind
+from manikin.errors import BodyError, InputError
+from manikin.kinematics.posture_terms import (
+    UP,
+    ClearanceTerm,
+    ComTerm,
+    LimitTerm,
+    Linearised,
+    PositionTerm,
+    ReferenceTerm,
+    RotationTerm,
+    Term,
+    UprightTerm,
+)
+from manikin.numerics.spatial import FloatArray, check_rotation, finite_number, frozen_array
+from manikin.scene.distance import NOTHING, Ignored, Proximity
+from manikin.scene.spheres import SphereProximity
+
+
+@dataclass(frozen=True, eq=False)
+class LearntRangeTerm:
+    """What each ball joint lacks of its learnt volume: ``r = min(d(q) - margin, 0)`` [rad].
+
+    ``d`` is the signed distance of its three angles to the surface of the volume ([Tonneau2015]_ 4.3.3).
+
+    Attributes:
+        body: The body; one without learnt joints makes no rows.
+        margin: Distance to keep to the surface, inside [rad].
+    """
+
+    body: BodyModel
+    margin: float = 0.0
+
+    @cached_property
+    def joints(self) -> tuple[LearntJoint, ...]:
+        """The ball joints of the body that have a volume."""
+        return learnt_joints(self.body)
+
+    def evaluate(self, configuration: Configuration) -> Linearised:
+        """See :class:`~manikin.kinematics.posture_terms.Term`."""
+        angles = configuration.q[7:]
+        residual, jacobian = np.zeros(len(self.joints)), np.zeros((len(self.joints), self.body.nv))
+        for row, joint in enumerate(self.joints):
+            own, volume = angles[joint.hinges], joint.range.volume
+            missing = float(volume.distance(own)) - self.margin
+            if missing < 0.0:
+                residual[row] = missing
+                jacobian[row, 6 + joint.hinges.start : 6 + joint.hinges.stop] = volume.gradient(own)
+        return Linearised(residual, jacobian)
+
+    def describe(self, residual: FloatArray) -> str:
+        """See :class:`~manikin.kinematics.posture_terms.Term`."""
+        worst = int(np.argmin(residual))
+        beyond = np.rad2deg(-residual[worst])
+        return f"'{self.joints[worst].segment}' is {beyond:.1f} deg beyond its learnt range"
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where an effector that touches nothing must be.
+
+    Attributes:
+        position: (3,) [m], or None to leave it free.
+        rotation: (3, 3) effector-to-world, or None to leave it free.
+        position_weight: None when the position is required; otherwise it is only wished, with this
+            weight [1/m^2].
+        rotation_weight: None when the rotation is required; otherwise it is only wished, with
+            this weight [1/rad^2] beside those of :class:`Preferences`.
+    """
+
+    position: FloatArray | None = None
+    rotation: FloatArray | None = None
+    rotation_weight: float | None = None
+    position_weight: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.position is not None:
+            object.__setattr__(self, "position", frozen_array(self.position, "placement position [m]", (3,)))
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", check_rotation(self.rotation, "placement rotation"))
+
+
+@dataclass(frozen=True)
+class Preferences:
+    """What a posture should look like where the requirements leave freedom: weights of squares.
+
+    The values are our choice, by eye.
+
+    Attributes:
+        hinge: Of every hinge's distance from the reference [1/rad^2].
+        hinges: Replaces ``hinge`` for hinges whose name contains the key.
+        pelvis: Of the pelvis' tilt.
+        trunk: Of the thorax' tilt.
+        head: Of the head's tilt.
+        arms: Of the upper arms' deviation from hanging.
+        grasp: Of a grasping hand's deviation from the orientation its contact gives [1/rad^2].
+        damping: Of every change in one iteration; keeps the problem regular.
+    """
+
+    hinge: float = 0.1
+    hinges: Mapping[str, float] = field(
+        default_factory=lambda: {
+            "knee_flexion": 0.01, "hip_flexion": 0.01, "ankle_dorsiflexion": 0.02, "knee_rotation": 1.0,
+            "hip_abduction": 0.1, "hip_rotation": 0.3, "ankle_inversion": 0.3, "toe_extension": 20.0,
+            "lumbar": 0.3, "thorax": 0.4, "neck": 0.2, "_rotation": 0.3, "side_bend": 0.6,
+            "shoulder_flexion": 0.02, "shoulder_abduction": 0.1, "shoulder_rotation": 0.1,
+            "elbow": 0.1, "wrist": 0.3, "forearm": 0.2,
+        }
+    )  # fmt: skip
+    pelvis: float = 0.1
+    trunk: float = 0.2
+    head: float = 0.6
+    arms: float = 0.1
+    grasp: float = 0.3
+    damping: float = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class PostureProblem:
+    """Requirements and preferences of one posture.
+
+    Attributes:
+        body: The body.
+        contacts: Contacts held: a sole's whole pose, a point's or grasp's position.
+        placements: Further effectors that must be somewhere, by name.
+        com: (3,) centre of mass [m]; NaN leaves an axis free; None leaves it wholly free.
+        com_weight: None when it is required; otherwise it is only wished, with this weight [1/m^2].
+        proximity: Measures distances of this body in a scene, exactly or between bounding
+            spheres ([Qiu2012]_ 6.2.2, Appendix F); None without obstacles.
+        clearance: Distance to keep to obstacles [m].
+        self_clearance: Distance to keep between body parts [m].
+        ignore: Pairs (segment, obstacle) or (segment, segment) that may touch.
+        range_margin: Angle to keep from the ends of the hinge ranges [rad].
+        learnt_margin: Angle to keep to the surface of the learnt volumes of hips and shoulders, inside [rad];
+            None where the ranges of their hinges are all that counts.
+        reference: (nq,) posture to stay near, with its root ignored; standing when omitted.
+        preferences: Weights of what is not required.
+        upright: Whether pelvis, trunk, head and arms should be upright (a human habit).
+    """
+
+    body: BodyModel
+    contacts: tuple[Contact, ...] = ()
+    placements: Mapping[str, Placement] = field(default_factory=dict)
+    com: FloatArray | None = None
+    com_weight: float | None = None
+    proximity: Proximity | SphereProximity | None = None
+    clearance: float = 0.02
+    self_clearance: float = 0.005
+    ignore: Ignored = NOTHING
+    range_margin: float = 0.0
+    learnt_margin: float | None = None
+    reference: FloatArray | None = None
+    preferences: Preferences = field(default_factory=Preferences)
+    upright: bool = True
+
+    def __post_init__(self) -> None:
+        contacts = tuple(self.contacts)
+        object.__setattr__(self, "contacts", contacts)
+        object.__setattr__(self, "placements", dict(self.placements))
+        for name in [contact.effector for contact in contacts] + list(self.placements):
+            if name not in self.body.effectors:
+                valid = ", ".join(self.body.effectors)
+                raise BodyError(f"posture asks for effector {name!r}; valid: {valid}")
+        if self.com is not None:
+            com = np.array(self.com, dtype=np.float64)
+            if com.shape != (3,) or np.any(np.isinf(com)):
+                raise InputError(f"posture com is {com.tolist()}; valid: 3 numbers, nan for a free axis")
+            com.setflags(write=False)
+            object.__setattr__(self, "com", com)
+        reference = self.body.standing_posture() if self.reference is None else self.reference
+        shape = (self.body.nq,)
+        object.__setattr__(self, "reference", frozen_array(reference, "posture reference", shape, BodyError))
+        finite_number(self.clearance, "posture clearance [m]")
+        finite_number(self.self_clearance, "posture self_clearance [m]")
+        finite_number(self.range_margin, "posture range_margin [rad]", at_least=0.0)
+        if self.learnt_margin is not None:
+            finite_number(self.learnt_margin, "posture learnt_margin [rad]", at_least=0.0)
+
+    def requirements(self) -> tuple[Term, ...]:
+        """Terms that must be zero."""
+        terms: list[Term] = []
+        for contact in self.contacts:
+            terms.append(PositionTerm(contact.effector, contact.position, "contact"))
+            if contact.kind is ContactKind.SOLE:
+                terms.append(RotationTerm(contact.effector, contact.rotation_contact_to_world, "contact"))
+        for name, placement in self.placements.items():
+            if placement.position is not None and placement.position_weight is None:
+                terms.append(PositionTerm(name, placement.position))
+            if placement.rotation is not None and placement.rotation_weight is None:
+                terms.append(RotationTerm(name, placement.rotation))
+        if self.com is not None and self.com_weight is None and np.any(np.isfinite(self.com)):
+            terms.append(ComTerm(self.com))
+        if self.learnt_margin is not None:
+            terms.append(LearntRangeTerm(self.body, self.learnt_margin))
+        return tuple(terms)
+
+    def wishes(self) -> tuple[tuple[FloatArray, Term], ...]:
+        """Terms that should be small, with the weight of each row."""
+        weights = self.preferences
+        assert self.reference is not None  # set on construction
+        wishes: list[tuple[FloatArray, Term]] = [
+            (hinge_weights(self.body, weights), ReferenceTerm(self.reference[7:]))
+        ]
+        for contact in self.contacts:
+            if contact.kind is ContactKind.GRASP and contact.oriented:
+                weight = np.full(3, weights.grasp)
+                wishes.append((weight, RotationTerm(contact.effector, contact.rotation_contact_to_world)))
+        for name, placement in self.placements.items():
+            if placement.position is not None and placement.position_weight is not None:
+                weight = np.full(3, placement.position_weight)
+                wishes.append((weight, PositionTerm(name, placement.position)))
+            if placement.rotation is not None and placement.rotation_weight is not None:
+                weight = np.full(3, placement.rotation_weight)
+                wishes.append((weight, RotationTerm(name, placement.rotation)))
+        if self.com is not None and self.com_weight is not None and np.any(np.isfinite(self.com)):
+            wishes.append((np.full(np.isfinite(self.com).sum(), self.com_weight), ComTerm(self.com)))
+        if self.upright:
+            names = {segment.name for segment in self.body.segments}
+            sides = ("left_upper_arm", "right_upper_arm")
+            tilts = {"pelvis": weights.pelvis, "thorax": weights.trunk, "head": weights.head}
+            tilts.update(dict.fromkeys(sides, weights.arms))
+            wishes += [
+                (np.full(3, weight), UprightTerm(name, UP)) for name, weight in tilts.items() if name in names
+            ]
+        return tuple(wishes)
+
+    def limits(self) -> LimitTerm:
+        """The hinge ranges."""
+        return LimitTerm(self.body, self.range_margin)
+
+    def clearances(self, activation: float) -> ClearanceTerm | None:
+        """The distances to keep, or None without a scene."""
+        if self.proximity is None:
+            return None
+        return ClearanceTerm(self.proximity, self.clearance, self.self_clearance, activation, self.ignore)
+
+
+def hinge_weights(body: BodyModel, preferences: Preferences) -> FloatArray:
+    """(nv - 6,) weight of each hinge: that of the first key its name contains."""
+    return np.array(
+        [
+            next((w for key, w in preferences.hinges.items() if key in name), preferences.hinge)
+            for name in body.joint_names
+        ]
+    )
+
+
+def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
+    """Pairs (segment, obstacle) that a contact brings together: the effector's segment and its children.
+
+    Args:
+        body: The body.
+        effector_obstacles: Pairs of an effector and the obstacle it touches.
+    """
+    pairs = set()
+    for effector, obstacle in effector_obstacles:
+        segment = body.effector(effector).segment
+        pairs.add((segment, obstacle))
+        pairs.update((other.name, obstacle) for other in body.segments if other.parent == segment)
+    return frozenset(pairs)
+
+
+def com_target(
+    x: ArrayLike | None = None, y: ArrayLike | None = None, z: ArrayLike | None = None
+) -> FloatArray:
+    """(3,) centre-of-mass target with the axes that are not given left free."""
+    return np.array([np.nan if value is None else float(np.asarray(value)) for value in (x, y, z)])

@@ -1,0 +1,280 @@
+"""The terms of a posture problem: residuals and Jacobians on the tangent space of the body.
+
+Each term takes a :class:`~manikin.body.configuration.Configuration` and gives a residual
+``r`` (m,) with its Jacobian ``J`` (m, nv), so that ``r(q + v) = r(q) + J v`` to first order
+for a tangent vector ``v`` of Pinocchio's ``integrate``.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.body.configuration import Configuration
+from manikin.body.model import BodyModel
+from manikin.numerics.spatial import FloatArray, skew
+from manikin.scene.distance import Ignored, Pair, Proximity
+from manikin.scene.spheres import SphereProximity
+
+UP: FloatArray = np.array([0.0, 0.0, 1.0])
+UP.setflags(write=False)
+
+
+class Linearised(NamedTuple):
+    """A residual and its Jacobian.
+
+    Attributes:
+        residual: (m,).
+        jacobian: (m, nv).
+    """
+
+    residual: FloatArray
+    jacobian: FloatArray
+
+
+class Term(Protocol):
+    """A residual that is to be zero (a requirement) or small (a preference)."""
+
+    def evaluate(self, configuration: Configuration) -> Linearised:
+        """Residual and Jacobian at a configuration."""
+        ...
+
+    def describe(self, residual: FloatArray) -> str:
+        """Say in words what a residual of this term means."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class PositionTerm:
+    """An effector's origin at a place: ``r = p - p*`` [m].
+
+    Attributes:
+        effector: Name of the effector.
+        position: (3,) place in the world [m].
+        kind: What the message calls it, such as ``"contact"``.
+    """
+
+    effector: str
+    position: FloatArray
+    kind: str = "placement"
+
+    def evaluate(self, configuration: Configuration) -> Linearised:
+        """See :class:`Term`."""
+        _, position = configuration.effector_placement(self.effector)
+        return Linearised(position - self.position, configuration.effector_jacobian(self.effector)[:3])
+
+    def describe(self, residual: FloatArray) -> str:
+        """See :class:`Term`."""
+        return f"{self.kind} '{self.effector}' misses its position by {np.linalg.norm(residual):.4f} m"
+
+
+@dataclass(frozen=True, eq=False)
+class RotationTerm:
+    """An effector's axes parallel to given ones: ``r = log(R R*^T)`` in the world [rad].
+
+    Attributes:
+        effector: Name of the effector.
+        rotation: (3, 3) wanted effector-to-world rotation.
+        kind: What the message calls it.
+    """
+
+    effector: str
+    rotation: FloatArray
+    kind: str = "placement"
+
+    def evaluate(self, configuration: Configuration) -> Linearised:
+        """See :class:`Term`."""
+        rotation, _ = configuration.effector_placement(self.effector)
+        error = rotation @ self.rotation.T
+        # Turning the world axes is a left perturbation: log(exp(w) E) = log(E exp(E^T w)).
+        derivative = pin.Jlog3(error) @ error.T
+        jacobian = derivative @ configuration.effector_jacobian(self.effector)[3:]
+        return Linearised(pin.log3(error), jacobian)
+
+    def describe(self, residual: FloatArray) -> str:
+        """See :class:`Term`."""
+        angle = np.rad2deg(np.linalg.norm(residual))
+        return f"{self.kind} '{self.effector}' misses its orientation by {angle:.2f} deg"
+
+
+@dataclass(frozen=True, eq=False)
+class ComTerm:
+    """The centre of mass at a place, along the axes that are given: ``r = c - c*`` [m].
+
+    Attributes:
+        position: (3,) place [m]; NaN leaves an axis free.
+    """
+
+    position: FloatArray
+
+    def evaluate(self, configuration: Configuration) -> Linearised:
+        """See :class:`Term`."""
+        axes = np.isfinite(self.position)
+        return Linearised(configuration.com[axes] - self.position[axes], configuration.com_jacobian[axes])
+
+    def describe(self, residual: FloatArray) -> str:
+        """See :class:`Term`."""
+        axes = [axis for axis, value in zip("xyz", self.position, strict=True) if np.isfinite(value)]
+        parts = ", ".join(f"{axis} {value:+.4f}" for axis, value in zip(axes, residual, strict=True))
+        return f"centre of mass misses by {np.linalg.norm(residual):.4f} m ({parts})"
+
+
+@dataclass(frozen=True, eq=False)
+class UprightTerm:
+    """A segment's vertical axis upright: ``r = z - up``, the chord of the tilt.
+
+    For small tilts it is as long as the tilt; unlike the sine it grows up to the opposite
+    direction, so that a raised arm is drawn down.
+
+    Attributes:
+        segment: Name of the segment.
+        axis: (3,) unit axis of the segment that is to point along ``direction``.
+        direction: (3,) unit direction in the world.
+    """
+
+    segment: str
+    axis: FloatArray = field(default_factory=lambda: UP)
+    direction: FloatArray = field(default_factory=lambda: UP)
+
+    def evaluate(self, configuration: Configuration) -> Linearised:
+        """See :class:`Term`."""
+        rotation, _ = configuration.segment_placement(self.segment)
+        axis = rotation @ self.axis
+        return Linearised(
+            axis - self.direction, -skew(axis) @ configuration.segment_jacobian(self.segment)[3:]
+        )
+
+    def describe(self, residual: FloatArray) -> str:
+        """See :class:`Term`."""
+        angle = np.rad2deg(2.0 * np.arcsin(min(1.0, 0.5 * float(np.linalg.norm(residual)))))
+        return f"segment '{self.segment}' is tilted by {angle:.1f} deg"
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceTerm:
+    """The hinges near a reference posture: ``r = q_hinges - q*_hinges`` [rad].
+
+    Attributes:
+        angles: (nv - 6,) reference angles [rad].
+    """
+
+    angles: FloatArray
+
+    def evaluate(self, configuration: Configuration) -> Linearised:
+        """See :class:`Term`."""
+        return Linearised(configuration.q[7:] - self.angles, self._jacobian)
+
+    @cached_property
+    def _jacobian(self) -> FloatArray:
+        count = len(self.angles)
+        jacobian = np.hstack([np.zeros((count, 6)), np.eye(count)])
+        jacobian.setflags(write=False)
+        return jacobian
+
+    def describe(self, residual: FloatArray) -> str:
+        """See :class:`Term`."""
+        return f"posture differs from its reference by up to {np.abs(residual).max():.3f} rad"
+
+
+@dataclass(frozen=True, eq=False)
+class LimitTerm:
+    """The hinge ranges: how far each hinge is inside, ``s = min(q - lower, upper - q)`` [rad].
+
+    Attributes:
+        body: The body with its ranges.
+        margin: Kept from both ends of each range [rad]; at most a quarter of the range.
+    """
+
+    body: BodyModel
+    margin: float = 0.0
+
+    @cached_property
+    def lower(self) -> FloatArray:
+        """(nv - 6,) smallest angles [rad]."""
+        return self.body.lower + self._margins
+
+    @cached_property
+    def upper(self) -> FloatArray:
+        """(nv - 6,) largest angles [rad]."""
+        return self.body.upper - self._margins
+
+    @property
+    def _margins(self) -> FloatArray:
+        return np.minimum(self.margin, 0.25 * (self.body.upper - self.body.lower))
+
+    def bounds(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
+        """(nv - 6,) smallest and largest change of each hinge that stays inside."""
+        angles = configuration.q[7:]
+        return self.lower - angles, self.upper - angles
+
+    def evaluate(self, configuration: Configuration) -> Linearised:
+        """Slack of each hinge to its nearer end, and its Jacobian."""
+        below, above = self.bounds(configuration)
+        nearer_lower = -below < above
+        count = len(below)
+        jacobian = np.hstack([np.zeros((count, 6)), np.diag(np.where(nearer_lower, 1.0, -1.0))])
+        return Linearised(np.where(nearer_lower, -below, above), jacobian)
+
+    def at_limit(self, configuration: Configuration, tolerance: float = 1e-3) -> tuple[str, ...]:
+        """Names of the hinges within ``tolerance`` [rad] of an end of their range."""
+        slack = self.evaluate(configuration).residual
+        return tuple(
+            name for name, value in zip(self.body.joint_names, slack, strict=True) if value < tolerance
+        )
+
+    def describe(self, residual: FloatArray) -> str:
+        """See :class:`Term`."""
+        worst = int(np.argmin(residual))
+        return f"hinge '{self.body.joint_names[worst]}' is {-residual[worst]:.4f} rad beyond its range"
+
+
+class Clearances(NamedTuple):
+    """Distances beyond the safety distance, with their gradients.
+
+    Attributes:
+        residual: (k,) distance minus the safety distance [m]; negative is too close.
+        jacobian: (k, nv).
+        pairs: The shapes of each row.
+    """
+
+    residual: FloatArray
+    jacobian: FloatArray
+    pairs: tuple[Pair, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ClearanceTerm:
+    """No shape closer than a safety distance to an obstacle or to another part of the body.
+
+    Attributes:
+        proximity: Measures the distances.
+        safety: Distance to keep to obstacles [m].
+        self_safety: Distance to keep between body parts [m].
+        activation: Pairs farther apart than the safety distance plus this are left out [m].
+        ignore: Pairs of names that may touch.
+    """
+
+    proximity: Proximity | SphereProximity
+    safety: float
+    self_safety: float
+    activation: float
+    ignore: Ignored
+
+    def evaluate(self, configuration: Configuration) -> Clearances:
+        """Distances beyond the safety distance of the pairs that are close."""
+        reach = max(self.safety, self.self_safety) + self.activation
+        found = self.proximity.evaluate(configuration.q, reach, self.ignore)
+        safety = np.array([self.self_safety if "/" in other else self.safety for _, other in found.pairs])
+        return Clearances(
+            found.distance - safety, found.gradient.reshape(-1, configuration.body.nv), found.pairs
+        )
+
+    def describe(self, residual: FloatArray, pairs: tuple[Pair, ...]) -> str:
+        """Say which pair is closest to or beyond its safety distance."""
+        worst = int(np.argmin(residual))
+        first, second = pairs[worst]
+        safety = self.self_safety if "/" in second else self.safety
+        distance = residual[worst] + safety
+        return f"'{first}' and '{second}' are {distance:.4f} m apart; required {safety:.4f} m"

@@ -1,0 +1,174 @@
+"""A whole-body motion as one clamped B-spline in configuration space.
+
+The control points live in R^nq: pelvis position, four quaternion components and the joint
+angles.  The quaternion part is normalised on evaluation, so the motion is smooth wherever
+the raw quaternion does not vanish, without the singularity of Euler angles.  Velocities and
+accelerations are exact derivatives, in Pinocchio's convention (pelvis frame).
+"""
+
+import itertools
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline
+
+from manikin.errors import SplineError
+from manikin.numerics.spatial import FloatArray, frozen_array, rotation_from_quaternion, skew
+
+
+class StateSamples(NamedTuple):
+    """Configurations with their exact derivatives.
+
+    Attributes:
+        q: (n, nq) with unit quaternions.
+        v: (n, nq - 1) velocity, pelvis part in the pelvis frame.
+        a: (n, nq - 1) its time derivative.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ConfigurationSpline:
+    """Clamped B-spline ``q(t)`` of a free-floating body.
+
+    Attributes:
+        knots: (m,) clamped knots [s].
+        control_points: (k, nq), raw: the quaternion columns need not be of unit length.
+        degree: Polynomial degree.
+    """
+
+    knots: FloatArray
+    control_points: FloatArray
+    degree: int
+
+    def __post_init__(self) -> None:
+        knots = frozen_array(self.knots, "configuration spline knots [s]", (None,), SplineError)
+        points = frozen_array(
+            self.control_points, "configuration spline control points", (None, None), SplineError
+        )
+        if len(knots) != len(points) + self.degree + 1:
+            raise SplineError(
+                f"configuration spline has {len(knots)} knots and {len(points)} control points of degree "
+                f"{self.degree}; valid: knots = control points + degree + 1"
+            )
+        object.__setattr__(self, "knots", knots)
+        object.__setattr__(self, "control_points", points)
+
+    def evaluate(self, time: ArrayLike) -> StateSamples:
+        """Evaluate the motion at ``time`` (n,) [s], clamped to the spline's interval."""
+        t = np.clip(np.atleast_1d(np.asarray(time, dtype=float)), self.knots[0], self.knots[-1])
+        spline = BSpline(self.knots, self.control_points, self.degree)
+        return states_from_raw(spline(t), spline(t, nu=1), spline(t, nu=2))
+
+
+def states_from_raw(raw: FloatArray, raw_rate: FloatArray, raw_second: FloatArray) -> StateSamples:
+    """Turn raw spline values and derivatives (n, nq) into Pinocchio states.
+
+    With ``rho`` the raw quaternion and ``u = rho / |rho|``, the pelvis turns at
+    ``omega = 2 vec(conj(u) u')`` and accelerates at ``2 vec(conj(u) u'')``.
+    """
+    rho, rho_1, rho_2 = raw[:, 3:7], raw_rate[:, 3:7], raw_second[:, 3:7]
+    size = np.linalg.norm(rho, axis=1, keepdims=True)
+    u = rho / size
+    size_1 = _dot(u, rho_1)
+    u_1 = (rho_1 - size_1 * u) / size
+    size_2 = _dot(u, rho_2) + _dot(u_1, rho_1)
+    u_2 = (rho_2 - size_2 * u - 2.0 * size_1 * u_1) / size
+    body = _quaternion_left_vector(u)
+    omega = 2.0 * np.einsum("nij,nj->ni", body, u_1)
+    alpha = 2.0 * np.einsum("nij,nj->ni", body, u_2)
+    world_to_body = rotation_from_quaternion(u).transpose(0, 2, 1)
+    linear = np.einsum("nij,nj->ni", world_to_body, raw_rate[:, :3])
+    linear_rate = np.einsum("nij,nj->ni", world_to_body, raw_second[:, :3]) - np.cross(omega, linear)
+    return StateSamples(
+        q=np.hstack([raw[:, :3], u, raw[:, 7:]]),
+        v=np.hstack([linear, omega, raw_rate[:, 7:]]),
+        a=np.hstack([linear_rate, alpha, raw_second[:, 7:]]),
+    )
+
+
+def tangent_map(raw: FloatArray) -> FloatArray:
+    """Derivative of Pinocchio's tangent vector with respect to the raw coordinates.
+
+    Args:
+        raw: (n, nq) raw spline values.
+
+    Returns:
+        (n, 7, 7) whose first six rows map raw pelvis coordinates (position, quaternion) to
+        the pelvis part of the tangent; the last row is the radial direction of the
+        quaternion, which does not move the body.  Joint angles map to themselves.
+    """
+    size = np.linalg.norm(raw[:, 3:7], axis=1)
+    u = raw[:, 3:7] / size[:, None]
+    block = np.zeros((len(raw), 7, 7))
+    block[:, :3, :3] = rotation_from_quaternion(u).transpose(0, 2, 1)
+    block[:, 3:6, 3:7] = 2.0 * _quaternion_left_vector(u) / size[:, None, None]
+    block[:, 6, 3:7] = u
+    return block
+
+
+class TurnDerivatives(NamedTuple):
+    """How the pelvis' angular velocity and acceleration depend on the raw quaternion.
+
+    Attributes:
+        omega_by_value: (n, 3, 4) derivative of the angular velocity by the raw quaternion.
+        omega_by_rate: (n, 3, 4) by its rate.
+        alpha_by_value: (n, 3, 4) derivative of the angular acceleration by the quaternion.
+        alpha_by_rate: (n, 3, 4) by its rate.
+        alpha_by_second: (n, 3, 4) by its second derivative.
+    """
+
+    omega_by_value: FloatArray
+    omega_by_rate: FloatArray
+    alpha_by_value: FloatArray
+    alpha_by_rate: FloatArray
+    alpha_by_second: FloatArray
+
+
+def turn_derivatives(rho: FloatArray, rho_1: FloatArray, rho_2: FloatArray) -> TurnDerivatives:
+    """Differentiate ``omega = 2 Q(rho) rho' / |rho|^2`` and its rate (arguments (n, 4)).
+
+    ``alpha = 2 Q(rho) rho'' / |rho|^2 - 2 omega (rho . rho') / |rho|^2``, and
+    ``Q(a) b = -Q(b) a`` gives the derivatives by the quaternion itself.
+    """
+    square = np.sum(rho**2, axis=1)[:, None, None]
+    q0, q1, q2 = (_quaternion_left_vector(part) for part in (rho, rho_1, rho_2))
+    omega = 2.0 * (q0 @ rho_1[:, :, None]) / square
+    stretch = np.sum(rho * rho_1, axis=1)[:, None, None]
+    row, row_1 = rho[:, None, :], rho_1[:, None, :]
+    by_second = 2.0 * q0 / square
+    omega_by_value = -2.0 * q1 / square - 2.0 * omega @ row / square
+    alpha = by_second @ rho_2[:, :, None] - 2.0 * omega * stretch / square
+    alpha_by_rate = -2.0 * (stretch * by_second + omega @ row) / square
+    alpha_by_value = (
+        -2.0 * q2 / square
+        - 2.0 * alpha @ row / square
+        - 2.0 * (stretch * omega_by_value + omega @ row_1) / square
+    )
+    return TurnDerivatives(omega_by_value, by_second, alpha_by_value, alpha_by_rate, by_second)
+
+
+def align_quaternions(configurations: FloatArray) -> FloatArray:
+    """Flip quaternion signs so that consecutive rows lie in the same half-space."""
+    aligned = np.array(configurations, dtype=float)
+    for before, row in itertools.pairwise(aligned):
+        if before[3:7] @ row[3:7] < 0.0:
+            row[3:7] *= -1.0
+    return aligned
+
+
+def _quaternion_left_vector(u: FloatArray) -> FloatArray:
+    """(n, 3, 4) matrices with ``vec(conj(u) * p) = Q p`` for xyzw quaternions."""
+    matrix = np.zeros((len(u), 3, 4))
+    matrix[:, :, :3] = u[:, 3, None, None] * np.eye(3) - skew(u[:, :3])
+    matrix[:, :, 3] = -u[:, :3]
+    return matrix
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.sum(a * b, axis=1, keepdims=True)

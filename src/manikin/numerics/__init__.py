@@ -1,0 +1,1 @@
+"""Mathematics that knows no body: rotations, polytopes, splines, quadratic programs, filters."""

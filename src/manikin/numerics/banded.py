@@ -1,0 +1,183 @@
+"""Assembly and solution of the block-banded normal equations of a spline fit.
+
+A clamped B-spline of degree ``p`` couples each control point with ``p`` neighbours, so the
+normal equations of any sum of per-sample residuals are block-banded: they are assembled with
+one sparse product and solved by a banded Cholesky factorisation in linear time.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg import solveh_banded
+from scipy.linalg.blas import dsyrk
+from scipy.sparse import csr_matrix
+
+from manikin.numerics.spatial import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class SampledBasis:
+    """The non-zero basis functions of a clamped spline at sample times.
+
+    Attributes:
+        first: (n,) index of the first control point that matters at each sample.
+        values: (3, n, degree + 1) basis values and their first two derivatives.
+        size: Number of control points.
+    """
+
+    first: NDArray[np.int64]
+    values: FloatArray
+    size: int
+
+    @classmethod
+    def at(cls, time: FloatArray, knots: FloatArray, degree: int) -> "SampledBasis":
+        """Sample the basis of ``knots`` [s] at ``time`` (n,) [s]."""
+        size = len(knots) - degree - 1
+        first = np.clip(np.searchsorted(knots, time, side="right") - 1, degree, size - 1) - degree
+        identity = BSpline(knots, np.eye(size), degree)
+        rows = np.arange(len(time))[:, None]
+        columns = first[:, None] + np.arange(degree + 1)
+        values = np.stack([identity(time, nu=order)[rows, columns] for order in range(3)])
+        return cls(first, values, size)
+
+    def gather(self, per_sample: FloatArray) -> FloatArray:
+        """(size,) sum of (n,) values per sample, shared out to the control points around them."""
+        columns = self.first[:, None] + np.arange(self.values.shape[2])
+        shares = (self.values[0] * per_sample[:, None]).ravel()
+        return np.asarray(np.bincount(columns.ravel(), shares, self.size), dtype=np.float64)
+
+    def evaluate(self, control_points: FloatArray, order: int = 0) -> FloatArray:
+        """(n, d) spline values, or derivatives of ``order`` 1 or 2."""
+        columns = self.first[:, None] + np.arange(self.values.shape[2])
+        return np.einsum("ns,nsd->nd", self.values[order], control_points[columns])
+
+
+class BlockBandedSystem:
+    """Normal equations ``A x = b`` over control points of dimension ``dimension``."""
+
+    def __init__(self, basis: SampledBasis, dimension: int) -> None:
+        self._basis = basis
+        self._dimension = dimension
+        self._bandwidth = basis.values.shape[2]
+        self._spans = _spans(basis.first)
+        self._products = [self._pair_products(order) for order in range(3)]
+        self._rows = [self._row_weights(order) for order in range(3)]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget every term."""
+        size, d = self._basis.size, self._dimension
+        self._blocks = np.zeros((self._bandwidth * size, d * d))
+        self._coupled: list[FloatArray] = []
+        self._right = np.zeros((size, d))
+        self._memory: FloatArray | None = None
+
+    def add(self, hessian: FloatArray | None, gradient: FloatArray, order: int = 0) -> None:
+        """Add per-sample terms on the spline's derivative of ``order``.
+
+        Args:
+            hessian: (n, d, d) Gauss-Newton matrices, or None for none.
+            gradient: (n, d) gradients of half the squared residuals.
+            order: 0 for values, 1 for rates, 2 for accelerations.
+        """
+        if hessian is not None:
+            self._memory = None
+            self._blocks += self._products[order] @ hessian.reshape(len(hessian), -1)
+        self._right -= self._rows[order] @ gradient
+
+    def add_diagonal(self, weight: FloatArray, gradient: FloatArray, order: int = 0) -> None:
+        """Add per-sample terms whose Gauss-Newton matrices are diagonal.
+
+        Args:
+            weight: (n, d) diagonals of the matrices.
+            gradient: (n, d) gradients of half the squared residuals.
+            order: 0 for values, 1 for rates, 2 for accelerations.
+        """
+        self._memory = None
+        self._blocks[:, :: self._dimension + 1] += self._products[order] @ weight
+        self._right -= self._rows[order] @ gradient
+
+    def add_coupled(self, jacobians: tuple[FloatArray, FloatArray, FloatArray], residual: FloatArray) -> None:
+        """Add residuals that depend on values, rates and accelerations at once.
+
+        Args:
+            jacobians: Three (n, m, d) derivatives, by value, rate and acceleration.
+            residual: (n, m).
+        """
+        self._memory = None
+        n, m, d = jacobians[0].shape
+        local = np.zeros((n, m, self._bandwidth, d))
+        for order, jacobian in enumerate(jacobians):
+            local += self._basis.values[order][:, None, :, None] * jacobian[:, :, None, :]
+            self._right -= self._rows[order] @ (residual[:, None, :] @ jacobian)[:, 0]
+        self._coupled.append(local.reshape(n, m, -1))
+
+    def solve(self, damping: float | FloatArray) -> FloatArray:
+        """Return the step of every control point, (size, d), with Levenberg damping.
+
+        Args:
+            damping: One number, or one per control point.
+        """
+        size, d = self._basis.size, self._dimension
+        if self._memory is None:  # a step is often solved for again with more damping
+            self._memory = self._assembled()
+        band = self._memory.copy().reshape(size * d, -1).T
+        band[0] += np.repeat(np.broadcast_to(damping, size), d)
+        return solveh_banded(
+            band, self._right.ravel(), overwrite_ab=True, lower=True, check_finite=False
+        ).reshape(size, d)
+
+    def _assembled(self) -> FloatArray:
+        """The matrix in LAPACK's lower banded storage (bandwidth d + 1, size d), column by column, flat.
+
+        The last row is zero; with it, a block of the matrix is an array that BLAS can add to in place.
+        """
+        size, d, width = self._basis.size, self._dimension, self._bandwidth
+        depth = width * d
+        memory = np.zeros(size * d * (depth + 1))
+        # Below a diagonal element follow the rows of its own block column, so that the same
+        # row of the next column lies one place earlier.
+        by_column = as_strided(
+            memory, (size, d, width, d), [memory.itemsize * step for step in (d * (depth + 1), depth, d, 1)]
+        )
+        blocks = self._blocks.reshape(width, size, d, d)
+        # What is above the diagonal would fall on places of the previous column.
+        by_column[:, :, 0] = np.tril(blocks[0]).transpose(0, 2, 1)
+        by_column[:, :, 1:] = blocks[1:].transpose(1, 3, 0, 2)
+        for local in self._coupled:
+            for first, start, stop in self._spans:
+                begin = first * d * (depth + 1)
+                block = memory[begin : begin + depth**2].reshape(depth, depth).T
+                rows = local[start:stop].reshape(-1, depth)
+                dsyrk(1.0, rows.T, beta=1.0, c=block, lower=1, overwrite_c=1)
+        return memory
+
+    def _pair_products(self, order: int) -> csr_matrix:
+        values, first, size = self._basis.values[order], self._basis.first, self._basis.size
+        n = len(first)
+        rows, columns, data = [], [], []
+        for b in range(self._bandwidth):
+            for a in range(b, self._bandwidth):
+                rows.append((a - b) * size + first + b)
+                columns.append(np.arange(n))
+                data.append(values[:, a] * values[:, b])
+        shape = (self._bandwidth * size, n)
+        return csr_matrix(
+            (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), shape=shape
+        )
+
+    def _row_weights(self, order: int) -> csr_matrix:
+        values, first, size = self._basis.values[order], self._basis.first, self._basis.size
+        n, width = values.shape
+        rows = (first[:, None] + np.arange(width)).ravel()
+        return csr_matrix((values.ravel(), (rows, np.repeat(np.arange(n), width))), shape=(size, n))
+
+
+def _spans(first: NDArray[np.int64]) -> list[tuple[int, int, int]]:
+    """Index of the first control point, first sample and sample after the last of each span with samples."""
+    points, start = np.unique(first, return_index=True)
+    stop = np.append(start[1:], len(first))
+    return list(zip(points.tolist(), start.tolist(), stop.tolist(), strict=True))

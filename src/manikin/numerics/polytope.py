@@ -1,0 +1,257 @@
+"""Convex polytopes ``{x : H x <= h}`` with unit rows, and hulls that may be flat.
+
+A flat (lower-dimensional) hull carries each equality ``n x = c`` as the pair of rows
+``n x <= c`` and ``-n x <= -c``, both loosened by :data:`FLATNESS` times the size of the
+hull, so that the margin of a point on the flat is zero (to that rounding), never negative.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog
+from scipy.spatial import HalfspaceIntersection, QhullError
+
+from manikin.errors import PolytopeError
+from manikin.numerics.facet_enumeration import NormalFan, fan_of_generators
+from manikin.numerics.spatial import FloatArray
+
+FLATNESS = 1e-12
+"""Half thickness of a flat polytope, relative to its extent."""
+
+_BLOCK = 400_000
+"""Distances looked at together: they stay in the processor's cache."""
+
+
+@dataclass(frozen=True, eq=False)
+class Polytope:
+    """The set ``{x : H x <= h}`` ([Qiu2012]_ 2.21), its rows scaled to unit length.
+
+    Attributes:
+        H: (m, d) unit outward normals.
+        h: (m,) offsets, so that ``h - H x`` are signed distances to the facets' planes.
+    """
+
+    H: FloatArray
+    h: FloatArray
+
+    def __init__(self, H: ArrayLike, h: ArrayLike) -> None:
+        rows, offsets = _unit_rows(H, h)
+        object.__setattr__(self, "H", rows)
+        object.__setattr__(self, "h", offsets)
+
+    @staticmethod
+    def from_vertices(points: ArrayLike) -> "Polytope":
+        """Hull of points; it may be flat.
+
+        Args:
+            points: (n, d), at least one.
+
+        Raises:
+            PolytopeError: If there is no point or a coordinate is not finite.
+        """
+        return Polytope(*convex_hull(points))
+
+    @staticmethod
+    def from_generators(points: ArrayLike, segments: ArrayLike) -> "Polytope":
+        """Hull of points plus the sum of the segments ``[-s, s]`` (a zonotope for one point).
+
+        Args:
+            points: (n, d), at least one.
+            segments: (q, d) half segments.
+
+        Raises:
+            PolytopeError: If there is no point or a number is not finite.
+        """
+        return Polytope(*convex_hull(points, segments))
+
+    @property
+    def dimension(self) -> int:
+        """Dimension d of the space."""
+        return self.H.shape[1]
+
+    def __len__(self) -> int:
+        return len(self.h)
+
+    def distances(self, points: ArrayLike) -> FloatArray:
+        """Signed distances ``h - H x`` to every facet's plane ([Qiu2012]_ Algorithm 3, corrected).
+
+        Args:
+            points: (..., d).
+
+        Returns:
+            (..., m), positive inside.
+        """
+        return self.h - np.asarray(points, dtype=np.float64) @ self.H.T
+
+    def margin(self, points: ArrayLike) -> FloatArray:
+        """Smallest signed facet distance, ``min_i h_i - H_i x``; inside it is the residual radius.
+
+        Args:
+            points: (..., d).
+
+        Returns:
+            (...), negative outside.
+        """
+        x = np.asarray(points, dtype=np.float64)
+        if x.shape[-1:] != (self.dimension,):
+            raise PolytopeError(f"points have shape {x.shape}; valid: (..., {self.dimension})")
+        flat = x.reshape(-1, self.dimension)
+        margins = np.empty(len(flat))
+        lifted = np.column_stack([self.H, -self.h])
+        step = max(1, _BLOCK // max(1, len(self.h)))
+        excess = np.empty((len(self.h), step))
+        for start in range(0, len(flat), step):
+            part = flat[start : start + step]
+            columns = np.ones((self.dimension + 1, len(part)))
+            columns[:-1] = part.T
+            block = np.matmul(lifted, columns, out=excess[:, : len(part)] if len(part) == step else None)
+            margins[start : start + step] = block.max(axis=0, initial=-np.inf)
+        np.negative(margins, out=margins)
+        return margins.reshape(x.shape[:-1])
+
+    def residual_radius(self, point: ArrayLike) -> FloatArray:
+        """Radius of the largest ball about ``point`` inside the polytope, 0 outside."""
+        return np.maximum(self.margin(point), 0.0)
+
+    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
+        """Whether each point is inside, give or take ``tolerance``."""
+        return np.asarray(self.margin(points) >= -tolerance)
+
+    def inscribed_ball(self) -> tuple[FloatArray, float]:
+        """Centre (d,) and radius of the largest ball inside ([Qiu2012]_ 2.25).
+
+        Raises:
+            PolytopeError: If the polytope is empty or holds balls of any size.
+        """
+        centre, radius = self._largest_ball(None)
+        if radius < -_tolerance(self.h):
+            raise PolytopeError("polytope is empty; valid: a polytope with at least one point")
+        return centre, max(radius, 0.0)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no point satisfies all rows."""
+        return self._largest_ball(1.0)[1] < -_tolerance(self.h)
+
+    def intersection(self, other: "Polytope") -> "Polytope":
+        """Points of both polytopes (rows of both, none removed)."""
+        return Polytope(np.vstack([self.H, other.H]), np.concatenate([self.h, other.h]))
+
+    def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Polytope":
+        """Points ``y`` whose image ``matrix @ y + offset`` is inside (a slice of the polytope).
+
+        Args:
+            matrix: (d, k).
+            offset: (d,) or 0.
+        """
+        m = np.asarray(matrix, dtype=np.float64)
+        return Polytope(self.H @ m, self.h - self.H @ np.broadcast_to(offset, (self.dimension,)))
+
+    def vertices(self) -> FloatArray:
+        """(n, d) vertices.
+
+        Raises:
+            PolytopeError: If the polytope is empty, flat, unbounded or of dimension 1.
+        """
+        centre, radius = self.inscribed_ball()
+        if radius <= _tolerance(self.h):
+            raise PolytopeError("polytope is flat; valid: one with a ball inside")
+        return vertices_around(self.H, self.h, centre)
+
+    def _largest_ball(self, largest: float | None) -> tuple[FloatArray, float]:
+        d = self.dimension
+        cost = np.zeros(d + 1)
+        cost[-1] = -1.0
+        lifted = np.column_stack([self.H, np.linalg.norm(self.H, axis=1)])
+        scale = max(1.0, float(np.abs(self.h).max(initial=0.0)))
+        answer = linprog(
+            cost,
+            A_ub=lifted,
+            b_ub=self.h / scale,
+            bounds=[(None, None)] * d + [(None, None if largest is None else largest / scale)],
+            method="highs",
+        )
+        if answer.status == 3:
+            raise PolytopeError("polytope holds balls of any size; valid: a bounded polytope")
+        if answer.x is None:
+            return np.full(d, np.nan), -np.inf
+        return answer.x[:-1] * scale, float(answer.x[-1]) * scale
+
+
+def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
+    """Facets of the hull of points (plus segments ``[-s, s]``), each once, flat hulls included.
+
+    Args:
+        points: (n, d).
+        segments: (q, d), none when omitted.
+
+    Returns:
+        H (m, d) with unit rows and h (m,).
+
+    Raises:
+        PolytopeError: If there is no point, or a number is not finite.
+    """
+    v = np.asarray(points, dtype=np.float64)
+    if v.ndim != 2 or len(v) == 0 or not np.all(np.isfinite(v)):
+        raise PolytopeError(f"hull of points of shape {v.shape}; valid: (n, d) finite points, n >= 1")
+    s = np.zeros((0, v.shape[1])) if segments is None else np.asarray(segments, dtype=np.float64)
+    if s.ndim != 2 or s.shape[1] != v.shape[1] or not np.all(np.isfinite(s)):
+        raise PolytopeError(f"segments have shape {s.shape}; valid: (q, {v.shape[1]}) finite half segments")
+    centre = v.mean(axis=0)
+    fan = fan_of_generators(v - centre, np.ones((len(v), 1)), np.array([False])).plus_segments(s)
+    H, h = facet_rows(fan, max(1.0, float(np.abs(v).max())))[:2]
+    return H, h + H @ centre
+
+
+def vertices_around(H: FloatArray, h: FloatArray, interior: FloatArray) -> FloatArray:
+    """(n, d) vertices of ``H x <= h`` around a point strictly inside.
+
+    Raises:
+        PolytopeError: If the polytope is unbounded.
+    """
+    try:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = HalfspaceIntersection(np.column_stack([H, -h]), interior).intersections
+    except QhullError:
+        found = np.full((1, H.shape[1]), np.inf)
+    if not np.all(np.abs(found) < 1e12 * (1.0 + np.abs(h).max())):
+        raise PolytopeError("polytope has no vertices; valid: a bounded one of dimension 2 or more")
+    return found
+
+
+def facet_rows(fan: NormalFan, extent: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Rows ``H x <= h`` of a fan's polytope, equalities as loosened pairs at the end.
+
+    Returns:
+        H (m, d), h (m,) and the level multipliers (m, k), zero for equalities.
+    """
+    facets = fan.facets()
+    across = facets.flat
+    slack = np.full(2 * len(across), max(FLATNESS * extent, fan.thickness))
+    multipliers = np.vstack([facets.multipliers, np.zeros((len(slack), facets.multipliers.shape[1]))])
+    return np.vstack([facets.H, across, -across]), np.concatenate([facets.h, slack]), multipliers
+
+
+def _unit_rows(H: ArrayLike, h: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    rows, offsets = np.array(H, dtype=np.float64), np.array(h, dtype=np.float64)
+    if rows.ndim != 2 or offsets.shape != rows.shape[:1]:
+        raise PolytopeError(f"H has shape {rows.shape} and h {offsets.shape}; valid: (m, d) and (m,)")
+    if not (np.all(np.isfinite(rows)) and np.all(np.isfinite(offsets))):
+        raise PolytopeError("H or h holds a number that is not finite; valid: finite numbers")
+    length = np.linalg.norm(rows, axis=1)
+    zero = length < 1e-12
+    if np.any(zero):
+        keep = ~zero | (offsets < -_tolerance(offsets))
+        rows, offsets, length, zero = rows[keep], offsets[keep], length[keep], zero[keep]
+        rows[zero] = 0.0
+        length[zero] = 1.0
+    rows /= length[:, None]
+    offsets /= length
+    rows.setflags(write=False)
+    offsets.setflags(write=False)
+    return rows, offsets
+
+
+def _tolerance(offsets: FloatArray) -> float:
+    return 1e-9 * max(1.0, float(np.abs(offsets).max(initial=0.0)))

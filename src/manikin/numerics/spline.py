@@ -1,0 +1,346 @@
+"""Clamped B-splines of any degree with exact derivatives ([Qiu2012]_ 2.4).
+
+Knots are ``t_0 <= ... <= t_m``, control points ``a_0 ... a_n`` and ``m = n + k + 1`` for the
+degree ``k`` (the thesis says "order"). Knot spans are half-open, ``[t_j, t_j+1)``, and the
+last one is closed, so that the basis functions add up to one everywhere on the domain.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline as ScipySpline
+
+from manikin.errors import SplineError
+from manikin.numerics.spatial import FloatArray, frozen_array
+
+_DOMAIN_TOLERANCE = 1e-9
+"""How far outside the domain a parameter may lie, as a share of it (rounding of sums of durations)."""
+
+
+@dataclass(frozen=True, eq=False)
+class BSpline:
+    """A clamped B-spline curve ``p(t) = sum_i N_i,k(t) a_i`` ([Qiu2012]_ 2.28).
+
+    Attributes:
+        degree: Degree k >= 0.
+        knots: (m + 1,) nondecreasing, the first and the last repeated k + 1 times
+            ([Qiu2012]_ 2.31).
+        control_points: (n + 1, d) de Boor points, n = m - k - 1.
+    """
+
+    degree: int
+    knots: FloatArray
+    control_points: FloatArray
+
+    def __init__(self, degree: int, knots: ArrayLike, control_points: ArrayLike) -> None:
+        points = frozen_array(control_points, "spline control points", (None, None), SplineError)
+        object.__setattr__(self, "degree", degree)
+        object.__setattr__(self, "knots", check_clamped(degree, knots, len(points)))
+        object.__setattr__(self, "control_points", points)
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """First and last parameter value."""
+        return float(self.knots[0]), float(self.knots[-1])
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """Distinct knots, in order."""
+        return np.unique(self.knots)
+
+    def __call__(self, t: ArrayLike, derivative: int = 0) -> FloatArray:
+        """Evaluate the curve or one of its derivatives ([Qiu2012]_ 2.28, 2.34).
+
+        Args:
+            t: (...) parameter values inside the domain.
+            derivative: Order; beyond the degree the derivative is zero.
+
+        Returns:
+            (..., d).
+
+        Raises:
+            SplineError: If a value lies outside the domain.
+        """
+        t = _inside(self.knots, t)
+        if derivative > self.degree:
+            return np.zeros((*t.shape, self.control_points.shape[1]))
+        return self.derivative(derivative)._engine(t)
+
+    def derivative(self, order: int = 1) -> "BSpline":
+        """Return the derivative curve of degree k - order ([Qiu2012]_ 2.32-2.34).
+
+        Raises:
+            SplineError: If ``order`` is negative or larger than the degree.
+        """
+        if order == 0:
+            return self
+        if order not in self._derivatives:
+            matrix = derivative_matrix(self.degree, self.knots, order)
+            inner = self.knots[order : len(self.knots) - order]
+            self._derivatives[order] = BSpline(self.degree - order, inner, matrix @ self.control_points)
+        return self._derivatives[order]
+
+    def bezier_points(self) -> FloatArray:
+        """(spans, k + 1, d) Bezier points of each polynomial piece between breakpoints.
+
+        A piece is ``sum_j C(k, j) s^j (1 - s)^(k - j) b_j`` with s in [0, 1] across its span.
+        """
+        s = np.linspace(0.0, 1.0, self.degree + 1)
+        times = self.breakpoints[:-1, None] + np.diff(self.breakpoints)[:, None] * s
+        return np.asarray(np.linalg.solve(bernstein_matrix(self.degree, s), self(times)), dtype=np.float64)
+
+    @classmethod
+    def fit(
+        cls,
+        degree: int,
+        knots: ArrayLike,
+        t: ArrayLike,
+        values: ArrayLike,
+        *,
+        first: ArrayLike | None = None,
+        last: ArrayLike | None = None,
+    ) -> "BSpline":
+        """Least-squares fit with some of the first and last control points given.
+
+        Args:
+            degree: Degree k.
+            knots: (m + 1,) clamped knots.
+            t: (s,) parameter values.
+            values: (s, d) wanted positions.
+            first: (i, d) control points a_0 ... a_i-1 to keep, see :func:`start_control_points`.
+            last: (j, d) control points a_n-j+1 ... a_n to keep, see :func:`end_control_points`.
+
+        Raises:
+            SplineError: If knots or parameter values are not usable.
+        """
+        design = basis_matrix(degree, knots, t)
+        wanted = frozen_array(values, "spline fit values", (len(design), None), SplineError)
+        count, dimension = design.shape[1], wanted.shape[1]
+        head = np.zeros((0, dimension)) if first is None else np.atleast_2d(np.asarray(first, float))
+        tail = np.zeros((0, dimension)) if last is None else np.atleast_2d(np.asarray(last, float))
+        middle = slice(len(head), count - len(tail))
+        points = np.concatenate([head, np.zeros((max(count - len(head) - len(tail), 0), dimension)), tail])
+        points[middle] = np.linalg.lstsq(design[:, middle], wanted - design @ points, rcond=None)[0]
+        return cls(degree, knots, points)
+
+    @cached_property
+    def _engine(self) -> ScipySpline:
+        return ScipySpline(self.knots, self.control_points, self.degree, extrapolate=False)
+
+    @cached_property
+    def _derivatives(self) -> "dict[int, BSpline]":
+        return {}
+
+
+def check_clamped(degree: int, knots: ArrayLike, control_points: int) -> FloatArray:
+    """Return the knots as a read-only array after checking them ([Qiu2012]_ 2.27, 2.29, 2.31).
+
+    Raises:
+        SplineError: If degree, number or order of knots do not make a clamped B-spline.
+    """
+    if isinstance(degree, bool) or not isinstance(degree, (int, np.integer)) or degree < 0:
+        raise SplineError(f"spline degree is {degree!r}; valid: an integer >= 0")
+    times = frozen_array(knots, "spline knots", (None,), SplineError)
+    needed = control_points + degree + 1
+    if control_points <= degree:
+        raise SplineError(f"spline has {control_points} control points; valid: more than its degree {degree}")
+    if len(times) != needed:
+        raise SplineError(
+            f"spline has {len(times)} knots; valid: {needed} (control points {control_points} + degree + 1)"
+        )
+    if np.any(np.diff(times) < 0):
+        raise SplineError(f"spline knots are {times.tolist()}; valid: nondecreasing")
+    clamped = times[degree] == times[0] and times[-1 - degree] == times[-1]
+    inner = times[degree + 1 : len(times) - degree - 1]
+    if not clamped or times[0] == times[-1] or np.any((inner == times[0]) | (inner == times[-1])):
+        raise SplineError(
+            f"spline knots are {times.tolist()}; valid: first and last knot repeated {degree + 1} times"
+        )
+    if degree > 0 and np.any(inner[degree:] == inner[:-degree]):
+        raise SplineError(
+            f"spline knots are {times.tolist()}; valid: inner knots repeated at most {degree} times"
+        )
+    return times
+
+
+def clamped_knots(degree: int, breakpoints: ArrayLike) -> FloatArray:
+    """Knots that pass once through each inner breakpoint ([Qiu2012]_ 2.31 and 5.4.3).
+
+    Args:
+        degree: Degree k.
+        breakpoints: (b,) increasing; b - 1 spans, hence b + k - 1 control points.
+
+    Returns:
+        (b + 2 k,).
+
+    Raises:
+        SplineError: If the breakpoints do not increase.
+    """
+    times = frozen_array(breakpoints, "spline breakpoints", (None,), SplineError)
+    if len(times) < 2 or np.any(np.diff(times) <= 0):
+        raise SplineError(f"spline breakpoints are {times.tolist()}; valid: at least two, increasing")
+    return np.concatenate([np.full(degree, times[0]), times, np.full(degree, times[-1])])
+
+
+def span_basis(degree: int, knots: Sequence[Any], span: int, t: Any) -> list[Any]:
+    """The k + 1 basis functions that live on one knot span, by the Cox-de Boor recursion.
+
+    Algorithm 2 of [Qiu2012]_ with its inner loop corrected to end at ``j - 1``. Only sums,
+    products and quotients are used, so numbers, arrays and CasADi symbols are equally good
+    for ``knots`` and ``t``: this is how the knots can be unknowns of an optimisation. Not a
+    single denominator vanishes on a span of positive length.
+
+    Args:
+        degree: Degree k.
+        knots: (m + 1,) clamped knots.
+        span: Index j of the span ``[t_j, t_j+1)`` that holds ``t``, k <= j <= n.
+        t: Parameter value(s).
+
+    Returns:
+        ``[N_j-k,k(t), ..., N_j,k(t)]``; all other basis functions are zero there.
+    """
+    values: list[Any] = [1.0 + 0.0 * t]
+    for d in range(1, degree + 1):
+        raised: list[Any] = [0.0 * t] * (d + 1)
+        for r in range(d):
+            left, right = knots[span - d + 1 + r], knots[span + 1 + r]
+            share = values[r] / (right - left)
+            raised[r] = raised[r] + (right - t) * share
+            raised[r + 1] = raised[r + 1] + (t - left) * share
+        values = raised
+    return values
+
+
+def basis_matrix(degree: int, knots: ArrayLike, t: ArrayLike, derivative: int = 0) -> FloatArray:
+    """Discretisation matrix of the spline or of a derivative ([Qiu2012]_ 2.52, 2.55).
+
+    Args:
+        degree: Degree k.
+        knots: (m + 1,) clamped knots.
+        t: (s,) parameter values inside the domain.
+        derivative: Order; the matrix still multiplies the control points of the spline itself.
+
+    Returns:
+        (s, n + 1) matrix A with ``p^(d)(t_j) = A[j] @ control_points``.
+
+    Raises:
+        SplineError: If the knots are not clamped or a value lies outside the domain.
+    """
+    times = check_clamped(degree, knots, np.size(knots) - degree - 1)
+    inside = np.atleast_1d(_inside(times, t))
+    if derivative > degree:
+        return np.zeros((len(inside), len(times) - degree - 1))
+    inner = times[derivative : len(times) - derivative]
+    design = ScipySpline.design_matrix(inside, inner, degree - derivative).toarray()
+    return design if derivative == 0 else design @ derivative_matrix(degree, times, derivative)
+
+
+def derivative_matrix(degree: int, knots: ArrayLike, order: int) -> FloatArray:
+    """Matrix from the control points to those of a derivative, ``T_d0`` ([Qiu2012]_ 2.32, 2.44).
+
+    Args:
+        degree: Degree k.
+        knots: (m + 1,) clamped knots.
+        order: d, 0 <= d <= k.
+
+    Returns:
+        (n + 1 - d, n + 1).
+
+    Raises:
+        SplineError: If the knots are not clamped or the order is out of range.
+    """
+    times = check_clamped(degree, knots, np.size(knots) - degree - 1)
+    if not 0 <= order <= degree:
+        raise SplineError(f"spline derivative order is {order}; valid: 0 to the degree {degree}")
+    count = len(times) - degree - 1
+    matrix = np.eye(count)
+    for d in range(1, order + 1):
+        index = np.arange(count - d)
+        width = times[index + degree + 1] - times[index + d]
+        scale = np.divide(degree - d + 1, width, out=np.zeros_like(width), where=width > 0)
+        matrix = scale[:, None] * np.diff(matrix, axis=0)
+    return matrix
+
+
+def start_control_points(
+    degree: int,
+    knots: ArrayLike,
+    position: ArrayLike,
+    velocity: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+) -> FloatArray:
+    """First control points that give the wanted start ([Qiu2012]_ 2.45-2.47).
+
+    Args:
+        degree: Degree k >= 2 when an acceleration is wanted.
+        knots: (m + 1,) clamped knots.
+        position: (d,) p(t_0).
+        velocity: (d,) first derivative there; None leaves it free.
+        acceleration: (d,) second derivative there; needs a velocity too.
+
+    Returns:
+        (1 to 3, d).
+
+    Raises:
+        SplineError: If an acceleration is given without a velocity.
+    """
+    t = np.asarray(knots, dtype=np.float64)
+    k = degree
+    points = [np.asarray(position, dtype=np.float64)]
+    if acceleration is not None and velocity is None:
+        raise SplineError(
+            "spline end acceleration is given without a velocity; valid: both or only a velocity"
+        )
+    if velocity is not None:
+        speed = np.asarray(velocity, dtype=np.float64)
+        points.append(points[0] + (t[k + 1] - t[0]) / k * speed)
+        if acceleration is not None:
+            next_speed = speed + (t[k + 1] - t[0]) / (k - 1) * np.asarray(acceleration, dtype=np.float64)
+            points.append(points[1] + (t[k + 2] - t[0]) / k * next_speed)
+    return np.array(points)
+
+
+def end_control_points(
+    degree: int,
+    knots: ArrayLike,
+    position: ArrayLike,
+    velocity: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+) -> FloatArray:
+    """Last control points that give the wanted end ([Qiu2012]_ 2.48-2.50).
+
+    Equation 2.49 is read with ``t_n+k - t_n`` in place of the printed ``t_n+k-1 - t_n-1``.
+    Arguments and result as :func:`start_control_points`, the last row being a_n.
+
+    Raises:
+        SplineError: If an acceleration is given without a velocity.
+    """
+    backwards = -np.asarray(knots, dtype=np.float64)[::-1]
+    reversed_speed = None if velocity is None else -np.asarray(velocity, dtype=np.float64)
+    return start_control_points(degree, backwards, position, reversed_speed, acceleration)[::-1]
+
+
+def bernstein_matrix(degree: int, s: ArrayLike) -> FloatArray:
+    """Bernstein polynomials, the B-spline basis of a single span ([Qiu2012]_ 2.30 on [0, 1]).
+
+    Args:
+        degree: Degree k.
+        s: (n,) in [0, 1].
+
+    Returns:
+        (n, k + 1) values ``C(k, j) s^j (1 - s)^(k - j)``.
+    """
+    return basis_matrix(degree, clamped_knots(degree, (0.0, 1.0)), s)
+
+
+def _inside(knots: FloatArray, t: ArrayLike) -> FloatArray:
+    times = np.asarray(t, dtype=np.float64)
+    first, last = knots[0], knots[-1]
+    slack = _DOMAIN_TOLERANCE * (last - first)
+    if not np.all((times >= first - slack) & (times <= last + slack)):
+        raise SplineError(f"spline parameter outside [{first:g}, {last:g}]; valid: values of the domain")
+    return np.clip(times, first, last)

@@ -1,0 +1,1 @@
+"""The road through the stages, runs in directories, and many runs at once."""

@@ -1,0 +1,348 @@
+"""The run directory: what one job leaves behind.
+
+::
+
+    DIR/scenario.yaml      the scenario with every default and override, ready to run again
+    DIR/stages/*.json      what each stage found, written as soon as it is known
+    DIR/motion.h5          planned motion, then planned and executed (manikin.motion.file)
+    DIR/motion-NAME.h5     planned motion of somebody else who walks there
+    DIR/summary.json       written when every stage is done
+    DIR/report.html        verdict, requirements, figures and numbers in one page that needs no other file
+    DIR/motion.bvh         drawn from the files above, for animation programs
+    DIR/figures/*.png      drawn from the files above
+
+Each file is written atomically, so an interrupted run leaves whole files of the stages
+that were done and nothing half-written.
+
+Also here. A run read back from its directory: plan, motions, and what follows from them.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manikin.balance import pseudo_wrench
+from manikin.balance.zmp import ZmpPath, contact_wrench, zmp_path
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule, StanceSequence
+from manikin.errors import InputError, MotionFileError
+from manikin.motion import Motion
+from manikin.motion.file import MotionFile, read_motions
+from manikin.motion.motion import PhaseTable, com_velocity, effector_positions, phases_of
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.com import CentroidalTrajectory
+from manikin.planning.com.com_certificate import phase_margins, phase_times
+from manikin.planning.com.feasibility import polytopes_of
+from manikin.runtime.display import Displayed
+from manikin.runtime.files import FIGURES, ResultDirectory, write_result
+from manikin.scenarios import Scenario, load_scenario
+from manikin.scene import Scene
+
+COM_TRAJECTORY = "com_trajectory.json"
+
+
+@dataclass(frozen=True, eq=False)
+class ComTrack:
+    """The centre of mass in time, with its margin.
+
+    Attributes:
+        time: (n,) not decreasing [s].
+        position: (n, 3) [m].
+        velocity: (n, 3) [m/s].
+        acceleration: (n, 3) [m/s^2].
+        margin: (n,) in :attr:`margin_unit`.
+        margin_unit: ``"N.m"``, or ``"N"`` when the margin is a force at the CoM.
+    """
+
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    margin: FloatArray
+    margin_unit: str = "N.m"
+
+    @classmethod
+    def of_motion(cls, motion: Motion) -> "ComTrack":
+        """Track of a motion, its derivatives by central differences."""
+        velocity = com_velocity(motion)
+        still = len(motion.time) < 2
+        acceleration = np.zeros_like(velocity) if still else np.gradient(velocity, motion.time, axis=0)
+        return cls(motion.time, motion.com, velocity, acceleration, motion.margin, motion.margin_unit)
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """(n, 3) position at other times [m]; held before the first and after the last."""
+        return np.column_stack([np.interp(times, self.time, column) for column in self.position.T])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RunRecord(Displayed):
+    """Everything that a run left behind; what it does not have is None or empty.
+
+    Attributes:
+        label: What to call the run in figures.
+        content: Motions, body, scene and schedule with the real soles.
+        summary: As written by the run.
+        mass: Of the body [kg].
+        plan: The CoM as planned for a point mass, its margin with the planning soles.
+        walks: (n, 4) instants [s], x, y [m] and headings [rad] of ways over the floor, by who walks.
+    """
+
+    label: str
+    content: MotionFile
+    summary: Mapping[str, Any] = field(default_factory=dict)
+    mass: float | None = None
+    plan: ComTrack | None = None
+    walks: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def scenario(self) -> str:
+        """Name of the scenario."""
+        return str(self.summary.get("scenario", self.label))
+
+    @property
+    def body(self) -> BodyModel | None:
+        """Who moved."""
+        return self.content.body
+
+    @property
+    def scene(self) -> Scene | None:
+        """Where."""
+        return self.content.scene
+
+    @property
+    def schedule(self) -> ContactSchedule | None:
+        """With which contacts, when."""
+        return self.content.schedule
+
+    @property
+    def motions(self) -> dict[str, Motion]:
+        """Whole-body motions by name, ``"planned"`` before ``"executed"``; a point mass has none."""
+        jointed = {name: motion for name, motion in self.content.motions.items() if motion.joint_names}
+        return jointed if self.body is None or self.body.joint_names else {}
+
+    @cached_property
+    def tracks(self) -> dict[str, ComTrack]:
+        """The CoM of each motion; without a whole body, that of the planned point mass."""
+        if self.plan is not None and not self.motions:
+            return {"planned": self.plan}
+        moved = self.motions or self.content.motions
+        return {name: ComTrack.of_motion(motion) for name, motion in moved.items()}
+
+    @cached_property
+    def phases(self) -> PhaseTable | None:
+        """Phases of the schedule, or else of the first motion."""
+        if self.schedule is None:
+            moved = next(iter(self.content.motions.values()), None)
+            return None if moved is None else phases_of(moved)
+        supports = tuple(tuple(phase.stance.effectors) for phase in self.schedule.sequence)
+        return PhaseTable(self.schedule.instants, supports)
+
+    @property
+    def effectors(self) -> tuple[str, ...]:
+        """Every effector that is ever in contact, in order of first use."""
+        if self.phases is None:
+            return ()
+        return tuple(dict.fromkeys(name for supports in self.phases.supports for name in supports))
+
+    @cached_property
+    def effector_paths(self) -> dict[str, dict[str, FloatArray]]:
+        """(n, 3) origin of each effector in contact, by motion and effector [m]; none without a body."""
+        if self.body is None or not self.motions:
+            return {}
+        names = tuple(name for name in self.effectors if name in self.body.effectors)
+        return {kind: effector_positions(self.body, motion, names) for kind, motion in self.motions.items()}
+
+    @cached_property
+    def zmp(self) -> dict[str, ZmpPath]:
+        """The ZMP of each motion; without any, of the planned point mass."""
+        if self.schedule is None:
+            return {}
+        if not self.motions and self.plan is not None and self.mass is not None:
+            wrench = pseudo_wrench(self.mass, self.plan.position, self.plan.acceleration)
+            return {"planned": zmp_path(self.schedule, self.plan.time, wrench)}
+        return {
+            name: zmp_path(self.schedule, motion.time, contact_wrench(motion, self.schedule))
+            for name, motion in self.motions.items()
+        }
+
+
+def read_run(directory: str | Path) -> RunRecord:
+    """Read a run directory, however far the run got.
+
+    Args:
+        directory: Written by ``manikin run``.
+
+    Raises:
+        InputError: If it is missing, is not a run directory, or one of its files is damaged.
+    """
+    folder = Path(directory)
+    _check_is_run(folder)
+    summary = read_summary(folder)
+    has_motion = (folder / MOTION).is_file()
+    content = read_motions(folder / MOTION) if has_motion else MotionFile()
+    data = _read_trajectory(folder / STAGES / COM_TRAJECTORY)
+    if data is None:
+        mass = None if content.body is None else content.body.mass
+        return RunRecord(_label(folder), content, summary, mass, walks=_read_walks(folder))
+    scenario = load_scenario(folder / SCENARIO)
+    trajectory = _trajectory(data, scenario.build_sequence(planning=True), folder)
+    if not has_motion:
+        real = _first_phases(scenario.build_sequence(), len(trajectory.schedule.sequence))
+        schedule = ContactSchedule(real, trajectory.schedule.instants)
+        content = MotionFile(scene=scenario.build_scene(), schedule=schedule)
+    plan = point_mass_track(scenario, trajectory)
+    return RunRecord(_label(folder), content, summary, trajectory.mass, plan, _read_walks(folder))
+
+
+def point_mass_track(scenario: Scenario, trajectory: CentroidalTrajectory) -> ComTrack:
+    """The planned CoM every millisecond, its margin measured as the scenario asks."""
+    problem = scenario.build_centroidal_problem()
+    polytopes = polytopes_of(problem)[: len(trajectory.schedule.sequence)]
+    time = np.concatenate(phase_times(trajectory))
+    return ComTrack(
+        time,
+        trajectory.position(time),
+        trajectory.velocity(time),
+        trajectory.acceleration(time),
+        np.concatenate(phase_margins(problem, trajectory, polytopes)),
+        problem.margin_unit,
+    )
+
+
+def _label(folder: Path) -> str:
+    return folder.resolve().name
+
+
+def _check_is_run(folder: Path) -> None:
+    valid = "valid: a directory written by manikin run"
+    if not folder.exists():
+        raise MotionFileError(f"{folder}: there is no such directory; {valid}")
+    if not folder.is_dir():
+        raise MotionFileError(f"{folder}: is a file; {valid}")
+    if not (folder / SCENARIO).is_file():
+        raise MotionFileError(f"{folder}: is not a run directory, it has no {SCENARIO}; {valid}")
+    if not (folder / SUMMARY).is_file():
+        raise MotionFileError(f"{folder}: has no {SUMMARY}, its run did not finish; {valid} to its end")
+
+
+def _read_trajectory(path: Path) -> dict[str, Any] | None:
+    if not path.is_file():
+        return None
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise MotionFileError(f"{path}: cannot be read ({error}); valid: as written by manikin") from None
+    if not isinstance(data, dict):
+        raise MotionFileError(f"{path}: is not a JSON object; valid: as written by manikin")
+    return data
+
+
+def _read_walks(folder: Path) -> dict[str, FloatArray]:
+    """Ways over the floor, (n, 4) each; none where nobody walks."""
+    path = folder / STAGES / f"{WALK_PATHS}.json"
+    data = _read_trajectory(path)
+    try:
+        return {
+            name: np.column_stack([one["time_s"], np.reshape(one["place"], (-1, 3))]).astype(np.float64)
+            for name, one in (data or {}).items()
+        }
+    except (KeyError, TypeError, ValueError) as error:
+        problem = " ".join(str(error).split())[:160]
+        raise MotionFileError(f"{path}: is damaged ({problem}); valid: as written by manikin") from None
+
+
+def _trajectory(data: dict[str, Any], sequence: StanceSequence, folder: Path) -> CentroidalTrajectory:
+    try:
+        phases = len(data["key_instants_s"]) - 1
+        return CentroidalTrajectory.from_dict(data, _first_phases(sequence, phases))
+    except (InputError, KeyError, TypeError, ValueError) as error:
+        path = folder / STAGES / COM_TRAJECTORY
+        problem = " ".join(str(error).split())[:160]
+        raise MotionFileError(f"{path}: is damaged ({problem}); valid: as written by manikin") from None
+
+
+def _first_phases(sequence: StanceSequence, count: int) -> StanceSequence:
+    """The planned CoM may end before the last phases, which then rest on something else."""
+    return sequence if count == len(sequence) else StanceSequence(sequence.phases[:count])
+
+
+SCENARIO = "scenario.yaml"
+MOTION = "motion.h5"
+BVH = "motion.bvh"
+OTHERS = "motion-*.h5"
+WALK_PATHS = "walk_paths"
+"""What the walking stage keeps of the ways over the floor, by the name of who walks."""
+BODY = "the body"
+"""In it, the body that the scenario is about."""
+SUMMARY = "summary.json"
+REPORT = "report.html"
+STAGES = "stages"
+
+
+def other_motion(name: str) -> str:
+    """File of the motion of somebody else who walks there."""
+    return OTHERS.replace("*", name)
+
+
+def other_motions(directory: Path) -> dict[str, Path]:
+    """Files of the motions of others in a run directory, by their names; none beside a single file."""
+    first, last = OTHERS.split("*")
+    return {path.name.removeprefix(first).removesuffix(last): path for path in sorted(directory.glob(OTHERS))}
+
+
+class RunDirectory(ResultDirectory):
+    """Writes the files of one run; those of an earlier run are removed first."""
+
+    kind, marks = "run", (SCENARIO,)
+
+    def __init__(self, path: str | Path) -> None:
+        """Create the directory, or take over that of an earlier run and remove its files.
+
+        Raises:
+            MotionFileError: If it cannot be created, or holds something that is not a run.
+        """
+        super().__init__(path)
+        # The summary goes first: without it the directory is known to be incomplete.
+        self.remove(SUMMARY, MOTION, BVH, REPORT, f"{STAGES}/*.json", f"{FIGURES}/*.png", OTHERS)
+
+    def write_scenario(self, yaml_text: str) -> Path:
+        """Keep the resolved scenario."""
+        return self.write(SCENARIO, yaml_text)
+
+    def write_stage(self, name: str, result: Mapping[str, Any]) -> Path:
+        """Keep what a stage found, as soon as it is known.
+
+        Args:
+            name: Of the stage, such as ``"centroidal"``.
+            result: Plain values and arrays.
+        """
+        return write_result(self.folder(STAGES) / f"{name}.json", result)
+
+    def write_summary(self, summary: Mapping[str, Any]) -> Path:
+        """Write the summary; the last thing a run does."""
+        return self.write(SUMMARY, summary)
+
+
+def read_summary(path: str | Path) -> dict[str, Any]:
+    """Summary of a run directory.
+
+    Raises:
+        MotionFileError: If there is none, or it is damaged.
+    """
+    file = Path(path) / SUMMARY
+    try:
+        summary = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise MotionFileError(
+            f"{file}: there is no such file; valid: the directory of a finished run"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise MotionFileError(f"{file}: cannot be read ({error}); valid: as written by manikin") from None
+    if not isinstance(summary, dict):
+        raise MotionFileError(f"{file}: is not a JSON object; valid: as written by manikin")
+    return summary

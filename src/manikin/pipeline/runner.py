@@ -1,0 +1,146 @@
+"""The pipeline: scenario, contacts, centre of mass, whole body, act, execution, results.
+
+Each stage reads the one before it and its result is written as soon as it is known, so that
+nothing already computed is lost.  A stage that finds nothing ends the run with an
+explanation; only misuse and broken input raise.
+"""
+
+import time as clock
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from manikin.errors import ScenarioError
+from manikin.pipeline.stages import ExecutionRequirements, Progress, Report, RunContext, RunResult
+from manikin.pipeline.stages.contact_stage import plan_contacts
+from manikin.pipeline.stages.execution_stage import PlannedMotion, append_act, execute_motion
+from manikin.pipeline.stages.recovery_stage import recover_from_push
+from manikin.pipeline.stages.refinement_stage import KeyedContacts, refine_contacts
+from manikin.pipeline.stages.walking_stage import walk_on_footprints, walk_to_goal
+from manikin.pipeline.stages.whole_body_stage import (
+    follow_centre_of_mass,
+    move_point_mass,
+    plan_centre_of_mass,
+    with_key_postures,
+    with_stricter_key_postures,
+)
+from manikin.planning.whole_body import WholeBodySettings
+from manikin.scenarios import Scenario, load_scenario
+
+
+def run(
+    scenario: str | Path | Scenario,
+    *,
+    variant: str | None = None,
+    overrides: Sequence[str] = (),
+    out: str | Path | None = None,
+    seed: int | None = None,
+    settings: WholeBodySettings | None = None,
+    requirements: ExecutionRequirements | None = None,
+    progress: Progress | None = None,
+) -> RunResult:
+    """Plan a scenario, execute it in the physics engine and report.
+
+    Args:
+        scenario: Name of a built-in scenario, a scenario file, or a scenario.
+        variant: Name of one of the scenario's variants.
+        overrides: Values to set, ``"supports.friction=0.5"`` each.
+        out: Run directory; nothing is written when omitted.
+        seed: Seed of every random choice; the scenario's own when omitted.
+        settings: Options of the whole-body stage; the defaults in the scenario's manner when omitted.
+        requirements: What the execution must keep.
+        progress: Called with the stage and the share of it that is done.
+
+    Returns:
+        The result; an infeasible task, or a motion that fell, is a result with ``succeeded`` False.
+
+    Raises:
+        InputError: If the scenario, or a file it names, is not usable.
+    """
+    job = _job(scenario, variant, overrides)
+    if seed is not None:
+        job = job.with_seed(seed)
+    # Threads make the many small products slower, and the last bits depend on their number.
+    with threadpool_limits(1):
+        began = clock.perf_counter()
+        context = RunContext.of(job, settings)
+        report = Report(context, out, progress, began)
+        return _follow_the_road(context, report, requirements or ExecutionRequirements())
+
+
+def _job(scenario: str | Path | Scenario, variant: str | None, overrides: Sequence[str]) -> Scenario:
+    if not isinstance(scenario, Scenario):
+        return load_scenario(str(scenario), variant, overrides)
+    if variant is not None:
+        raise ScenarioError(
+            f"variant {variant!r} is given beside a scenario that is already loaded; valid: its name or file"
+        )
+    return scenario.with_overrides(overrides)
+
+
+def _follow_the_road(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
+    """The whole road; contacts are planned where the scenario lists none, and none for a body that stays."""
+    if context.scenario.recovery is not None:
+        return RunResult.of(report, recovery=recover_from_push(context, report))
+    walking = context.scenario.walking
+    if walking is not None and not walking.is_planned(context.scenario.file.supports):
+        return RunResult.of(report, planned=walk_to_goal(context, report))
+    if walking is not None:
+        on_footprints = walk_on_footprints(context, report)
+        if on_footprints is None:
+            return RunResult.of(report)
+        context = on_footprints
+    with_contacts = context if context.has_supports else plan_contacts(context, report)
+    if with_contacts is None:
+        return RunResult.of(report)
+    if context.scenario.refines:
+        return _refined(with_contacts, report, requirements)
+    if context.scenario.is_point_mass:
+        return _moved_point_mass(with_contacts, report)
+    return _followed(with_contacts, report, requirements)
+
+
+def _moved_point_mass(context: RunContext, report: Report) -> RunResult:
+    """A body without joints: its centre of mass is all there is."""
+    centroidal = plan_centre_of_mass(context, report)
+    return RunResult.of(report, centroidal, planned=move_point_mass(report, centroidal))
+
+
+def _followed(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
+    """The centre of mass first, then all joints along it, the act and the execution."""
+    centroidal = plan_centre_of_mass(context, report)
+    plan = with_key_postures(context, report, centroidal)
+    wholebody = follow_centre_of_mass(context, report, plan)
+    if wholebody is not None and not wholebody.succeeded:
+        other = with_stricter_key_postures(context, report, centroidal, plan)
+        if other is not None:
+            plan, wholebody = other, follow_centre_of_mass(context, report, other)
+    if plan.trajectory is None or wholebody is None or not wholebody.succeeded:
+        return RunResult.of(report, plan.centroidal, wholebody)
+    planned = append_act(context, report, PlannedMotion(plan.trajectory.schedule, wholebody.motion))
+    wholebody = replace(wholebody, motion=planned.motion)
+    if report.failure is not None or not context.scenario.execution_required:
+        return RunResult.of(report, plan.centroidal, wholebody)
+    execution = execute_motion(context, report, planned, requirements)
+    return RunResult.of(report, plan.centroidal, wholebody, execution)
+
+
+def _refined(context: RunContext, report: Report, requirements: ExecutionRequirements) -> RunResult:
+    """Key postures of the contact plan, or of the centre of mass on given supports, then the refinement."""
+    centroidal, keyed = None, None
+    if context.plan is not None:
+        keyed = KeyedContacts.of_plan(context.plan, context.scenario.contact_model)
+    else:
+        plan = with_key_postures(context, report, plan_centre_of_mass(context, report))
+        centroidal = plan.centroidal
+        if plan.trajectory is not None and plan.postures is not None:
+            keyed = KeyedContacts.of_postures(plan.trajectory.schedule, plan.postures)
+    if keyed is None:
+        return RunResult.of(report, centroidal)
+    refined, execution = refine_contacts(context, report, keyed), None
+    if refined.succeeded and context.scenario.execution_required:
+        planned = PlannedMotion(refined.schedule, refined.motion)
+        execution = execute_motion(context, report, planned, requirements)
+    return RunResult.of(report, centroidal, refined, execution)

@@ -1,0 +1,408 @@
+"""The contacts stage: supports for a scenario that gives start and goal alone.
+
+Also here. Contacts of feet from start and goal: guide, contacts, and the scenario with what was found.
+Contacts of any limbs from start and goal: guide, then algorithm 7 ([Tonneau2015]_ chapters 6 and 7).
+
+For a scenario without supports whose body goes on its feet ([Tonneau2015]_ chapters 6 and 7); the hands
+join in where it ends with an act.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+
+from manikin.body import BodyModel, Limb, limb_named, limbs_of
+from manikin.body.limbs import is_further
+from manikin.contact import ContactKind
+from manikin.kinematics import reach_volume
+from manikin.numerics.spatial import FloatArray
+from manikin.pipeline.stages.contact_guides import ContactSearch, RootGuide, SearchTally, guide_root, stage_at
+from manikin.pipeline.stages.context import Report, RunContext
+from manikin.pipeline.stages.execution_stage import act_of
+from manikin.planning.contacts import (
+    ContactPlan,
+    Endpoints,
+    ExtendSettings,
+    Extension,
+    GuideLine,
+    LimbExtendSettings,
+    LimbPlaces,
+    LimbStart,
+    PostureFinder,
+    PostureFinderSettings,
+    Stage,
+    follow_guide,
+    follow_guide_with_limbs,
+    heading_of,
+    sample_limbs,
+    starts_on_limbs,
+)
+from manikin.planning.guide import (
+    Abstraction,
+    Condition,
+    GuideWorld,
+    LimbRule,
+    SamplingRegion,
+    UsableSurface,
+    abstraction_of,
+)
+from manikin.planning.push_pull import Brace, BraceSettings, arrival, find_braced_posture, with_hands
+from manikin.planning.whole_body.posture_style import posture_style_of
+from manikin.scenarios import Scenario
+from manikin.scenarios.planned import with_supports
+from manikin.scenarios.sequence import contact_rules
+from manikin.scenarios.world import CLIMBING, carried_to
+from manikin.scene import Scene
+
+LEGS = ("left_leg", "right_leg")
+
+AROUND = 1.2
+"""Room around start and goal in which the root is led [m]."""
+
+PITCH = (-0.2, 1.0)
+ROLL = (-0.1, 0.1)
+"""How the root may lean [rad]; our choice for a body on its feet."""
+
+TURN = float(np.deg2rad(75.0))
+"""How far the root may turn from the headings of start and goal, where these are that close [rad]."""
+
+SEARCHES_AGAIN = 60
+"""Postures that are looked for along every guide after the first."""
+
+
+def find_foot_contacts(
+    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
+) -> ContactSearch:
+    """Plan the supports of a body that goes on its feet.
+
+    Args:
+        scenario: Without supports.
+        body: A human.
+        scene: Its scene.
+        rng: Source of all randomness.
+    """
+    return _FootSearch(scenario, body, scene, rng).run()
+
+
+class _FootSearch:
+    def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
+        self._tally = SearchTally()
+        self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
+        self._reference = posture_style_of(scenario.manner).posture(body)
+        self._natural = scenario.contacts.ranges == "learnt"
+        self._endpoints = Endpoints(
+            body, scene, scenario.contacts.friction, self._reference,
+            natural=self._natural, friction_model=scenario.contact_model.friction,
+        )  # fmt: skip
+        self._brace: Brace | None = None
+
+    def run(self) -> ContactSearch:
+        start = stage_at(self._endpoints, self._scenario, "start")
+        if isinstance(start, str):
+            return self._tally.failed(start, "start")
+        goal = self._goal(start)
+        if isinstance(goal, str):
+            return self._tally.failed(goal, "goal")
+        standing = self._endpoints.risen(start) if "buttocks" in start.contacts else None
+        if standing is not None and standing.stage is None:
+            return self._tally.failed(standing.failure or "", "start")
+        first = start if standing is None or standing.stage is None else standing.stage
+        found = self._tally.along_guides(
+            self._scenario.contacts.attempts,
+            lambda: self._guide(first, goal),
+            lambda line, number: self._follow(line, start, goal, again=number > 0),
+        )
+        if found.plan is None:
+            return found
+        return replace(found, scenario=with_supports(self._scenario, found.plan))
+
+    def _follow(self, line: GuideLine, start: Stage, goal: Stage, *, again: bool) -> Extension:
+        """Contacts along a guide, with the hands on the object where there is an act."""
+        settings = self._settings(again=again)
+        found = follow_guide(self._body, self._scene, line, start, goal, settings, self._reference)
+        return found if found.plan is None else replace(found, plan=self._acting(found.plan))
+
+    def _settings(self, *, again: bool) -> ExtendSettings:
+        """How contacts are looked for; along another guide, which is much like the first, not as long."""
+        options = self._scenario.contacts
+        settings = ExtendSettings(
+            stride=options.stride_m, friction=options.friction, natural=self._natural,
+            friction_model=self._scenario.contact_model.friction,
+        )  # fmt: skip
+        return replace(settings, searches=SEARCHES_AGAIN) if again else settings
+
+    def _goal(self, start: Stage) -> Stage | str:
+        """Where to go, or why there is no such place; for an act, on the level of the start."""
+        act = act_of(self._scenario)
+        if act is None:
+            return stage_at(self._endpoints, self._scenario, "goal")
+        samples = sample_limbs(self._body, self._rng, natural=self._natural)
+        friction, model = self._scenario.contacts.friction, self._scenario.contact_model.friction
+        found = find_braced_posture(
+            self._body, self._scene, samples, act, start.com[:2],
+            level=min(contact.position[2] for contact in start.contacts.values()),
+            settings=BraceSettings(friction=friction, friction_model=model), reference=self._reference,
+        )  # fmt: skip
+        self._tally.summary["act_places"] = found.tried
+        if found.brace is None:
+            return found.failure or ""
+        self._brace = found.brace
+        return arrival(self._body, found.brace)
+
+    def _acting(self, way: ContactPlan) -> ContactPlan:
+        """The way, and the hands on the object where there is an act."""
+        return way if self._brace is None else with_hands(self._body, way, self._brace)
+
+    def _guide(self, start: Stage, goal: Stage) -> RootGuide:
+        ends = np.array([start.q[:7], goal.q[:7]])
+        world = GuideWorld(self._scene, self._abstraction(), _region(ends), _condition())
+        return guide_root(world, ends, self._rng)
+
+    def _abstraction(self) -> Abstraction:
+        volumes = [
+            reach_volume(self._body, limb, np.random.default_rng(0), natural=self._natural)
+            for limb in limbs_of(self._body)
+            if limb.name in LEGS
+        ]
+        return abstraction_of(self._body, volumes)
+
+
+def _region(ends: FloatArray) -> SamplingRegion:
+    """Box around start and goal; headings between theirs, and a little beyond."""
+    low, high = ends[:, :3].min(axis=0) - AROUND, ends[:, :3].max(axis=0) + AROUND
+    low[2], high[2] = ends[:, 2].min() - 0.7, ends[:, 2].max() + 0.1
+    headings = np.unwrap([heading_of(pose) for pose in ends])
+    yaw = (headings.min() - TURN, headings.max() + TURN) if np.ptp(headings) <= TURN else None
+    return SamplingRegion(low, high, yaw=yaw, pitch=PITCH, roll=ROLL)
+
+
+def _condition() -> Condition:
+    """Both legs reach something to stand on."""
+    ground = UsableSurface((0.0, 0.0, 1.0), float(np.deg2rad(35.0)))
+    return Condition((LimbRule(LEGS, len(LEGS)),), dict.fromkeys(LEGS, ground))
+
+
+STANDING_HEIGHT = 0.92
+"""Height of the root of a standing person of 1.75 m, the unit in which bodies are compared [m]."""
+
+SMALLEST = 0.3
+"""Least factor on distances that are kept for safety, however small the body."""
+
+STRIDE = 0.4
+"""Stride of a creature as a share of the reach of its limbs; our choice."""
+
+AROUND_LIMBS = 1.3
+"""Room around start and goal in which the root is led, in heights of a standing root."""
+
+STEEPEST = float(np.deg2rad(50.0))
+"""Largest slope on which a limb that cannot hold on counts as within reach; our choice."""
+
+LEAN = 0.35
+"""How far the root may lean in any direction [rad]; our choice."""
+
+NEAR_GOAL = 0.2
+"""Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
+
+
+def find_limb_contacts(
+    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
+) -> ContactSearch:
+    """Plan contacts of the limbs that a scenario names, all limbs where it names none.
+
+    Args:
+        scenario: Without supports.
+        body: Its body.
+        scene: Its scene.
+        rng: Source of all randomness.
+
+    Raises:
+        BodyError: If the body has no such limb.
+    """
+    return _LimbSearch(scenario, body, scene, rng).run()
+
+
+class _LimbSearch:
+    def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
+        self._tally = SearchTally()
+        self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
+        self._limbs = _limbs(body, scenario.contact_limbs or ())
+        self._kinds = {limb.name: _kind(body, limb) for limb in self._limbs}
+        self._size = float(body.standing_posture()[2]) / STANDING_HEIGHT
+        safe = max(self._size, SMALLEST)
+        self._reference = _as_climbing(body, scenario.manner)
+        self._natural = scenario.contacts.ranges == "learnt"
+        settings = PostureFinderSettings(
+            natural=self._natural, friction_model=scenario.contact_model.friction
+        )
+        self._poser = PostureFinder(body, scene, self._reference, settings.scaled(safe))
+        samples = sample_limbs(body, np.random.default_rng(0), natural=self._natural)
+        self._places = LimbPlaces(
+            body, scene, self._limbs, self._kinds, contact_rules(scenario, body), self._reference, samples
+        )
+        volumes = [samples[limb.name].reach for limb in self._limbs]
+        self._abstraction: Abstraction = abstraction_of(body, volumes)
+
+    def run(self) -> ContactSearch:
+        goal, starts = self._goal(), self._starts()
+        if isinstance(goal, str):
+            return self._tally.failed(goal, "goal")
+        first = next(starts)
+        if first.stage is None:
+            return self._tally.failed(first.reason, "start")
+        # Another guide begins at another start, as long as there are some.
+        stages = [first.stage]
+        others = (item.stage for item in starts if item.stage is not None)
+
+        def lead() -> RootGuide:
+            if self._tally.summary["attempts"] > 0:
+                stages.extend(islice(others, 1))
+            return self._guide(stages[-1].q[:7], goal)
+
+        settings = self._settings()
+        return self._tally.along_guides(
+            self._scenario.contacts.attempts,
+            lead,
+            lambda line, _: follow_guide_with_limbs(self._poser, self._places, line, stages[-1], settings),
+        )
+
+    @property
+    def _climbs(self) -> bool:
+        return self._scenario.file.task.goal.posture == CLIMBING
+
+    def _settings(self) -> LimbExtendSettings:
+        """Lengths by the size of the body, times by how fast a body of that size moves."""
+        options, plain = self._scenario.contacts, LimbExtendSettings()
+        size, pace = self._size, float(np.sqrt(self._size))
+        human = self._body.stature is not None
+        return LimbExtendSettings(
+            stride=options.stride_m * size if human else STRIDE * self._places.reach,
+            same_place=plain.same_place * size,
+            lift=plain.lift * max(size, SMALLEST),
+            swing_duration=plain.swing_duration * pace,
+            swing_speed=plain.swing_speed * pace,
+            shift_duration=plain.shift_duration * pace,
+            hinge_pace=plain.hinge_pace / pace,
+            goal_distance=plain.goal_distance * max(size, SMALLEST) if not self._climbs else NEAR_GOAL,
+        )
+
+    def _starts(self) -> Iterator[LimbStart]:
+        """Where the body is at the start, the best first, or why it cannot be there."""
+        state = self._scenario.file.task.start
+        if self._body.stature is not None and state.posture != CLIMBING:
+            found = stage_at(self._endpoints(), self._scenario, "start")
+            yield LimbStart(None, found) if isinstance(found, str) else LimbStart(found)
+            return
+        at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
+        q = self._standing(at, yaw, state.height_m)
+        for found in starts_on_limbs(self._poser, self._places, q, self._settings().shift_duration):
+            where = f"the start: no posture at {at.round(3).tolist()} m: "
+            yield found if found.stage is not None else LimbStart(None, where + found.reason)
+
+    def _endpoints(self) -> Endpoints:
+        return Endpoints(
+            self._body, self._scene, self._scenario.contacts.friction,
+            natural=self._natural, friction_model=self._scenario.contact_model.friction,
+        )  # fmt: skip
+
+    def _goal(self) -> FloatArray | str:
+        """(7,) pose of the root at the goal, or why there is none."""
+        if self._body.stature is not None and not self._climbs:
+            found = stage_at(self._endpoints(), self._scenario, "goal")
+            return found if isinstance(found, str) else found.q[:7]
+        state = self._scenario.file.task.goal
+        yaw = float(np.deg2rad(state.heading_deg or 0.0))
+        return self._standing(np.array(state.at), yaw, state.height_m)[:7]
+
+    def _standing(self, at: FloatArray, yaw: float, height: float | None) -> FloatArray:
+        """(nq,) reference posture at a place, as high as if it stood there."""
+        level = height if height is not None else self._scenario.start_level
+        return carried_to(self._reference, at, yaw, level)
+
+    def _guide(self, start: FloatArray, goal: FloatArray) -> RootGuide:
+        ends = np.array([start, goal])
+        world = GuideWorld(self._scene, self._abstraction, self._region(ends), self._condition())
+        return guide_root(world, ends, self._rng)
+
+    def _region(self, ends: FloatArray) -> SamplingRegion:
+        """Box around start and goal; headings between theirs, and a little beyond."""
+        room = AROUND_LIMBS * STANDING_HEIGHT * self._size
+        headings = np.unwrap([heading_of(pose) for pose in ends])
+        yaw = (headings.min() - LEAN, headings.max() + LEAN)
+        lean = (-LEAN, LEAN)
+        return SamplingRegion(
+            ends[:, :3].min(axis=0) - room, ends[:, :3].max(axis=0) + room, yaw=yaw, pitch=lean, roll=lean
+        )
+
+    def _condition(self) -> Condition:
+        """What cannot hold on reaches something to stand on: all but two of more than four such limbs."""
+        bearing = [
+            limb.name for limb in self._limbs
+            if self._kinds[limb.name] is not ContactKind.GRASP and not is_further(self._body, limb)
+        ]  # fmt: skip
+        least = len(bearing) if len(bearing) <= 4 else len(bearing) - 2
+        rule = LimbRule(tuple(bearing) if least == len(bearing) else (), least)
+        return Condition((rule,), dict.fromkeys(bearing, UsableSurface((0.0, 0.0, 1.0), STEEPEST)))
+
+
+def _limbs(body: BodyModel, names: tuple[str, ...]) -> tuple[Limb, ...]:
+    return tuple(limb_named(body, name) for name in names) if names else body.limbs
+
+
+def _kind(body: BodyModel, limb: Limb) -> ContactKind:
+    """A person's hands hold on; all other limbs touch in their own way."""
+    return ContactKind.GRASP if body.stature is not None and "hand" in limb.effector else limb.kind
+
+
+def _as_climbing(body: BodyModel, manner: str) -> FloatArray:
+    """(nq,) posture to be like: of a manner for a person, else standing."""
+    if body.stature is None:
+        return np.array(body.standing_posture())
+    return posture_style_of(manner).posture(body)
+
+
+def find_supports(
+    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
+) -> ContactSearch:
+    """Plan the contacts of a scenario that gives start and goal alone.
+
+    Args:
+        scenario: Without supports.
+        body: Its body.
+        scene: Its scene.
+        rng: Source of all randomness.
+
+    Raises:
+        BodyError: If the scenario names a limb that the body has not.
+    """
+    find = find_foot_contacts if scenario.contact_limbs is None else find_limb_contacts
+    return find(scenario, body, scene, rng)
+
+
+def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
+    """Plan the supports of a scenario that lists none; None where there are none.
+
+    Args:
+        context: Of a scenario without supports.
+        report: Takes the ``contacts`` block.
+
+    Raises:
+        ScenarioError: If contacts of any limbs are asked for without the refinement, which alone takes them.
+    """
+    scenario = context.scenario
+    if scenario.contact_limbs is not None and not scenario.refines:
+        raise scenario.error(("wholebody", "method"), "is follow; valid: refine, for contacts of any limbs")
+    report.progress("contacts", 0.0)
+    found = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
+    report.summary["contacts"] = dict(found.summary)
+    report.keep("contacts", found.to_dict(report.transform))
+    if found.plan is None:
+        report.fail("contacts", found.failure or "", where=found.where)
+        return None
+    planned = replace(context, plan=found.plan)
+    if not scenario.refines and found.scenario is not None:
+        planned = planned.with_supports(found.scenario)
+        report.keep_scenario(found.scenario)
+    report.progress("contacts", 1.0)
+    return planned

@@ -1,0 +1,478 @@
+"""What every stage of a run reads: the scenario with its body, its scene and what was found before.
+
+Everything here is in the frame of the task (:mod:`manikin.scenarios.placement`): the stages work there, and
+results are moved to the world where they leave, in :class:`~manikin.pipeline.stages.context.Report` and
+:class:`~manikin.pipeline.stages.context.RunResult`.
+
+Also here. What a run reports: its summary and verdict, the files of its directory, its progress. The outcome
+of one run. Results of a run in the world: what was found in the frame of the task, moved to where that is.
+
+The stages work in the frame of the task; what leaves through here is in the world.
+"""
+
+import re
+import time as clock
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from manikin.body import BodyModel
+from manikin.contact import Contact, ContactSchedule, Stance, StanceSequence
+from manikin.errors import ScenarioError
+from manikin.motion import Motion
+from manikin.motion.file import MotionFile, write_motions
+from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
+from manikin.numerics.spline import BSpline
+from manikin.pipeline.run_directory import MOTION, RunDirectory, other_motion
+from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
+from manikin.planning.contacts import ContactPlan
+from manikin.planning.whole_body import (
+    HeadClearance,
+    RefineResult,
+    WholeBodyResult,
+    WholeBodySettings,
+    measure_passage,
+)
+from manikin.planning.whole_body.posture_style import posture_style_of
+from manikin.runtime.requirement import RequirementTable
+from manikin.scenarios import Scenario
+from manikin.scene import Scene
+from manikin.simulation import Execution, Recovery
+
+_PLACE = re.compile(r"\[(-?\d[\d.e+-]*(?:, -?\d[\d.e+-]*){1,2})\]")
+"""A position as the stages write it into their reasons: two or three numbers in brackets."""
+
+
+def motion_in_world(motion: Motion, transform_task_to_world: PlanarTransform) -> Motion:
+    """A motion with its root, centre of mass, momentum and contact forces in the world."""
+    transform = transform_task_to_world
+    if transform.is_identity:
+        return motion
+    forces = motion.contact_force.reshape(*motion.contact_force.shape[:-1], 2, 3)
+    return replace(
+        motion,
+        q=transform.poses(motion.q),
+        com=transform.points(motion.com),
+        angular_momentum=transform.directions(motion.angular_momentum),
+        contact_force=transform.directions(forces).reshape(motion.contact_force.shape),
+    )
+
+
+def schedule_in_world(schedule: ContactSchedule, transform_task_to_world: PlanarTransform) -> ContactSchedule:
+    """Contacts in time, where they are in the world."""
+    if transform_task_to_world.is_identity:
+        return schedule
+    # A contact that several phases hold stays one.
+    moved: dict[int, Contact] = {}
+    phases = []
+    for phase in schedule.sequence:
+        for contact in phase.stance:
+            if id(contact) not in moved:
+                moved[id(contact)] = contact_in_world(contact, transform_task_to_world)
+        stance = Stance([moved[id(contact)] for contact in phase.stance], model=phase.stance.model)
+        phases.append(replace(phase, stance=stance))
+    return ContactSchedule(StanceSequence(phases), schedule.instants)
+
+
+def contact_in_world(contact: Contact, transform_task_to_world: PlanarTransform) -> Contact:
+    """A contact at its place in the world."""
+    rotation = transform_task_to_world.rotations(contact.rotation_contact_to_world)
+    return replace(
+        contact,
+        position=frozen_array(transform_task_to_world.points(contact.position), "contact position"),
+        rotation_contact_to_world=frozen_array(rotation, "contact rotation"),
+    )
+
+
+def trajectory_in_world(
+    trajectory: CentroidalTrajectory, transform_task_to_world: PlanarTransform
+) -> CentroidalTrajectory:
+    """A trajectory of the centre of mass with its contacts in the world."""
+    transform, spline, turning = transform_task_to_world, trajectory.spline, trajectory.turning
+    if transform.is_identity:
+        return trajectory
+    return replace(
+        trajectory,
+        spline=BSpline(spline.degree, spline.knots, transform.points(spline.control_points)),
+        schedule=schedule_in_world(trajectory.schedule, transform),
+        turning=None if turning is None
+        else BSpline(turning.degree, turning.knots, transform.directions(turning.control_points)),
+    )  # fmt: skip
+
+
+def reason_in_world(reason: str, transform_task_to_world: PlanarTransform) -> str:
+    """A reason in one line with the positions in it in the world.
+
+    Positions are what the stages write as two or three numbers in brackets, ``[1.2, 0.5]``; they keep their
+    number of digits.
+    """
+    if transform_task_to_world.is_identity:
+        return reason
+
+    def moved(found: re.Match[str]) -> str:
+        numbers = found[1].split(", ")
+        digits = max(len(number.partition(".")[2]) for number in numbers)
+        x, y = transform_task_to_world.points([float(number) for number in numbers[:2]])
+        return f"[{', '.join([str(round(float(value), digits) + 0.0) for value in (x, y)] + numbers[2:])}]"
+
+    return _PLACE.sub(moved, reason)
+
+
+@dataclass(frozen=True, eq=False)
+class RunContext:
+    """One job, in the frame of its task.
+
+    Attributes:
+        given: The scenario as it was given, in the world.
+        transform_task_to_world: From the frame of the task to the world.
+        scenario: With the supports that were found, where a file can list them.
+        body: Its body.
+        scene: Its scene.
+        scene_in_world: The scene that was given.
+        settings: Options of the whole-body stage.
+        problem: What the centre of mass is planned for; None as long as there are no supports.
+        plan: The contacts that were found from start and goal, or None.
+    """
+
+    given: Scenario
+    transform_task_to_world: PlanarTransform
+    scenario: Scenario
+    body: BodyModel
+    scene: Scene
+    scene_in_world: Scene
+    settings: WholeBodySettings
+    problem: CentroidalProblem | KeyframeProblem | None = None
+    plan: ContactPlan | None = None
+
+    @classmethod
+    def of(cls, scenario: Scenario, settings: WholeBodySettings | None = None) -> "RunContext":
+        """Build what a scenario describes, in the frame of its task.
+
+        Args:
+            scenario: In the world, with supports or without.
+            settings: Options of the whole-body stage; the defaults in the scenario's manner when omitted.
+
+        Raises:
+            ScenarioError: If the body, the scene or the supports cannot be built.
+        """
+        settings = settings or WholeBodySettings(manner=posture_style_of(scenario.manner))
+        body, scene = scenario.build_body(), scenario.build_scene()
+        if scenario.file.supports is not None:
+            scenario.check_contacts(scene)
+        transform, task = scenario.transform_task_to_world, scenario.in_task_frame()
+        bare = cls(scenario, transform, task, body, task.build_scene(), scene, settings)
+        return bare if task.file.supports is None else bare._posed(task)
+
+    def with_supports(self, scenario: Scenario) -> "RunContext":
+        """The same for a scenario with supports, whose problem is posed.
+
+        Args:
+            scenario: In the frame of the task.
+
+        Raises:
+            ScenarioError: If the supports do not fit the scene, or a value is out of range.
+        """
+        scenario.check_contacts(self.scene)
+        return self._posed(scenario)
+
+    def posed_problem(self) -> CentroidalProblem | KeyframeProblem:
+        """What the centre of mass is planned for.
+
+        Raises:
+            ScenarioError: If there are no supports yet.
+        """
+        if self.problem is None:
+            raise ScenarioError(f"scenario {self.scenario.name!r} has no supports; valid: with supports")
+        return self.problem
+
+    @property
+    def has_supports(self) -> bool:
+        """Whether the scenario lists supports."""
+        return self.scenario.file.supports is not None
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether the centre of mass follows the key frames of a recording."""
+        return isinstance(self.problem, KeyframeProblem)
+
+    @property
+    def padded(self) -> tuple[str, ...]:
+        """Names of the obstacles that any part of the body may lean on."""
+        return self.scenario.padded
+
+    @property
+    def known_postures(self) -> FloatArray | None:
+        """(n + 1, nq) postures of the contact plan, or None."""
+        return None if self.plan is None else self.plan.postures
+
+    def _posed(self, scenario: Scenario) -> "RunContext":
+        try:
+            problem = scenario.build_keyframe_problem() or scenario.build_centroidal_problem()
+        except ScenarioError as error:
+            raise ScenarioError(reason_in_world(str(error), self.transform_task_to_world)) from None
+        return replace(self, scenario=scenario, problem=problem)
+
+    def passage(self, schedule: ContactSchedule, motion: Motion) -> HeadClearance:
+        """How low the body comes, and how near its head to the scene."""
+        return measure_passage(self.body, self.scene, schedule, motion, self.padded)
+
+
+Progress = Callable[[str, float], None]
+"""Told the stage and the share of it that is done, in [0, 1]."""
+
+
+@dataclass(frozen=True)
+class StageFailure:
+    """Why a run ended without success.
+
+    Attributes:
+        stage: ``"contacts"``, ``"centroidal"``, ``"wholebody"``, ``"execution"`` or ``"push"``.
+        reason: In one line.
+        time_s: When in the motion [s].
+        where: Phase, contact, limb or pair.
+    """
+
+    stage: str
+    reason: str
+    time_s: float
+    where: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the ``failure`` block of the summary."""
+        return {"stage": self.stage, "reason": self.reason, "time_s": self.time_s, "where": self.where}
+
+
+class Report:
+    """Summary and files of one run; each is written as soon as it is known.
+
+    Attributes:
+        summary: As printed by ``manikin run --json``.
+        progress: Called with the stage and the share of it that is done.
+        failure: Why the run is no success so far, or None.
+        planned: Whether a plan keeps every requirement of its certificate; None for a run without a plan.
+        proved: Whether the body moved in the physics engine and kept every requirement.
+    """
+
+    def __init__(
+        self, context: RunContext, out: str | Path | None, progress: Progress | None, began: float
+    ) -> None:
+        """Open the run directory.
+
+        Args:
+            context: What is run.
+            out: Run directory; nothing is written when None.
+            progress: Told how far the run is, or None.
+            began: Reading of ``time.perf_counter`` when the run began [s].
+
+        Raises:
+            MotionFileError: If the directory cannot be made, or holds something that is not a run.
+        """
+        self._context, self._began = context, began
+        self.progress = progress or _silent
+        self.failure: StageFailure | None = None
+        self.planned: bool | None = False
+        self.proved = False
+        self._tables: dict[str, RequirementTable] = {}
+        self._directory = None if out is None else RunDirectory(out)
+        scenario = context.given
+        self._keep_scenario(scenario)
+        stature = None if scenario.is_point_mass else context.body.stature
+        self.summary: dict[str, Any] = {
+            "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
+            "verdict": "failed", "planned": False, "proved": False, "succeeded": False, "failure": None,
+            "requirements": [],
+            "contacts": None, "centroidal": None, "wholebody": None, "act": None, "execution": None,
+            "push": None, "walk": None,
+            "wall_s": 0.0,
+        }  # fmt: skip
+
+    @property
+    def transform(self) -> PlanarTransform:
+        """From the frame of the task to the world, where everything is that is kept."""
+        return self._context.transform_task_to_world
+
+    @property
+    def path(self) -> Path | None:
+        """The run directory, or None."""
+        return None if self._directory is None else self._directory.path
+
+    def fail(self, stage: str, reason: str, time: float = 0.0, where: str = "") -> None:
+        """Say why the run is no success.
+
+        Args:
+            stage: Stage that failed.
+            reason: In one line; positions in it, in the frame of the task, are moved to the world.
+            time: When in the motion [s].
+            where: Phase, contact, limb or pair.
+        """
+        self.failure = StageFailure(stage, reason_in_world(reason, self.transform), float(time), where)
+
+    def require(self, stage: str, table: RequirementTable) -> None:
+        """Take the requirements of a stage's result into the summary, in place of earlier ones.
+
+        Args:
+            stage: Stage whose result was measured.
+            table: Its requirements.
+        """
+        self._tables[stage] = table
+
+    def finish(self, stage: str, block: Mapping[str, Any]) -> None:
+        """Take a stage's block into the summary, and keep it."""
+        self.summary[stage] = dict(block)
+        self.keep(stage, block)
+
+    def keep(self, name: str, result: Mapping[str, Any]) -> None:
+        """Keep what a stage found among the files of the run."""
+        if self._directory is not None:
+            self._directory.write_stage(name, result)
+
+    def keep_scenario(self, scenario: Scenario) -> None:
+        """Keep a scenario of the task frame with the supports that were found, in the world."""
+        self._keep_scenario(scenario.from_task_frame(self.transform))
+
+    def keep_motions(
+        self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None
+    ) -> None:
+        """Keep the motions that there are so far, moved to the world."""
+        self._keep_motions(MOTION, schedule, planned, executed)
+
+    def keep_other(self, name: str, schedule: ContactSchedule, planned: Motion) -> None:
+        """Keep the motion of somebody else, who has the same body, moved to the world."""
+        self._keep_motions(other_motion(name), schedule, planned)
+
+    def close(self) -> dict[str, Any]:
+        """Complete the summary, write it and return it."""
+        self._judge()
+        failure, required = self.failure, self._context.scenario.execution_required
+        word = "failed" if failure is not None else "proved" if required else "planned"
+        self.summary |= {
+            "verdict": word, "planned": self.planned, "proved": self.proved, "succeeded": failure is None,
+            "failure": None if failure is None else failure.as_dict(),
+            "requirements": [
+                row.as_dict(stage) for stage, table in self._tables.items() for row in table
+            ],
+        }  # fmt: skip
+        self.summary["wall_s"] = clock.perf_counter() - self._began
+        if self._directory is not None:
+            self._directory.write_summary(self.summary)
+        return self.summary
+
+    def _judge(self) -> None:
+        """A run that broke a requirement, or did not come to what was asked for, has failed."""
+        for stage, table in self._tables.items():
+            if self.failure is None and (broken := table.first_broken) is not None:
+                self.fail(stage, broken.reason, broken.time_s or 0.0, broken.where)
+        required = self._context.scenario.execution_required
+        if self.failure is None and not (self.proved if required else self.planned):
+            stage = "execution" if required else "wholebody"
+            self.fail(stage, "the motion was not executed" if required else "there is no plan")
+
+    def _keep_scenario(self, scenario: Scenario) -> None:
+        if self._directory is not None:
+            self._directory.write_scenario(scenario.to_yaml())
+
+    def _keep_motions(
+        self, name: str, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None
+    ) -> None:
+        if self._directory is None:
+            return
+        transform = self.transform
+        content = MotionFile(
+            None if planned is None else motion_in_world(planned, transform),
+            None if executed is None else motion_in_world(executed, transform),
+            self._context.body,
+            self._context.scene_in_world,
+            schedule_in_world(schedule, transform),
+        )
+        write_motions(self._directory.path / name, content)
+
+
+def place(phase: int | None, where: str) -> str:
+    """Where something failed, in words: a phase with its contacts, or what there is of both."""
+    return where if phase is None else f"phase {phase}" + (f" on {where}" if where else "")
+
+
+def _silent(stage: str, share: float) -> None:
+    """Report progress to nobody."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunResult:
+    """Outcome of one run.
+
+    Attributes:
+        summary: As printed by ``manikin run --json``.
+        planned: Planned whole-body motion, or that of a point mass, in the world; None when there is none.
+        executed: Executed motion in the world, or None.
+        centroidal: Result of the centre-of-mass stage, or None where there was none; it and those of the
+            other stages are in the frame of the task.
+        wholebody: Result of the whole-body stage, or None.
+        execution: Result of the execution, or None.
+        directory: Where the files are, or None.
+        recovery: Result of a recovery from a push, or None.
+        transform_task_to_world: From the frame of the task to the world.
+    """
+
+    summary: dict[str, Any]
+    planned: Motion | None
+    executed: Motion | None
+    centroidal: CentroidalResult | None
+    wholebody: WholeBodyResult | RefineResult | None
+    execution: Execution | None
+    directory: Path | None
+    recovery: Recovery | None = None
+    transform_task_to_world: PlanarTransform = IDENTITY
+
+    @classmethod
+    def of(
+        cls,
+        report: Report,
+        centroidal: CentroidalResult | None = None,
+        wholebody: WholeBodyResult | RefineResult | None = None,
+        execution: Execution | None = None,
+        *,
+        planned: Motion | None = None,
+        recovery: Recovery | None = None,
+    ) -> "RunResult":
+        """Close the report of a run and gather what its stages returned.
+
+        Args:
+            report: Of the run.
+            centroidal: Of the centre of mass.
+            wholebody: Of the whole body.
+            execution: Of the physics engine.
+            planned: The planned motion, where no whole body was planned.
+            recovery: Of a recovery from a push.
+        """
+        executed = execution.motion if execution is not None else None
+        if recovery is not None:
+            executed = recovery.trace.motion
+        planned = planned if wholebody is None else wholebody.motion
+        transform = report.transform
+        return cls(
+            report.close(),
+            None if planned is None else motion_in_world(planned, transform),
+            None if executed is None else motion_in_world(executed, transform),
+            centroidal,
+            wholebody,
+            execution,
+            report.path,
+            recovery,
+            transform,
+        )
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether what the scenario asks for is proved, or for ``execution: none`` planned."""
+        return bool(self.summary["succeeded"])
+
+    @property
+    def verdict(self) -> str:
+        """``"proved"``, ``"planned"`` (a planned-only job that succeeded) or ``"failed"``."""
+        return str(self.summary["verdict"])
+
+    @property
+    def motion(self) -> Motion | None:
+        """The executed motion, or else the planned one."""
+        return self.executed if self.executed is not None else self.planned

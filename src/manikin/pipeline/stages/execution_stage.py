@@ -1,0 +1,313 @@
+"""The execution stage: the planned motion under control in the physics engine, and its report.
+
+Also here. What an executed motion must keep. The act at the end of a scenario's motion: certified, appended
+to the motion, measured. A planned motion with its contacts in time, as it is handed to the physics engine.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from manikin.balance.contact_forces import FrictionUse, friction_share, friction_use
+from manikin.contact import ContactKind, ContactSchedule, FrictionModel
+from manikin.control import ControlSettings, ReturnSettings, SupportSettings
+from manikin.motion import Motion
+from manikin.pipeline.stages.context import Report, RunContext, StageFailure, place
+from manikin.planning.push_pull import (
+    Act,
+    ActKind,
+    BracedForces,
+    PlannedAct,
+    largest_force,
+    measure_act,
+    plan_act,
+    share_force,
+)
+from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
+from manikin.scenarios import Scenario
+from manikin.simulation import Execution, Push, execute, push_on_the_way
+from manikin.simulation.execution import BACK
+
+
+@dataclass(frozen=True)
+class ExecutionRequirements:
+    """What an executed motion must keep to count as a success.
+
+    Attributes:
+        com_rms_error: Root mean square distance of the CoM from its plan [m].
+        foot_error: Largest distance of an effector from its plan [m].
+        margin: Least margin, exclusive [N.m].
+        penetration: Deepest penetration of hard contacts [m]; ``padding_compression`` where the motion
+            ends on a seat, whose impact shakes every contact.
+        padding_compression: Deepest one of padded obstacles, which give way [m].
+    """
+
+    com_rms_error: float = 0.015
+    foot_error: float = 0.02
+    margin: float = 0.0
+    penetration: float = 0.005
+    padding_compression: float = 0.01
+
+    def table(self, execution: Execution, seated: bool = False) -> RequirementTable:
+        """Every requirement with its measured value.
+
+        Where what was measured does not say when, the time is that of the least margin. A body that was
+        pushed is out of balance and off its plan for a while; it has to be back on it at the end.
+
+        Args:
+            execution: What happened.
+            seated: Whether the motion ends on a seat.
+        """
+        rest = self._followed(execution, seated) if execution.push is None else self._returned(execution)
+        return requirement_table([*_kept_standing(execution), *rest])
+
+    def _followed(self, execution: Execution, seated: bool) -> list[Requirement | None]:
+        """Of a body that nothing disturbs."""
+        deepest = self.padding_compression if seated else self.penetration
+        thinnest = float(execution.motion.time[int(np.argmin(execution.motion.margin))])
+        pressed = execution.max_padding_compression_m > 0.0
+        return [
+            Requirement("min_margin", "executed margin", execution.motion.margin_unit, execution.min_margin,
+                        ">", self.margin, thinnest),
+            Requirement("com_rms_error_m", "RMS error of the centre of mass", "m",
+                        execution.com_rms_error_m, "<=", self.com_rms_error, thinnest),
+            Requirement("max_foot_error_m", "error", "m", execution.max_foot_error_m, "<=", self.foot_error,
+                        execution.worst_effector_time_s, execution.worst_effector),
+            Requirement("max_penetration_m", "penetration", "m", execution.max_penetration_m, "<=", deepest,
+                        thinnest),
+            Requirement("max_padding_compression_m", "compression of padding", "m",
+                        execution.max_padding_compression_m, "<=", self.padding_compression, thinnest)
+            if pressed else None,
+        ]  # fmt: skip
+
+    def _returned(self, execution: Execution) -> list[Requirement | None]:
+        """Of a body that was pushed: what it has to come back to."""
+        push, end = execution.push, float(execution.motion.time[-1])
+        if push is None:
+            return []
+        return [
+            Requirement("final_com_error_m", "distance of the centre of mass from its plan at the end", "m",
+                        execution.final_com_error_m, "<=", BACK, end),
+            Requirement("max_foot_deviation_m", "distance of an effector from its plan at the end", "m",
+                        push.max_foot_deviation_m, "<=", self.foot_error, end),
+        ]  # fmt: skip
+
+
+def _kept_standing(execution: Execution) -> list[Requirement]:
+    """The body does not fall, and nothing touches that should not."""
+    touches = execution.counted_touches
+    first = touches[0] if touches else None
+    return [
+        Requirement("fell", "falls", "", float(execution.fell), "<=", 0.0,
+                    execution.failure_time_s if execution.fell else None),
+        Requirement("unplanned_touches", "unplanned touches", "", float(len(touches)), "<=", 0.0,
+                    None if first is None else first.time,
+                    "" if first is None else f"{first.segment} on {first.other}"),
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedMotion:
+    """What is to be executed.
+
+    Attributes:
+        schedule: Contacts in time.
+        motion: All joints.
+        act: The act at the end of both, or None.
+    """
+
+    schedule: ContactSchedule
+    motion: Motion
+    act: PlannedAct | None = None
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample [s]."""
+        return float(self.motion.time[-1])
+
+
+def use_of_friction(schedule: ContactSchedule, motion: Motion) -> dict[str, float | str]:
+    """Largest use of friction by the contact forces of a planned motion, for the run's summary."""
+    return friction_use(schedule, motion.time, motion.contact_names, motion.contact_force).summary()
+
+
+FORCE_ERROR = 0.05
+"""Largest error of the mean force that was exerted, as a share of what is wanted."""
+
+
+def act_of(scenario: Scenario) -> Act | None:
+    """The act of a scenario, or None."""
+    found = scenario.act
+    if found is None:
+        return None
+    return Act(ActKind(found.kind), found.on, found.direction, found.force_N)
+
+
+def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> PlannedMotion:
+    """A motion with the scenario's act at its end; as it is without one, or where it cannot be done.
+
+    The last posture is certified for the act first.
+
+    Args:
+        context: Of the run.
+        report: Takes the ``act`` block.
+        planned: The motion to the place of the act.
+    """
+    act, section = act_of(context.scenario), context.scenario.act
+    if act is None or section is None:
+        return planned
+    q, contacts = planned.motion.q[-1], list(planned.schedule.sequence[-1].stance)
+    rub = context.scenario.explicit_supports().friction, context.scenario.contact_model.friction
+    largest = largest_force(context.body, q, contacts, act, *rub)
+    forces = share_force(context.body, q, contacts, act, *rub)
+    used = _used_friction(planned, forces, context.scenario.contact_model.friction)
+    report.finish("act", _summary(act, largest, forces) | {"friction": used})
+    if forces is not None:
+        report.require("act", RequirementTable((
+            Requirement("max_torque_share", "share of a torque limit in the act", "", forces.torque_share,
+                        "<=", 1.0, planned.end, forces.tightest),
+        )))  # fmt: skip
+    if forces is None or forces.torque_share > 1.0:
+        weak = "friction and balance allow" if forces is None else f"{forces.tightest} allows"
+        reason = f"the last posture cannot {act.kind} with {act.force:g} N: {weak} less"
+        report.planned = False
+        report.fail("wholebody", reason, planned.end, act.obstacle)
+        return planned
+    acting = plan_act(planned.motion, planned.schedule, forces, section.ramp_s, section.hold_s)
+    report.keep_motions(acting.schedule, acting.motion)
+    return PlannedMotion(acting.schedule, acting.motion, acting)
+
+
+def measured_act_failure(
+    context: RunContext, report: Report, planned: PlannedMotion, executed: Motion
+) -> StageFailure | None:
+    """Add what was exerted to the report; a failure where it is too little or too much, or nothing.
+
+    Args:
+        context: Of the run.
+        report: Has the ``act`` block.
+        planned: The motion, with its act or without one.
+        executed: What the physics engine made of it.
+    """
+    act, acting = act_of(context.scenario), planned.act
+    if act is None or acting is None:
+        return None
+    friction = context.scenario.explicit_supports().friction
+    found = measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
+    if found is None:
+        return StageFailure(
+            "execution", "the motion did not come to its act", acting.timing.end, act.obstacle
+        )
+    report.finish("act", report.summary["act"] | found.summary())
+    row = Requirement("mean_force_error_N", "error of the mean force", "N", abs(found.mean_force - act.force),
+                      "<=", FORCE_ERROR * act.force, acting.timing.end, act.obstacle)  # fmt: skip
+    report.require("act execution", RequirementTable((row,)))
+    if not row.held:
+        reason = f"the mean force was {found.mean_force:.0f} N; wanted {act.force:g} N"
+        return StageFailure("execution", reason, acting.timing.end, act.obstacle)
+    return None
+
+
+def _used_friction(
+    planned: PlannedMotion, forces: BracedForces | None, model: FrictionModel
+) -> dict[str, float | str] | None:
+    """Largest share of the friction that the feet use while they act."""
+    if forces is None:
+        return None
+    feet = [
+        (float(friction_share(contact, force[None, :3], model)[0]), contact.effector)
+        for contact, force in zip(planned.schedule.sequence[-1].stance, forces.contact_force, strict=True)
+        if contact.kind is not ContactKind.GRASP
+    ]
+    share, effector = max(feet)
+    return FrictionUse(model, share, planned.end, effector).summary()
+
+
+def _summary(act: Act, largest: BracedForces | None, forces: BracedForces | None) -> dict[str, Any]:
+    return {
+        "kind": str(act.kind), "on": act.obstacle, "wanted_force_N": act.force,
+        "largest_force_N": 0.0 if largest is None else largest.force,
+        "max_torque_share": None if forces is None else forces.torque_share,
+        "tightest_joint": None if forces is None else forces.tightest,
+        "equilibrium_residual": None if forces is None else forces.residual,
+    }  # fmt: skip
+
+
+def execute_motion(
+    context: RunContext, report: Report, planned: PlannedMotion, requirements: ExecutionRequirements
+) -> Execution:
+    """Execute a motion, with the scenario's push and its act, and measure what became of it.
+
+    A body that may be pushed is ready for it, but not told when or whence; see
+    :mod:`manikin.control.plan_return`.
+
+    Args:
+        context: Of the run.
+        report: Takes the ``execution`` block, and the failure of a motion that broke a requirement.
+        planned: What is executed.
+        requirements: What the execution must keep.
+    """
+    scenario, act = context.scenario, planned.act
+    # The share of the friction that planning keeps to, where it has its own, holds in control too.
+    settings = ControlSettings(
+        supports=SupportSettings(friction_share=scenario.friction_share),
+        returning=None if scenario.push is None else ReturnSettings(),
+    )
+    result = execute(
+        context.body, context.scene, planned.motion, planned.schedule,
+        pushes=_pushes(scenario, planned.motion), padded=context.padded, settings=settings,
+        wishes=() if act is None else act.wishes,
+        progress=lambda share: report.progress("execution", share),
+    )  # fmt: skip
+    table = requirements.table(result, scenario.seated_from is not None)
+    report.require("execution", table)
+    fallen = _failure(planned.schedule, result, table)
+    exerted = measured_act_failure(context, report, planned, result.motion)
+    failure = exerted if fallen is None else fallen
+    block = {
+        "required": True,
+        "failure": None if failure is None else failure.as_dict(),
+        **_summary_in_world(result, report),
+        **context.passage(result.schedule or planned.schedule, result.motion).summary(),
+    }
+    report.finish("execution", block)
+    report.proved = failure is None
+    if failure is not None:
+        report.fail(failure.stage, failure.reason, failure.time_s, failure.where)
+    report.keep_motions(planned.schedule, planned.motion, result.motion)
+    return result
+
+
+def _summary_in_world(result: Execution, report: Report) -> dict[str, Any]:
+    block = result.summary()
+    if block["push"] is not None:
+        block["push"] |= {"direction_deg": report.transform.turned(block["push"]["direction_deg"])}
+    return block
+
+
+def _failure(schedule: ContactSchedule, result: Execution, table: RequirementTable) -> StageFailure | None:
+    """What the execution itself did not keep, or None."""
+    broken = table.first_broken
+    if result.failure:
+        reason, time = result.failure, float(result.failure_time_s or 0.0)
+    elif broken is not None:
+        reason, time = broken.reason, broken.time_s or 0.0
+    else:
+        return None
+    phase = int((result.schedule or schedule).phase_at(time))
+    held = ", ".join(schedule.sequence[phase].stance.effectors)
+    return StageFailure("execution", reason, time, place(phase, held))
+
+
+def _pushes(scenario: Scenario, motion: Motion) -> tuple[Push, ...]:
+    """The push that a scenario asks for, its direction seen from where the body faces then."""
+    push = scenario.push
+    if push is None:
+        return ()
+    scenario.check_push(float(motion.time[-1]))
+    return (
+        push_on_the_way(
+            motion, push.force_N, push.direction_deg, push.at_s, push.duration_s, push.frequency_hz or 0.0
+        ),
+    )

@@ -1,0 +1,127 @@
+"""The recovery stage: a standing body is pushed and keeps its balance, in the physics engine."""
+
+import math
+from dataclasses import replace
+from itertools import groupby
+
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
+from manikin.control.recovery import RecoverySettings
+from manikin.errors import InputError, ScenarioError
+from manikin.numerics.spatial import rotation_from_yaw
+from manikin.pipeline.stages.context import Report, RunContext
+from manikin.scenarios import Scenario
+from manikin.scenarios.sections.task_sections import PushSection, RecoverySection
+from manikin.simulation import (
+    Feet,
+    PushTrials,
+    Recovery,
+    RecoveryTask,
+    feet_apart_posture,
+    one_foot_posture,
+    push_near_com,
+    recover,
+)
+
+STAGE = "push"
+
+
+def recover_from_push(context: RunContext, report: Report) -> Recovery:
+    """Push the body of a scenario with a ``recovery`` section and measure what becomes of it.
+
+    Args:
+        context: Of the run.
+        report: Takes the ``push`` block, and the failure where the body does not stand in the end.
+
+    Raises:
+        ScenarioError: If there is nothing to recover from, or the push is not usable.
+    """
+    scenario, body = context.scenario, context.body
+    section, push = _sections(scenario)
+    force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
+    task, settings = _task(scenario, section, body), _settings(section)
+    try:
+        one = push_near_com(
+            body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
+        )
+    except InputError as error:
+        raise scenario.refused(("push",), error) from None
+    task = replace(task, pushes=(one,))
+    found = recover(
+        body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
+    )
+    report.finish(STAGE, found.summary() | _bound(body, task, settings, found))
+    report.require(STAGE, found.requirements)
+    report.planned, report.proved = None, found.recovered
+    if found.failure:
+        report.fail(STAGE, found.failure, float(found.trace.motion.time[-1]), f"feet {section.feet}")
+    report.keep_motions(_schedule(found), None, found.trace.motion)
+    return found
+
+
+def push_trials(scenario: Scenario) -> PushTrials:
+    """The body and stance of a scenario with a ``recovery`` section, to be pushed from any direction.
+
+    Of its push only the duration and the beginning are taken over; the ground is level and empty.
+
+    Raises:
+        ScenarioError: If there is nothing to recover from.
+    """
+    section, push = _sections(scenario)
+    body = scenario.build_body()
+    return PushTrials(body, _task(scenario, section, body), _settings(section), push.duration_s, push.at_s)
+
+
+def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
+    if scenario.recovery is None or scenario.push is None:
+        raise ScenarioError(f"scenario {scenario.name!r} has no recovery; valid: recovery and push")
+    return scenario.recovery, scenario.push
+
+
+def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> RecoveryTask:
+    """The stance, without a push."""
+    task = RecoveryTask(
+        (), Feet(section.feet), section.duration_s, friction=section.friction, steps=section.steps
+    )
+    if section.support == "both":
+        if section.feet_apart_m is None:
+            return task
+        try:
+            return replace(task, q=feet_apart_posture(body, section.feet_apart_m))
+        except InputError as error:
+            raise scenario.refused(("recovery", "feet_apart_m"), error) from None
+    foot = f"{section.support}_foot"
+    try:
+        return replace(task, q=one_foot_posture(body, foot), support=(foot,))
+    except InputError as error:
+        raise scenario.refused(("recovery", "support"), error) from None
+
+
+def _settings(section: RecoverySection) -> RecoverySettings:
+    return RecoverySettings(
+        delay=section.delay_s, locked=tuple(section.locked), strength=section.strength,
+        posture_control_only=section.posture_control_only, ankle_stiffness=section.ankle_stiffness,
+        sole_inset=section.sole_inset_m,
+    )  # fmt: skip
+
+
+def _bound(
+    body: BodyModel, task: RecoveryTask, settings: RecoverySettings, found: Recovery
+) -> dict[str, float | None]:
+    """Upper bound of the impulse that free feet hold without a step, for one push that is no sine."""
+    if len(task.pushes) != 1 or task.pushes[0].frequency > 0.0:
+        return {"bound_Ns": None}
+    direction = math.degrees(math.atan2(found.direction[1], found.direction[0]))
+    bound = PushTrials(body, task, settings, task.pushes[0].duration).bound([direction])
+    return {"bound_Ns": None if bound is None else bound[0]}
+
+
+def _schedule(found: Recovery) -> ContactSchedule:
+    """The feet that carried, in time."""
+    time, standings = found.trace.motion.time, found.trace.standings
+    phases, instants, first = [], [float(time[0])], 0
+    for standing, run in groupby(standings):
+        first += len(list(run))
+        phases.append(Phase(Stance(standing.soles)))
+        instants.append(float(time[min(first, len(time) - 1)]))
+    return ContactSchedule(StanceSequence(phases), instants)

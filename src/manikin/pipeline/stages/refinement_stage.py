@@ -1,0 +1,144 @@
+"""The whole-body stage by refinement: from postures at the changes of contact to a motion and its report.
+
+Also here. What the refinement begins with: contacts in time and a posture at each of their changes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.contact import ContactModel, ContactSchedule
+from manikin.numerics.spatial import FloatArray
+from manikin.pipeline.stages.context import Report, RunContext
+from manikin.pipeline.stages.execution_stage import use_of_friction
+from manikin.planning.contacts import ContactPlan
+from manikin.planning.whole_body import KeyPostures, RefineResult, RefineScales, RefineSettings, refine_motion
+from manikin.planning.whole_body.refine_input import KeyPath
+from manikin.planning.whole_body.swing_planner import with_mid_flights
+from manikin.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class KeyedContacts:
+    """What the refinement begins with.
+
+    Attributes:
+        schedule: Contacts in time.
+        time: (n,) key times [s].
+        q: (n, nq) postures at them.
+    """
+
+    schedule: ContactSchedule
+    time: FloatArray
+    q: FloatArray
+
+    @classmethod
+    def of_plan(cls, plan: ContactPlan, model: ContactModel) -> "KeyedContacts":
+        """A contact plan, every phase as long as it has to be at least.
+
+        Args:
+            plan: Found from start and goal.
+            model: Contact model of every stance.
+        """
+        schedule = plan.schedule(model)
+        return cls(schedule, *plan.keys(schedule.instants))
+
+    @classmethod
+    def of_postures(cls, schedule: ContactSchedule, postures: KeyPostures) -> "KeyedContacts":
+        """Postures found at the key instants of a planned centre of mass, with its timing."""
+        return cls(schedule, schedule.instants, np.array([item.q for item in postures.postures]))
+
+    def at_pace(self, pace: float) -> "KeyedContacts":
+        """The same with everything ``pace`` times as fast."""
+        schedule = ContactSchedule(self.schedule.sequence, self.schedule.instants / pace)
+        return KeyedContacts(schedule, self.time / pace, self.q)
+
+    def with_lifted_feet(self, body: BodyModel, scene: Scene, padded: Sequence[str]) -> "KeyedContacts":
+        """The same with postures between, see ``with_mid_flights``."""
+        path = with_mid_flights(body, scene, self.schedule, KeyPath(self.time, self.q), padded)
+        return KeyedContacts(self.schedule, path.time, path.q)
+
+
+def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -> RefineResult:
+    """Refine the motion through key postures, at the scenario's pace.
+
+    Args:
+        context: Of the run.
+        report: Takes the ``wholebody`` block.
+        keyed: Contacts with a posture at each change.
+    """
+    body, scene, padded = context.body, context.scene, context.padded
+    keyed = keyed.at_pace(context.scenario.pace).with_lifted_feet(body, scene, padded)
+    options = context.scenario.file.wholebody
+    settings = RefineSettings(
+        scales=RefineScales.of(body),
+        contact_variables=options.contact_variables,
+        speed_share=options.speed_share,
+    )
+    result = refine_motion(
+        body, scene, keyed.time, keyed.q, keyed.schedule, settings=settings,
+        padded=padded, progress=lambda share: report.progress("wholebody", share),
+    )  # fmt: skip
+    passage = context.passage(result.schedule, result.motion).summary()
+    used = {"friction": use_of_friction(result.schedule, result.motion)}
+    block = refined_summary(result) | passage | used | {"seed_matters": context.plan is not None}
+    report.finish("wholebody", block)
+    report.require("wholebody", result.requirements)
+    report.planned = result.succeeded
+    if result.failure is not None:
+        report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
+    report.keep_motions(result.schedule, result.motion)
+    return result
+
+
+def refined_summary(result: RefineResult) -> dict[str, Any]:
+    """Return the ``wholebody`` block of the summary of a refined motion."""
+    certificate = result.certificate
+    return {
+        "method": "refine",
+        "duration_s": result.after.duration_s,
+        "max_support_error_m": certificate.max_support_error_m,
+        "max_meeting_error_m": None,
+        "max_com_error_m": None,
+        "min_clearance_m": certificate.min_clearance_m,
+        "closest_pair": list(certificate.closest_pair),
+        "max_scuff_m": certificate.max_penetration_m,
+        "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
+        "max_velocity_share": certificate.max_velocity_share,
+        "max_torque_share": certificate.max_torque_share,
+        "max_torque_joint": certificate.tightest_joint,
+        "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
+        "impacts": [],
+        "min_margin": certificate.min_margin,
+        "min_force_at_com_N": certificate.min_force_at_com_N,
+        "min_zmp_distance_m": certificate.min_zmp_distance_m,
+        "swings": None,
+        "refinement": {
+            "min_contact_slack": result.contact_slack,
+            "max_physics_violation_N": certificate.max_physics_violation,
+            "physics_violation_falls": _fall(
+                result.before.physics_violation, result.after.physics_violation
+            ),
+            "squared_accelerations_fall": _fall(
+                result.before.squared_accelerations, result.after.squared_accelerations
+            ),
+            "before": result.before.as_dict(),
+            "smoothed": result.smoothed.as_dict(),
+            "after": result.after.as_dict(),
+            "least_contact_variable": min(
+                (value for phase in result.variables for value in phase.values()), default=None
+            ),
+            "released_contacts": [{"phase": phase, "effector": name} for phase, name in result.released],
+            "stretch": result.stretch,
+            "iterations": result.iterations,
+        },
+        "wall_s": result.wall_time,
+    }  # fmt: skip
+
+
+def _fall(before: float, after: float) -> float | None:
+    """How many times less there is after; None where nothing is left."""
+    return before / after if after > 0.0 else None

@@ -1,0 +1,443 @@
+"""The walking stage: ways over the floor, then the whole body along them.
+
+Also here. A walk as a motion with its supports, forces and margins. A walk on footprints: the way over the
+floor first, then supports along it, for the stages that follow.
+"""
+
+import itertools
+import math
+import time as clock
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.balance import wrench_polytopes
+from manikin.balance.motion_forces import full_motion
+from manikin.contact import (
+    Contact,
+    ContactSchedule,
+    Phase,
+    Stance,
+    StanceSequence,
+    default_normal_force_cap,
+    sole,
+)
+from manikin.errors import BodyError, InputError
+from manikin.motion import Motion
+from manikin.numerics.signals import low_passed
+from manikin.numerics.spatial import FloatArray, PlanarTransform
+from manikin.pipeline.run_directory import BODY, WALK_PATHS
+from manikin.pipeline.stages.context import Report, RunContext
+from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF
+from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
+from manikin.scenarios import Scenario
+from manikin.scenarios.planned import walk_before, walking_supports
+from manikin.scenarios.sections import StandSection, WalkingSection, WaypointSection
+from manikin.scenarios.sequence import flat_sequence
+from manikin.scenarios.validation import Path as KeyPath
+from manikin.walking import (
+    LITERAL_ORDER,
+    PROSE_ORDER,
+    RECORDED_TURNS,
+    RECORDED_WALKS,
+    Footprints,
+    StepRule,
+    Walk,
+    Walker,
+    WalkingPath,
+    WalkObjective,
+    WalkObstacle,
+    WalkRoute,
+    Waypoint,
+    floor_plan,
+    place_footprints,
+    walk_along,
+    walked_footprints,
+    walking_route,
+)
+from manikin.walking.footsteps.footprints import FEET
+from manikin.walking.path.walk_obstacles import clearance
+from manikin.walking.path.walking_path import TOLERANCE
+
+FRICTION = 0.8
+"""Of the soles of one who walks."""
+
+
+def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
+    """Supports of a walk in time, and its motion with what the ground has to do for it.
+
+    The motion is that of recorded people, carried over to another body, so that its margin may be negative
+    and its torques may leave a rest on the pelvis: both say how far this body is from walking like that.
+    Velocities are low-passed as those of recordings are, since accelerations follow from them.
+
+    Args:
+        walk: Of a body along a path.
+        height: Of the floor [m].
+    """
+    schedule, motion = walked_schedule(walk, height), walk.motion
+    polytopes = wrench_polytopes([phase.stance for phase in schedule.sequence])
+    rate = (len(motion.time) - 1) / motion.duration
+    v = low_passed(motion.v, MOTION_CUTOFF, rate, padding=9)
+    a = np.gradient(v, 1.0 / rate, axis=0)
+    full, _ = full_motion(walk.body, schedule, polytopes, motion.time, motion.q, v, a)
+    return schedule, full
+
+
+def walked_schedule(walk: Walk, height: float) -> ContactSchedule:
+    """Whole soles where the feet are in the middle of each support, level on a floor of a height [m]."""
+    held = [_contacts(walk, foot, height) for foot in range(walk.support.shape[1])]
+    cap = default_normal_force_cap(walk.body.mass)
+    changes = 1 + np.flatnonzero(np.any(np.diff(walk.support[:-1], axis=0), axis=1))
+    rows = [0, *changes.tolist(), len(walk.time) - 1]
+    phases = [
+        Phase(Stance([contacts[row] for contacts in held if row in contacts], cap), end - start, end - start)
+        for row, (start, end) in zip(rows, itertools.pairwise(walk.time[rows].tolist()), strict=False)
+    ]
+    return ContactSchedule(StanceSequence(phases), walk.time[rows])
+
+
+def _contacts(walk: Walk, foot: int, height: float) -> dict[int, Contact]:
+    """The contact of a foot by the frames in which it stands; one and the same in each support."""
+    body, name = walk.body, walk.feet[foot]
+    if body.sole_length is None or body.sole_width is None:
+        raise BodyError(f"body {body.name!r} has no soles; valid: a human")
+    data, frame = body.pinocchio.createData(), body.effector_frame(name)
+    standing = np.flatnonzero(walk.support[:, foot])
+    contacts: dict[int, Contact] = {}
+    for rows in np.split(standing, 1 + np.flatnonzero(np.diff(standing) > 1)):
+        pin.forwardKinematics(body.pinocchio, data, walk.q[rows[len(rows) // 2]])
+        place = pin.updateFramePlacement(body.pinocchio, data, frame)
+        made = sole(
+            name, [*place.translation[:2], height], math.atan2(place.rotation[1, 0], place.rotation[0, 0]),
+            length=body.sole_length, width=body.sole_width, friction=FRICTION,
+        )  # fmt: skip
+        contacts |= dict.fromkeys(rows.tolist(), made)
+    return contacts
+
+
+def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None:
+    """Put footprints along the way of a walking scenario; None where there is no way.
+
+    With supports the walk leads from ``walking.start`` to the feet of their first phase, without them from
+    start to goal.
+
+    Args:
+        context: Of a scenario with a planned walk.
+        report: Takes the ``walk`` block and the scenario with the supports, and the failure where there is
+            no way.
+
+    Raises:
+        ScenarioError: If the way cannot be asked for, or its end does not fit the first phase.
+    """
+    scenario = context.scenario
+    stance = None if scenario.file.supports is None else _first_stance(scenario)
+    start, goal = _ends(scenario, stance)
+    plan = plan_walks(context, start, goal)
+    keep_paths(report, plan)
+    if not plan.route.succeeded:
+        report.fail(STAGE, plan.route.failure or "", where="way of the body")
+        report.finish(STAGE, path_block(plan))
+        return None
+    path, bare = plan.route.legs[0], scenario.replaced(walking=None)
+    rule = StepRule().scaled(context.body.stature or 1.75)
+    height = context.scene.floor_height or 0.0
+    try:
+        if stance is None:
+            footprints = _along(path, rule, height, context)
+            walked = walking_supports(footprints, bare)
+        else:
+            rule = replace(rule, standing_width=_apart(stance))
+            footprints = _ending_for(scenario, [
+                place_footprints(path, rule, first=first, height=height) for first in FEET
+            ])  # fmt: skip
+            walked = walk_before(footprints, bare)
+    except InputError as error:
+        raise scenario.refused(("walking",), error) from None
+    report.finish(STAGE, path_block(plan) | {"steps": footprints.count})
+    report.keep_scenario(walked)
+    return replace(context, body=walked.build_body()).with_supports(walked)
+
+
+def _along(path: WalkingPath, rule: StepRule, height: float, context: RunContext) -> Footprints:
+    """By the rule, or where the feet of the library's walk stand."""
+    section = context.scenario.walking
+    if section is None or section.footprints == "stepper":
+        return place_footprints(path, rule, height=height)
+    return walked_footprints(walk_along(path, context.body, height=height), rule, height=height)
+
+
+def _ends(scenario: Scenario, stance: dict[str, tuple[FloatArray, float]] | None) -> tuple[FloatArray, ...]:
+    """(3,) places from where to where the body walks."""
+    section = scenario.walking
+    if stance is None or section is None or section.start is None:
+        return end_of(scenario, "start"), end_of(scenario, "goal")
+    middle = np.mean([position[:2] for position, _ in stance.values()], axis=0)
+    turns = np.exp(1j * np.array([yaw for _, yaw in stance.values()]))
+    return place_of(section.start), np.append(middle, np.angle(turns.sum()))
+
+
+def _first_stance(scenario: Scenario) -> dict[str, tuple[FloatArray, float]]:
+    """Position [m] and yaw [rad] of each foot in the first phase of the supports."""
+    held = {contact.effector: contact for contact in flat_sequence(scenario)[0].stance}
+    missing = [foot for foot in FEET if foot not in held]
+    if missing:
+        raise scenario.error(
+            ("supports", "phases", 0), f"has no {missing[0]}; valid for a walk to it: both feet"
+        )
+    return {foot: (held[foot].position, held[foot].yaw) for foot in FEET}
+
+
+def _apart(stance: dict[str, tuple[FloatArray, float]]) -> float:
+    (left, _), (right, _) = (stance[foot] for foot in FEET)
+    return float(np.hypot(*(left - right)[:2]))
+
+
+def _ending_for(scenario: Scenario, choices: list[Footprints]) -> Footprints:
+    """The walk whose last step is that of the foot that stays when the plan goes on; the shorter of two."""
+    phases = scenario.explicit_supports().resolved_phases()
+    stays = [foot for foot in FEET if len(phases) > 1 and phases[1].get(foot) == phases[0][foot]]
+    fitting = [one for one in choices if one.steps[-1].effector in stays] or choices
+    return min(fitting, key=lambda one: one.duration)
+
+
+STAGE = "walk"
+
+PATH_EVERY = 5
+"""Instants of a route for each one that is kept."""
+
+CLOCK = 0.01
+"""Step of the common clock on which distances of walkers are measured [s]."""
+
+ROOM_TOLERANCE = 1e-3
+"""The path keeps its room at the instants of its optimisation; between them it may miss this much [m]."""
+
+STANCE_SLIDE = 1e-3
+"""A foot on the ground moves by at most this, as a planned support does [m]."""
+
+OBJECTIVES = {
+    "prose": PROSE_ORDER, "literal": LITERAL_ORDER,
+    "recorded": RECORDED_WALKS, "recorded-turns": RECORDED_TURNS,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedWalks:
+    """Ways of all who walk in a scenario.
+
+    Attributes:
+        route: Of the scenario's body.
+        others: Of the others, by name.
+        obstacles: What stands there, and the others.
+        wall_s: Time in which the body's own route was found [s].
+    """
+
+    route: WalkRoute
+    others: dict[str, WalkRoute]
+    obstacles: tuple[WalkObstacle, ...]
+    wall_s: float
+
+
+def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
+    """Find the ways of all who walk in a scenario, and walk them; None where there is no way.
+
+    Args:
+        context: Of a scenario with a ``walking`` section.
+        report: Takes the ``walk`` block, and the failure where there is no way.
+    """
+    plan = plan_walks(context)
+    keep_paths(report, plan)
+    report.progress(STAGE, 0.5)
+    height, block = context.scene.floor_height or 0.0, path_block(plan)
+    for name, route in plan.others.items():
+        if not route.succeeded:
+            report.fail(STAGE, f"way of {name}: {route.failure}", where=name)
+    if not plan.route.succeeded:
+        report.fail(STAGE, plan.route.failure or "", plan.route.begins[-1], "way of the body")
+    if report.failure is not None:
+        report.finish(STAGE, block)
+        return None
+    began = clock.perf_counter()
+    walk = walk_along(plan.route, context.body, height=height)
+    block |= _walk_block(walk, clock.perf_counter() - began)
+    schedule, motion = walked_motion(walk, height)
+    report.finish(STAGE, block | _balance_block(motion))
+    report.require(STAGE, _requirements(context, plan, walk))
+    report.planned = True
+    report.keep_motions(schedule, motion)
+    for number, (name, route) in enumerate(plan.others.items()):
+        report.keep_other(name, *walked_motion(walk_along(route, context.body, height=height), height))
+        report.progress(STAGE, 0.6 + 0.4 * (number + 1) / len(plan.others))
+    report.progress(STAGE, 1.0)
+    return motion
+
+
+def plan_walks(
+    context: RunContext, start: FloatArray | None = None, goal: FloatArray | None = None
+) -> PlannedWalks:
+    """Find a way for everyone, each around those before.
+
+    Args:
+        context: Of a scenario with a ``walking`` section.
+        start: (3,) x, y [m], heading [rad] of the body at the beginning; that of the task if omitted.
+        goal: (3,) The same at the end.
+
+    Raises:
+        ScenarioError: If a way cannot be asked for: no floor, a start in an obstacle, a waypoint in vain.
+    """
+    scenario, section = context.scenario, _section(context.scenario)
+    try:
+        standing = floor_plan(context.scene, context.body.stature or 2.0)
+    except InputError as error:
+        raise scenario.refused(("scene",), error) from None
+    objective, radius = OBJECTIVES[section.weights], Walker().width / 2
+    obstacles, others = list(standing), {}
+    for number, other in enumerate(section.others):
+        key: KeyPath = ("walking", "others", number)
+        stops = [_waypoint(one) for one in other.via]
+        others[other.name] = _route(
+            scenario, key, place_of(other.start), stops, objective, obstacles, section.room_m,
+            other.max_speed_m_s, other.wait_s,
+        )  # fmt: skip
+        if others[other.name].succeeded:
+            obstacles.append(others[other.name].as_obstacle(other.name, radius))
+    began = clock.perf_counter()
+    start = end_of(scenario, "start") if start is None else start
+    goal = end_of(scenario, "goal") if goal is None else goal
+    stops = [*map(_waypoint, section.via), Waypoint(goal)]
+    route = _route(
+        scenario, ("walking",), start, stops, objective, obstacles, section.room_m, section.max_speed_m_s,
+        section.wait_s,
+    )  # fmt: skip
+    return PlannedWalks(route, others, tuple(obstacles), clock.perf_counter() - began)
+
+
+def _section(scenario: Scenario) -> WalkingSection:
+    if scenario.walking is None:
+        raise InputError(f"scenario {scenario.name!r} has no walk; valid: one with walking")
+    return scenario.walking
+
+
+def _route(
+    scenario: Scenario,
+    key: KeyPath,
+    start: FloatArray,
+    stops: list[Waypoint],
+    objective: WalkObjective,
+    obstacles: list[WalkObstacle],
+    room: float,
+    max_speed: float,
+    wait: float,
+) -> WalkRoute:
+    try:
+        return walking_route(
+            start, stops, objective, obstacles=obstacles, room=room, max_speed=max_speed, wait=wait
+        )
+    except InputError as error:
+        raise scenario.refused(key, error) from None
+
+
+def keep_paths(report: Report, plan: PlannedWalks) -> None:
+    """Keep the ways of all who walk among the files of the run: instants [s], x, y [m], headings [rad]."""
+    routes = {BODY: plan.route, **plan.others}
+    report.keep(WALK_PATHS, {
+        name: {
+            "time_s": route.time[::PATH_EVERY],
+            "place": _in_world(route.place[::PATH_EVERY], report.transform),
+        }
+        for name, route in routes.items()
+    })  # fmt: skip
+
+
+def _in_world(places: FloatArray, transform: PlanarTransform) -> FloatArray:
+    """(n, 3) x, y [m] and headings [rad] in the world."""
+    return np.column_stack([transform.points(places[:, :2]), places[:, 2] + transform.yaw])
+
+
+def end_of(scenario: Scenario, end: str) -> FloatArray:
+    """(3,) x, y [m], heading [rad] of an end of the task."""
+    state = getattr(scenario.file.task, end)
+    return np.array([*state.at, math.radians(state.heading_deg or 0.0)])
+
+
+def place_of(stand: StandSection) -> FloatArray:
+    """(3,) x, y [m], heading [rad] of a place in a file."""
+    return np.array([*stand.at, math.radians(stand.heading_deg)])
+
+
+def _waypoint(section: WaypointSection) -> Waypoint:
+    return Waypoint(place_of(section), section.speed_m_s, section.wait_s)
+
+
+def path_block(plan: PlannedWalks) -> dict[str, Any]:
+    """What the summary says of the way itself."""
+    route, forward, left = plan.route, *np.abs(plan.route.velocity[:, :2]).max(axis=0)
+    return {
+        "duration_s": route.duration,
+        "path_length_m": route.length,
+        "cost": route.cost,
+        "max_forward_mps": float(forward),
+        "max_left_mps": float(left),
+        "segments": [
+            {"kind": one.kind, "start_s": one.start, "end_s": one.end} for one in route.segments().segments
+        ],
+        "min_room_m": _room(plan),
+        "others": {
+            name: {"duration_s": other.duration, "path_length_m": other.length} | _closest(route, other)
+            for name, other in plan.others.items()
+        },
+        "path_wall_ms": 1e3 * plan.wall_s,
+    }
+
+
+def _closest(route: WalkRoute, other: WalkRoute) -> dict[str, float]:
+    """Least distance of two ways' middles on the common clock [m], and when it is reached first [s]."""
+    time = np.arange(0.0, max(route.duration, other.duration) + CLOCK, CLOCK)
+    away = np.linalg.norm((route.place_at(time) - other.place_at(time))[:, :2], axis=1)
+    nearest = int(np.argmin(away))
+    return {"closest_m": float(away[nearest]), "closest_at_s": float(time[nearest])}
+
+
+def _room(plan: PlannedWalks) -> float | None:
+    """Least distance of the walker's discs from anything [m], measured densely; None where nothing is."""
+    room = clearance(plan.obstacles, Walker(), plan.route.place, plan.route.time)
+    return float(room.min()) if room.size else None
+
+
+def _requirements(context: RunContext, plan: PlannedWalks, walk: Walk) -> RequirementTable:
+    """What a walk that is not executed keeps: its ends, its speed, its room, and feet that stand still."""
+    section, route = _section(context.scenario), plan.route
+    ends = np.abs(route.place[[0, -1]] - [end_of(context.scenario, end) for end in ("start", "goal")])
+    ends[:, 2] = np.abs(np.angle(np.exp(1j * ends[:, 2])))
+    speed = np.hypot(*route.velocity[:, :2].T)
+    fastest, room = int(np.argmax(speed)), _room(plan)
+    return requirement_table([
+        Requirement("end_error", "distance of the path from start and goal", "m, rad", float(ends.max()),
+                    "<=", 0.0, tolerance=TOLERANCE),
+        Requirement("max_speed_mps", "speed of the path", "m/s", float(speed[fastest]), "<=",
+                    section.max_speed_m_s, float(route.time[fastest]), tolerance=TOLERANCE),
+        None if room is None
+        else Requirement("min_room_m", "room to obstacles and others", "m", room, ">=", section.room_m,
+                         tolerance=ROOM_TOLERANCE),
+        Requirement("max_stance_slide_m", "slide of a foot on the ground", "m",
+                    float(walk.slides.max(initial=0.0)), "<=", STANCE_SLIDE),
+    ])  # fmt: skip
+
+
+def _walk_block(walk: Walk, wall: float) -> dict[str, Any]:
+    return {
+        "steps": int(np.sum(np.diff(walk.support.astype(np.int64), axis=0) == 1)),
+        "max_stance_slide_m": float(walk.slides.max(initial=0.0)),
+        "max_stance_slide_before_m": float(walk.slides_before.max(initial=0.0)),
+        "outside_library_share": float(np.mean(walk.outside)),
+        "motion_wall_ms": 1e3 * wall,
+    }
+
+
+def _balance_block(motion: Motion) -> dict[str, Any]:
+    return {
+        "min_margin": float(motion.margin.min()),
+        "margin_unit": motion.margin_unit,
+        "balanced_share": float(np.mean(motion.margin >= 0.0)),
+    }

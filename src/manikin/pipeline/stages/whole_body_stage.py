@@ -1,0 +1,331 @@
+"""The whole-body stage: a motion of all joints that follows the centre of mass, and its report.
+
+Also here. Between centre of mass and whole body: postures at the key instants, and other plans where one
+fails. The centroidal stage: a balanced trajectory of the centre of mass, and its report.
+"""
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from manikin.balance import motion_margin
+from manikin.balance.contact_forces import friction_use
+from manikin.contact import ContactSchedule, StanceSequence
+from manikin.motion import Motion
+from manikin.pipeline.stages.context import Report, RunContext, place, reason_in_world, trajectory_in_world
+from manikin.pipeline.stages.execution_stage import use_of_friction
+from manikin.planning.com import (
+    CentroidalResult,
+    CentroidalTrajectory,
+    KeyframeProblem,
+    KeyframeResult,
+    plan_com,
+    plan_com_through_key_frames,
+)
+from manikin.planning.com.com_certificate import phase_times
+from manikin.planning.whole_body import (
+    Eligibility,
+    KeyPostures,
+    WholeBodyResult,
+    continue_seated,
+    find_eligible_plan,
+    find_key_postures,
+    plan_whole_body,
+)
+from manikin.planning.whole_body.point_mass_motion import point_mass_forces, point_mass_motion
+
+KEY_ROOM = 0.5
+"""Share of the fit's distance from the ends of the joint ranges that key postures keep."""
+
+KEY_TOLERANCES = (1.0e-3, 2.0e-4)
+"""How exact key postures are [m]: as exact as the finished motion has to be; and more, where no motion is
+found although each posture was just within reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeyedPlan:
+    """A plan of the centre of mass with its key postures.
+
+    Attributes:
+        centroidal: The plan, the last one where it was planned again.
+        trajectory: It on the real supports; None where it cannot be done.
+        postures: Its key postures, or None.
+        replans: Plans tried after the first one.
+    """
+
+    centroidal: CentroidalResult
+    trajectory: CentroidalTrajectory | None = None
+    postures: KeyPostures | None = None
+    replans: int = 0
+
+
+def with_key_postures(context: RunContext, report: Report, planned: CentroidalResult) -> KeyedPlan:
+    """Find the key postures of a plan, or of another one where a posture fails.
+
+    Args:
+        context: With supports.
+        report: Takes the ``centroidal`` block anew.
+        planned: The plan; it is returned as it is where it failed.
+    """
+    if planned.trajectory is None:
+        return KeyedPlan(planned)
+    return _reported(report, _tested(context, report, planned, KEY_TOLERANCES[0]))
+
+
+def with_stricter_key_postures(
+    context: RunContext, report: Report, planned: CentroidalResult, before: KeyedPlan
+) -> KeyedPlan | None:
+    """Another plan where no motion was found and a key posture is only just within reach, or None.
+
+    Args:
+        context: With supports.
+        report: Has the failure of the whole body, which is forgotten where there is another plan.
+        planned: The first plan.
+        before: What was found for it.
+    """
+    if planned.trajectory is None:
+        return None
+    failure = report.failure
+    found = _tested(context, report, planned, KEY_TOLERANCES[1])
+    if found.failure is not None or found.trajectory is None or found.replans <= before.replans:
+        report.failure = failure
+        return None
+    report.failure = None
+    return _reported(report, found)
+
+
+def _tested(context: RunContext, report: Report, planned: CentroidalResult, tolerance: float) -> Eligibility:
+    """The plan, or another one where a key posture fails."""
+    # The fit keeps its distance from the ends of the ranges: the key postures leave room for that,
+    # if they can.
+    found = _eligible(context, report, planned, KEY_ROOM * context.settings.fit.joint_buffer, tolerance)
+    if found.failure is not None or (found.trajectory is None and found.replans > 0):
+        report.failure = None  # of a seated part that did not fit another plan
+        found = _eligible(context, report, planned, 0.0, tolerance)
+    return found
+
+
+def _eligible(
+    context: RunContext, report: Report, planned: CentroidalResult, range_margin: float, tolerance: float
+) -> Eligibility:
+    """Test the key postures of a plan, and plan again where they fail."""
+
+    def realise(trajectory: CentroidalTrajectory) -> CentroidalTrajectory | None:
+        return _on_real_supports(context, report, trajectory)
+
+    def look(trajectory: CentroidalTrajectory) -> KeyPostures:
+        return find_key_postures(
+            context.body, context.scene, trajectory, manner=context.settings.manner,
+            requirements=context.settings.requirements, range_margin=range_margin,
+            tolerance=tolerance, known=context.known_postures,
+            padded=() if context.plan is None else context.padded,
+        )  # fmt: skip
+
+    return find_eligible_plan(planned, realise, look, replan=not context.is_recorded)
+
+
+def _on_real_supports(
+    context: RunContext, report: Report, planned: CentroidalTrajectory
+) -> CentroidalTrajectory | None:
+    """The plan on the real soles, friction and caps, with the seated part where there is one."""
+    real, seat = context.scenario.build_sequence(), context.scenario.seated_from
+    standing = real if seat is None else StanceSequence(real.phases[:seat])
+    trajectory = replace(planned, schedule=ContactSchedule(standing, planned.schedule.instants))
+    if seat is None:
+        return trajectory
+    sitting = StanceSequence(real.phases[seat:])
+    continuation = continue_seated(context.body, context.scene, trajectory, sitting)
+    if continuation.failure is not None:
+        report.fail("wholebody", continuation.failure, trajectory.duration, f"phase {seat}")
+    return continuation.trajectory
+
+
+def _in_world(found: KeyPostures, report: Report) -> KeyPostures:
+    transform = report.transform
+    postures = [
+        replace(
+            item, com=transform.points(item.com), q=transform.poses(item.q),
+            reason=None if item.reason is None else reason_in_world(item.reason, transform),
+        )
+        for item in found.postures
+    ]  # fmt: skip
+    return replace(found, postures=tuple(postures))
+
+
+def _reported(report: Report, found: Eligibility) -> KeyedPlan:
+    """Report a plan that was tested, and return it with its trajectory if it can be done."""
+    postures = None if found.postures is None else _in_world(found.postures, report)
+    block = centroidal_summary(found.centroidal) | {
+        "replans": found.replans,
+        "key_postures": None if postures is None else postures.summary(),
+    }
+    report_centre_of_mass(report, found.centroidal, block)
+    if postures is not None:
+        report.keep("key_postures", postures.to_dict())
+    trajectory = found.trajectory
+    if found.failure is not None:
+        trajectory, failed = None, found.failure.posture
+        where = place(failed.phase, ", ".join(failed.contacts))
+        report.fail(found.failure.stage, found.failure.reason, failed.time, where)
+    return KeyedPlan(found.centroidal, trajectory, found.postures, found.replans)
+
+
+def plan_centre_of_mass(context: RunContext, report: Report) -> CentroidalResult:
+    """Plan the centre of mass on the supports, freely timed or through the key frames of a recording.
+
+    Args:
+        context: With supports.
+        report: Takes the ``centroidal`` block.
+    """
+    report.progress("centroidal", 0.0)
+    problem = context.posed_problem()
+    recorded = isinstance(problem, KeyframeProblem)
+    result = plan_com_through_key_frames(problem) if recorded else plan_com(problem)
+    report_centre_of_mass(report, result, centroidal_summary(result))
+    if result.failure is not None:
+        failure = result.failure
+        where = place(failure.phase, failure.where)
+        report.fail("centroidal", failure.reason, failure.time or 0.0, where)
+    report.progress("centroidal", 1.0)
+    return result
+
+
+def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[str, Any]) -> None:
+    """Take a plan into the report, with its trajectory.
+
+    Args:
+        report: Of the run.
+        result: The plan.
+        block: Its ``centroidal`` block.
+    """
+    report.finish("centroidal", block)
+    if result.certificate is not None:
+        report.require("centroidal", result.certificate.table(result.problem))
+    if result.trajectory is not None:
+        report.keep("com_trajectory", trajectory_in_world(result.trajectory, report.transform).to_dict())
+
+
+def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
+    """Return the ``centroidal`` block of the summary."""
+    trajectory = result.trajectory
+    recorded = isinstance(result, KeyframeResult)
+    return {
+        "method": "keyframes" if recorded else "timing-free",
+        "added_key_frames_s": sorted(result.added_times) if recorded else None,
+        "duration_s": None if trajectory is None else trajectory.duration,
+        "phase_durations_s": None if trajectory is None else trajectory.schedule.durations.tolist(),
+        "min_margin": result.d_min,
+        "margin_unit": result.problem.margin_unit,
+        "friction": None if trajectory is None else _friction(trajectory),
+        "limiting_phase": result.limiting_phase,
+        "limiting_contact": limiting_contact(result),
+        "min_force_at_com_N": least_force_at_com(result),
+        "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
+        "feasibility_radius": result.feasibility_radius,
+        "replans": 0,
+        "key_postures": None,
+        "wall_s": result.wall_time,
+    }
+
+
+def least_force_at_com(result: CentroidalResult) -> float | None:
+    """Smallest force at the CoM that would end the point mass's balance, every millisecond [N]."""
+    trajectory = result.trajectory
+    if trajectory is None:
+        return None
+    times = phase_times(trajectory)
+    phases = np.repeat(np.arange(len(times)), [len(instants) for instants in times])
+    instants = np.concatenate(times)
+    found = motion_margin(
+        [phase.stance for phase in trajectory.schedule.sequence], phases,
+        trajectory.pseudo_wrench(instants), trajectory.position(instants), polytopes=result.polytopes,
+    )  # fmt: skip
+    return found.min_force
+
+
+def limiting_contact(result: CentroidalResult) -> str | None:
+    """Contact and limit behind the smallest margin, such as ``"left_foot: tipping over ..."``."""
+    limiting = result.limiting
+    return None if limiting is None else limiting.description
+
+
+FORCE_STEP = 0.02
+"""Time between the samples at which the use of friction is measured [s]."""
+
+
+def _friction(trajectory: CentroidalTrajectory) -> dict[str, float | str]:
+    """Use of friction by the contact forces of the point mass, the least ones that carry it."""
+    time = np.linspace(0.0, trajectory.duration, max(2, round(trajectory.duration / FORCE_STEP) + 1))
+    forces = point_mass_forces(trajectory, time)
+    return friction_use(trajectory.schedule, time, trajectory.schedule.sequence.effectors, forces).summary()
+
+
+def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) -> WholeBodyResult | None:
+    """Plan all joints along a trajectory of the centre of mass; None where there is none.
+
+    Args:
+        context: Of the run.
+        report: Takes the ``wholebody`` block.
+        plan: The trajectory with its key postures.
+    """
+    trajectory = plan.trajectory
+    if trajectory is None:
+        return None
+    rng = np.random.default_rng(context.scenario.seed)
+    unused = rng.bit_generator.state
+    result = plan_whole_body(
+        context.body, context.scene, trajectory, rng=rng, settings=context.settings,
+        padded=context.padded, key_postures=context.known_postures, waypoints=plan.postures,
+        progress=lambda share: report.progress("wholebody", share),
+    )  # fmt: skip
+    drawn = rng.bit_generator.state != unused
+    passage = context.passage(trajectory.schedule, result.motion).summary()
+    used = {"friction": use_of_friction(trajectory.schedule, result.motion)}
+    report.finish("wholebody", wholebody_summary(result) | passage | used | {"seed_matters": drawn})
+    report.require("wholebody", result.requirements)
+    report.planned = result.succeeded
+    if result.failure is not None:
+        report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
+    report.keep_motions(trajectory.schedule, result.motion)
+    return result
+
+
+def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | None:
+    """Motion of a body that has no joints to plan for and nothing to execute; None without a plan.
+
+    Args:
+        report: Keeps the motion.
+        centroidal: The plan of its centre of mass.
+    """
+    if centroidal.trajectory is None:
+        return None
+    motion = point_mass_motion(centroidal.problem, centroidal.trajectory, centroidal.polytopes)
+    report.keep_motions(centroidal.trajectory.schedule, motion)
+    report.planned = centroidal.succeeded
+    return motion
+
+
+def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
+    """Return the ``wholebody`` block of the summary."""
+    certificate = result.certificate
+    return {
+        "method": "follow",
+        "max_support_error_m": certificate.max_support_error_m,
+        "max_meeting_error_m": certificate.max_meeting_error_m,
+        "max_com_error_m": certificate.max_com_error_m,
+        "min_clearance_m": certificate.min_clearance_m,
+        "closest_pair": list(certificate.closest_pair),
+        "max_scuff_m": certificate.max_scuff_m,
+        "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
+        "max_velocity_share": certificate.max_velocity_share,
+        "max_torque_share": certificate.max_torque_share,
+        "max_torque_joint": certificate.tightest_joint,
+        "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
+        "impacts": [asdict(impact) for impact in certificate.impacts],
+        "min_margin": float(result.motion.margin.min()),
+        "min_force_at_com_N": certificate.min_force_at_com_N,
+        "min_zmp_distance_m": certificate.min_zmp_distance_m,
+        "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],
+        "wall_s": result.wall_time,
+    }

@@ -1,0 +1,250 @@
+"""Every requirement of a trajectory measured afresh, every millisecond, without the solver."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.balance import WrenchPolytope, least_zmp_distance
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory
+from manikin.planning.com.feasibility import row_slopes
+from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
+
+STEP = 1e-3
+"""Distance of the instants at which a trajectory is measured [s]."""
+
+TOLERANCE = 1e-6
+"""Violation up to which a requirement counts as met [SI unit of the requirement]."""
+
+
+_BLOCK = 1024
+
+UNIT_SCALE = {"m": 0.01, "m/s": 0.01, "m/s^2": 0.1, "s": 0.01, "N.m": 10.0, "N": 100.0}
+"""Violations that are about equally bad, to compare requirements of different units."""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """How far one requirement is violated at worst.
+
+    Attributes:
+        requirement: ``"balance margin"``, ``"support distance"``, ``"phase duration"``,
+            ``"total duration"``, ``"start position"``, ... or the name of a geometric constraint.
+        value: Largest violation; negative is what is left to spare.
+        unit: Of the value.
+        phase: Where it happens, or None for the whole motion.
+        time: When it happens [s], or None.
+    """
+
+    requirement: str
+    value: float
+    unit: str
+    phase: int | None = None
+    time: float | None = None
+
+    @property
+    def severity(self) -> float:
+        """Violation in units of :data:`UNIT_SCALE`."""
+        return self.value / UNIT_SCALE[self.unit]
+
+    def __str__(self) -> str:
+        place = "" if self.phase is None else f" in phase {self.phase}"
+        instant = "" if self.time is None else f" at {self.time:.3f} s"
+        return f"{self.requirement} violated by {self.value:.3g} {self.unit}{place}{instant}"
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Violations of all requirements and the smallest margin.
+
+    Attributes:
+        items: One entry per requirement.
+        min_margin: Smallest margin [N.m] or [N].
+        limiting_phase: Phase in which it occurs.
+        limiting_time: Instant at which it occurs [s].
+        min_zmp_distance: Least distance of the ZMP to the edge of the support polygon, negative
+            outside [m]; of the phases whose contacts lie in one plane, None without any.
+    """
+
+    items: tuple[Residual, ...]
+    min_margin: float
+    limiting_phase: int
+    limiting_time: float
+    min_zmp_distance: float | None = None
+
+    def __getitem__(self, requirement: str) -> Residual:
+        for item in self.items:
+            if item.requirement == requirement:
+                return item
+        raise KeyError(f"no residual {requirement!r}; valid: {[item.requirement for item in self.items]}")
+
+    @property
+    def largest(self) -> Residual:
+        """The most violated requirement, units compared by :data:`UNIT_SCALE`."""
+        return max(self.items, key=lambda item: item.severity)
+
+    def within(self, tolerance: float = TOLERANCE) -> bool:
+        """Whether every requirement is met."""
+        return all(item.value <= tolerance for item in self.items)
+
+    def table(self, problem: CentroidalProblem) -> RequirementTable:
+        """The margin, the total duration, and the most violated of the other requirements.
+
+        Args:
+            problem: Whose requirements were measured.
+        """
+        others = [item for item in self.items if item.requirement not in ("balance margin", "total duration")]
+        worst = max(others, key=lambda item: item.severity, default=None)
+        duration = next((item for item in self.items if item.requirement == "total duration"), None)
+        longest = problem.max_duration
+        return requirement_table([
+            Requirement("min_margin", "margin of the centre of mass", problem.margin_unit, self.min_margin,
+                        ">=", problem.required_margin, self.limiting_time, f"phase {self.limiting_phase}",
+                        TOLERANCE),
+            None if duration is None or longest is None
+            else Requirement("duration_s", "duration", "s", duration.value + longest, "<=", longest,
+                             tolerance=TOLERANCE),
+            None if worst is None
+            else Requirement("max_violation", "violation of a constraint", worst.unit, max(worst.value, 0.0),
+                             "<=", TOLERANCE, worst.time, worst.requirement),
+        ])  # fmt: skip
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """Order of quality, the smaller the better: worst of the other violations, then the margin.
+
+        Violations within :data:`TOLERANCE` count as none.
+        """
+        others = [item for item in self.items if item.requirement != "balance margin"]
+        worst = max((item.severity for item in others if item.value > TOLERANCE), default=0.0)
+        return worst, -self.min_margin
+
+
+def phase_times(trajectory: CentroidalTrajectory, step: float = STEP) -> list[FloatArray]:
+    """Instants of each phase: both its ends and every multiple of ``step`` between them [s]."""
+    times = []
+    for start, end in zip(trajectory.schedule.instants[:-1], trajectory.schedule.instants[1:], strict=True):
+        grid = step * np.arange(np.floor(start / step) + 1, np.ceil(end / step))
+        times.append(np.concatenate([[start], grid[(grid > start) & (grid < end)], [end]]))
+    return times
+
+
+def phase_margins(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
+) -> list[FloatArray]:
+    """Margin at the instants of :func:`phase_times`; at key instants in both polytopes [N.m] or [N]."""
+    return [
+        np.concatenate([block.min(axis=1) for block in facet_margins(problem, trajectory, polytope, times)])
+        for polytope, times in zip(polytopes, phase_times(trajectory), strict=True)
+    ]
+
+
+def facet_margins(
+    problem: CentroidalProblem,
+    trajectory: CentroidalTrajectory,
+    polytope: WrenchPolytope,
+    times: FloatArray,
+) -> Iterator[FloatArray]:
+    """(up to 1024, facets) distances to every facet at the given times, in blocks [N.m] or [N]."""
+    for start in range(0, len(times), _BLOCK):
+        part = times[start : start + _BLOCK]
+        distances = polytope.distances(trajectory.pseudo_wrench(part, problem.reference))
+        yield distances / row_slopes(polytope, problem, trajectory.position(part))
+
+
+def measure(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
+) -> Residuals:
+    """Measure every requirement of ``problem`` on a trajectory.
+
+    Args:
+        problem: The requirements.
+        trajectory: Any trajectory through the same number of phases.
+        polytopes: W_i of the phases about ``problem.reference``.
+    """
+    times = phase_times(trajectory)
+    margins = phase_margins(problem, trajectory, polytopes)
+    lowest = [float(values.min()) for values in margins]
+    phase = int(np.argmin(lowest))
+    time = float(times[phase][np.argmin(margins[phase])])
+    shortfall = Residual(
+        "balance margin", problem.required_margin - lowest[phase], problem.margin_unit, phase, time
+    )
+    items = (
+        shortfall,
+        *_end_residuals(problem, trajectory),
+        *_position_residuals(problem, trajectory, times),
+        *_key_plane_residuals(problem, trajectory),
+        *_duration_residuals(problem, trajectory),
+    )
+    zmp = least_zmp_distance(
+        (part.stance, trajectory.pseudo_wrench(instants))
+        for part, instants in zip(problem.sequence, times, strict=True)
+    )
+    return Residuals(items, lowest[phase], phase, time, zmp)
+
+
+def _end_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
+    wanted = {
+        "start": (problem.start_com, problem.start_velocity, problem.start_acceleration),
+        "goal": (problem.goal_com, problem.goal_velocity, problem.goal_acceleration),
+    }
+    measured = (
+        ("position", "m", trajectory.position),
+        ("velocity", "m/s", trajectory.velocity),
+        ("acceleration", "m/s^2", trajectory.acceleration),
+    )
+    for end, values in wanted.items():
+        time, phase = (0.0, 0) if end == "start" else (trajectory.duration, len(problem.sequence) - 1)
+        for (name, unit, evaluate), value in zip(measured, values, strict=True):
+            if value is not None:
+                error = float(np.abs(evaluate(time) - value).max())
+                yield Residual(f"{end} {name}", error, unit, phase, time)
+
+
+def position_excess(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: Sequence[FloatArray]
+) -> Iterator[tuple[str, list[FloatArray]]]:
+    """Name of each constraint on the position and its violation at the instants of each phase [m]."""
+    positions = [trajectory.position(instants) for instants in times]
+    if problem.support_distance is not None:
+        excess = [
+            np.max(
+                [np.linalg.norm(p - c.position, axis=1) for c in phase.stance] or [np.zeros(len(p))], axis=0
+            )
+            - problem.support_distance
+            for p, phase in zip(positions, problem.sequence, strict=True)
+        ]
+        yield "support distance", excess
+    for constraint in problem.geometric:
+        yield constraint.name, [constraint.violation(p) for p in positions]
+
+
+def _position_residuals(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: list[FloatArray]
+) -> Iterator[Residual]:
+    for requirement, excess in position_excess(problem, trajectory, times):
+        yield _worst(requirement, excess, times)
+
+
+def _key_plane_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
+    for index, plane in enumerate(problem.key_planes):
+        time = float(trajectory.schedule.instants[plane.key])
+        beyond = float(plane.violation(trajectory.position(time)))
+        yield Residual(f"key plane {index} at T_{plane.key}", beyond, "m", plane.key - 1, time)
+
+
+def _worst(requirement: str, values: list[FloatArray], times: list[FloatArray]) -> Residual:
+    phase = int(np.argmax([value.max() for value in values]))
+    index = int(np.argmax(values[phase]))
+    return Residual(requirement, float(values[phase][index]), "m", phase, float(times[phase][index]))
+
+
+def _duration_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
+    durations, instants = trajectory.schedule.durations, trajectory.schedule.instants
+    excess = np.maximum(problem.min_durations - durations, durations - problem.max_durations)
+    phase = int(np.argmax(excess))
+    yield Residual("phase duration", float(excess[phase]), "s", phase, float(instants[phase]))
+    if problem.max_duration is not None:
+        yield Residual("total duration", trajectory.duration - problem.max_duration, "s")

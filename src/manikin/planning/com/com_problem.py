@@ -1,0 +1,373 @@
+"""What the timing-free method is asked: bodies, stances, bounds and weights ([Qiu2012]_ 5.4).
+
+Also here. The CoM trajectory: a clamped B-spline over normalised time with its contact schedule.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.balance import pseudo_wrench
+from manikin.contact import ContactSchedule, StanceSequence
+from manikin.errors import InputError, SplineError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spline import BSpline
+from manikin.planning.com.com_constraints import GeometricConstraint, KeyPlane
+from manikin.runtime.display import Displayed
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CentroidalTrajectory(Displayed):
+    """``p(t) = p_s(sigma t)`` with ``sigma = 1 / T`` ([Qiu2012]_ 5.2-5.6).
+
+    Before the start and after the end the body rests: the position is held and all
+    derivatives are zero.
+
+    Attributes:
+        mass: [kg].
+        spline: B-spline on [0, 1] in three dimensions [m].
+        schedule: Stances with their key instants [s]; the motion starts at 0.
+        binding_until: A whole body must keep its CoM on the trajectory until then [s]; after
+            that, safe on a seat, the trajectory only shows the way. None for the whole motion.
+        turning: Rate of the angular momentum about the CoM, a B-spline on [0, 1] in three dimensions
+            [N.m] ([Qiu2012]_ 4.51); None for that of a point mass, zero.
+    """
+
+    mass: float
+    spline: BSpline
+    schedule: ContactSchedule
+    binding_until: float | None = None
+    turning: BSpline | None = None
+
+    def __post_init__(self) -> None:
+        finite_number(self.mass, "centroidal trajectory mass [kg]", above=0.0)
+        if self.spline.domain != (0.0, 1.0) or self.spline.control_points.shape[1] != 3:
+            raise SplineError(
+                "centroidal trajectory needs a spline over [0, 1]; valid: with (n, 3) control points"
+            )
+        if self.turning is not None and (
+            self.turning.domain != (0.0, 1.0) or self.turning.control_points.shape[1] != 3
+        ):
+            raise SplineError(
+                "centroidal trajectory has turning of another domain or dimension; valid: a spline over "
+                "[0, 1] with (n, 3) control points"
+            )
+        if self.schedule.instants[0] != 0.0:
+            raise InputError(f"centroidal trajectory starts at {self.schedule.instants[0]:g} s; valid: 0")
+
+    @property
+    def duration(self) -> float:
+        """Length of the motion [s]."""
+        return float(self.schedule.instants[-1])
+
+    def binds(self, time: ArrayLike) -> NDArray[np.bool_]:
+        """(...) whether the whole body must keep its CoM on the trajectory at each time."""
+        last = np.inf if self.binding_until is None else self.binding_until
+        return np.asarray(time, dtype=np.float64) <= last + 1e-9
+
+    def followed_by(self, other: "CentroidalTrajectory") -> "CentroidalTrajectory":
+        """Join a trajectory that starts where this one ends, at the same velocity and acceleration.
+
+        Raises:
+            SplineError: If end and start, or the degrees, differ, or one of them turns.
+        """
+        if self.turning is not None or other.turning is not None:
+            raise SplineError("trajectories that turn cannot be joined; valid: those of point masses")
+        k, here, there = self.spline.degree, self.spline, other.spline
+        gaps = [
+            float(np.abs(self._derivative(self.duration, d) - other._derivative(0.0, d)).max())
+            for d in range(3)
+        ]
+        if there.degree != k or max(gaps) > 1e-4:
+            raise SplineError(
+                f"trajectories of degrees {k} and {there.degree} meet with gaps of {gaps[0]:.2g} m, "
+                f"{gaps[1]:.2g} m/s and {gaps[2]:.2g} m/s^2; valid: one degree, and the second starts as the "
+                "first ends"
+            )
+        total = self.duration + other.duration
+        first, second = (
+            here.knots * (self.duration / total),
+            1.0 - (1.0 - there.knots) * (other.duration / total),
+        )
+        # Two continuous derivatives: the joint is k - 2 knots.
+        joint = np.full(k - 2, self.duration / total)
+        knots = np.concatenate([first[: -k - 1], joint, second[k + 1 :]])
+        inner = np.unique(knots)
+        times = np.unique(np.concatenate([np.linspace(a, b, 4 * k) for a, b in itertools.pairwise(inner)]))
+        before = times <= joint[0]
+        wanted = np.concatenate([
+            here(np.clip(times[before] * total / self.duration, 0.0, 1.0)),
+            there(np.clip(1.0 - (1.0 - times[~before]) * total / other.duration, 0.0, 1.0)),
+        ])  # fmt: skip
+        spline = BSpline.fit(
+            k, knots, times, wanted, first=here.control_points[:1], last=there.control_points[-1:]
+        )
+        phases = (*self.schedule.sequence, *other.schedule.sequence)
+        instants = np.concatenate([self.schedule.instants, self.duration + other.schedule.instants[1:]])
+        schedule = ContactSchedule(StanceSequence(phases), instants)
+        return CentroidalTrajectory(self.mass, spline, schedule)
+
+    def position(self, time: ArrayLike) -> FloatArray:
+        """(..., 3) CoM at each time [m] ([Qiu2012]_ 5.5)."""
+        return self._derivative(time, 0)
+
+    def velocity(self, time: ArrayLike) -> FloatArray:
+        """(..., 3) velocity at each time [m/s] ([Qiu2012]_ 5.6)."""
+        return self._derivative(time, 1)
+
+    def acceleration(self, time: ArrayLike) -> FloatArray:
+        """(..., 3) acceleration at each time [m/s^2] ([Qiu2012]_ 5.6)."""
+        return self._derivative(time, 2)
+
+    def jerk(self, time: ArrayLike) -> FloatArray:
+        """(..., 3) third derivative at each time [m/s^3] ([Qiu2012]_ 5.6)."""
+        return self._derivative(time, 3)
+
+    def pseudo_wrench(self, time: ArrayLike, reference: ArrayLike | None = None) -> FloatArray:
+        """(..., 6) ``[m (a - g); (p - o) x m (a - g) + Ldot]`` about ``reference`` o [N, N.m].
+
+        Moments are about the world origin when it is omitted.
+
+        [Qiu2012]_ 4.6 for a point mass, 4.51 with the rate of its angular momentum.
+        """
+        rate = None if self.turning is None else self.angular_momentum_rate(time)
+        return pseudo_wrench(self.mass, self.position(time), self.acceleration(time), rate, reference)
+
+    def angular_momentum_rate(self, time: ArrayLike) -> FloatArray:
+        """(..., 3) rate of the angular momentum about the CoM at each time [N.m]; zero for a point mass."""
+        t = np.asarray(time, dtype=np.float64)
+        if self.turning is None:
+            return np.zeros((*t.shape, 3))
+        inside = ((t >= 0.0) & (t <= self.duration))[..., None]
+        return np.where(inside, self.turning(np.clip(t / self.duration, 0.0, 1.0)), 0.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Mass, degree, normalised knots, control points and key instants as plain lists and numbers."""
+        turning = self.turning
+        return {
+            "mass_kg": float(self.mass),
+            "degree": int(self.spline.degree),
+            "knots": self.spline.knots.tolist(),
+            "control_points_m": self.spline.control_points.tolist(),
+            "key_instants_s": self.schedule.instants.tolist(),
+            **({} if turning is None else {"turning": _spline_dict(turning)}),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], sequence: StanceSequence) -> Self:
+        """Rebuild a trajectory written by :meth:`to_dict`.
+
+        Args:
+            data: The dictionary.
+            sequence: The stances, which the dictionary does not hold.
+
+        Raises:
+            InputError: If a key is missing.
+            SplineError: If knots and control points do not make a clamped spline.
+        """
+        wanted = ("mass_kg", "degree", "knots", "control_points_m", "key_instants_s")
+        missing = [key for key in wanted if key not in data]
+        if missing:
+            raise InputError(f"centroidal trajectory lacks {missing[0]!r}; valid keys: {', '.join(wanted)}")
+        spline = BSpline(data["degree"], data["knots"], data["control_points_m"])
+        schedule = ContactSchedule(sequence, data["key_instants_s"])
+        told = data.get("turning")
+        turning = None if told is None else BSpline(told["degree"], told["knots"], told["control_points_Nm"])
+        return cls(float(data["mass_kg"]), spline, schedule, turning=turning)
+
+    def _derivative(self, time: ArrayLike, order: int) -> FloatArray:
+        t = np.asarray(time, dtype=np.float64)
+        values = self.spline(np.clip(t / self.duration, 0.0, 1.0), order) / self.duration**order
+        if order > 0:
+            values = np.where(((t >= 0.0) & (t <= self.duration))[..., None], values, 0.0)
+        return values
+
+
+def _spline_dict(spline: BSpline) -> dict[str, Any]:
+    return {
+        "degree": int(spline.degree),
+        "knots": spline.knots.tolist(),
+        "control_points_Nm": spline.control_points.tolist(),
+    }
+
+
+MarginSpace = Literal["wrench", "force", "wrench_about_origin"]
+"""``wrench``: distance to the facets of W_p with moments about the CoM in [N.m], alpha = 1 m;
+``force``: smallest force at the CoM that ends balance, [N] ([Qiu2012]_ 4.2.9, cases 3 and 1).
+``wrench_about_origin`` has the moments about the world origin, as the tables of [Qiu2012]_ have: it
+depends on where the scene stands."""
+
+_UNITS: dict[str, str] = {"wrench": "N.m", "force": "N", "wrench_about_origin": "N.m"}
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the objectives ([Qiu2012]_ 5.27-5.28).
+
+    The objective is ``- margin d_min + smoothness S + duration T`` with S the mean over time
+    of ``v' Qv v + a' Qa a + j' Qj j``, exactly integrated: the sum of the thesis divided by
+    its number of samples, in the limit of many. Its sum has no acceleration term.
+
+    Attributes:
+        margin: [1/(N.m)] or [1/N].
+        smoothness: Of S as a whole.
+        duration: [1/s].
+        velocity: Diagonal of Qv [s^2/m^2].
+        acceleration: Diagonal of Qa [s^4/m^2].
+        jerk: Diagonal of Qj [s^6/m^2].
+    """
+
+    margin: float = 1.0
+    smoothness: float = 10.0
+    duration: float = 5.0
+    velocity: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    acceleration: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    jerk: tuple[float, float, float] = (1e-3, 1e-3, 1e-3)
+
+    def __post_init__(self) -> None:
+        for name in ("margin", "smoothness", "duration"):
+            finite_number(getattr(self, name), f"weight {name}", at_least=0.0)
+        for name in ("velocity", "acceleration", "jerk"):
+            diagonal = frozen_array(getattr(self, name), f"weights {name}", (3,))
+            if np.any(diagonal < 0):
+                raise InputError(f"weights {name} are {diagonal.tolist()}; valid: numbers >= 0")
+            object.__setattr__(self, name, tuple(float(value) for value in diagonal))
+
+
+@dataclass(frozen=True, eq=False)
+class CentroidalProblem:
+    """A CoM trajectory to find through a sequence of stances ([Qiu2012]_ 5.18-5.28).
+
+    Attributes:
+        mass: [kg].
+        sequence: Stances with the bounds of their durations.
+        start_com: (3,) p_i [m] (5.22).
+        goal_com: (3,) p_f [m] (5.23).
+        start_velocity: (3,) [m/s] (5.24), or None when free.
+        goal_velocity: (3,) [m/s] (5.25), or None when free.
+        start_acceleration: (3,) [m/s^2], or None when free.
+        goal_acceleration: (3,) [m/s^2], or None when free.
+        degree: Degree of the spline, >= 3; it has ``phases + degree`` control points.
+        margin_space: Whether the margin is a wrench [N.m] or a force at the CoM [N].
+        required_margin: d_min must not be smaller (5.21) [N.m] or [N].
+        support_distance: Largest distance of the CoM from every active contact (5.26) [m].
+        geometric: Further constraints on the CoM position.
+        key_planes: Planes behind which the CoM must be at single key instants, neither the first nor the
+            last, where the CoM is given.
+        max_duration: Of the whole motion [s].
+        weights: Of the objectives (5.28).
+        samples: n_s, balance is imposed at j = 0 ... n_s in every phase.
+    """
+
+    mass: float
+    sequence: StanceSequence
+    start_com: FloatArray
+    goal_com: FloatArray
+    start_velocity: FloatArray | None
+    goal_velocity: FloatArray | None
+    start_acceleration: FloatArray | None
+    goal_acceleration: FloatArray | None
+    degree: int
+    margin_space: MarginSpace
+    required_margin: float
+    support_distance: float | None
+    geometric: tuple[GeometricConstraint, ...]
+    key_planes: tuple[KeyPlane, ...]
+    max_duration: float | None
+    weights: Weights
+    samples: int
+
+    def __init__(
+        self,
+        mass: float,
+        sequence: StanceSequence,
+        start_com: ArrayLike,
+        goal_com: ArrayLike,
+        *,
+        start_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
+        goal_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
+        start_acceleration: ArrayLike | None = None,
+        goal_acceleration: ArrayLike | None = None,
+        degree: int = 5,
+        margin_space: MarginSpace = "wrench",
+        required_margin: float = 0.0,
+        support_distance: float | None = None,
+        geometric: Sequence[GeometricConstraint] = (),
+        key_planes: Sequence[KeyPlane] = (),
+        max_duration: float | None = None,
+        weights: Weights | None = None,
+        samples: int = 10,
+    ) -> None:
+        if margin_space not in _UNITS:
+            raise InputError(f"centroidal margin_space is {margin_space!r}; valid: {', '.join(_UNITS)}")
+        values = {
+            "mass": finite_number(mass, "centroidal mass [kg]", above=0.0),
+            "sequence": sequence,
+            "start_com": frozen_array(start_com, "centroidal start_com [m]", (3,)),
+            "goal_com": frozen_array(goal_com, "centroidal goal_com [m]", (3,)),
+            "start_velocity": _optional_vector(start_velocity, "start_velocity [m/s]"),
+            "goal_velocity": _optional_vector(goal_velocity, "goal_velocity [m/s]"),
+            "start_acceleration": _optional_vector(start_acceleration, "start_acceleration [m/s^2]"),
+            "goal_acceleration": _optional_vector(goal_acceleration, "goal_acceleration [m/s^2]"),
+            "degree": _integer(degree, "degree", 3),
+            "margin_space": margin_space,
+            "required_margin": finite_number(required_margin, "centroidal required_margin", at_least=0.0),
+            "support_distance": _optional_limit(support_distance, "support_distance [m]"),
+            "geometric": tuple(geometric),
+            "key_planes": _inner_planes(key_planes, len(sequence)),
+            "max_duration": _optional_limit(max_duration, "max_duration [s]"),
+            "weights": Weights() if weights is None else weights,
+            "samples": _integer(samples, "samples", 2),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def reference(self) -> FloatArray:
+        """(3,) middle of all contacts, about which the programmes have positions and moments [m].
+
+        Their numbers are then the same wherever the scene stands.
+        """
+        places = [contact.position for phase in self.sequence for contact in phase.stance]
+        return np.mean(places or [self.start_com], axis=0)
+
+    @property
+    def margin_unit(self) -> str:
+        """``"N.m"`` or ``"N"``."""
+        return _UNITS[self.margin_space]
+
+    @property
+    def min_durations(self) -> FloatArray:
+        """(phases,) lower bounds of the durations [s]."""
+        return np.array([phase.min_duration for phase in self.sequence])
+
+    @property
+    def max_durations(self) -> FloatArray:
+        """(phases,) upper bounds of the durations [s], infinite where there is none."""
+        return np.array([np.inf if p.max_duration is None else p.max_duration for p in self.sequence])
+
+
+def _optional_vector(value: ArrayLike | None, name: str) -> FloatArray | None:
+    return None if value is None else frozen_array(value, f"centroidal {name}", (3,))
+
+
+def _inner_planes(planes: Sequence[KeyPlane], phases: int) -> tuple[KeyPlane, ...]:
+    for plane in planes:
+        if not 1 <= plane.key < phases:
+            valid = f"1 to {phases - 1}" if phases > 1 else "none with a single phase"
+            raise InputError(f"centroidal key_planes name key instant {plane.key}; valid: {valid}")
+    return tuple(planes)
+
+
+def _optional_limit(value: float | None, name: str) -> float | None:
+    return None if value is None else finite_number(value, f"centroidal {name}", above=0.0)
+
+
+def _integer(value: object, name: str, least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InputError(f"centroidal {name} is {value!r}; valid: an integer >= {least}")
+    return int(value)

@@ -1,0 +1,468 @@
+"""What can be said before solving: Propositions 1 and 2 and the ends of the motion ([Qiu2012]_ 5.4.3).
+
+Also here. Why a stance cannot work at all: friction too low for a slope, feet too far apart for the legs.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import linprog
+
+from manikin.balance import WrenchPolytope, admissible_com_polygon, pseudo_wrench, wrench_polytopes
+from manikin.balance.margin import force_levers, wrench_levers
+from manikin.contact import ContactKind, Stance, StanceSequence
+from manikin.errors import InputError
+from manikin.numerics.polytope import Polytope
+from manikin.numerics.spatial import GRAVITY, FloatArray, skew
+from manikin.planning.com.com_problem import CentroidalProblem
+
+FIRM_FRICTION = 0.7
+"""Friction of dry shoes on a dry floor, tried where a smaller one may be the cause."""
+
+REACH_TOLERANCE = 0.01
+"""A place that misses the constraints on the CoM by less than this may be off the grid's points [m]."""
+
+SLIPPERY = 0.2
+"""Friction below this is tried otherwise where a plan fails: of ice, or of wet and smooth floors."""
+
+_GRID = 25
+_LEVELS = 15
+
+
+def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str | None:
+    """Say that the friction is too low to stand still on the slopes of a stance, or None."""
+    if any(contact.kind is ContactKind.GRASP for contact in stance) or not len(stance):
+        return None
+    steepness = [(_slope(contact.normal), contact) for contact in stance]
+    if not all(np.tan(angle) > contact.friction for angle, contact in steepness):
+        return None
+    try:
+        if len(admissible_com_polygon(polytope, mass)):
+            return None
+    except InputError:
+        return None
+    angle, contact = min(steepness, key=lambda item: item[0])
+    return (
+        f"nobody can stand on {', '.join(stance.effectors)}: a slope of {np.degrees(angle):.1f} degrees "
+        f"needs a friction of at least {np.tan(angle):.2f}, {contact.effector} has {contact.friction:g}"
+    )
+
+
+def _slope(normal: FloatArray) -> float:
+    """Angle of a surface to the horizontal [rad]."""
+    return float(np.arccos(np.clip(normal[2], -1.0, 1.0)))
+
+
+def low_friction(
+    stances: Sequence[Stance],
+    problem: CentroidalProblem,
+    measure: Callable[[Sequence[WrenchPolytope]], float],
+) -> str:
+    """Say that a quantity would suffice with firm friction; empty when friction is not the cause.
+
+    Args:
+        stances: What the quantity depends on.
+        problem: Where it occurs.
+        measure: The quantity from the stances' polytopes; it suffices above the required margin.
+    """
+    least = least_friction(stances)
+    if least >= FIRM_FRICTION:
+        return ""
+    firm = wrench_polytopes([_firm(s) for s in stances], reference=problem.reference)
+    value = measure(firm)
+    if value <= problem.required_margin:
+        return ""
+    return f"; the friction of {least:g} is too low: with {FIRM_FRICTION:g} it would be {value:.2f} N.m"
+
+
+def least_friction(stances: Sequence[Stance]) -> float:
+    """Least coefficient of the soles and points of some stances; infinite without any."""
+    return min((c.friction for s in stances for c in s if c.kind is not ContactKind.GRASP), default=np.inf)
+
+
+def with_firm_friction(problem: CentroidalProblem) -> CentroidalProblem:
+    """The same problem with friction of :data:`FIRM_FRICTION` at least."""
+    phases = [replace(phase, stance=_firm(phase.stance)) for phase in problem.sequence]
+    return replace(problem, sequence=StanceSequence(phases))
+
+
+def _firm(stance: Stance) -> Stance:
+    contacts = [
+        contact
+        if contact.kind is ContactKind.GRASP
+        else replace(contact, friction=max(contact.friction, FIRM_FRICTION))
+        for contact in stance
+    ]
+    return stance.with_contacts(contacts)
+
+
+def out_of_reach(problem: CentroidalProblem, phase: int) -> str | None:
+    """Say that no CoM is near enough to all contacts of a phase and keeps the constraints, or None."""
+    stance, limit = problem.sequence[phase].stance, problem.support_distance
+    if limit is None or len(stance) < 2:
+        return None
+    apart, first, second = max(
+        (float(np.linalg.norm(a.position - b.position)), a.effector, b.effector)
+        for i, a in enumerate(stance)
+        for b in stance.contacts[:i]
+    )
+    missing = _least_miss(problem, np.array([contact.position for contact in stance]), limit)
+    if missing <= REACH_TOLERANCE:
+        return None
+    return (
+        f"the step is too long: {second} and {first} are {apart:.2f} m apart in phase {phase}, and no "
+        f"centre of mass within {limit:.3f} m of both keeps the constraints on it "
+        f"(it misses them by {missing:.2f} m)"
+    )
+
+
+def _least_miss(problem: CentroidalProblem, places: FloatArray, limit: float) -> float:
+    """Least violation of distance and constraints over a grid of CoM positions above the contacts [m]."""
+    low, high = places.max(axis=0) - limit, places.min(axis=0) + limit
+    axes = [np.linspace(min(a, b), max(a, b), _GRID) for a, b in zip(low[:2], high[:2], strict=True)]
+    x, y = (grid.ravel() for grid in np.meshgrid(*axes))
+    flat = np.linalg.norm(np.stack([x, y], axis=1)[:, None] - places[:, :2], axis=2)
+    tops = places[:, 2] + np.sqrt(np.maximum(limit**2 - flat**2, 0.0))
+    top, far = tops.min(axis=1), np.maximum(flat - limit, 0.0).max(axis=1)
+    worst = np.inf
+    for depth in np.linspace(0.0, 0.3 * limit, _LEVELS):
+        position = np.stack([x, y, top - depth], axis=1)
+        violation = [far, *(constraint.violation(position) for constraint in problem.geometric)]
+        worst = min(worst, float(np.max(violation, axis=0).min()))
+    return worst
+
+
+ROUNDING = 1e-9
+"""Slack given to comparisons of given lengths and times [m], [s]."""
+
+VANISHING_MARGIN = 1e-6
+"""Margins up to this are none, as free fall has everywhere ([Qiu2012]_ 5.21) [N.m] or [N]."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why there is no trajectory.
+
+    Attributes:
+        requirement: Short name of what cannot be met: ``"durations"``, ``"weight"``, ``"intersection"``,
+            ``"start balance"``, ``"goal balance"``, ``"friction"``, ``"support distance"``,
+            ``"balance margin"`` or the name of a geometric constraint.
+        reason: One sentence with the numbers.
+        phase: Index of the phase, or None when it concerns the whole motion.
+        time: Instant in the last attempt [s], or None when nothing was attempted.
+        where: Contacts or place concerned.
+    """
+
+    requirement: str
+    reason: str
+    phase: int | None = None
+    time: float | None = None
+    where: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Feasibility:
+    """Intersections of consecutive polytopes and the first thing that cannot work.
+
+    Attributes:
+        radii: (phases - 1,) upper bound of the margin at each key instant, see :func:`margin_bounds`; about
+            the world origin, the radius of the largest ball inside each intersection [N.m]. Negative
+            when the intersection is empty.
+        failure: Why the problem has no solution, or None when that cannot be excluded.
+    """
+
+    radii: FloatArray
+    failure: Failure | None
+
+    @property
+    def radius(self) -> float:
+        """Difficulty of the problem and upper bound of d_min [N.m] (Proposition 2); inf for one phase."""
+        return float(self.radii.min(initial=np.inf))
+
+
+def polytopes_of(problem: CentroidalProblem) -> tuple[WrenchPolytope, ...]:
+    """W_i of every phase about ``problem.reference`` ([Qiu2012]_ 5.4.1; n_t polytopes for n_t phases)."""
+    return wrench_polytopes([phase.stance for phase in problem.sequence], reference=problem.reference)
+
+
+def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
+    """Radius of the largest ball inside each consecutive intersection ([Qiu2012]_ 2.25, Propositions 1-2).
+
+    The thesis calls it the radius of the Chebyshev ball; the *inscribed* one is meant. An
+    empty intersection has the (negative) radius by which the facets would have to move out.
+
+    Args:
+        polytopes: W_i of n phases.
+
+    Returns:
+        (n - 1,).
+    """
+    return np.array([
+        _largest_distance(both, np.ones(len(both)))
+        for both in (a.intersection(b) for a, b in itertools.pairwise(polytopes))
+    ])  # fmt: skip
+
+
+def margin_bounds(polytopes: Sequence[Polytope]) -> FloatArray:
+    """Upper bound of the margin about the CoM at each key instant, wherever the CoM is (our own).
+
+    The margin at ``x`` is the least of ``d_i / hypot(|H1 + H2 x^|, |H2|)`` over the rows of both
+    polytopes. As a row is a screw, no ``x`` makes its force part shorter than the part along its moment,
+    ``|H1 . H2| / |H2|``: with these least lengths, which no choice of the moments' point changes, the
+    bound is a linear programme in the wrench. It takes the place of the largest ball of Proposition 2
+    ([Qiu2012]_ 5.4.3), which is about a fixed point. Like that one it is necessary, not sufficient.
+
+    Args:
+        polytopes: W_i of n phases, all about one point.
+
+    Returns:
+        (n - 1,) [N.m]; negative when no wrench is in both polytopes.
+    """
+    return np.array([
+        _largest_distance(both, _least_lengths(both.H))
+        for both in (a.intersection(b) for a, b in itertools.pairwise(polytopes))
+    ])  # fmt: skip
+
+
+def _least_lengths(H: FloatArray) -> FloatArray:
+    """(m,) least length of rows with moments about any point."""
+    force, moment = H[:, :3], np.linalg.norm(H[:, 3:], axis=1)
+    turning = moment > 1e-9
+    along = np.abs(np.einsum("ij,ij->i", force, H[:, 3:])) / np.where(turning, moment, 1.0)
+    return np.hypot(np.where(turning, along, np.linalg.norm(force, axis=1)), moment)
+
+
+def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Feasibility:
+    """Test everything that needs no optimisation.
+
+    Durations against their bounds, whether the legs reach the contacts of each phase, end points
+    against their bounds, whether any phase lifts the weight,
+    whether the friction holds the body at both ends, then emptiness of the
+    intersections (Proposition 1) and the bound of the margin in them against the required one
+    (Proposition 2), then whether any acceleration balances the CoM at the start and at the goal.
+
+    Args:
+        problem: What to find.
+        polytopes: W_i of the phases about ``problem.reference``.
+    """
+    radii = _bounds(problem, polytopes)
+    failure = (
+        _duration_failure(problem)
+        or _reach_failure(problem)
+        or _end_failure(problem)
+        or _weight_failure(problem, polytopes)
+        or _slope_failure(problem, polytopes)
+        or _intersection_failure(problem, radii)
+        or _end_balance_failure(problem, polytopes)
+    )
+    return Feasibility(radii, failure)
+
+
+def _bounds(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> FloatArray:
+    """Upper bounds of the margin at the key instants; of forces only the sign counts."""
+    if problem.margin_space != "wrench_about_origin":
+        return margin_bounds(polytopes)
+    return intersection_radii([_about_origin(polytope, problem.reference) for polytope in polytopes])
+
+
+def _about_origin(polytope: Polytope, reference: FloatArray) -> Polytope:
+    H = polytope.H
+    return Polytope(np.hstack([H[:, :3] - np.cross(H[:, 3:], reference), H[:, 3:]]), polytope.h)
+
+
+def _largest_distance(polytope: Polytope, lengths: FloatArray) -> float:
+    """Largest ``d`` with ``H x + lengths d <= h`` at some x; negative when the polytope is empty."""
+    cost = np.zeros(polytope.dimension + 1)
+    cost[-1] = -1.0
+    rows = np.column_stack([polytope.H, lengths])
+    found = linprog(cost, rows, polytope.h, bounds=(None, None), method="highs")
+    return float(found.x[-1]) if found.success else np.inf
+
+
+def _duration_failure(problem: CentroidalProblem) -> Failure | None:
+    shortest = float(problem.min_durations.sum())
+    if problem.max_duration is None or shortest <= problem.max_duration + ROUNDING:
+        return None
+    return Failure(
+        "durations",
+        f"the phases last at least {shortest:.3f} s together, longer than max_duration "
+        f"{problem.max_duration:.3f} s",
+    )
+
+
+def _end_failure(problem: CentroidalProblem) -> Failure | None:
+    last = len(problem.sequence) - 1
+    for name, phase, com in (("start", 0, problem.start_com), ("goal", last, problem.goal_com)):
+        limit = problem.support_distance
+        for contact in problem.sequence[phase].stance if limit is not None else ():
+            distance = float(np.linalg.norm(com - contact.position))
+            if limit is not None and distance > limit + ROUNDING:
+                return Failure(
+                    "support distance",
+                    f"{name} CoM is {distance:.3f} m from {contact.effector}, out of reach: "
+                    f"the limit is {limit:.3f} m",
+                    phase, where=contact.effector,
+                )  # fmt: skip
+        for constraint in problem.geometric:
+            violation = float(constraint.violation(com))
+            if violation > ROUNDING:
+                return Failure(
+                    constraint.name, f"{name} CoM violates '{constraint.name}' by {violation:.4f} m", phase
+                )
+    return None
+
+
+def _reach_failure(problem: CentroidalProblem) -> Failure | None:
+    for index, phase in enumerate(problem.sequence):
+        reason = out_of_reach(problem, index)
+        if reason is not None:
+            return Failure("support distance", reason, index, where=", ".join(phase.stance.effectors))
+    return None
+
+
+def _slope_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Failure | None:
+    for index in (0, len(problem.sequence) - 1):
+        stance, polytope = problem.sequence[index].stance, polytopes[index]
+        reason = (
+            slipping_slope(stance, polytope, problem.mass) if isinstance(polytope, WrenchPolytope) else None
+        )
+        if reason is not None:
+            return Failure("friction", reason, index, where=", ".join(stance.effectors))
+    return None
+
+
+def _weight_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Failure | None:
+    """From rest to rest the mean vertical force is the weight, so some phase must be able to exceed it."""
+    start, goal = problem.start_velocity, problem.goal_velocity
+    if start is None or goal is None or goal[2] < start[2]:
+        return None
+    weight = problem.mass * GRAVITY
+    lifts = [_largest_lift(polytope) for polytope in polytopes]
+    best = int(np.argmax(lifts))
+    if lifts[best] >= weight:
+        return None
+    stance = problem.sequence[best].stance
+    rubbing = [contact for contact in stance if contact.friction > 0.0 and abs(contact.normal[2]) < 0.1]
+    cause = "the caps on the normal forces are too small"
+    if rubbing and len(rubbing) == len(stance):
+        squeeze = sum(contact.normal_force_cap or 0.0 for contact in rubbing)
+        pressed = f" pressed with {squeeze:.0f} N in all" if squeeze else ""
+        friction = min(contact.friction for contact in rubbing)
+        cause = (
+            f"on walls only friction carries, and a friction of {friction:g}{pressed} is too small: "
+            "more friction or a stronger squeeze is needed"
+        )
+    return Failure(
+        "weight",
+        f"the contacts push up with {lifts[best]:.0f} N at most, in phase {best}, and the body weighs "
+        f"{weight:.0f} N; {cause}",
+        best,
+        where=", ".join(stance.effectors),
+    )
+
+
+def _largest_lift(polytope: Polytope) -> float:
+    """Largest upward force of any admissible wrench [N]."""
+    cost = np.zeros(polytope.dimension)
+    cost[2] = -1.0
+    found = linprog(cost, polytope.H, polytope.h, bounds=(None, None), method="highs")
+    return -float(found.fun) if found.success else np.inf
+
+
+def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Failure | None:
+    for index, radius in enumerate(radii):
+        where = f"phases {index} and {index + 1}"
+        stances = [problem.sequence[number].stance for number in (index, index + 1)]
+        if radius < -VANISHING_MARGIN:
+            return Failure(
+                "intersection",
+                f"no wrench is admissible in both of {where}: their polytopes do not meet (Proposition 1)"
+                f"{low_friction(stances, problem, lambda firm: float(_bounds(problem, firm).min()))}",
+                index, where=where,
+            )  # fmt: skip
+        if problem.margin_space != "force" and radius <= max(problem.required_margin, VANISHING_MARGIN):
+            return Failure(
+                "intersection",
+                f"the margin between {where} is at most {radius:.2f} N.m for any wrench in both polytopes "
+                f"(Proposition 2); required {problem.required_margin:.2f} N.m"
+                f"{low_friction(stances, problem, lambda firm: float(_bounds(problem, firm).min()))}",
+                index, where=where,
+            )  # fmt: skip
+    return None
+
+
+def _end_balance_failure(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Failure | None:
+    last = len(problem.sequence) - 1
+    ends = (
+        ("start", 0, problem.start_com, problem.start_acceleration),
+        ("goal", last, problem.goal_com, problem.goal_acceleration),
+    )
+    for name, phase, com, acceleration in ends:
+        margin = best_margin_at(polytopes[phase], problem, com, acceleration)
+        if margin <= max(problem.required_margin, VANISHING_MARGIN):
+            stance = problem.sequence[phase].stance
+            held = ", ".join(stance.effectors)
+            what = (
+                "cannot be balanced" if margin <= VANISHING_MARGIN
+                else f"reaches a margin of at most {margin:.2f} {problem.margin_unit}"
+            )  # fmt: skip
+            return Failure(
+                f"{name} balance",
+                f"{name} CoM {np.round(com, 3).tolist()} {what} on {held or 'no contact'}; "
+                f"required {problem.required_margin:g} {problem.margin_unit}"
+                f"{_end_friction(stance, problem, com, acceleration)}",
+                phase, where=held,
+            )  # fmt: skip
+    return None
+
+
+def _end_friction(
+    stance: Stance, problem: CentroidalProblem, com: FloatArray, acceleration: FloatArray | None
+) -> str:
+    def margin(firm: Sequence[WrenchPolytope]) -> float:
+        return best_margin_at(firm[0], problem, com, acceleration)
+
+    return low_friction([stance], problem, margin) if len(stance) else ""
+
+
+def best_margin_at(
+    polytope: Polytope, problem: CentroidalProblem, com: FloatArray, acceleration: FloatArray | None
+) -> float:
+    """Largest margin at a CoM position over all accelerations, or with the given one.
+
+    At a fixed position the pseudo-wrench is linear in the acceleration, so this is a linear
+    programme.
+    """
+    slopes = row_slopes(polytope, problem, com)
+    arm = com - problem.reference
+    still = polytope.distances(pseudo_wrench(problem.mass, arm, np.zeros(3)))
+    gain = problem.mass * np.vstack([np.eye(3), skew(arm)])
+    if acceleration is not None:
+        return float(np.min((still - polytope.H @ gain @ acceleration) / slopes))
+    found = linprog(
+        [0.0, 0.0, 0.0, -1.0],
+        np.column_stack([polytope.H @ gain, slopes]),
+        still,
+        bounds=(None, None),
+        method="highs",
+    )
+    return float(found.x[-1]) if found.success else np.inf
+
+
+def row_slopes(polytope: Polytope, problem: CentroidalProblem, com: FloatArray) -> FloatArray:
+    """(..., m) change of each row per unit of margin at CoM positions (..., 3).
+
+    Its length with moments about the CoM, or about the world origin; ``|H1 + H2 p^|`` for forces.
+
+    Args:
+        polytope: About ``problem.reference``.
+        problem: Says what the margin measures.
+        com: In the world [m].
+    """
+    place = np.asarray(com, dtype=np.float64)
+    point = np.zeros_like(place) if problem.margin_space == "wrench_about_origin" else place
+    arm = (point - problem.reference).reshape(-1, 3)
+    lengths = force_levers if problem.margin_space == "force" else wrench_levers
+    return np.maximum(lengths(polytope.H, arm), 1e-12).reshape(*place.shape[:-1], len(polytope.h))

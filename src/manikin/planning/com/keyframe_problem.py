@@ -1,0 +1,270 @@
+"""What the keyframe-based method is asked: a recording and what the motion has to keep ([Qiu2012]_ 5.3.1).
+
+Also here. A recorded CoM with the stances it was recorded on ([Qiu2012]_ 3.2.2, 5.3.1).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.contact import ContactSchedule, Phase, StanceSequence
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.planning.com.com_constraints import GeometricConstraint
+from manikin.planning.com.com_problem import CentroidalProblem, MarginSpace, Weights
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedCom:
+    """Samples of a CoM from the first key frame to the last, on a known sequence of stances.
+
+    A key frame is a sample at which the support changes; the first and the last sample are
+    key frames as well ([Qiu2012]_ Definition 3).
+
+    Attributes:
+        time: (n,) increasing [s]; 0 at the first key frame.
+        com: (n, 3) [m].
+        key_frames: (phases + 1,) indices of the key frames among the samples.
+        sequence: Stances, one per phase, whose duration bounds are both the recorded duration.
+        angular_momentum_rate: (n, 3) about the CoM [N.m] ([Qiu2012]_ 4.51); None where it is not known.
+    """
+
+    time: FloatArray
+    com: FloatArray
+    key_frames: NDArray[np.int64]
+    sequence: StanceSequence
+    angular_momentum_rate: FloatArray | None
+
+    def __init__(
+        self,
+        time: ArrayLike,
+        com: ArrayLike,
+        sequence: StanceSequence,
+        key_times: ArrayLike,
+        angular_momentum_rate: ArrayLike | None = None,
+    ) -> None:
+        """Take over the samples from the first to the last key frame.
+
+        Args:
+            time: (n,) [s], increasing; any origin.
+            com: (n, 3) [m].
+            sequence: Stances, one per phase, each with at least one contact.
+            key_times: (phases + 1,) [s], where the support changes, with both ends; each is
+                moved to the nearest sample.
+            angular_momentum_rate: (n, 3) about the CoM [N.m]; None where it is not known.
+
+        Raises:
+            InputError: If a number is not finite, times do not increase, or a phase has no
+                contact or fewer than one sample interval.
+        """
+        times = frozen_array(time, "recording time [s]", (None,))
+        positions = frozen_array(com, "recording com [m]", (len(times), 3))
+        wanted = frozen_array(key_times, "recording key times [s]", (len(sequence) + 1,))
+        _check_increasing(times, "recording time")
+        _check_increasing(wanted, "recording key times")
+        _check_supported(sequence)
+        _check_inside(times, wanted)
+        frames = np.array([int(np.argmin(np.abs(times - instant))) for instant in wanted])
+        for index in np.flatnonzero(np.diff(frames) < 1):
+            raise InputError(
+                f"recording has no sample between its key times {wanted[index]:g} and "
+                f"{wanted[index + 1]:g} s; valid: samples that are closer than the shortest phase"
+            )
+        kept = slice(frames[0], frames[-1] + 1)
+        instants = times[frames] - times[frames[0]]
+        turning = angular_momentum_rate
+        if turning is not None:
+            turning = frozen_array(turning, "recording angular momentum rate [N.m]", (len(times), 3))
+            turning = frozen_array(turning[kept], "recording angular momentum rate [N.m]")
+        values = {
+            "time": frozen_array(times[kept] - times[frames[0]], "recording time [s]"),
+            "com": frozen_array(positions[kept], "recording com [m]"),
+            "key_frames": _frozen_indices(frames - frames[0]),
+            "sequence": _with_durations(sequence, np.diff(instants)),
+            "angular_momentum_rate": turning,
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def with_angular_momentum_rate(self, rate: ArrayLike) -> "RecordedCom":
+        """The same with a rate of the angular momentum (n, 3) about the CoM at its samples [N.m]."""
+        return RecordedCom(self.time, self.com, self.sequence, self.key_times, rate)
+
+    @property
+    def key_times(self) -> FloatArray:
+        """(phases + 1,) time of each key frame [s]; the first is 0."""
+        return self.time[self.key_frames]
+
+    @property
+    def schedule(self) -> ContactSchedule:
+        """The stances with the key times."""
+        return ContactSchedule(self.sequence, self.key_times)
+
+
+def _check_increasing(times: FloatArray, name: str) -> None:
+    steps = np.flatnonzero(np.diff(times) <= 0)
+    if len(times) < 2 or len(steps):
+        found = f"have {len(times)} entries" if len(times) < 2 else f"fall or stay at entry {steps[0] + 1}"
+        raise InputError(f"{name} values {found}; valid: at least two, strictly increasing seconds")
+
+
+def _check_supported(sequence: StanceSequence) -> None:
+    for number, phase in enumerate(sequence):
+        if not len(phase.stance):
+            raise InputError(
+                f"recording has no support in phase {number}; valid: at least one contact in every phase"
+            )
+
+
+def _check_inside(times: FloatArray, key_times: FloatArray) -> None:
+    slack = float(np.median(np.diff(times)))
+    if key_times[0] < times[0] - slack or key_times[-1] > times[-1] + slack:
+        raise InputError(
+            f"recording lasts from {times[0]:g} to {times[-1]:g} s but its key times from "
+            f"{key_times[0]:g} to {key_times[-1]:g} s; valid: key times inside the recording"
+        )
+
+
+def _with_durations(sequence: StanceSequence, durations: FloatArray) -> StanceSequence:
+    pairs = zip(sequence, durations.tolist(), strict=True)
+    return StanceSequence([Phase(phase.stance, duration, duration) for phase, duration in pairs])
+
+
+def _frozen_indices(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    values = np.array(values, dtype=np.int64)
+    values.setflags(write=False)
+    return values
+
+
+EXTRA_CONTROL_POINTS = 7
+"""Control points by default beyond the number of key frames: 16 for the 9 of [Qiu2012]_ 5.3.3."""
+
+FRAME_SPACING = 0.05
+"""Least distance of an added key frame from the others [s]; closer ones would follow the noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeyframeProblem:
+    """A CoM to find through the key frames of a recording ([Qiu2012]_ 5.3.1).
+
+    Attributes:
+        recording: Samples, key frames and stances.
+        requirements: What the motion has to keep, with the timing and the ends of the recording.
+        control_points: Of the spline, before key frames are added; each added one brings one more.
+        frame_spacing: Least distance of an added key frame from the others [s].
+    """
+
+    recording: RecordedCom
+    requirements: CentroidalProblem
+    control_points: int
+    frame_spacing: float
+
+    def __init__(
+        self,
+        mass: float,
+        recording: RecordedCom,
+        *,
+        degree: int = 5,
+        control_points: int | None = None,
+        start_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
+        goal_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
+        start_acceleration: ArrayLike | None = None,
+        goal_acceleration: ArrayLike | None = None,
+        required_margin: float = 0.0,
+        margin_space: MarginSpace = "wrench",
+        support_distance: float | None = None,
+        geometric: Sequence[GeometricConstraint] = (),
+        weights: Weights | None = None,
+        frame_spacing: float = FRAME_SPACING,
+    ) -> None:
+        """Put the problem together.
+
+        Args:
+            mass: [kg].
+            recording: Samples, key frames and stances.
+            degree: Of the spline, >= 3.
+            control_points: At least one more than there are key frames and end conditions; the
+                number of key frames plus 7 when omitted.
+            start_velocity: (3,) [m/s] (5.15), or None when free.
+            goal_velocity: (3,) [m/s] (5.16), or None when free.
+            start_acceleration: (3,) [m/s^2], or None when free; needs a velocity too.
+            goal_acceleration: (3,) [m/s^2], or None when free; needs a velocity too.
+            required_margin: The whole motion has to keep it [N.m] or [N].
+            margin_space: What the margin measures.
+            support_distance: Largest distance of the CoM from every active contact [m].
+            geometric: Further constraints on the CoM position.
+            weights: Qv and Qj of the objective, and a Qa that the thesis does not have; those of
+                margin and duration play no part.
+            frame_spacing: Least distance of an added key frame from the others [s].
+
+        Raises:
+            InputError: If a value is not usable or there are too few control points.
+        """
+        requirements = CentroidalProblem(
+            mass, recording.sequence, recording.com[0], recording.com[-1],
+            start_velocity=start_velocity, goal_velocity=goal_velocity,
+            start_acceleration=start_acceleration, goal_acceleration=goal_acceleration,
+            degree=degree, margin_space=margin_space, required_margin=required_margin,
+            support_distance=support_distance, geometric=geometric,
+            weights=Weights() if weights is None else weights,
+        )  # fmt: skip
+        frames = len(recording.key_frames)
+        if control_points is None:
+            control_points = max(frames + EXTRA_CONTROL_POINTS, degree + 1)
+        _check_control_points(control_points, frames, requirements)
+        _check_weights(requirements.weights)
+        spacing = finite_number(frame_spacing, "keyframes frame_spacing [s]", above=0.0)
+        values = {
+            "recording": recording, "requirements": requirements,
+            "control_points": int(control_points), "frame_spacing": spacing,
+        }  # fmt: skip
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def of(
+        cls, problem: CentroidalProblem, recording: RecordedCom, control_points: int | None = None
+    ) -> "KeyframeProblem":
+        """Ask for the same as ``problem``, but with ends and timing of a recording.
+
+        Args:
+            problem: Whose body, margin, constraints, weights and conditions at the ends are taken over.
+            recording: Samples, key frames and stances.
+            control_points: The number of key frames plus 7 when omitted.
+
+        Raises:
+            InputError: If there are too few control points.
+        """
+        names = (
+            "degree", "start_velocity", "goal_velocity", "start_acceleration", "goal_acceleration",
+            "required_margin", "margin_space", "support_distance", "geometric", "weights",
+        )  # fmt: skip
+        given = {name: getattr(problem, name) for name in names}
+        return cls(problem.mass, recording, control_points=control_points, **given)
+
+
+def _check_control_points(count: object, frames: int, problem: CentroidalProblem) -> None:
+    conditions = sum(
+        value is not None
+        for value in (
+            problem.start_velocity, problem.start_acceleration, problem.goal_velocity,
+            problem.goal_acceleration,
+        )
+    )  # fmt: skip
+    least = max(frames + conditions + 1, problem.degree + 1)
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < least:
+        raise InputError(
+            f"keyframes control_points is {count!r}; valid: an integer >= {least} for {frames} key frames, "
+            f"{conditions} end conditions and degree {problem.degree}"
+        )
+
+
+def _check_weights(weights: Weights) -> None:
+    total = np.array([weights.velocity, weights.acceleration, weights.jerk]).sum(axis=0)
+    if weights.smoothness == 0 or np.any(total == 0):
+        raise InputError(
+            "keyframes weights of velocity, acceleration and jerk are all zero along an axis; "
+            "valid: one of them, and smoothness, > 0"
+        )

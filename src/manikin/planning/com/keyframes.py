@@ -1,0 +1,326 @@
+"""The keyframe-based method: a smooth CoM through recorded positions ([Qiu2012]_ 5.3).
+
+The CoM passes the recorded positions at the instants at which the support changes and has the
+least velocity and jerk in between. Balance is imposed at these key frames and measured every
+millisecond afterwards; where it is lost in between, the recorded position there becomes one
+more key frame and the programme is solved again (5.3.3).
+"""
+
+import time as clock
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from manikin.balance import WrenchPolytope
+from manikin.contact import ContactSchedule
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.com.com_certificate import (
+    TOLERANCE,
+    UNIT_SCALE,
+    Residual,
+    Residuals,
+    measure,
+    phase_margins,
+    phase_times,
+    position_excess,
+)
+from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory
+from manikin.planning.com.feasibility import (
+    VANISHING_MARGIN,
+    Failure,
+    Feasibility,
+    assess_feasibility,
+    best_margin_at,
+    polytopes_of,
+)
+from manikin.planning.com.keyframe_problem import KeyframeProblem
+from manikin.planning.com.keyframe_spline import (
+    KeyframeProgramme,
+    build_keyframe_programme,
+    phases_touching,
+    spline_of,
+)
+from manikin.planning.com.timing_free import CentroidalResult, limiting_at
+
+MAX_ROUNDS = 30
+"""Key frames that are tried before the method gives up."""
+
+
+@dataclass(frozen=True, eq=False)
+class KeyframeResult(CentroidalResult):
+    """A trajectory through the key frames with its certificate, or why there is none.
+
+    Attributes:
+        keyframes: What was asked; ``problem`` is its ``requirements``.
+        frames: Samples of the recording that the trajectory passes, in order.
+        added: Those among them that were added, in the order of their addition.
+        least_margins: Least margin of the motion after each solution [N.m] or [N].
+        programme: Of the last solution; None when nothing was attempted.
+    """
+
+    keyframes: KeyframeProblem
+    frames: tuple[int, ...]
+    added: tuple[int, ...]
+    least_margins: tuple[float, ...]
+    programme: KeyframeProgramme | None
+
+    @property
+    def added_times(self) -> tuple[float, ...]:
+        """Instants of the added key frames [s], in the order of their addition."""
+        return tuple(float(self.keyframes.recording.time[frame]) for frame in self.added)
+
+    def residuals(self) -> Residuals:
+        """Measure every requirement again, every millisecond, and the distance from the key frames.
+
+        Raises:
+            ValueError: If there is no trajectory.
+        """
+        if self.trajectory is None:
+            raise ValueError("no trajectory to measure; valid: a result that succeeded")
+        return _measure(self.keyframes, self.trajectory, self.polytopes, self.frames)
+
+
+def plan_com_through_key_frames(problem: KeyframeProblem) -> KeyframeResult:
+    """Find the smoothest balanced CoM trajectory through the key frames of a recording.
+
+    Every programme is convex and solved to its one optimum; see
+    :mod:`manikin.planning.com.keyframe_spline`. A trajectory that does not meet its own
+    certificate, measured every millisecond, gets key frames until it does or no sample of the
+    recording is left that would help.
+
+    Args:
+        problem: What to find.
+
+    Returns:
+        A result that holds the trajectory or says which requirement could not be met.
+    """
+    return _Search(problem).run()
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    frames: tuple[int, ...]
+    programme: KeyframeProgramme
+    trajectory: CentroidalTrajectory
+    certificate: Residuals
+
+
+@dataclass
+class _Search:
+    """The rounds of one problem."""
+
+    problem: KeyframeProblem
+    useless: set[int] = field(default_factory=set)
+    added: list[int] = field(default_factory=list)
+    least_margins: list[float] = field(default_factory=list)
+    iterations: int = 0
+
+    def run(self) -> KeyframeResult:
+        began = clock.perf_counter()
+        self.polytopes = polytopes_of(self.problem.requirements)
+        feasibility = _assess(self.problem, self.polytopes)
+        failure, attempt = feasibility.failure, None
+        if failure is None:
+            first = tuple(self.problem.recording.key_frames.tolist())
+            attempt = self._solve(first)
+            failure = self._unsolvable(first) if attempt is None else None
+        if attempt is not None:
+            attempt = self._add_frames(attempt)
+            failure = None if attempt.certificate.within() else self._explain(attempt)
+        return KeyframeResult(
+            problem=self.problem.requirements, polytopes=self.polytopes, feasibility=feasibility,
+            failure=failure,
+            trajectory=attempt.trajectory if attempt is not None and failure is None else None,
+            certificate=None if attempt is None else attempt.certificate,
+            iterations=self.iterations, rounds=len(self.least_margins),
+            wall_time=clock.perf_counter() - began, keyframes=self.problem,
+            frames=() if attempt is None else attempt.frames,
+            added=() if attempt is None else tuple(f for f in self.added if f in attempt.frames),
+            least_margins=tuple(self.least_margins),
+            programme=None if attempt is None else attempt.programme,
+        )  # fmt: skip
+
+    def _add_frames(self, attempt: _Attempt) -> _Attempt:
+        """Add the sample nearest to the worst violation until there is none, or no sample is left."""
+        best = attempt
+        for _ in range(MAX_ROUNDS):
+            frame = None if attempt.certificate.within() else self._next_frame(attempt)
+            if frame is None:
+                break
+            following = self._solve(tuple(sorted((*attempt.frames, frame))))
+            if following is None:
+                self.useless.add(frame)
+                continue
+            attempt = following
+            self.added.append(frame)
+            if attempt.certificate.rank < best.certificate.rank:
+                best = attempt
+        return best
+
+    def _solve(self, frames: tuple[int, ...]) -> _Attempt | None:
+        programme = self._programme(frames)
+        solution = programme.solve(self.problem.requirements.required_margin)
+        if solution is None:
+            return None
+        self.iterations += solution.iterations
+        trajectory = self._trajectory(programme, solution.control_points)
+        certificate = _measure(self.problem, trajectory, self.polytopes, frames)
+        self.least_margins.append(certificate.min_margin)
+        return _Attempt(frames, programme, trajectory, certificate)
+
+    def _programme(self, frames: tuple[int, ...]) -> KeyframeProgramme:
+        recording, index = self.problem.recording, list(frames)
+        control_points = self.problem.control_points + len(frames) - len(recording.key_frames)
+        return build_keyframe_programme(
+            self.problem.requirements, self.polytopes, recording.schedule, recording.time[index],
+            recording.com[index], control_points,
+        )  # fmt: skip
+
+    def _trajectory(self, programme: KeyframeProgramme, control_points: FloatArray) -> CentroidalTrajectory:
+        schedule = self.problem.recording.schedule
+        spline = spline_of(programme, control_points)
+        return CentroidalTrajectory(self.problem.requirements.mass, spline, schedule)
+
+    def _next_frame(self, attempt: _Attempt) -> int | None:
+        """Sample nearest to the worst violation, among those far enough from all key frames."""
+        recording = self.problem.recording
+        key_times = recording.time[list(attempt.frames)]
+        away = np.abs(recording.time[:, None] - key_times).min(axis=1)
+        usable = away >= self.problem.frame_spacing - TOLERANCE
+        usable[list(self.useless)] = False
+        samples = np.flatnonzero(usable)
+        gap_of_sample = np.searchsorted(key_times, recording.time[samples])
+        time, severity = _violations(self.problem.requirements, attempt.trajectory, self.polytopes)
+        gap_of_time = np.searchsorted(key_times, time)
+        for index in np.argsort(-severity, kind="stable"):
+            if severity[index] <= 0.0:
+                return None
+            near = samples[gap_of_sample == gap_of_time[index]]
+            if len(near):
+                return int(near[np.argmin(np.abs(recording.time[near] - time[index]))])
+        return None
+
+    def _unsolvable(self, frames: tuple[int, ...]) -> Failure:
+        """Say how much margin the given key frames allow, and which of them limits it."""
+        requirements = self.problem.requirements
+        programme = self._programme(frames)
+        points, margin, row = programme.most_margin()
+        phase = int(programme.phases[row])
+        time = float(self.problem.recording.time[frames[programme.frames[row]]])
+        trajectory = self._trajectory(programme, points)
+        limit = limiting_at(requirements, trajectory, self.polytopes[phase], time)
+        return Failure(
+            "balance margin",
+            f"no spline of degree {programme.degree} with {len(points)} control points through the "
+            f"{len(frames)} key frames keeps the required margin at all of them: the largest is "
+            f"{margin:.2f} {requirements.margin_unit}, limited in phase {phase} at {time:.3f} s by "
+            f"{limit.description}; required {requirements.required_margin:.2f} {requirements.margin_unit}",
+            phase, time, limit.effector,
+        )  # fmt: skip
+
+    def _explain(self, attempt: _Attempt) -> Failure:
+        """Name what the best attempt breaks between its key frames."""
+        unit, certificate = self.problem.requirements.margin_unit, attempt.certificate
+        count = len(attempt.frames) - len(self.problem.recording.key_frames)
+        tried = f"with {count} key frames added, and no further sample of the recording helps"
+        worst = certificate.largest
+        if worst.requirement != "balance margin":
+            return Failure(worst.requirement, f"{worst} {tried}", worst.phase, worst.time)
+        polytope = self.polytopes[certificate.limiting_phase]
+        limit = limiting_at(
+            self.problem.requirements, attempt.trajectory, polytope, certificate.limiting_time
+        )
+        reason = (
+            f"the largest margin found is {certificate.min_margin:.2f} {unit}, limited in phase "
+            f"{certificate.limiting_phase} at {certificate.limiting_time:.3f} s by {limit.description}, "
+            f"{tried}; required {self.problem.requirements.required_margin:.2f} {unit}"
+        )
+        return Failure(
+            "balance margin", reason, certificate.limiting_phase, certificate.limiting_time, limit.effector
+        )
+
+
+def _assess(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Feasibility:
+    """Propositions 1 and 2 and the ends, then each recorded position by itself."""
+    found = assess_feasibility(problem.requirements, polytopes)
+    failure = found.failure or _position_failure(problem) or _key_frame_failure(problem, polytopes)
+    return replace(found, failure=failure)
+
+
+def _position_failure(problem: KeyframeProblem) -> Failure | None:
+    """Find a key frame whose recorded position breaks a constraint; passing it, the motion would as well."""
+    requirements, recording = problem.requirements, problem.recording
+    for number, frame in enumerate(recording.key_frames):
+        time, com = float(recording.time[frame]), recording.com[frame]
+        phase = int(recording.schedule.phase_at(time))
+        what = f"recorded CoM {np.round(com, 3).tolist()} of key frame {number} at {time:.3f} s"
+        for constraint in requirements.geometric:
+            violation = float(constraint.violation(com))
+            if violation > TOLERANCE:
+                reason = f"{what} violates '{constraint.name}' by {violation:.4f} m"
+                return Failure(constraint.name, reason, phase, time)
+        limit = requirements.support_distance
+        for index in phases_touching(recording.schedule, time) if limit is not None else ():
+            for contact in recording.sequence[index].stance:
+                distance = float(np.linalg.norm(com - contact.position))
+                if limit is not None and distance > limit + TOLERANCE:
+                    reason = f"{what} is {distance:.3f} m from {contact.effector}; the limit is {limit:.3f} m"
+                    return Failure("support distance", reason, index, time, contact.effector)
+    return None
+
+
+def _key_frame_failure(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Failure | None:
+    requirements, schedule = problem.requirements, problem.recording.schedule
+    for number, frame in enumerate(problem.recording.key_frames):
+        time, com = float(problem.recording.time[frame]), problem.recording.com[frame]
+        phases = phases_touching(schedule, time)
+        both = polytopes[phases[0]]
+        for phase in phases[1:]:
+            both = both.intersection(polytopes[phase])
+        margin = best_margin_at(both, requirements, com, None)
+        if margin <= max(requirements.required_margin, VANISHING_MARGIN):
+            held = _shared(schedule, phases)
+            return Failure(
+                "key frame balance",
+                f"recorded CoM {np.round(com, 3).tolist()} of key frame {number} at {time:.3f} s reaches a "
+                f"margin of at most {margin:.2f} {requirements.margin_unit} with any acceleration on {held}; "
+                f"required {requirements.required_margin:g} {requirements.margin_unit}",
+                phases[-1], time, held,
+            )  # fmt: skip
+    return None
+
+
+def _shared(schedule: ContactSchedule, phases: Sequence[int]) -> str:
+    """Contacts held in all of some phases."""
+    stances = [schedule.sequence[phase].stance for phase in phases]
+    names = [name for name in stances[0].effectors if all(name in stance for stance in stances)]
+    return ", ".join(names) or "no contact"
+
+
+def _measure(
+    problem: KeyframeProblem,
+    trajectory: CentroidalTrajectory,
+    polytopes: Sequence[WrenchPolytope],
+    frames: Sequence[int],
+) -> Residuals:
+    """Measure the requirements every millisecond, and the distance from the recording at the key frames."""
+    found = measure(problem.requirements, trajectory, polytopes)
+    times = problem.recording.time[list(frames)]
+    errors = np.linalg.norm(trajectory.position(times) - problem.recording.com[list(frames)], axis=1)
+    worst = int(np.argmax(errors))
+    phase = int(trajectory.schedule.phase_at(times[worst]))
+    distance = Residual("key frame position", float(errors[worst]), "m", phase, float(times[worst]))
+    return replace(found, items=(*found.items, distance))
+
+
+def _violations(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
+) -> tuple[FloatArray, FloatArray]:
+    """Every millisecond and the severity of the worst violation there, not positive where there is none."""
+    times = phase_times(trajectory)
+    margins = np.concatenate(phase_margins(problem, trajectory, polytopes))
+    severity = (problem.required_margin - margins) / UNIT_SCALE[problem.margin_unit]
+    for _, excess in position_excess(problem, trajectory, times):
+        severity = np.maximum(severity, np.concatenate(excess) / UNIT_SCALE["m"])
+    return np.concatenate(times), severity

@@ -1,0 +1,471 @@
+"""A balanced CoM near the key frames of a recording: the keyframe-based method for noisy ones.
+
+:func:`~manikin.planning.com.keyframes.plan_com_through_key_frames` passes the recorded positions exactly, as
+[Qiu2012]_ 5.3 does. Where a walk's supports last a tenth of a second, a centimetre of error asks for
+accelerations that no foot can give, and further key frames make it worse. Here the key frames pull, balance
+is imposed all along, and the motion is measured every millisecond. Where it strays from the recording,
+the sample that is farthest off becomes one more key frame. With the recorded rate of the angular momentum the
+plan keeps its balance twice: as a point mass, as in the thesis, and with a rate near the recorded one.
+
+Also here. The quadratic programme of a CoM that stays near key frames and keeps its balance all the time.
+
+A recorded position is not exact, so that the one CoM that passes all of them may be out of balance where a
+person was not. Here the key frames pull instead, and balance is imposed every ten milliseconds: the
+pseudo-wrench ``m [a - g; p x (a - g)]`` ([Qiu2012]_ 4.6), bilinear in position and acceleration, is
+linearised about the last solution; the rows' lengths, which make the margin one about the CoM, are
+those at the last solution. Where the recorded rate of the angular momentum is known, the plan has
+one too, near it, and both wrenches keep their balance: that of the point mass and that of the body which
+turns ([Qiu2012]_ 4.51). More margin than has to be kept is wished for, and what lacks of it is paid for.
+All this is our own.
+"""
+
+import time as clock
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import piqp
+from scipy import sparse
+
+from manikin.balance import WrenchPolytope
+from manikin.balance.margin import wrench_levers
+from manikin.contact import ContactSchedule
+from manikin.errors import InputError
+from manikin.numerics.spatial import GRAVITY, FloatArray, skew
+from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
+from manikin.planning.com.com_certificate import TOLERANCE, Residuals, measure, phase_margins
+from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory, Weights
+from manikin.planning.com.feasibility import Failure, Feasibility, assess_feasibility, polytopes_of
+from manikin.planning.com.keyframe_problem import KeyframeProblem, RecordedCom
+from manikin.planning.com.timing_free import CentroidalResult
+
+DEGREE = 5
+"""Degree of the spline ([Qiu2012]_ 5.3.3)."""
+
+KNOT_SPACING = 0.05
+"""Largest distance of the spline's knots: steps of a walk are supports of a tenth of a second [s]."""
+
+BALANCE_STEP = 0.01
+"""Largest distance of two instants at which balance is imposed [s]."""
+
+FACETS = 16
+"""Facets of a polytope that an instant is kept from: the nearest ones."""
+
+PULL = 1e4
+"""Cost of a mean squared distance from the key frames, against that of a speed of 1 m/s [1/m^2]."""
+
+TURN = 100.0
+"""Unit of the rate of the angular momentum among the unknowns [N.m]."""
+
+TURN_PULL = 2.0
+"""Cost of its mean squared distance from the recorded one, in that unit: 10 N.m cost as much as the
+key frames missed by a little more than a millimetre."""
+
+RESERVE = 5.8
+"""Margin of the body that turns beyond that of the point mass: arms and legs meet the rate of its angular
+momentum only nearly [N.m]."""
+
+ROOM = 14.5
+"""Margin wished for beyond that: whoever follows a plan needs some to come back to it. A controller that
+keeps its forces 1 cm inside the soles has 5 N.m less [N.m]."""
+
+ROOM_PULL = 1.0
+"""Cost of the mean square of the share of it that lacks: all of it costs as much as key frames missed by a
+centimetre."""
+
+TURN_BEND = 1e-7
+"""Cost of its mean squared second derivative, in that unit [s^4]."""
+
+_NO_BOUND = 1e30
+
+
+@dataclass(frozen=True, eq=False)
+class NearProgramme:
+    """Everything about the programme that does not depend on the last solution.
+
+    Attributes:
+        mass: [kg].
+        reference: (3,) point of the polytopes' moments [m].
+        polytopes: W_i of the phases about ``reference``.
+        knots: On [0, 1].
+        smoothness: (n, n) matrix of the objective of one axis, without the pull.
+        turning: (n, n) and (n, 3) objective of the rate of the angular momentum, in :data:`TURN`; None for a
+            point mass.
+        phases: (m,) phase of each instant at which balance is imposed; key instants count twice.
+        position: (m, n) CoM there by control points.
+        acceleration: (m, n) its acceleration.
+    """
+
+    mass: float
+    reference: FloatArray
+    polytopes: tuple[WrenchPolytope, ...]
+    knots: FloatArray
+    smoothness: FloatArray
+    turning: tuple[FloatArray, FloatArray] | None
+    phases: np.ndarray
+    position: FloatArray
+    acceleration: FloatArray
+
+    @classmethod
+    def of(
+        cls, mass: float, polytopes: Sequence[WrenchPolytope], recording: RecordedCom, weights: Weights
+    ) -> "NearProgramme":
+        """Lay out knots and instants.
+
+        Args:
+            mass: [kg].
+            polytopes: W_i of the phases about one point.
+            recording: Stances with their instants, from 0 on, and the rate of the angular momentum.
+            weights: Of velocity, acceleration and jerk; the first entry of each counts for all three axes.
+        """
+        schedule = recording.schedule
+        duration = float(schedule.instants[-1])
+        spans = max(1, round(duration / KNOT_SPACING))
+        knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, spans + 1))
+        times, phases = _instants(schedule)
+        shares = np.minimum(times / duration, 1.0)
+        return cls(
+            mass, polytopes[0].reference, tuple(polytopes), knots, _smoothness(knots, duration, weights),
+            _turning(knots, duration, recording), phases,
+            basis_matrix(DEGREE, knots, shares), basis_matrix(DEGREE, knots, shares, 2) / duration**2,
+        )  # fmt: skip
+
+    def spline(self, points: FloatArray) -> BSpline:
+        """CoM over [0, 1] of control points (n, 3 or 6)."""
+        return BSpline(DEGREE, self.knots, points[:, :3])
+
+    def turning_spline(self, points: FloatArray) -> BSpline | None:
+        """Rate of the angular momentum over [0, 1] of control points (n, 3 or 6) [N.m]."""
+        return None if self.turning is None else BSpline(DEGREE, self.knots, TURN * points[:, 3:])
+
+    def free(self, shares: FloatArray, wanted: FloatArray) -> FloatArray:
+        """(n, 3 or 6) control points without regard to balance; the last three of the turning.
+
+        Args:
+            shares: (f,) key frames on [0, 1].
+            wanted: (f, 3) CoM there [m].
+        """
+        solved = [np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)]
+        return np.asarray(np.hstack(solved), dtype=np.float64)
+
+    def solve(
+        self, shares: FloatArray, wanted: FloatArray, margin: FloatArray, near: FloatArray
+    ) -> tuple[FloatArray, int] | None:
+        """Control points and iterations; None when the linearised programme has no solution.
+
+        Args:
+            shares: (f,) key frames on [0, 1].
+            wanted: (f, 3) CoM there [m].
+            margin: (phases,) to keep [N.m].
+            near: (n, 3 or 6) control points about which the wrench is linearised.
+        """
+        parts = self._objectives(shares, wanted)
+        linear = np.hstack([line for _, line in parts])
+        rows, bounds = self._balance(margin, near)
+        axes = [np.diag(np.repeat(np.arange(len(parts)) == number, 3)) for number in range(len(parts))]
+        whole = sum(np.kron(quadratic, axis) for (quadratic, _), axis in zip(parts, axes, strict=True))
+        lacking = len(self.phases)
+        cost = sparse.block_diag([whole, ROOM_PULL / lacking * sparse.eye_array(lacking)])
+        solver = piqp.SparseSolver()
+        solver.settings.verbose = False
+        free = np.full(linear.size, _NO_BOUND)
+        solver.setup(
+            sparse.csc_matrix(2.0 * cost), 2.0 * np.append(linear.ravel(), np.zeros(lacking)), None, None,
+            rows, np.full(len(bounds), -_NO_BOUND), bounds,
+            np.append(-free, np.zeros(lacking)), np.append(free, np.ones(lacking)),
+        )  # fmt: skip
+        if solver.solve() != piqp.PIQP_SOLVED:
+            return None
+        return solver.result.x[: linear.size].reshape(linear.shape), int(solver.result.info.iter)
+
+    def _objectives(self, shares: FloatArray, wanted: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """(n, n) and (n, 3) of CoM and turning: the objective is ``C' Q C + 2 l' C`` of each axis."""
+        basis = basis_matrix(DEGREE, self.knots, shares)
+        pull = PULL / len(shares) * basis.T
+        com = self.smoothness + pull @ basis, -pull @ wanted
+        return [com] if self.turning is None else [com, self.turning]
+
+    def _balance(self, margin: FloatArray, near: FloatArray) -> tuple[Any, FloatArray]:
+        """Rows and bounds of unit length; ``p x b`` is ``p0 x b + p x b0 - p0 x b0`` with ``b = a - g``."""
+        blocks, bounds = [], []
+        gravity = np.array([0.0, 0.0, -GRAVITY])
+        for row, phase in enumerate(self.phases):
+            polytope = self.polytopes[phase]
+            force, moment = self.mass * polytope.H[:, :3], self.mass * polytope.H[:, 3:]
+            p = self.position[row] @ near[:, :3] - self.reference
+            b = self.acceleration[row] @ near[:, :3] - gravity
+            length = wrench_levers(polytope.H, p[None])[0]
+            by_acceleration, by_position = force + moment @ skew(p), -moment @ skew(b)
+            bound = polytope.h - margin[phase] * length + by_acceleration @ gravity + moment @ np.cross(p, b)
+            still = bound - by_acceleration @ (b + gravity) - by_position @ p
+            bound += by_position @ self.reference
+            for turn in self._turns(polytope):
+                room = still - (0.0 if turn is None else turn @ (self.position[row] @ near[:, 3:]))
+                chosen = np.argsort(room / length, kind="stable")[:FACETS]
+                block = (
+                    self.acceleration[row][:, None] * by_acceleration[chosen, None]
+                    + self.position[row][:, None] * by_position[chosen, None]
+                )
+                if self.turning is not None:
+                    by_turn = np.zeros((len(chosen), 3)) if turn is None else turn[chosen]
+                    turned = self.position[row][:, None] * by_turn[:, None]
+                    block = np.concatenate([block, turned], axis=2)
+                block = block.reshape(len(chosen), -1)
+                scale = np.linalg.norm(block, axis=1)
+                # Only the wrench that is planned for, not that of the point mass beside it, has room.
+                wished = 0.0 if turn is None and self.turning is not None else ROOM
+                lacks = sparse.csr_matrix(
+                    (-wished * length[chosen] / scale, (np.arange(len(chosen)), np.full(len(chosen), row))),
+                    shape=(len(chosen), len(self.phases)),
+                )
+                blocks.append(sparse.hstack([block / scale[:, None], lacks]))
+                spare = wished + (0.0 if turn is None else RESERVE)
+                bounds.append((bound[chosen] - spare * length[chosen]) / scale)
+        return sparse.vstack(blocks).tocsc(), np.concatenate(bounds)
+
+    def _turns(self, polytope: WrenchPolytope) -> list[FloatArray | None]:
+        """Derivatives (facets, 3) by the turning: None of the point mass, those of the body that turns."""
+        return [None] if self.turning is None else [None, TURN * polytope.H[:, 3:]]
+
+
+def _instants(schedule: ContactSchedule) -> tuple[FloatArray, np.ndarray]:
+    times, phases = [], []
+    for index, (start, end) in enumerate(zip(schedule.instants[:-1], schedule.instants[1:], strict=True)):
+        count = int(np.ceil((end - start) / BALANCE_STEP)) + 1
+        times.append(np.linspace(start, end, count))
+        phases.append(np.full(count, index))
+    return np.concatenate(times), np.concatenate(phases)
+
+
+def _turning(
+    knots: FloatArray, duration: float, recording: RecordedCom
+) -> tuple[FloatArray, FloatArray] | None:
+    """(n, n) and (n, 3) objective of the rate of the angular momentum, near the recorded one."""
+    if recording.angular_momentum_rate is None:
+        return None
+    basis = basis_matrix(DEGREE, knots, np.minimum(recording.time / duration, 1.0))
+    pull = TURN_PULL / len(basis) * basis.T
+    bend = _squared(knots, duration, {2: TURN_BEND})
+    return pull @ basis + bend, -pull @ recording.angular_momentum_rate / TURN
+
+
+def _smoothness(knots: FloatArray, duration: float, weights: Weights) -> FloatArray:
+    """(n, n) objective of the CoM's derivatives, the first entry of each weight."""
+    kinds = (weights.velocity, weights.acceleration, weights.jerk)
+    return _squared(knots, duration, {order: kind[0] for order, kind in enumerate(kinds, start=1)})
+
+
+def _squared(knots: FloatArray, duration: float, costs: Mapping[int, float]) -> FloatArray:
+    """(n, n) mean over time of the weighted squared derivatives by order, exact for the polynomials."""
+    nodes, shares = np.polynomial.legendre.leggauss(DEGREE)
+    breaks = np.unique(knots)
+    half = 0.5 * np.diff(breaks)[:, None]
+    times, share = (breaks[:-1, None] + half * (1.0 + nodes)).ravel(), (half * shares).ravel()
+    total = np.zeros((len(knots) - DEGREE - 1,) * 2)
+    for order, cost in costs.items():
+        basis = basis_matrix(DEGREE, knots, times, order) / duration**order
+        total += cost * basis.T @ (share[:, None] * basis)
+    return total
+
+
+STRAY = 0.01
+"""Distance from the recording from which a sample becomes a key frame [m]."""
+
+FRAME_ROUNDS = 6
+"""Times that key frames are added at most."""
+
+LINEARISATIONS = 12
+"""Programmes for one set of key frames at most."""
+
+SPARE = 0.5
+"""Margin asked for beyond the required one at first, and then by as much as it is missed between the
+instants at which it is imposed [N.m]."""
+
+STILL = 1e-4
+"""A solution whose control points move less has converged [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class NearKeyFramesResult(CentroidalResult):
+    """A balanced trajectory near a recording, or why there is none.
+
+    Attributes:
+        keyframes: What was asked; ``problem`` are its requirements with the ends that were found.
+        frames: Samples of the recording that pulled, in order.
+        added: Those among them that are no changes of support.
+        distance: (n,) of the CoM from the recording at its samples [m]; NaN without a trajectory.
+    """
+
+    keyframes: KeyframeProblem
+    frames: tuple[int, ...]
+    added: tuple[int, ...]
+    distance: FloatArray
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the distance [m]."""
+        return float(np.sqrt(np.mean(self.distance**2)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    frames: tuple[int, ...]
+    points: FloatArray
+    trajectory: CentroidalTrajectory
+    problem: CentroidalProblem
+    certificate: Residuals
+
+
+def plan_com_near_key_frames(problem: KeyframeProblem) -> NearKeyFramesResult:
+    """Find a smooth CoM that keeps its balance and comes near the key frames of a recording.
+
+    The ends are free: position and velocity of the first and last sample pull like those of any key frame.
+    The number of control points follows from the duration.
+
+    Args:
+        problem: What to find, without conditions on velocity or acceleration of the ends, with a margin in
+            the space of wrenches. A distance from the supports and geometric constraints are measured, not
+            sought.
+
+    Raises:
+        InputError: If the problem has conditions on the ends, or a margin in the space of forces.
+    """
+    _check(problem)
+    return _Search(problem).run()
+
+
+class _Search:
+    """The rounds of one problem."""
+
+    def __init__(self, problem: KeyframeProblem) -> None:
+        asked, recording = problem.requirements, problem.recording
+        self.problem, self.recording, self.iterations, self.rounds = problem, recording, 0, 0
+        self.polytopes: tuple[WrenchPolytope, ...] = polytopes_of(asked)
+        self.programme = NearProgramme.of(asked.mass, self.polytopes, recording, asked.weights)
+
+    def run(self) -> NearKeyFramesResult:
+        began = clock.perf_counter()
+        feasibility = assess_feasibility(self.problem.requirements, self.polytopes)
+        failure, best = _hopeless(feasibility), None
+        if failure is None:
+            best = self._best()
+            failure = self._explain(best)
+        succeeded = best is not None and failure is None
+        distance = np.full(len(self.recording.time), np.nan) if best is None else self._distance(best)
+        changes = set(self.recording.key_frames.tolist())
+        frames = () if best is None else best.frames
+        return NearKeyFramesResult(
+            problem=self.problem.requirements if best is None else best.problem, polytopes=self.polytopes,
+            feasibility=replace(feasibility, failure=failure), failure=failure,
+            trajectory=best.trajectory if best is not None and succeeded else None,
+            certificate=None if best is None else best.certificate, iterations=self.iterations,
+            rounds=self.rounds, wall_time=clock.perf_counter() - began, keyframes=self.problem, frames=frames,
+            added=tuple(frame for frame in frames if frame not in changes), distance=distance,
+        )  # fmt: skip
+
+    def _best(self) -> _Attempt | None:
+        """The nearest of the balanced attempts, each with more key frames than the one before."""
+        best = None
+        for attempt in self._attempts():
+            if best is None or self._order(attempt) < self._order(best):
+                best = attempt
+        return best
+
+    def _attempts(self) -> Iterator[_Attempt]:
+        frames, start = tuple(self.recording.key_frames.tolist()), None
+        for _ in range(FRAME_ROUNDS):
+            attempt = self._solve(frames, start)
+            if attempt is None:
+                return
+            yield attempt
+            further = self._straying(attempt)
+            if not further:
+                return
+            frames, start = tuple(sorted({*frames, *further})), attempt.points
+
+    def _order(self, attempt: _Attempt) -> tuple[bool, float]:
+        return not attempt.certificate.within(), float(np.sqrt(np.mean(self._distance(attempt) ** 2)))
+
+    def _solve(self, frames: tuple[int, ...], start: FloatArray | None) -> _Attempt | None:
+        """Linearise and solve until nothing moves and the margin is kept between the instants as well."""
+        index, required = list(frames), self.problem.requirements.required_margin
+        shares = np.minimum(self.recording.time[index] / self.recording.time[-1], 1.0)
+        wanted = self.recording.com[index]
+        points = self.programme.free(shares, wanted) if start is None else start
+        margin, attempt = np.full(len(self.polytopes), required + SPARE), None
+        for _ in range(LINEARISATIONS):
+            self.rounds += 1
+            found = self.programme.solve(shares, wanted, margin, points)
+            if found is None:
+                return attempt
+            moved = float(np.abs(found[0] - points).max())
+            points, self.iterations = found[0], self.iterations + found[1]
+            if moved > STILL:
+                continue
+            attempt = self._measured(frames, points)
+            missing = required - np.array([float(values.min()) for values in self._margins(attempt)])
+            if np.all(missing <= 0.0):
+                break
+            margin += np.where(missing > 0.0, missing + 0.5 * SPARE, 0.0)
+        return self._measured(frames, points)
+
+    def _measured(self, frames: tuple[int, ...], points: FloatArray) -> _Attempt:
+        asked = self.problem.requirements
+        trajectory = CentroidalTrajectory(
+            asked.mass, self.programme.spline(points), self.recording.schedule,
+            turning=self.programme.turning_spline(points),
+        )  # fmt: skip
+        problem = replace(asked, start_com=points[0, :3], goal_com=points[-1, :3])
+        measured = [measure(problem, way, self.polytopes) for way in _ways(trajectory)]
+        worst = min(measured, key=lambda certificate: certificate.min_margin)
+        return _Attempt(frames, points, trajectory, problem, worst)
+
+    def _margins(self, attempt: _Attempt) -> list[FloatArray]:
+        """Of each phase, the lesser ones of the point mass and of the body that turns."""
+        found = [phase_margins(attempt.problem, way, self.polytopes) for way in _ways(attempt.trajectory)]
+        return [np.minimum.reduce(margins) for margins in zip(*found, strict=True)]
+
+    def _distance(self, attempt: _Attempt) -> FloatArray:
+        offset = attempt.trajectory.position(self.recording.time) - self.recording.com
+        return np.linalg.norm(offset, axis=1)
+
+    def _straying(self, attempt: _Attempt) -> list[int]:
+        """The farthest sample between each two key frames, where it is too far off and not too near them."""
+        distance, time, found = self._distance(attempt), self.recording.time, []
+        for before, after in zip(attempt.frames[:-1], attempt.frames[1:], strict=True):
+            away = np.minimum(time - time[before], time[after] - time)
+            usable = np.where(away >= self.problem.frame_spacing - TOLERANCE, distance, 0.0)
+            if usable.max() > STRAY:
+                found.append(int(np.argmax(usable)))
+        return found
+
+    def _explain(self, best: _Attempt | None) -> Failure | None:
+        if best is None:
+            return Failure(
+                "balance margin", "no smooth centre of mass near the key frames keeps its balance all along"
+            )
+        if best.certificate.within():
+            return None
+        worst = best.certificate.largest
+        return Failure(worst.requirement, f"{worst} near the key frames", worst.phase, worst.time)
+
+
+def _ways(trajectory: CentroidalTrajectory) -> tuple[CentroidalTrajectory, ...]:
+    """The trajectory, and without its turning."""
+    return (trajectory,) if trajectory.turning is None else (trajectory, replace(trajectory, turning=None))
+
+
+def _hopeless(feasibility: Feasibility) -> Failure | None:
+    """What no motion can do; the recorded ends are only wished for."""
+    failure = feasibility.failure
+    return None if failure is None or failure.requirement in ("start balance", "goal balance") else failure
+
+
+def _check(problem: KeyframeProblem) -> None:
+    asked = problem.requirements
+    for name in ("start_velocity", "goal_velocity", "start_acceleration", "goal_acceleration"):
+        if getattr(asked, name) is not None:
+            raise InputError(f"near key frames {name} is given; valid: None, for the recording pulls there")
+    if asked.margin_space != "wrench":
+        raise InputError(f"near key frames margin_space is {asked.margin_space!r}; valid: wrench")

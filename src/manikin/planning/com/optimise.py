@@ -1,0 +1,304 @@
+"""One optimisation of the timing-free method: from a guess to a measured attempt.
+
+Also here. Which facets of the polytopes the optimisation has to know about.
+
+Far from all facets ever limit a motion: near an upright stance those of friction and of the
+normal-force cap are hundreds of newtons away. The programme is given the nearest ones only,
+and every solution is measured against all of them; facets found violated are added and the
+programme is solved again (constraint generation).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.balance import WrenchPolytope
+from manikin.contact import ContactSchedule
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.com.com_certificate import TOLERANCE, Residuals, facet_margins, measure, phase_times
+from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory
+from manikin.planning.com.feasibility import row_slopes
+from manikin.planning.com.transcription import (
+    MARGIN_SCALE,
+    ComProgram,
+    ComStructure,
+    spline_from_bezier,
+    transcribe,
+)
+
+FIRST_COUNT = 12
+"""Facets per phase in the first round."""
+
+FacetIndices = tuple[NDArray[np.int64], ...]
+"""Indices of the chosen facets of each phase."""
+
+
+def facet_distances(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
+) -> list[FloatArray]:
+    """Least distance of the pseudo-wrench from every facet of each phase [N.m] or [N]."""
+    return [
+        np.min([block.min(axis=0) for block in facet_margins(problem, trajectory, polytope, times)], axis=0)
+        for polytope, times in zip(polytopes, phase_times(trajectory), strict=True)
+    ]
+
+
+def nearest_facets(distances: Sequence[FloatArray], count: int = FIRST_COUNT) -> FacetIndices:
+    """Indices of the ``count`` facets with the smallest distances in each phase, in facet order."""
+    return tuple(np.sort(np.argsort(values, kind="stable")[:count]) for values in distances)
+
+
+def with_violated(
+    chosen: FacetIndices, distances: Sequence[FloatArray], margin: float, step: int = FIRST_COUNT // 2
+) -> FacetIndices:
+    """Add to each phase its nearest left-out facets, up to ``step``, that are nearer than ``margin``.
+
+    Args:
+        chosen: Facets of the last programme.
+        distances: Of its solution, from :func:`facet_distances`.
+        margin: Distance that all facets should keep [N.m] or [N].
+        step: Number of facets that a phase with a violation receives.
+    """
+    grown = []
+    for indices, values in zip(chosen, distances, strict=True):
+        left_out = np.setdiff1d(np.arange(len(values)), indices)
+        order = left_out[np.argsort(values[left_out], kind="stable")]
+        added = order[:step] if len(order) and values[order[0]] < margin else order[:0]
+        grown.append(np.sort(np.concatenate([indices, added])))
+    return tuple(grown)
+
+
+SHORTFALL_WEIGHT = 20.0
+"""First exact penalty of a margin below the required one [1/(N.m)] or [1/N]."""
+
+LONGEST_PHASE = 20.0
+"""Bound of a phase's duration where the problem gives none [s]; without it waiting has no end."""
+
+
+@dataclass(frozen=True)
+class MarginTargets:
+    """What the programme is asked at its samples, a little more than the problem asks everywhere.
+
+    Attributes:
+        margin: Smallest margin [N.m] or [N].
+        position: Distance kept from the geometric constraints and the support distance [m].
+        duration: Distance kept from the total duration [s].
+        shortfall_weight: Penalty of a smaller margin [1/(N.m)] or [1/N].
+    """
+
+    margin: float
+    position: float = 3e-4
+    duration: float = 1e-7
+    shortfall_weight: float = SHORTFALL_WEIGHT
+
+    @classmethod
+    def of(cls, problem: CentroidalProblem) -> "MarginTargets":
+        """Targets of the first round; the ends may lie closer to the constraints than the rest."""
+        ends = ((problem.sequence[0], problem.start_com), (problem.sequence[-1], problem.goal_com))
+        room = [-float(item.violation(com)) for item in problem.geometric for _, com in ends]
+        if problem.support_distance is not None:
+            room += [
+                problem.support_distance - float(np.linalg.norm(com - contact.position))
+                for phase, com in ends
+                for contact in phase.stance
+            ]
+        position = min(cls.position, *(0.5 * max(slack, 0.0) for slack in room)) if room else cls.position
+        return cls(problem.required_margin + 1e-3, position)
+
+    def grown(self, problem: CentroidalProblem, certificate: Residuals) -> "MarginTargets":
+        """Targets that make up for what the last solution broke between its samples."""
+        positions = ["support distance"] if problem.support_distance is not None else []
+        positions += [constraint.name for constraint in problem.geometric]
+        position = max((certificate[name].value for name in positions), default=0.0)
+        return replace(
+            self,
+            margin=self.margin + 1.2 * max(certificate["balance margin"].value, 0.0),
+            position=self.position + (1.2 * position + 1e-5 if position > TOLERANCE else 0.0),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """Outcome of one optimisation, measured every millisecond against the whole problem.
+
+    Attributes:
+        trajectory: Whatever the solver ended with.
+        certificate: Its residuals.
+        bezier: (phases, k + 1, 3) Bezier points [m], to start again from.
+        durations: (phases,) [s].
+        iterations: Of the solver.
+        margin: d_min at the samples over the imposed facets [N.m] or [N].
+        converged: Whether the solver reports an optimum.
+    """
+
+    trajectory: CentroidalTrajectory
+    certificate: Residuals
+    bezier: FloatArray
+    durations: FloatArray
+    iterations: int
+    margin: float
+    converged: bool
+
+
+def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> ComProgram:
+    """The compiled optimisation of a problem, shared by all problems of the same structure.
+
+    Args:
+        problem: What to find.
+        facets: Indices of the facets imposed in each phase.
+    """
+    return transcribe(
+        ComStructure(
+            degree=problem.degree,
+            samples=problem.samples,
+            rows=tuple(len(indices) for indices in facets),
+            contacts=tuple(len(phase.stance) for phase in problem.sequence),
+            margin_space=problem.margin_space,
+            geometric=tuple(constraint.function for constraint in problem.geometric),
+            limited_distance=problem.support_distance is not None,
+            key_planes=tuple(plane.key for plane in problem.key_planes),
+        )
+    )
+
+
+def optimise(
+    problem: CentroidalProblem,
+    polytopes: Sequence[WrenchPolytope],
+    facets: FacetIndices,
+    targets: MarginTargets,
+    bezier: FloatArray,
+    durations: FloatArray,
+) -> Attempt:
+    """Run the solver once from the given Bezier points and durations.
+
+    Args:
+        problem: What to find.
+        polytopes: W_i of the phases about ``problem.reference``.
+        facets: Indices of the facets imposed in each phase.
+        targets: Bounds used at the samples.
+        bezier: (phases, k + 1, 3) [m].
+        durations: (phases,) [s].
+    """
+    programme = build_programme(problem, facets)
+    lower, upper = _unknown_bounds(programme, problem, targets)
+    row_lower, row_upper = _row_bounds(programme, problem, targets)
+    unknowns = programme.pack_unknowns(
+        bezier - problem.reference, durations, float(durations.sum()), problem.required_margin, 10.0
+    )
+    solution = programme.solver(
+        x0=np.clip(unknowns, lower, upper),
+        p=programme.pack_parameters(_parameters(problem, polytopes, facets, targets)),
+        lbx=lower, ubx=upper, lbg=row_lower, ubg=row_upper,
+    )  # fmt: skip
+    local, durations, margin = programme.unpack_unknowns(np.asarray(solution["x"], dtype=np.float64).ravel())
+    bezier = local + problem.reference
+    trajectory = trajectory_of(problem, bezier, durations)
+    stats = programme.solver.stats()
+    return Attempt(
+        trajectory, measure(problem, trajectory, polytopes),
+        bezier, durations, int(stats["iter_count"]), margin, bool(stats["success"]),
+    )  # fmt: skip
+
+
+def _parameters(
+    problem: CentroidalProblem,
+    polytopes: Sequence[WrenchPolytope],
+    facets: FacetIndices,
+    targets: MarginTargets,
+) -> dict[str, object]:
+    weights, reference = problem.weights, problem.reference
+    values: dict[str, object] = {
+        "mass": problem.mass,
+        "weights": (weights.margin, weights.smoothness, weights.duration, targets.shortfall_weight),
+        "velocity": weights.velocity,
+        "acceleration": weights.acceleration,
+        "jerk": weights.jerk,
+        "reference": reference,
+    }
+    for name in ("start_velocity", "start_acceleration", "goal_velocity", "goal_acceleration"):
+        value = getattr(problem, name)
+        values[name] = np.zeros(3) if value is None else value
+    for index, (phase, polytope, rows) in enumerate(zip(problem.sequence, polytopes, facets, strict=True)):
+        # About the world origin the rows have one length all along; then they are given with length 1.
+        fixed = problem.margin_space == "wrench_about_origin"
+        length = row_slopes(polytope, problem, problem.start_com)[rows] if fixed else np.ones(len(rows))
+        values[f"H{index}"], values[f"h{index}"] = (
+            polytope.H[rows] / length[:, None],
+            polytope.h[rows] / length,
+        )
+        values[f"contacts{index}"] = [contact.position - reference for contact in phase.stance]
+    for index, plane in enumerate(problem.key_planes):
+        values[f"normal{index}"], values[f"offset{index}"] = (
+            plane.normal,
+            plane.offset - plane.normal @ reference,
+        )
+    return values
+
+
+def _unknown_bounds(
+    programme: ComProgram, problem: CentroidalProblem, targets: MarginTargets
+) -> tuple[FloatArray, FloatArray]:
+    phases, k = programme.structure.phases, programme.structure.degree
+    points = np.full((phases, k + 1, 3), np.inf)
+    low, high = -points, points.copy()
+    for bound in (low, high):
+        bound[0, 0], bound[-1, -1] = (
+            end - problem.reference for end in (problem.start_com, problem.goal_com)
+        )
+    total = np.inf if problem.max_duration is None else problem.max_duration - targets.duration
+    lower = programme.pack_unknowns(low, problem.min_durations, 0.0, -np.inf, 0.0)
+    longest = np.maximum(LONGEST_PHASE, 2.0 * problem.min_durations)
+    upper = programme.pack_unknowns(high, np.minimum(problem.max_durations, longest), total, np.inf, np.inf)
+    return lower, upper
+
+
+def _row_bounds(
+    programme: ComProgram, problem: CentroidalProblem, targets: MarginTargets
+) -> tuple[FloatArray, FloatArray]:
+    limit = (problem.support_distance or 0.0) - targets.position
+    bounds = {
+        "balance": (0.0, np.inf),
+        "distance": (-np.inf, limit**2),
+        "continuity": (0.0, 0.0),
+        "key_plane": (-np.inf, 0.0),
+        "total_duration": (0.0, 0.0),
+        "required_margin": (targets.margin / MARGIN_SCALE[problem.margin_space], np.inf),
+    }
+    ends = iter(
+        (problem.start_velocity, problem.start_acceleration, problem.goal_velocity, problem.goal_acceleration)
+    )
+    lower, upper = [], []
+    for group, count in programme.groups:
+        if group == "end":
+            low, high = (0.0, 0.0) if next(ends) is not None else (-np.inf, np.inf)
+        elif group.startswith("geometric"):
+            low, high = -np.inf, -targets.position
+        else:
+            low, high = bounds[group]
+        lower.append(np.full(count, low))
+        upper.append(np.full(count, high))
+    return np.concatenate(lower), np.concatenate(upper)
+
+
+def trajectory_of(
+    problem: CentroidalProblem, bezier: FloatArray, durations: FloatArray
+) -> CentroidalTrajectory:
+    """The trajectory of Bezier points (phases, k + 1, 3) and durations, ends and bounds met exactly."""
+    durations = np.clip(durations, problem.min_durations, problem.max_durations)
+    spline = spline_from_bezier(
+        bezier, durations,
+        start=_given(problem.start_com, problem.start_velocity, problem.start_acceleration),
+        goal=_given(problem.goal_com, problem.goal_velocity, problem.goal_acceleration),
+    )  # fmt: skip
+    instants = np.concatenate([[0.0], np.cumsum(durations)])
+    return CentroidalTrajectory(problem.mass, spline, ContactSchedule(problem.sequence, instants))
+
+
+def _given(
+    position: FloatArray, velocity: FloatArray | None, acceleration: FloatArray | None
+) -> tuple[FloatArray, ...]:
+    if velocity is None:
+        return (position,)
+    return (position, velocity) if acceleration is None else (position, velocity, acceleration)

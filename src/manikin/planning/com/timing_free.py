@@ -1,0 +1,401 @@
+"""The timing-free method: CoM trajectory, durations and margin in one optimisation ([Qiu2012]_ 5.4).
+
+Also here. First trajectory for the optimisation: of a pendulum on the supports, or through their centres.
+"""
+
+import itertools
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import linprog
+
+from manikin.balance import LimitingConstraint, WrenchPolytope
+from manikin.contact import ContactKind, Stance
+from manikin.numerics.spatial import GRAVITY, GRAVITY_VECTOR, FloatArray, skew
+from manikin.numerics.spline import BSpline, clamped_knots, end_control_points, start_control_points
+from manikin.planning.com.com_certificate import Residuals, measure
+from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory
+from manikin.planning.com.feasibility import (
+    FIRM_FRICTION,
+    SLIPPERY,
+    Failure,
+    Feasibility,
+    assess_feasibility,
+    least_friction,
+    polytopes_of,
+    with_firm_friction,
+)
+from manikin.planning.com.optimise import (
+    Attempt,
+    MarginTargets,
+    facet_distances,
+    nearest_facets,
+    optimise,
+    trajectory_of,
+    with_violated,
+)
+from manikin.runtime.display import Displayed
+
+
+@dataclass(frozen=True)
+class GuessStyle:
+    """One way of guessing; several are tried in order.
+
+    Attributes:
+        pull: 0 follows the straight line from start to goal, 1 goes over the supports. None is the motion of
+            a linear inverted pendulum on the supports.
+        stretch: Durations as multiples of the lower bounds, before the bounds are applied.
+    """
+
+    pull: float | None
+    stretch: float
+
+
+INFEASIBLE = 2
+"""Status of a linear programme without a solution."""
+
+GUESS_STYLES = (GuessStyle(0.5, 1.5), GuessStyle(0.3, 1.2), GuessStyle(0.7, 2.5))
+"""Of any motion."""
+
+PENDULUM = GuessStyle(None, 1.5)
+"""Of a body on its feet, before the others."""
+
+_PENDULUM_SAMPLES = 5
+_JERK_TIME = 0.02
+"""Weight of the jerk in metres of distance from the supports [s^3]."""
+
+
+def guess_styles(problem: CentroidalProblem) -> tuple[GuessStyle, ...]:
+    """Ways of guessing, in the order in which they should be tried."""
+    contacts = [contact for phase in problem.sequence for contact in phase.stance]
+    on_feet = all(contact.kind is ContactKind.SOLE and contact.normal[2] > 0.99 for contact in contacts)
+    return (PENDULUM, *GUESS_STYLES) if on_feet else GUESS_STYLES
+
+
+def guess(
+    problem: CentroidalProblem, style: GuessStyle, polytopes: Sequence[WrenchPolytope]
+) -> tuple[FloatArray, FloatArray]:
+    """Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s] to start from.
+
+    Args:
+        problem: What to find.
+        style: How to guess.
+        polytopes: W_i of the phases about ``problem.reference``.
+    """
+    durations = _guess_durations(problem, style.stretch, polytopes)
+    instants = np.concatenate([[0.0], np.cumsum(durations)])
+    if style.pull is None:
+        return _pendulum(problem, instants).bezier_points(), durations
+    path = PchipInterpolator(instants, _guess_key_positions(problem, instants, style.pull))
+    k = problem.degree
+    knots = clamped_knots(k, instants)
+    rest = (problem.start_velocity, problem.goal_velocity)
+    times = np.linspace(0.0, instants[-1], 20 * len(durations) + 1)
+    spline = BSpline.fit(
+        k, knots, times, path(times),
+        first=start_control_points(k, knots, problem.start_com, rest[0]),
+        last=end_control_points(k, knots, problem.goal_com, rest[1]),
+    )  # fmt: skip
+    return spline.bezier_points(), durations
+
+
+def _pendulum(problem: CentroidalProblem, instants: FloatArray) -> BSpline:
+    """Path of a linear inverted pendulum whose zero moment point is near the middles of the supports.
+
+    Its height is that of the start. With ``c`` the middle of a phase's supports and ``h`` the height above
+    them, the spline minimises ``|p - h / g p'' - c|^2 + w^2 |p^(3)|^2`` over samples of the motion; as ``h``
+    is given, this is linear least squares. The true height changes evenly along the way.
+    """
+    k = problem.degree
+    knots = clamped_knots(k, instants)
+    count = len(knots) - k - 1
+    share = (np.arange(_PENDULUM_SAMPLES) + 0.5) / _PENDULUM_SAMPLES
+    durations = np.diff(instants)
+    times = (instants[:-1, None] + durations[:, None] * share).ravel()
+    weight = np.repeat(np.sqrt(durations), _PENDULUM_SAMPLES)[:, None]
+    middles = np.array([
+        np.mean([contact.points_in_world.mean(axis=0) for contact in phase.stance], axis=0)
+        for phase in problem.sequence
+    ])  # fmt: skip
+    wanted = np.repeat(middles[:, :2], _PENDULUM_SAMPLES, axis=0)
+    height = problem.start_com[2] - middles[0, 2]
+    basis = BSpline(k, knots, np.eye(count))
+    rows = np.vstack([
+        weight * (basis(times) - height / GRAVITY * basis(times, 2)), _JERK_TIME * weight * basis(times, 3)
+    ])  # fmt: skip
+    values = np.vstack([weight * wanted, np.zeros_like(wanted)])
+    rest = np.zeros(3)
+    first = start_control_points(k, knots, problem.start_com, _or(problem.start_velocity, rest), rest)
+    last = end_control_points(k, knots, problem.goal_com, _or(problem.goal_velocity, rest), rest)
+    points = np.linspace(problem.start_com, problem.goal_com, count)
+    points[: len(first)], points[count - len(last) :] = first, last
+    inner = slice(len(first), count - len(last))
+    given = rows[:, : inner.start] @ first[:, :2] + rows[:, inner.stop :] @ last[:, :2]
+    points[inner, :2] = np.linalg.lstsq(rows[:, inner], values - given, rcond=None)[0]
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+    if way[-1] > 0.0:
+        points[inner, 2] = np.interp(way[inner], way[[0, -1]], points[[0, -1], 2])
+    return BSpline(k, knots, points)
+
+
+def _or(given: FloatArray | None, default: FloatArray) -> FloatArray:
+    return default if given is None else given
+
+
+def _guess_durations(
+    problem: CentroidalProblem, stretch: float, polytopes: Sequence[WrenchPolytope]
+) -> FloatArray:
+    lower, upper = problem.min_durations, problem.max_durations
+    durations = np.minimum(stretch * lower + 0.1, upper)
+    # Where the weight cannot be carried the body falls: such a phase is over as soon as it may be.
+    falling = np.array([not can_rest(polytope, problem.mass) for polytope in polytopes])
+    durations = np.where(falling, lower, durations)
+    if problem.max_duration is not None and durations.sum() > problem.max_duration:
+        room = problem.max_duration - lower.sum()
+        durations = lower + 0.95 * room * (durations - lower) / max((durations - lower).sum(), 1e-9)
+    return durations
+
+
+def can_rest(polytope: WrenchPolytope, mass: float) -> bool:
+    """Whether the contacts can hold a body of this mass still at some position of its CoM.
+
+    The wrench ``[m (-g); p ^ m (-g)]`` is linear in the position ``p``: a linear programme.
+    """
+    weight = -mass * GRAVITY_VECTOR
+    found = linprog(
+        np.zeros(3),
+        polytope.H[:, 3:] @ -skew(weight),
+        polytope.h - polytope.H[:, :3] @ weight,
+        bounds=(None, None),
+        method="highs",
+    )
+    return found.status != INFEASIBLE
+
+
+def _guess_key_positions(problem: CentroidalProblem, instants: FloatArray, pull: float) -> FloatArray:
+    progress = (instants / instants[-1])[:, None]
+    positions = problem.start_com + progress * (problem.goal_com - problem.start_com)
+    stances = [phase.stance for phase in problem.sequence]
+    for index, (before, after) in enumerate(itertools.pairwise(stances), start=1):
+        centre = _shared_centre(before, after)
+        if centre is not None:
+            positions[index, :2] += pull * (centre[:2] - positions[index, :2])
+    return positions
+
+
+def _shared_centre(before: Stance, after: Stance) -> FloatArray | None:
+    """Mean position of the contacts held across a key instant, or of all when none is."""
+    held = [contact.position for contact in before if contact.effector in after]
+    held = held or [contact.position for stance in (before, after) for contact in stance]
+    return np.mean(held, axis=0) if held else None
+
+
+MAX_ROUNDS = 6
+"""Optimisations from one initial guess before another guess is tried."""
+
+NEGLIGIBLE = 0.02
+"""Share of the margin by which left-out facets may lower it without another round."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CentroidalResult(Displayed):
+    """A trajectory with its certificate, or why there is none.
+
+    Attributes:
+        problem: What was asked.
+        polytopes: W_i of the phases about ``problem.reference``.
+        feasibility: Upper bounds of the margin at the key instants.
+        failure: Why it failed, or None.
+        trajectory: The trajectory; None when it failed.
+        certificate: Requirements measured every millisecond; of the best attempt when it
+            failed, None when nothing was attempted.
+        iterations: Of the solver, over all rounds.
+        rounds: Number of optimisations.
+        wall_time: [s].
+    """
+
+    problem: CentroidalProblem
+    polytopes: tuple[WrenchPolytope, ...]
+    feasibility: Feasibility
+    failure: Failure | None
+    trajectory: CentroidalTrajectory | None
+    certificate: Residuals | None
+    iterations: int
+    rounds: int
+    wall_time: float
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the trajectory meets every requirement."""
+        return self.failure is None
+
+    @property
+    def key_instants(self) -> FloatArray | None:
+        """(phases + 1,) T_0 ... T_n [s] ([Qiu2012]_ 5.19)."""
+        return None if self.trajectory is None else self.trajectory.schedule.instants
+
+    @property
+    def d_min(self) -> float | None:
+        """Smallest margin over the motion, measured every millisecond [N.m] or [N]."""
+        return None if self.certificate is None else self.certificate.min_margin
+
+    @property
+    def limiting_phase(self) -> int | None:
+        """Phase in which the margin is smallest."""
+        return None if self.certificate is None else self.certificate.limiting_phase
+
+    @property
+    def limiting(self) -> LimitingConstraint | None:
+        """What limits the smallest margin: contact, what gives way there and in which direction."""
+        if self.trajectory is None or self.certificate is None:
+            return None
+        certificate = self.certificate
+        polytope = self.polytopes[certificate.limiting_phase]
+        return limiting_at(self.problem, self.trajectory, polytope, certificate.limiting_time)
+
+    @property
+    def limiting_contact(self) -> str | None:
+        """Effector whose contact limits the smallest margin."""
+        return None if self.limiting is None else self.limiting.effector
+
+    @property
+    def feasibility_radius(self) -> float:
+        """Upper bound of d_min ([Qiu2012]_ Proposition 2) [N.m]."""
+        return self.feasibility.radius
+
+    def residuals(self) -> Residuals:
+        """Measure every requirement again, every millisecond, by numpy alone.
+
+        Raises:
+            ValueError: If there is no trajectory.
+        """
+        if self.trajectory is None:
+            raise ValueError("no trajectory to measure; valid: a result that succeeded")
+        return measure(self.problem, self.trajectory, self.polytopes)
+
+
+def plan_com(problem: CentroidalProblem) -> CentroidalResult:
+    """Find control points, key instants and margin of a CoM trajectory ([Qiu2012]_ 5.20-5.28).
+
+    Every solution is measured every millisecond against all facets and all bounds. Where a
+    requirement is broken between the samples it is asked for with more distance, where by a
+    facet that was left out the facet is added, and the programme is solved again. A result
+    that does not meet its own certificate is a failure.
+
+    Args:
+        problem: What to find.
+
+    Returns:
+        A result that holds the trajectory or says which requirement could not be met.
+    """
+    began = time.perf_counter()
+    polytopes = polytopes_of(problem)
+    feasibility = assess_feasibility(problem, polytopes)
+    attempts: list[Attempt] = []
+    failure, best = feasibility.failure, None
+    if failure is None:
+        attempts = _search(problem, polytopes)
+        best = min(attempts, key=lambda attempt: attempt.certificate.rank)
+        if not best.certificate.within():
+            failure = _explain(problem, polytopes, best)
+            failure = replace(failure, reason=failure.reason + _friction_cause(problem))
+    return CentroidalResult(
+        problem, polytopes, feasibility, failure,
+        best.trajectory if best is not None and failure is None else None,
+        None if best is None else best.certificate,
+        sum(attempt.iterations for attempt in attempts), len(attempts), time.perf_counter() - began,
+    )  # fmt: skip
+
+
+def _search(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope]) -> list[Attempt]:
+    attempts: list[Attempt] = []
+    for style in guess_styles(problem):
+        attempts.extend(_rounds(problem, polytopes, style))
+        if attempts[-1].certificate.within():
+            break
+    return attempts
+
+
+def _rounds(
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], style: GuessStyle
+) -> Iterator[Attempt]:
+    """Optimise until the certificate holds with all facets, or until another round cannot help."""
+    bezier, durations = guess(problem, style, polytopes)
+    trajectory = trajectory_of(problem, bezier, durations)
+    facets = nearest_facets(facet_distances(problem, trajectory, polytopes))
+    targets = MarginTargets.of(problem)
+    for _ in range(MAX_ROUNDS):
+        attempt = optimise(problem, polytopes, facets, targets, bezier, durations)
+        yield attempt
+        distances = facet_distances(problem, attempt.trajectory, polytopes)
+        kept = min(float(values[rows].min()) for values, rows in zip(distances, facets, strict=True))
+        more_facets = with_violated(facets, distances, kept - NEGLIGIBLE * abs(kept))
+        enough = all(len(new) == len(old) for new, old in zip(more_facets, facets, strict=True))
+        if enough and (attempt.certificate.within() or _hopeless(attempt, targets)):
+            return
+        if enough:
+            targets = targets.grown(problem, attempt.certificate)
+        facets, bezier, durations = more_facets, attempt.bezier, attempt.durations
+
+
+def _hopeless(attempt: Attempt, targets: MarginTargets) -> bool:
+    """Whether a violation is more than an effect of sampling."""
+    return not attempt.converged or attempt.margin < targets.margin - 1e-3
+
+
+def limiting_at(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytope: WrenchPolytope, time: float
+) -> LimitingConstraint:
+    """Contact and limit nearest to the wrench of a trajectory at a time.
+
+    Args:
+        problem: Says what the margin measures.
+        trajectory: The trajectory.
+        polytope: Of the phase of that time, about ``problem.reference``.
+        time: [s].
+    """
+    fixed = problem.margin_space == "wrench_about_origin"
+    about = np.zeros(3) if fixed else trajectory.position(time)
+    return polytope.limiting(trajectory.pseudo_wrench(time, problem.reference), about)
+
+
+def _friction_cause(problem: CentroidalProblem) -> str:
+    """Say that the same problem has a plan with firm friction; empty where it has none or is not slippery."""
+    least = least_friction([phase.stance for phase in problem.sequence])
+    if least >= SLIPPERY:
+        return ""
+    firm = plan_com(with_firm_friction(problem))
+    if firm.d_min is None or not firm.succeeded:
+        return ""
+    return (
+        f"; the friction of {least:g} is too low: with {FIRM_FRICTION:g} it would be {firm.d_min:.2f} "
+        f"{problem.margin_unit}"
+    )
+
+
+def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], best: Attempt) -> Failure:
+    """Name the requirement that fails in the best attempt.
+
+    The required margin is penalised and not imposed, so that an attempt that breaks nothing
+    else has the largest margin that was found.
+    """
+    found, worst = best.certificate, best.certificate.largest
+    barrier = next((item for item in problem.geometric if item.impassable), None)
+    if barrier is not None:
+        at = found[barrier.name]
+        return Failure(barrier.name, f"{barrier.impassable}; no way around it was found", at.phase, at.time)
+    if worst.requirement != "balance margin":
+        return Failure(
+            worst.requirement, f"no trajectory found: {worst} in the best attempt", worst.phase, worst.time
+        )
+    polytope = polytopes[found.limiting_phase]
+    limit = limiting_at(problem, best.trajectory, polytope, found.limiting_time)
+    place = f"in phase {found.limiting_phase} at {found.limiting_time:.3f} s by {limit.description}"
+    reason = (
+        f"the largest margin found is {found.min_margin:.2f} {problem.margin_unit}, limited {place}; "
+        f"required {problem.required_margin:.2f} {problem.margin_unit}"
+    )
+    return Failure("balance margin", reason, found.limiting_phase, found.limiting_time, limit.effector)

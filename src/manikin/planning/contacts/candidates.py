@@ -1,0 +1,308 @@
+"""Samples of a limb whose effector is near a surface of the scene: steps 1 and 2 of a request."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.body import Configuration, Limb, limb_placement
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.samples import LimbSamples
+from manikin.scene import Surface
+
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """Where a limb is and what it is asked for.
+
+    Attributes:
+        state: The body as it is.
+        limb: The limb that shall make a contact.
+        rotation: (3, 3) from the limb's frame to the world's.
+        origin: (3,) of the limb's frame in the world [m].
+        reaction: (3,) unit direction in the world in which the scene shall push the limb.
+    """
+
+    state: Configuration
+    limb: Limb
+    rotation: FloatArray
+    origin: FloatArray
+    reaction: FloatArray
+
+    @staticmethod
+    def of(state: Configuration, limb: Limb, reaction: FloatArray) -> "Situation":
+        """Situation of a limb of a placed body."""
+        return Situation(state, limb, *limb_placement(state, limb), reaction)
+
+    def to_world(self, points: FloatArray) -> FloatArray:
+        """Map (n, 3) points of the limb's frame to the world [m]."""
+        return points @ self.rotation.T + self.origin
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Samples near surfaces, one row per sample and surface.
+
+    Attributes:
+        samples: (n,) rows of the limb's samples.
+        surfaces: (n,) indices of the surfaces.
+        points: (n, 3) effector positions projected on their surface, in the world [m].
+        normals: (n, 3) unit normals of the surfaces in the world.
+        products: (n, 3, 3) ``J J^T`` in the limb's frame [m^2].
+        manipulability: (n,) [m^3].
+        rotations: (n, 3, 3) from the effector's axes to the limb frame's.
+    """
+
+    samples: IntArray
+    surfaces: IntArray
+    points: FloatArray
+    normals: FloatArray
+    products: FloatArray
+    manipulability: FloatArray
+    rotations: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+
+class SurfaceTable:
+    """The surfaces of a scene as arrays, so that all are tested at once.
+
+    Attributes:
+        surfaces: The surfaces.
+        normals: (m, 3) their unit normals.
+        offsets: (m,) of their planes along the normals [m].
+        group: (m,) number of the direction that a surface has for its normal.
+        frames: (g, 3, 3) of each direction the normal and two axes in its planes.
+        lines: (l, 3) the axes of all frames, those along one line once; upright boxes have three together.
+        line: (g, 3) number of the line of each axis.
+        sign: (g, 3) +1 where the axis is along the line's direction, -1 where it is against it.
+        side_low: (m, 2) smallest coordinates of the polygons along these axes [m].
+        side_high: (m, 2) largest ones.
+        filled: (m,) whether a polygon is all of the rectangle between them, as the faces of boxes are.
+    """
+
+    def __init__(self, surfaces: Sequence[Surface]) -> None:
+        self.surfaces = tuple(surfaces)
+        self.normals = np.array([item.normal for item in surfaces]).reshape(-1, 3)
+        self.offsets = np.array([item.polygon[0] @ item.normal for item in surfaces])
+        self._low = np.array([item.polygon.min(axis=0) for item in surfaces]).reshape(-1, 3)
+        self._high = np.array([item.polygon.max(axis=0) for item in surfaces]).reshape(-1, 3)
+        self._group_surfaces()
+        walls = [_walls(item) for item in surfaces]
+        self._convex = np.array([item is not None for item in walls], dtype=bool)
+        self._walls, self._wall_offsets = _padded(walls)
+
+    def _group_surfaces(self) -> None:
+        """Sort surfaces by their normals, of which the faces of boxes have few, and bound them sideways."""
+        rounded = np.round(self.normals, 9)
+        _, first, group = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        self.group: IntArray = group.ravel()
+        sides = np.array([self.surfaces[number].rotation[:, :2].T for number in first]).reshape(-1, 2, 3)
+        self.frames = np.concatenate([self.normals[first][:, None], sides], axis=1)
+        self.lines, self.line, self.sign = _lines(self.frames)
+        shadows = [
+            item.polygon @ sides[number].T for item, number in zip(self.surfaces, self.group, strict=True)
+        ]
+        self.side_low = np.array([item.min(axis=0) for item in shadows]).reshape(-1, 2)
+        self.side_high = np.array([item.max(axis=0) for item in shadows]).reshape(-1, 2)
+        areas = np.array([item.area for item in self.surfaces])
+        self.filled: NDArray[np.bool_] = areas >= np.prod(self.side_high - self.side_low, axis=1) * (1 - 1e-9)
+
+    def within_reach(self, situation: Situation, samples: LimbSamples, tolerance: float) -> IntArray:
+        """Surfaces that may meet the reach of a limb (step 1): no reachable one is left out.
+
+        The box of the polygon must meet the ball of the reach, and, along the normal and the sides of
+        the polygon, the extents of the hull.
+
+        Args:
+            situation: Where the limb is.
+            samples: Samples of the limb.
+            tolerance: How far beyond the hull a surface may be [m].
+        """
+        hull, radius = samples.hull
+        away = np.clip(situation.origin, self._low, self._high) - situation.origin
+        near = np.flatnonzero(np.einsum("mi,mi->m", away, away) <= (radius + tolerance) ** 2)
+        # Extents of the hull along the normals and sides of all directions, from the limb's origin.
+        extents = self.frames @ (situation.rotation @ hull.T)
+        low, high = extents.min(axis=2) - tolerance, extents.max(axis=2) + tolerance
+        offset = self.frames @ situation.origin
+        group = self.group[near]
+        heights = self.offsets[near] - offset[group, 0]
+        meets = (heights >= low[group, 0]) & (heights <= high[group, 0])
+        sides = offset[group, 1:]
+        meets &= (self.side_high[near] - sides >= low[group, 1:]).all(axis=1)
+        meets &= (self.side_low[near] - sides <= high[group, 1:]).all(axis=1)
+        return near[meets]
+
+    def over(
+        self, points: FloatArray, numbers: IntArray, margin: FloatArray | float = 0.0
+    ) -> NDArray[np.bool_]:
+        """(n,) whether points project into the polygon of their surface.
+
+        Args:
+            points: (n, 3) in the world [m].
+            numbers: (n,) indices of the surfaces.
+            margin: (n,) or one distance that points may lie outside [m].
+        """
+        beyond = np.einsum("nei,ni->ne", self._walls[numbers], points) - self._wall_offsets[numbers]
+        inside = (beyond <= np.asarray(margin)[..., None]).all(axis=1)
+        loose = np.flatnonzero(~self._convex[numbers])
+        for number in np.unique(numbers[loose]):
+            mine = loose[numbers[loose] == number]
+            allowed = np.broadcast_to(margin, len(points))[mine]
+            inside[mine] = self.surfaces[number].outside(points[mine]) <= allowed
+        return inside
+
+    def carries(
+        self, points: FloatArray, turns: FloatArray, numbers: IntArray, footprint: FloatArray
+    ) -> NDArray[np.bool_]:
+        """(n,) whether the whole footprint of placed effectors projects into their polygons.
+
+        Args:
+            points: (n, 3) places of the effectors in the world [m].
+            turns: (n, 3, 3) from their axes to the world's.
+            numbers: (n,) indices of the surfaces.
+            footprint: (c, 3) points of the effector's frame [m].
+        """
+        if self.filled[numbers].all():
+            sides = self.frames[self.group[numbers], 1:]
+            places = (sides @ points[..., None]) + (sides @ turns) @ footprint.T
+            inside = places >= self.side_low[numbers][..., None]
+            inside &= places <= self.side_high[numbers][..., None]
+            return np.logical_and.reduce(inside.reshape(len(points), 2 * len(footprint)), axis=1)
+        corners = points[:, None] + footprint @ turns.transpose(0, 2, 1)
+        each = self.over(corners.reshape(-1, 3), np.repeat(numbers, len(footprint)))
+        return np.logical_and.reduce(each.reshape(len(points), len(footprint)), axis=1)
+
+    def carries_one(self, corners: FloatArray, number: int) -> bool:
+        """Whether all (c, 3) corners of one footprint in the world project into a polygon [m]."""
+        if self._convex[number]:
+            return bool((corners @ self._walls[number].T <= self._wall_offsets[number]).all())
+        return bool((self.surfaces[number].outside(corners) <= 0.0).all())
+
+    def height_of(self, point: FloatArray, numbers: IntArray) -> FloatArray:
+        """(m,) signed distance of one world point to the planes of some surfaces [m]."""
+        return self.normals[numbers] @ point - self.offsets[numbers]
+
+
+def find_candidates(
+    table: SurfaceTable,
+    numbers: IntArray,
+    situation: Situation,
+    samples: LimbSamples,
+    *,
+    tolerance: float,
+    max_tilt: float,
+    footprint: FloatArray,
+) -> Candidates:
+    """Select the samples in contact (step 2, [Tonneau2015]_ 4.3): near the plane and over the polygon.
+
+    Args:
+        table: Surfaces of the scene.
+        numbers: Those within reach.
+        situation: Where the limb is.
+        samples: Samples of the limb.
+        tolerance: Largest distance of an effector to the plane, on either side [m].
+        max_tilt: Largest angle between the effector's z axis and the normal [rad]; what is
+            tilted more cannot be aligned by small moves of the joints.
+        footprint: (c, 3) points of the effector's frame that must lie over the polygon [m].
+    """
+    rows, owner, gap = _near_planes(table, numbers, situation, samples, tolerance, float(np.cos(max_tilt)))
+    order = np.argsort(rows * len(numbers) + owner)  # no two are the same
+    rows, owner, gap = rows.take(order), owner.take(order), gap.take(order)
+    normals = (table.normals[numbers] @ situation.rotation).take(owner, axis=0)
+    normals *= gap[:, None]
+    points = situation.to_world(samples.positions.take(rows, axis=0) - normals)
+    if not table.filled[numbers].all():
+        inside = table.over(points, numbers[owner]).nonzero()[0]
+        rows, owner, points = rows.take(inside), owner.take(inside), points.take(inside, axis=0)
+    if len(footprint) > 1:
+        turns = situation.rotation @ samples.rotations.take(rows, axis=0)
+        inside = table.carries(points, turns, numbers[owner], footprint).nonzero()[0]
+        rows, owner, points = rows.take(inside), owner.take(inside), points.take(inside, axis=0)
+    surfaces = numbers.take(owner)
+    return Candidates(
+        rows,
+        surfaces,
+        points,
+        table.normals.take(surfaces, axis=0),
+        samples.products.take(rows, axis=0),
+        samples.manipulability.take(rows),
+        samples.rotations.take(rows, axis=0),
+    )
+
+
+def _near_planes(
+    table: SurfaceTable,
+    numbers: IntArray,
+    situation: Situation,
+    samples: LimbSamples,
+    tolerance: float,
+    least: float,
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Samples upright over planes, within the bounds of their polygons; one direction of planes at a time.
+
+    Returns:
+        Rows of the samples, positions of their surfaces in ``numbers``, heights over the planes [m].
+    """
+    lines = table.lines @ situation.rotation
+    upward, places = lines @ samples.upward.T, lines @ samples.positions.T
+    shift = (table.lines @ situation.origin).tolist()
+    own_group = table.group[numbers]
+    found: list[tuple[IntArray, IntArray, FloatArray]] = []
+    for group in set(own_group.tolist()):
+        own = (own_group == group).nonzero()[0]
+        surfaces = numbers[own]
+        (along, *sides), (sign, *signs) = table.line[group].tolist(), table.sign[group].tolist()
+        planes = sign * table.offsets[surfaces] - shift[along]
+        low, high = planes - tolerance, planes + tolerance
+        rows = (upward[along] >= least if sign > 0.0 else upward[along] <= -least).nonzero()[0]
+        height = places[along].take(rows)
+        level = ((height >= low.min()) & (height <= high.max())).nonzero()[0]
+        rows, height = rows.take(level), height.take(level)
+        inside = (height >= low[:, None]) & (height <= high[:, None])
+        ends = table.side_low[surfaces], table.side_high[surfaces]
+        for axis, (line, side) in enumerate(zip(sides, signs, strict=True)):
+            place = side * (places[line].take(rows) + shift[line])
+            inside &= place >= ends[0][:, axis, None]
+            inside &= place <= ends[1][:, axis, None]
+        which, near = np.divmod(inside.ravel().nonzero()[0], len(rows) or 1)
+        found.append((rows.take(near), own.take(which), sign * (height.take(near) - planes.take(which))))
+    rows, owner, gap = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return rows, owner, gap
+
+
+def _lines(frames: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Lines (l, 3) along which the axes of frames (g, 3, 3) are; of each its line and its sign (g, 3)."""
+    axes = frames.reshape(-1, 3)
+    rounded = np.round(axes, 9)
+    leading = np.take_along_axis(rounded, np.argmax(rounded != 0.0, axis=1)[:, None], axis=1)
+    sign = np.where(leading < 0.0, -1.0, 1.0)
+    _, first, line = np.unique(sign * rounded + 0.0, axis=0, return_index=True, return_inverse=True)
+    shape = frames.shape[:2]
+    return (sign * axes)[first].reshape(-1, 3), line.reshape(shape), sign.reshape(shape)
+
+
+def _walls(surface: Surface) -> tuple[FloatArray, FloatArray] | None:
+    """Outward normals (e, 3) and offsets (e,) of a convex polygon's edges, or None if it is not convex."""
+    corners = surface.polygon
+    edges = np.roll(corners, -1, axis=0) - corners
+    out = np.cross(edges, surface.normal)
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    offsets = np.einsum("ei,ei->e", out, corners)
+    convex = bool((corners @ out.T <= offsets + 1e-9 * max(1.0, float(np.abs(corners).max()))).all())
+    return (out, offsets) if convex else None
+
+
+def _padded(walls: Sequence[tuple[FloatArray, FloatArray] | None]) -> tuple[FloatArray, FloatArray]:
+    """Walls of all surfaces in one array (m, e, 3), (m, e); missing ones hold everything inside."""
+    most = max((len(item[1]) for item in walls if item is not None), default=1)
+    normals, offsets = np.zeros((len(walls), most, 3)), np.full((len(walls), most), np.inf)
+    for number, item in enumerate(walls):
+        if item is not None:
+            normals[number, : len(item[1])], offsets[number, : len(item[1])] = item
+    return normals, offsets

@@ -1,0 +1,374 @@
+"""A sequence of contacts with a posture for every change, as the contact planner finds it.
+
+Also here. Certificate of a contact plan: every posture measured afresh, balance by other means than the
+search's. The contact that an effector makes where it has been put.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.balance.static import static_room, static_torque_share
+from manikin.body import BodyModel, Configuration, Limb
+from manikin.contact import (
+    Contact,
+    ContactKind,
+    ContactModel,
+    ContactSchedule,
+    Phase,
+    Stance,
+    StanceSequence,
+    grasp,
+    point,
+    sole,
+)
+from manikin.errors import ContactError
+from manikin.kinematics import touching_pairs
+from manikin.numerics.spatial import FloatArray, frozen_array, skew
+from manikin.scene import Proximity, Scene
+
+_RECTANGLE = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
+
+
+@dataclass(frozen=True)
+class ContactRules:
+    """What contacts can carry.
+
+    Attributes:
+        friction: Coulomb coefficient of soles and points.
+        grasp_force: Largest force of a grasp along each world axis [N].
+        grasp_moment: Largest moment of a grasp along each world axis [N.m].
+        patch: Part of a foot's sole that has to touch, as its start and end along the sole's x axis and its
+            width [m]; the whole sole when None. A climber stands on the front of the feet.
+    """
+
+    friction: float = 0.7
+    grasp_force: float = 400.0
+    grasp_moment: float = 10.0
+    patch: tuple[float, float, float] | None = None
+
+
+def footprint(
+    body: BodyModel, limb: Limb, kind: ContactKind, rules: ContactRules | None = None
+) -> FloatArray:
+    """(c, 3) points of the effector's frame that must lie on the surface [m].
+
+    Args:
+        body: The body.
+        limb: Its limb, whose own patch goes before the body's soles.
+        kind: How it touches.
+        rules: Which part of a sole has to touch; all of it when omitted.
+
+    Raises:
+        ContactError: If a sole is asked for of a body without soles.
+    """
+    if kind is not ContactKind.SOLE:
+        return np.zeros((1, 3))
+    if limb.patch is not None:
+        return _RECTANGLE * 0.5 * np.array([*limb.patch, 0.0])
+    if body.sole_length is None or body.sole_width is None:
+        raise ContactError(f"body {body.name!r} has no soles; valid: a contact of kind point or grasp")
+    if rules is not None and rules.patch is not None:
+        start, end, width = rules.patch
+        side = 0.5 * width
+        return np.array([[end, side, 0.0], [end, -side, 0.0], [start, -side, 0.0], [start, side, 0.0]])
+    return _RECTANGLE * 0.5 * np.array([body.sole_length, body.sole_width, 0.0])
+
+
+def make_contact(
+    body: BodyModel,
+    limb: Limb,
+    kind: ContactKind,
+    position: FloatArray,
+    rotation: FloatArray,
+    rules: ContactRules,
+) -> Contact:
+    """Contact of a limb's effector.
+
+    Args:
+        body: The body.
+        limb: The limb.
+        kind: How it touches.
+        position: (3,) in the world [m].
+        rotation: (3, 3) effector-to-world; its z column is the normal.
+        rules: Friction and strengths.
+
+    Raises:
+        ContactError: If a value is out of its range, or a sole is asked for of a body without.
+    """
+    if kind is ContactKind.GRASP:
+        return grasp(
+            limb.effector, position, max_force=rules.grasp_force, max_moment=rules.grasp_moment,
+            rotation=rotation,
+        )  # fmt: skip
+    if kind is ContactKind.POINT:
+        return point(limb.effector, position, friction=rules.friction, rotation=rotation)
+    length, width = 2.0 * footprint(body, limb, kind)[0, :2]
+    whole = sole(
+        limb.effector, position, length=length, width=width, friction=rules.friction, rotation=rotation
+    )
+    if rules.patch is None or limb.patch is not None:
+        return whole
+    return replace(whole, points=frozen_array(footprint(body, limb, kind, rules), "sole's patch [m]", (4, 3)))
+
+
+def onto_normal(rotation: FloatArray, normal: FloatArray) -> FloatArray:
+    """(3, 3) the rotation turned by the shortest way so that its z axis is the unit normal exactly."""
+    across = skew(normal) @ rotation[:, 0]
+    length = math.sqrt(across @ across)
+    if length < 1e-9:
+        across, length = np.array(rotation[:, 1]), 1.0
+    y = across / length
+    turned = np.empty((3, 3))
+    turned[:, 0], turned[:, 1], turned[:, 2] = skew(y) @ normal, y, normal
+    return turned
+
+
+COM_ROOM = (0.06, 0.06, 0.03)
+"""How far from that of its posture the centre of mass may be when a phase begins [m]; our choice."""
+
+
+HINGE_PACE = 1.3
+"""Mean speed of the hinge that turns most between two postures [rad/s]; our choice."""
+
+COM_PACE = 0.4
+"""Mean speed of the centre of mass between two postures [m/s]; our choice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The contacts of one phase and the posture with which it begins.
+
+    Attributes:
+        contacts: By effector.
+        q: (nq,) posture that holds the contacts of this phase and of the one before.
+        com: (3,) its centre of mass [m].
+        min_duration: Shortest time that the phase should last [s].
+        com_room: How far from there the centre of mass of a motion may be, along x, y and z [m].
+        via: (nq,) posture in the middle of the phase, in which the limb that moves is off everything; None
+            where the plan has none.
+    """
+
+    contacts: Mapping[str, Contact]
+    q: FloatArray
+    com: FloatArray
+    min_duration: float
+    com_room: tuple[float, float, float] = COM_ROOM
+    via: FloatArray | None = None
+
+    @classmethod
+    def of(
+        cls,
+        body: BodyModel,
+        contacts: Mapping[str, Contact],
+        q: FloatArray,
+        min_duration: float,
+        com_room: tuple[float, float, float] = COM_ROOM,
+        via: FloatArray | None = None,
+    ) -> "Stage":
+        """Stage with the centre of mass of its posture."""
+        com = frozen_array(Configuration(body, q).com, "com [m]", (3,))
+        kept = MappingProxyType(dict(contacts))
+        between = None if via is None else frozen_array(via, "posture between", (body.nq,))
+        return cls(kept, frozen_array(q, "posture", (body.nq,)), com, min_duration, com_room, between)
+
+    @property
+    def stance(self) -> Stance:
+        """The contacts as a stance."""
+        return Stance(list(self.contacts.values()))
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPlan:
+    """Stages from the start to the goal.
+
+    Attributes:
+        stages: At least one; one contact is made or broken from each to the next.
+        goal: (nq,) posture with which the last one ends.
+        goal_com: (3,) its centre of mass [m].
+    """
+
+    stages: tuple[Stage, ...]
+    goal: FloatArray
+    goal_com: FloatArray
+
+    @classmethod
+    def of(
+        cls, body: BodyModel, stages: Sequence[Stage], goal: FloatArray, hinge_pace: float = HINGE_PACE
+    ) -> "ContactPlan":
+        """Plan with the centre of mass of its last posture.
+
+        Args:
+            body: The body.
+            stages: From the start to the goal.
+            goal: (nq,) posture with which the last one ends.
+            hinge_pace: Mean speed of the hinge that turns most between two postures [rad/s].
+        """
+        com = frozen_array(Configuration(body, goal).com, "goal com [m]", (3,))
+        ends = [(stage.q, stage.com) for stage in stages[1:]] + [(goal, com)]
+        timed = [
+            replace(stage, min_duration=max(stage.min_duration, _least_time(stage, q, there, hinge_pace)))
+            for stage, (q, there) in zip(stages, ends, strict=True)
+        ]
+        return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
+
+    def sequence(self, model: ContactModel | None = None) -> StanceSequence:
+        """The stances in order, as the stages that follow take them.
+
+        Args:
+            model: Contact model of each; the default one without a cap when omitted.
+        """
+        stances = [Stance(list(stage.contacts.values()), model=model) for stage in self.stages]
+        return StanceSequence(
+            [Phase(stance, stage.min_duration) for stance, stage in zip(stances, self.stages, strict=True)]
+        )
+
+    def schedule(self, model: ContactModel) -> ContactSchedule:
+        """The stances in time, each as short as it may be, from zero on.
+
+        Args:
+            model: Contact model of each.
+        """
+        durations = [stage.min_duration for stage in self.stages]
+        return ContactSchedule(self.sequence(model), np.concatenate([[0.0], np.cumsum(durations)]))
+
+    def keys(self, instants: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Key times (k,) [s] and configurations (k, nq): at every change, and in between where there is one.
+
+        Args:
+            instants: (n + 1,) times of the changes [s].
+        """
+        times, keys = [float(instants[0])], [self.stages[0].q]
+        ends = [*(stage.q for stage in self.stages[1:]), self.goal]
+        for number, (stage, end) in enumerate(zip(self.stages, ends, strict=True)):
+            if stage.via is not None:
+                times.append(0.5 * float(instants[number] + instants[number + 1]))
+                keys.append(stage.via)
+            times.append(float(instants[number + 1]))
+            keys.append(end)
+        return np.array(times), np.array(keys)
+
+    @property
+    def postures(self) -> FloatArray:
+        """(n + 1, nq) the posture at every change and at the goal."""
+        return np.array([*(stage.q for stage in self.stages), self.goal])
+
+    @property
+    def steps(self) -> int:
+        """Number of contacts made."""
+        return sum(len(set(after.contacts) - set(before.contacts)) for before, after in pairwise(self.stages))
+
+
+def _least_time(stage: Stage, q: FloatArray, com: FloatArray, hinge_pace: float) -> float:
+    """Time that the change to the next posture takes at an unhurried pace [s]."""
+    between = stage.q[None] if stage.via is None else np.array([stage.q, stage.via])
+    turn = float(np.abs(np.diff([*between[:, 7:], q[7:]], axis=0)).max(axis=1, initial=0.0).sum())
+    return max(turn / hinge_pace, float(np.linalg.norm(com - stage.com)) / COM_PACE)
+
+
+@dataclass(frozen=True)
+class PlanCertificate:
+    """Largest violations of the postures of a plan.
+
+    Attributes:
+        postures: Number of postures: at every change, in the middle of flights, at the goal.
+        changes: Largest number of contacts made and broken at one change.
+        max_contact_error_m: Distance of an effector from a contact that it holds [m].
+        max_sole_turn_rad: Angle of a sole from its contact [rad].
+        min_clearance_m: Least distance of what does not touch [m].
+        closest_pair: Names of the shapes at that distance.
+        max_range_violation_rad: Violation of a joint range [rad].
+        min_room_m: Least room of the centre of mass on the contacts that stay, see
+            :func:`~manikin.balance.static.static_room` [m].
+        max_torque_share: Largest share of a torque limit with which the postures can be held at rest.
+    """
+
+    postures: int
+    changes: int
+    max_contact_error_m: float
+    max_sole_turn_rad: float
+    min_clearance_m: float
+    closest_pair: tuple[str, str]
+    max_range_violation_rad: float
+    min_room_m: float
+    max_torque_share: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """The values by name."""
+        return {**asdict(self), "closest_pair": list(self.closest_pair)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A posture, what it holds and what carries it."""
+
+    q: FloatArray
+    held: tuple[Contact, ...]
+    carrying: tuple[Contact, ...]
+
+
+def certify_plan(
+    body: BodyModel, scene: Scene, plan: ContactPlan, model: ContactModel | None = None
+) -> PlanCertificate:
+    """Measure every posture of a plan.
+
+    Args:
+        body: The body.
+        scene: Its surroundings.
+        plan: The plan.
+        model: Contact model; with the default cap of the body when omitted.
+    """
+    model = model or ContactModel.of_body(body.mass)
+    postures = _postures(plan)
+    proximity = Proximity(body, scene)
+    error = turn = beyond = share = 0.0
+    room, nearest, pair = np.inf, np.inf, ("", "")
+    for item in postures:
+        state = Configuration(body, item.q)
+        for contact in item.held:
+            rotation, place = state.effector_placement(contact.effector)
+            error = max(error, float(np.linalg.norm(place - contact.position)))
+            if contact.kind is ContactKind.SOLE:
+                off = rotation.T @ contact.rotation_contact_to_world
+                turn = max(turn, float(np.linalg.norm(pin.log3(off))))
+        touched = [(contact.effector, scene.touched_obstacle(contact)) for contact in item.held]
+        found = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched))
+        if len(found.distance) and found.distance.min() < nearest:
+            nearest, pair = float(found.distance.min()), found.pairs[int(np.argmin(found.distance))]
+        angles = item.q[7:]
+        beyond = max(beyond, float(np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)))
+        stance = Stance(item.carrying, model=model)
+        room = min(room, static_room(stance, body.mass, state.com))
+        share = max(share, static_torque_share(body, item.q, stance))
+    return PlanCertificate(
+        len(postures), _changes(plan), error, turn, nearest, pair, beyond, float(room), share
+    )
+
+
+def _postures(plan: ContactPlan) -> list[_Held]:
+    """At a change the contacts of both sides are held, and those that are in both carry."""
+    first = tuple(plan.stages[0].contacts.values())
+    found = [_Held(plan.stages[0].q, first, first)]
+    for before, after in pairwise(plan.stages):
+        both = tuple(c for name, c in after.contacts.items() if before.contacts.get(name) is c)
+        every = tuple({id(c): c for c in (*before.contacts.values(), *after.contacts.values())}.values())
+        found.append(_Held(after.q, every, both))
+        if after.via is not None:
+            own = tuple(after.contacts.values())
+            found.append(_Held(after.via, own, own))
+    last = tuple(plan.stages[-1].contacts.values())
+    return [*found, _Held(plan.goal, last, last)]
+
+
+def _changes(plan: ContactPlan) -> int:
+    most = 0
+    for before, after in pairwise(plan.stages):
+        changed = {name for name, c in after.contacts.items() if before.contacts.get(name) is not c}
+        most = max(most, len(changed | (set(before.contacts) - set(after.contacts))))
+    return most

@@ -1,0 +1,179 @@
+"""How well a limb can press along a direction: EFORT ([Tonneau2015]_ 5.2) and its ellipsoids.
+
+All functions take the translation's ``J J^T`` (3, 3) of each limb configuration, as the Jacobian of
+one limb is 3 by the number of its joints (the thesis prints l by n in 5.2), and directions of unit
+length, which 5.11 needs and does not say.
+
+Also here. The force that a limb can really exert at a contact: strength of each joint and friction.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import linprog
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, frozen_array
+
+SIDES = 8
+"""Of the pyramid inside the friction cone."""
+
+
+def limb_strength(
+    jacobian: FloatArray,
+    torque_lower: FloatArray,
+    torque_upper: FloatArray,
+    direction: FloatArray,
+    normal: FloatArray | None,
+    friction: float = 0.7,
+) -> float:
+    """Largest force along a direction that the scene can exert on a limb at rest [N].
+
+    ``max f . v`` over the forces ``f`` on the effector with ``-J^T f`` within the torque limits and,
+    where the limb does not hold on, inside the friction cone about the normal. The weight of the limb itself
+    is left out. This is what EFORT (5.12) stands for in the request, where all joints count alike
+    and friction does not exist.
+
+    Args:
+        jacobian: (3, k) of the effector's translation [m/rad].
+        torque_lower: (k,) most negative torques of the joints [N.m].
+        torque_upper: (k,) largest ones [N.m].
+        direction: (3,) unit vector ``v``, in the Jacobian's frame.
+        normal: (3,) unit normal of the surface in the same frame, or None for a grasp.
+        friction: Coulomb coefficient.
+
+    Returns:
+        At least 0; infinite where the limb carries the direction without torque.
+
+    Raises:
+        InputError: If the linear program fails for another reason.
+    """
+    table, bounds = [jacobian.T, -jacobian.T], [-torque_lower, torque_upper]
+    if normal is not None:
+        across = np.linalg.svd(normal[None])[2][1:]
+        turns = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
+        sides = np.column_stack([np.cos(turns), np.sin(turns)]) @ across
+        table.append(sides - friction * np.cos(np.pi / SIDES) * normal)
+        bounds.append(np.zeros(SIDES))
+    found = linprog(-direction, A_ub=np.vstack(table), b_ub=np.concatenate(bounds), bounds=[(None, None)] * 3)
+    if found.status == 3:
+        return float("inf")
+    if found.status != 0:
+        raise InputError(f"exertable force cannot be computed ({found.message}); valid: finite values")
+    return float(-found.fun)
+
+
+MOST_RATIO = 1e6
+"""Ratio at which EFORT takes a limb that needs no torque, which has an infinite one [N per N.m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoid:
+    """``{x : x^T A^-1 x <= 1}`` by its half axes.
+
+    Attributes:
+        axes: (3, 3) unit directions in columns, the longest first.
+        lengths: (3,) half lengths; infinite along what a singular limb carries without torque.
+    """
+
+    axes: FloatArray
+    lengths: FloatArray
+
+
+def velocity_ellipsoid(product: ArrayLike) -> Ellipsoid:
+    """Velocities of the effector at joint speeds with a norm of at most 1 rad/s (5.4) [m/s]."""
+    values, vectors = np.linalg.eigh(np.asarray(product, dtype=np.float64))
+    return Ellipsoid(vectors[:, ::-1], np.sqrt(np.maximum(values[::-1], 0.0)))
+
+
+def force_ellipsoid(product: ArrayLike) -> Ellipsoid:
+    """Forces of the effector at joint torques with a norm of at most 1 N.m (5.10) [N].
+
+    Its axes are those of the velocity ellipsoid, its lengths the inverse.
+    """
+    speed = velocity_ellipsoid(product)
+    with np.errstate(divide="ignore"):
+        return Ellipsoid(speed.axes[:, ::-1], 1.0 / speed.lengths[::-1])
+
+
+def unit_direction(direction: ArrayLike, name: str = "task direction") -> FloatArray:
+    """(3,) direction of length 1.
+
+    Raises:
+        InputError: If it is zero or not finite.
+    """
+    vector = frozen_array(direction, name, (3,))
+    length = float(np.linalg.norm(vector))
+    if length < 1e-12:
+        raise InputError(f"{name} is {vector.tolist()}; valid: a direction that is not zero")
+    return frozen_array(vector / length, name)
+
+
+def force_transmission_ratio(products: FloatArray, direction: ArrayLike) -> FloatArray:
+    """``f_T = (v^T J J^T v)^(-1/2)``, the force along ``v`` of unit torque (5.11) [N per N.m].
+
+    Args:
+        products: (n, 3, 3) ``J J^T`` [m^2].
+        direction: (3,) ``v`` in the same frame; only its direction counts.
+
+    Returns:
+        (n,); infinite where the limb carries the direction without torque.
+    """
+    v = unit_direction(direction)
+    squares = np.maximum((products.reshape(-1, 9) @ np.outer(v, v).ravel()), 0.0)
+    with np.errstate(divide="ignore"):
+        return 1.0 / np.sqrt(squares)
+
+
+def efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> FloatArray:
+    """EFORT: ``alpha = f_T (v . n)`` (5.12).
+
+    The ratio is infinite where the limb carries the direction without torque, above all where it has no
+    joints, as a pelvis on a seat: nothing but the surface bounds such a force.  It then counts as
+    :data:`MOST_RATIO`, more than any limb that has to work, and what is left is to order contacts by
+    how much the surface faces the direction, ``v . n``.
+
+    Args:
+        products: (n, 3, 3) ``J J^T`` [m^2].
+        direction: (3,) ``v``: where the scene shall push this limb, see :class:`Task`.
+        normals: (n, 3) unit normals of the surfaces, out of the scene, in the same frame.
+
+    Returns:
+        (n,) finite, negative where the surface would have to pull.
+    """
+    ratio = np.minimum(force_transmission_ratio(products, direction), MOST_RATIO)
+    return ratio * (normals @ unit_direction(direction))
+
+
+def pulling_efort(products: FloatArray, direction: ArrayLike, normals: FloatArray) -> FloatArray:
+    """EFORT of what holds on to a surface and pulls at it: ``-alpha`` (5.13), (n,)."""
+    return -efort(products, direction, normals)
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What is to be done, and with which limbs.
+
+    The thesis has one direction for all limbs, which makes every contact of hands that push a cupboard
+    score negative: its side faces the hands and thus against the push. EFORT asks where the scene
+    pushes the *limb*, so each limb has its own direction: along the task for those that move the
+    body or brace it, against it for those that act on an object.
+
+    Attributes:
+        direction: (3,) unit direction in the world: of the body's motion, or of the force on an object.
+        acting: Names of the limbs that act on an object.
+    """
+
+    direction: FloatArray
+    acting: frozenset[str] = frozenset()
+
+    def __init__(
+        self, direction: ArrayLike, acting: frozenset[str] | set[str] | tuple[str, ...] = ()
+    ) -> None:
+        object.__setattr__(self, "direction", unit_direction(direction))
+        object.__setattr__(self, "acting", frozenset(acting))
+
+    def reaction_on(self, limb: str) -> FloatArray:
+        """(3,) unit direction in which the scene shall push a limb; EFORT's ``v``."""
+        return -self.direction if limb in self.acting else self.direction

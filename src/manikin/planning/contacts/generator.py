@@ -1,0 +1,387 @@
+"""The request for one contact: reach, samples in contact, order, choice ([Tonneau2015]_ 5.3.2)."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.body import BodyModel, Configuration, Limb, limb_named
+from manikin.body.natural_range import NaturalRange
+from manikin.contact import Contact, ContactKind
+from manikin.errors import BodyError
+from manikin.kinematics import LimbKinematics
+from manikin.kinematics.alignment import POSITION_TOLERANCE, TILT_TOLERANCE, Aligner
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.candidates import Candidates, Situation, SurfaceTable, find_candidates
+from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
+from manikin.planning.contacts.efort import Task
+from manikin.planning.contacts.heuristics import Efort, Heuristic
+from manikin.planning.contacts.limb_collisions import DeepSamples, LimbCollisions
+from manikin.planning.contacts.samples import LimbSamples
+from manikin.scene import Scene
+
+_GROWTH = 0.15
+"""How much longer each step down the order is than the one before."""
+_STEPS = np.cumsum(1 + (_GROWTH * np.arange(1000)).astype(np.int64)) - 1
+_FEW, _SOME, _BLOCK = 4, 16, 64  # candidates looked at together: first, later, and where many collide
+_LOOKED_AT = 8  # candidates for each that may be tried
+_TILTED, _UNNATURAL = ("", "tilted"), ("", "unnatural")
+NATURAL_SLACK = 0.1
+"""Normalised distance by which the alignment may take a limb of natural samples out of its learnt range."""
+
+
+class Hindrance(StrEnum):
+    """What kept a limb from making a contact."""
+
+    REACH = "reach"
+    """No surface is within reach of the limb."""
+    SURFACE = "surface"
+    """Surfaces are within reach, but no sample of the limb lies on one."""
+    COLLISION = "collision"
+    """Every contact that was tried collides."""
+    ALIGNMENT = "alignment"
+    """No effector that was tried can be put flat onto its surface."""
+
+
+@dataclass(frozen=True)
+class GeneratorSettings:
+    """How a request searches.
+
+    Attributes:
+        tolerance: Largest distance of a sample's effector to a surface, closed by inverse kinematics; of a
+            limb without joints it stays [m].
+        max_tilt: Largest angle between the effector's z axis and the normal before the alignment [rad].
+        point_tilt: The same after it, for points, grasps and limbs without joints; soles lie flat [rad].
+        tries: Candidates that are aligned and tested before giving up.
+    """
+
+    tolerance: float = 0.03
+    max_tilt: float = float(np.deg2rad(45.0))
+    point_tilt: float = float(np.deg2rad(15.0))
+    tries: int = 120
+
+
+@dataclass(frozen=True, eq=False)
+class GeneratedContact:
+    """Answer to a request: a contact and the posture that makes it, or why there is none.
+
+    Attributes:
+        limb: Name of the limb.
+        contact: The contact, or None.
+        q: (nq,) the body with this limb in contact and all else as asked, or None.
+        obstacle: Name of the obstacle touched, or None.
+        score: Score of the candidate; minus infinity without one.
+        candidates: Number of samples in contact (Table 8.2).
+        tried: How many of them were tried, or, without a contact, were found impossible.
+        failure: What kept the limb from a contact, or None.
+        message: The failure in words, or an empty text.
+        gap: Distance of the effector from its contact in ``q`` [m]: none where joints close it.  A limb
+            without joints touches where the root puts it, at most the settings' tolerance away; it is for
+            whoever places the root to close the rest.
+    """
+
+    limb: str
+    contact: Contact | None
+    q: FloatArray | None
+    obstacle: str | None
+    score: float
+    candidates: int
+    tried: int
+    failure: Hindrance | None = None
+    message: str = ""
+    gap: float = 0.0
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a contact."""
+        return self.contact is not None
+
+
+class ContactGenerator:
+    """Makes contacts of a body in a scene, one request at a time.
+
+    What depends on the scene alone is prepared once; each request is a lookup in the samples, an order
+    and a few tests. The same request has the same answer. One instance works on buffers of its own:
+    use one per thread.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        samples: Mapping[str, LimbSamples],
+        settings: GeneratorSettings | None = None,
+        rules: ContactRules | None = None,
+    ) -> None:
+        """Prepare a scene.
+
+        Args:
+            body: A body with limbs.
+            scene: Its surroundings.
+            samples: Samples by name of the limb, see :func:`manikin.planning.contacts.sample_limbs`.
+            settings: How to search.
+            rules: What contacts can carry.
+
+        Raises:
+            BodyError: If samples belong to no limb of the body.
+        """
+        self.body = body
+        self.settings = settings or GeneratorSettings()
+        self.rules = rules or ContactRules()
+        self._state = Configuration(body)
+        self._table = SurfaceTable(scene.surfaces)
+        self._tools = {
+            name: _LimbTools(body, limb_named(body, name), scene, item) for name, item in samples.items()
+        }
+
+    def request(
+        self,
+        q: ArrayLike,
+        limb: str,
+        task: Task,
+        heuristic: Heuristic | None = None,
+        *,
+        kind: ContactKind | None = None,
+    ) -> GeneratedContact:
+        """Find the best contact of one limb ([Tonneau2015]_ algorithm 2).
+
+        Each candidate is aligned with its surface and then tested for collision: the print tests before
+        the alignment, after which the posture is another one. They are tried down their order in ever
+        longer steps, then those left out, best first; the first that is free is the answer. Where the
+        limb itself collides several times, samples with its inside deeper in something than the
+        alignment moves an effector (``tolerance``) are left out untried.
+
+        Args:
+            q: (nq,) the body; all but the limb stays as it is.
+            limb: Name of the limb.
+            task: What is to be done.
+            heuristic: What to prefer; EFORT when omitted.
+            kind: How the effector touches; the limb's own way when omitted.
+
+        Raises:
+            BodyError: If there are no samples of such a limb or ``q`` does not fit.
+            ContactError: If a sole is asked for of a body without soles.
+        """
+        return self.request_several(q, limb, task, heuristic, kind=kind)[0]
+
+    def request_several(
+        self,
+        q: ArrayLike,
+        limb: str,
+        task: Task,
+        heuristic: Heuristic | None = None,
+        *,
+        kind: ContactKind | None = None,
+        most: int = 1,
+        apart: float = 0.05,
+    ) -> list[GeneratedContact]:
+        """Find the best contacts of one limb in different places, best first.
+
+        Args:
+            q: As for :meth:`request`.
+            limb: As there.
+            task: As there.
+            heuristic: As there.
+            kind: As there.
+            most: Largest number of contacts.
+            apart: Distance between two of them [m].
+
+        Returns:
+            Contacts, or one answer without a contact.
+
+        Raises:
+            BodyError: As there.
+            ContactError: As there.
+        """
+        if limb not in self._tools:
+            raise BodyError(f"no samples of limb {limb!r}; valid: {', '.join(self._tools) or 'none'}")
+        tools = self._tools[limb]
+        touch = kind or tools.limb.kind
+        situation = Situation.of(self._state.update(q), tools.limb, task.reaction_on(limb))
+        near = self._table.within_reach(situation, tools.samples, self.settings.tolerance)
+        if not len(near):
+            return [_failure(limb, Hindrance.REACH, f"no surface is within reach of {limb}")]
+        candidates = find_candidates(
+            self._table, near, situation, tools.samples, tolerance=self.settings.tolerance,
+            max_tilt=self.settings.max_tilt, footprint=footprint(self.body, tools.limb, touch, self.rules),
+        )  # fmt: skip
+        if not len(candidates):
+            names = sorted({self._table.surfaces[number].obstacle for number in near})
+            return [
+                _failure(
+                    limb, Hindrance.SURFACE, f"no sample of {limb} lies flat on a surface of "
+                    f"{', '.join(names)}, though these are near",
+                )
+            ]  # fmt: skip
+        scores = (heuristic or Efort()).score(situation, candidates)
+        return self._choose(tools, situation, candidates, scores, touch, most, apart)
+
+    def _choose(
+        self,
+        tools: "_LimbTools",
+        situation: Situation,
+        candidates: Candidates,
+        scores: FloatArray,
+        kind: ContactKind,
+        most: int,
+        apart: float,
+    ) -> list[GeneratedContact]:
+        """Steps 3 and 4: best first, the first that can be aligned and are free."""
+        found: list[GeneratedContact] = []
+        faults: Counter[tuple[str, str]] = Counter()
+        flat = kind is ContactKind.SOLE
+        gap, allowed = tools.allowed(self.settings, flat=flat)
+        sole = footprint(self.body, tools.limb, kind, self.rules)
+        tools.collisions.begin(situation)
+        q = np.array(situation.state.q)
+        tried = 0
+        order = _order(scores)[: _LOOKED_AT * self.settings.tries]
+        for row, goal in self._worth_trying(tools, situation, candidates, order, faults):
+            if tried == self.settings.tries:
+                break
+            if found and _is_near(candidates.points[row], found, apart):
+                continue
+            tried += 1
+            aligned = tools.aligner.align(*goal, allowed)
+            if not aligned.lies(allowed, gap):
+                faults[_TILTED] += 1
+                continue
+            if not tools.natural(aligned.angles):
+                faults[_UNNATURAL] += 1
+                continue
+            q[tools.chain.slots] = aligned.angles
+            surface = int(candidates.surfaces[row])
+            hit = tools.collisions.first(q, self._table.surfaces[surface].obstacle)
+            if hit is not None:
+                faults[hit] += 1
+                continue
+            turn = situation.rotation @ aligned.rotation
+            if flat and not self._table.carries_one(candidates.points[row] + sole @ turn.T, surface):
+                faults[_TILTED] += 1
+                continue
+            made = self._found(tools.limb, kind, candidates, row, turn, q.copy(), scores, tried)
+            found.append(made if len(tools.chain) else replace(made, gap=aligned.error))
+            if len(found) == most:
+                break
+        return found or [_none_fits(tools.limb.name, faults, len(candidates))]
+
+    def _worth_trying(
+        self,
+        tools: "_LimbTools",
+        situation: Situation,
+        candidates: Candidates,
+        order: NDArray[np.int64],
+        faults: Counter[tuple[str, str]],
+    ) -> Iterator[tuple[int, tuple[FloatArray, FloatArray, FloatArray]]]:
+        """Rows in order with what to align there.
+
+        As soon as the limb itself, not its end, has collided a few times, candidates that are deep in
+        something are left out; they count as collisions.
+        """
+        start, size, around = 0, _FEW, None
+        while start < len(order):
+            rows = order[start : start + size]
+            start += size
+            if sum(count for hit, count in faults.items() if hit[0] in tools.deep.shapes) >= _FEW // 2:
+                around = around or tools.deep.around(situation)
+                deep = tools.deep.pairs(around, candidates.samples[rows], self.settings.tolerance)
+                faults.update(tools.collisions.names(pair) for pair in deep[deep >= 0].tolist())
+                rows, size = rows[deep < 0], _BLOCK
+            goals = tools.goals(situation, candidates, rows)
+            yield from zip(rows.tolist(), zip(*goals, strict=True), strict=True)
+            size = max(size, _SOME)
+
+    def _found(
+        self,
+        limb: Limb,
+        kind: ContactKind,
+        candidates: Candidates,
+        row: int,
+        turn: FloatArray,
+        q: FloatArray,
+        scores: FloatArray,
+        tried: int,
+    ) -> GeneratedContact:
+        surface = self._table.surfaces[int(candidates.surfaces[row])]
+        rotation = onto_normal(turn, surface.normal)
+        contact = make_contact(self.body, limb, kind, candidates.points[row], rotation, self.rules)
+        score = float(scores[row])
+        return GeneratedContact(limb.name, contact, q, surface.obstacle, score, len(candidates), tried)
+
+
+class _LimbTools:
+    """What one limb needs for its requests."""
+
+    def __init__(self, body: BodyModel, limb: Limb, scene: Scene, samples: LimbSamples) -> None:
+        self.limb = limb
+        self.samples = samples
+        self.chain = LimbKinematics(body, limb)
+        self.aligner = Aligner(self.chain)
+        self.collisions = LimbCollisions(body, limb, scene)
+        self.deep = DeepSamples(body, self.chain, samples, self.collisions)
+        self._range = NaturalRange(body, limb) if samples.natural else None
+        _ = samples.upward, samples.manipulability, samples.hull  # made now, not during a request
+
+    def allowed(self, settings: GeneratorSettings, *, flat: bool) -> tuple[float, float]:
+        """Distance [m] and tilt [rad] that the alignment may leave; what no joint moves is taken as it is."""
+        if not len(self.chain):
+            return settings.tolerance, settings.point_tilt
+        return POSITION_TOLERANCE, TILT_TOLERANCE if flat else settings.point_tilt
+
+    def natural(self, angles: FloatArray) -> bool:
+        """Whether a limb at angles (k,) is hardly beyond a learnt range of motion; so where none counts."""
+        if self._range is None:
+            return True
+        return bool(self._range.volume_distance(angles[None])[0] >= -NATURAL_SLACK)
+
+    def goals(
+        self, situation: Situation, candidates: Candidates, rows: NDArray[np.int64]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Angles to begin with, points and normals in the limb's frame of some candidates."""
+        return (
+            self.samples.angles.take(candidates.samples[rows], axis=0),
+            (candidates.points.take(rows, axis=0) - situation.origin) @ situation.rotation,
+            candidates.normals.take(rows, axis=0) @ situation.rotation,
+        )
+
+
+def _order(scores: FloatArray) -> NDArray[np.int64]:
+    """Candidates in the order of their trial: down the scores in ever longer steps, then those left out.
+
+    Neighbours in the order are often neighbours in space and collide with the same thing.
+    """
+    order = np.argsort(-scores, kind="stable")
+    steps = _STEPS[: int(np.searchsorted(_STEPS, len(order)))]
+    left = np.ones(len(order), dtype=bool)
+    left[steps] = False
+    return order[np.concatenate([steps, np.flatnonzero(left)])]
+
+
+def _is_near(point: FloatArray, found: list[GeneratedContact], apart: float) -> bool:
+    """Whether one of the contacts is nearer to a point (3,) than a distance [m]."""
+    places = (item.contact.position for item in found if item.contact is not None)
+    return any(np.linalg.norm(point - place) < apart for place in places)
+
+
+def _failure(
+    limb: str, kind: Hindrance, message: str, candidates: int = 0, tried: int = 0
+) -> GeneratedContact:
+    return GeneratedContact(limb, None, None, None, -np.inf, candidates, tried, kind, message)
+
+
+def _none_fits(limb: str, faults: Counter[tuple[str, str]], candidates: int) -> GeneratedContact:
+    tried = sum(faults.values())
+    tilted, unnatural = faults.pop(_TILTED, 0), faults.pop(_UNNATURAL, 0)
+    collided = sum(faults.values())
+    kind = Hindrance.COLLISION if collided > tilted else Hindrance.ALIGNMENT
+    what = [f"{tilted} cannot lie flat on the surface"] if tilted else []
+    if unnatural:
+        what.append(f"{unnatural} are beyond the range of motion")
+    if collided:
+        (shape, other), count = faults.most_common(1)[0]
+        what.append(f"{collided} collide, {count} by {shape} in {other}")
+    message = f"none of {tried} contacts of {limb} out of {candidates} is possible: {', '.join(what)}"
+    return _failure(limb, kind, message, candidates, tried)

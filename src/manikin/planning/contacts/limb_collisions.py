@@ -1,0 +1,378 @@
+"""Whether one limb of a body touches the scene or the rest of the body.
+
+Also here. Samples of a limb that are so deep in something that no small move of the joints frees them.
+
+Before a candidate is aligned and tested exactly, balls along the limb at its sample are compared with the
+boxes, capsules and balls around it, all candidates at once. Each of these is a box of half sizes ``h``
+widened by a radius ``r``, whose distance from a point ``p`` in its frame is, with ``e = |p| - h``,
+``|max(e, 0)| + min(max_i e_i, 0) - r``. Other shapes are left to the exact test.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel, Limb, Shape, ShapeKind
+from manikin.contact import ContactKind
+from manikin.kinematics import LimbKinematics
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts.candidates import IntArray, Situation
+from manikin.planning.contacts.samples import LimbSamples
+from manikin.scene import Scene, segment_of
+from manikin.scene.collision import CollisionPart, collision_parts
+
+TOUCH = 0.002
+"""Depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]."""
+YIELD = 0.8
+"""The same for a hand and its wrist in what the hand touches, as a share of the forearm's radius.
+
+The wrist of our shapes is thicker than the hand, so that a palm flat on a wall has it in the wall.
+"""
+
+
+class LimbCollisions:
+    """Collision test of one limb, and what hangs on it, with the scene and the rest of the body.
+
+    A yes or no, found in one call of the engine; distances are those of
+    :class:`manikin.scene.Proximity`. A limb wholly inside a mesh that is not convex is not noticed: it
+    would have to pass the mesh's surface to get there, where the limb is held. One instance works on
+    buffers of its own: use one per thread.
+
+    Attributes:
+        shapes: All geometries, those of the body first.
+        pairs: (p, 2) numbers of the limb's shape and of the other one of each pair.
+        active: (p,) which pairs may touch in the situation that was begun.
+        soft: Segments that give way in what the limb touches.
+    """
+
+    def __init__(self, body: BodyModel, limb: Limb, scene: Scene) -> None:
+        self._model = body.pinocchio
+        self._data = self._model.createData()
+        parts = [part for obstacle in scene for part in collision_parts(obstacle)]
+        self._shapes = _with_scene(body, parts)
+        moving = _moving_segments(body, limb)
+        count = len(body.geometry.geometryObjects)
+        names = [item.name for item in self._shapes.geometryObjects]
+        own = [number for number, name in enumerate(names[:count]) if segment_of(name) in moving]
+        self._shapes.removeAllCollisionPairs()
+        outer = [(shape, part) for shape in own for part in range(count, len(names))]
+        inner = [(names.index(a), names.index(b)) for a, b in body.collision_pairs]
+        inner = [pair for pair in inner if (pair[0] in own) != (pair[1] in own) or set(pair) <= set(own)]
+        inner = [(a, b) if a in own else (b, a) for a, b in inner]
+        for pair in outer + inner:
+            self._shapes.addCollisionPair(pin.CollisionPair(*pair))
+        self._placed = pin.GeometryData(self._shapes)
+        self._results = list(self._placed.collisionResults)  # references: making one takes longer
+        self._names = [(names[a], names[b].rsplit("#", 1)[0]) for a, b in outer]
+        self.soft, self._depth = yielding(body, limb)
+        self._yielding: dict[str, list[int]] = {}
+        for number, (shape, obstacle) in enumerate(self._names):
+            self._placed.collisionRequests[number].security_margin = -TOUCH
+            if segment_of(shape) in self.soft:
+                self._yielding.setdefault(obstacle, []).append(number)
+        self._names += [(names[a], names[b]) for a, b in inner]
+        self._touched: str | None = None
+        self._far = FarPairs(body, limb, parts, self._shapes, self._placed, outer + inner)
+        self.active: NDArray[np.bool_] = np.ones(len(self._names), dtype=bool)
+        self.pairs = np.array(outer + inner, dtype=np.int64).reshape(-1, 2)
+        self.shapes = list(self._shapes.geometryObjects)
+        self._places = list(self._placed.oMg)
+        self._tested = list(zip(self._names, self._results, strict=True))
+
+    def begin(self, situation: Situation) -> None:
+        """Leave out what the limb cannot reach wherever its joints are, until the next call."""
+        pin.updateGeometryPlacements(
+            self._model, self._data, self._shapes, self._placed, np.asarray(situation.state.q)
+        )
+        near = self._far.near(situation.origin)
+        for number in np.flatnonzero(near & ~self.active).tolist():
+            self._placed.activateCollisionPair(number)
+        for number in np.flatnonzero(self.active & ~near).tolist():
+            self._placed.deactivateCollisionPair(number)
+        self.active = near
+        self._tested = [(self._names[number], self._results[number]) for number in np.flatnonzero(near)]
+
+    def placements(self, numbers: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+        """Axes (n, 3, 3) and origins (n, 3) of some shapes in the world, as the situation began [m]."""
+        frames = [self._places[number] for number in numbers.tolist()]
+        turns = np.array([item.rotation for item in frames]).reshape(-1, 3, 3)
+        return turns, np.array([item.translation for item in frames]).reshape(-1, 3)
+
+    def names(self, number: int) -> tuple[str, str]:
+        """What the shapes of a pair are called: that of the body, and the obstacle or other shape."""
+        return self._names[number]
+
+    def first(self, q: FloatArray, touched: str | None = None) -> tuple[str, str] | None:
+        """Names of the first pair that collides at a configuration (nq,), or None.
+
+        Args:
+            q: The configuration; all but the limb as in the situation that was begun, if one was.
+            touched: Name of the obstacle on which the limb has its contact.
+
+        Returns:
+            (shape of the body, obstacle or shape of the body).
+        """
+        if touched != self._touched:
+            self._set_margin(self._touched, TOUCH)
+            self._set_margin(touched, max(self._depth, TOUCH))
+            self._touched = touched
+        if not pin.computeCollisions(self._model, self._data, self._shapes, self._placed, q, True):
+            return None
+        return next(names for names, result in self._tested if result.isCollision())
+
+    def _set_margin(self, obstacle: str | None, depth: float) -> None:
+        for number in self._yielding.get(obstacle or "", ()):
+            self._placed.collisionRequests[number].security_margin = -depth
+
+
+class FarPairs:
+    """Tells which pairs of a limb's shape and something else can never touch while the rest stays.
+
+    A shape of the limb is within a ball around the limb's origin whatever the joints do.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        limb: Limb,
+        parts: Sequence[CollisionPart],
+        shapes: pin.GeometryModel,
+        placed: pin.GeometryData,
+        pairs: Sequence[tuple[int, int]],
+    ) -> None:
+        """Prepare the pairs.
+
+        Args:
+            body: The body.
+            limb: Its limb.
+            parts: Of the scene.
+            shapes: Shapes of the body, then the parts.
+            placed: Where they are, updated by the caller.
+            pairs: (shape of the limb, part, or shape of the body) each.
+        """
+        reaches = _reaches(body, limb)
+        names = [item.name for item in shapes.geometryObjects]
+        count = len(names) - len(parts)
+        self._reach = np.array([reaches[names[first]] for first, _ in pairs])
+        self._others = np.array([second for _, second in pairs], dtype=np.int64)
+        own = {first for first, _ in pairs}
+        self._fixed = [number for number in range(count) if number not in own]
+        self._frames = [placed.oMg[number] for number in self._fixed]  # references: making one takes longer
+        self._radii = np.array([_radius(shapes.geometryObjects[number]) for number in self._fixed])
+        self._rotations = np.array([part.rotation for part in parts]).reshape(-1, 3, 3)
+        self._places = np.array([part.translation for part in parts]).reshape(-1, 3)
+        self._low = np.array([part.low for part in parts]).reshape(-1, 3)
+        self._high = np.array([part.high for part in parts]).reshape(-1, 3)
+        self._gaps = np.full(len(names), -np.inf)  # what belongs to the limb is always near
+        self._count = count
+
+    def near(self, origin: FloatArray) -> NDArray[np.bool_]:
+        """(pairs,) whether a pair may touch when the origin of the limb's frame is at (3,) [m]."""
+        away = np.array([frame.translation for frame in self._frames]).reshape(-1, 3) - origin
+        self._gaps[self._fixed] = np.sqrt(np.einsum("ni,ni->n", away, away)) - self._radii
+        local = np.einsum("nji,nj->ni", self._rotations, origin - self._places)
+        outside = np.maximum(np.maximum(self._low - local, local - self._high), 0.0)
+        self._gaps[self._count :] = np.sqrt(np.einsum("ni,ni->n", outside, outside))
+        return self._gaps[self._others] <= self._reach
+
+
+def _with_scene(body: BodyModel, parts: Sequence[CollisionPart]) -> Any:
+    """Copy of the body's geometry with the obstacles fixed to the world."""
+    shapes = body.geometry.copy()
+    for number, part in enumerate(parts):
+        place = pin.SE3(np.array(part.rotation), np.array(part.translation))
+        name = f"{part.obstacle}#{number}"
+        shapes.addGeometryObject(pin.GeometryObject(name, 0, 0, place, part.geometry))
+    return shapes
+
+
+def _reaches(body: BodyModel, limb: Limb) -> dict[str, float]:
+    """Largest distance of each of the limb's shapes from the limb's origin, by the shape's name [m]."""
+    along = {limb.segments[0]: 0.0}
+    for segment in body.segments:
+        if segment.parent in along and segment.name not in along:
+            along[segment.name] = along[segment.parent] + float(np.linalg.norm(segment.origin))
+    return {
+        f"{name}/{shape.name}": length + float(np.linalg.norm(shape.translation)) + _extent(shape)
+        for name, length in along.items()
+        for shape in body.segment(name).shapes
+    }
+
+
+def _extent(shape: Shape) -> float:
+    """Radius of the ball around the centre of a shape [m]."""
+    if shape.kind is ShapeKind.BOX:
+        return 0.5 * float(np.linalg.norm(shape.size))
+    return float(shape.size[0]) + (0.5 * float(shape.size[1]) if len(shape.size) > 1 else 0.0)
+
+
+def _radius(item: pin.GeometryObject) -> float:
+    """Radius of a ball around the origin of a geometry [m]."""
+    item.geometry.computeLocalAABB()
+    box = item.geometry.aabb_local
+    return float(np.linalg.norm(np.maximum(np.abs(box.min_), np.abs(box.max_))))
+
+
+def _moving_segments(body: BodyModel, limb: Limb) -> set[str]:
+    """Segments of the limb and what hangs on them; of one on the trunk, the root alone."""
+    moving = set(limb.segments)
+    if body.segments[0].name in moving:
+        return moving
+    for segment in body.segments:
+        if segment.parent in moving:
+            moving.add(segment.name)
+    return moving
+
+
+def yielding(body: BodyModel, limb: Limb) -> tuple[tuple[str, ...], float]:
+    """Segments that give way in what the limb touches, and how deep [m].
+
+    The hand and the forearm, and what corresponds to them: a limb's last two segments where nothing
+    hangs on them. None where the limb ends in a sole, or in the middle of another as a knee does.
+    """
+    last = limb.segments[-2:]
+    hanging = any(segment.parent == last[-1] for segment in body.segments)
+    if hanging or limb.kind is ContactKind.SOLE or len(last) < 2:
+        return (), 0.0
+    shapes = body.segment(last[0]).shapes
+    radii = [float(shape.size[0]) for shape in shapes if shape.kind is ShapeKind.CAPSULE]
+    return last, YIELD * max(radii, default=0.0)
+
+
+_ALONG = np.array([0.0, 0.5])
+"""Where the balls are on a capsule's axis, from its middle, over its length: not near the joint before."""
+
+
+class DeepSamples:
+    """Tells which samples of one limb have a ball deep in something.
+
+    The balls are on the axes of the limb's capsules, but for those of the segment that makes contact and
+    those that give way in what they touch.
+
+    Attributes:
+        shapes: Names of these capsules.
+    """
+
+    def __init__(
+        self, body: BodyModel, chain: LimbKinematics, samples: LimbSamples, collisions: LimbCollisions
+    ) -> None:
+        """Place the balls of all samples.
+
+        Args:
+            body: The body.
+            chain: Its limb.
+            samples: Samples of the limb.
+            collisions: Its exact collision test, whose pairs these are.
+        """
+        self._collisions = collisions
+        self._centres, radii, shapes = _balls(body, chain, samples.angles, collisions.soft)
+        self.shapes = frozenset(shapes)
+        round_boxes = [_round_box(item.geometry) for item in collisions.shapes]
+        known = np.array([item is not None for item in round_boxes], dtype=bool)
+        names = [item.name for item in collisions.shapes]
+        first, second = collisions.pairs.T
+        numbers = [names.index(name) for name in shapes]
+        mine = np.flatnonzero(np.isin(first, numbers) & known[second] & ~np.isin(second, numbers))
+        self._others, column = np.unique(second[mine], return_inverse=True)
+        self._half = np.array([np.zeros(3) if item is None else item[0] for item in round_boxes])[
+            self._others
+        ]
+        both = np.array([0.0 if item is None else item[1] for item in round_boxes])
+        # Number of the pair of each ball with each other shape, and the sum of their radii.
+        self._pair = np.full((len(self._others), len(numbers)), -1, dtype=np.int64)
+        self._reach = np.full(self._pair.shape, -np.inf)
+        for pair, row in zip(mine.tolist(), column.tolist(), strict=True):
+            own = np.array(numbers) == first[pair]
+            self._pair[row, own] = pair
+            self._reach[row, own] = both[second[pair]] + radii[own]
+
+    def around(self, situation: Situation) -> "Surroundings":
+        """What the balls may be in, in the limb's frame; the collision test was begun with the situation."""
+        active = np.append(self._collisions.active, False)[self._pair]
+        near = np.flatnonzero(active.any(axis=1))
+        turns, places = self._collisions.placements(self._others[near])
+        turns = turns.transpose(0, 2, 1) @ situation.rotation
+        places = (turns @ ((places - situation.origin) @ situation.rotation)[:, :, None])[:, :, 0]
+        reach = np.where(active[near], self._reach[near], -np.inf)
+        return Surroundings(turns, places, self._half[near], reach, self._pair[near])
+
+    def pairs(self, around: "Surroundings", rows: IntArray, depth: float) -> IntArray:
+        """(n,) number of a pair in which a sample is deeper than ``depth`` [m], or -1.
+
+        Args:
+            around: See :meth:`around`.
+            rows: (n,) samples.
+            depth: [m].
+        """
+        found = np.full(len(rows), -1, dtype=np.int64)
+        others, balls = around.reach.shape
+        beyond = around.turns.reshape(-1, 3) @ self._centres[rows].reshape(-1, 3).T
+        beyond = beyond.reshape(others, 3, len(rows), balls) - around.places[:, :, None, None]
+        np.abs(beyond, out=beyond)
+        beyond -= around.half[:, :, None, None]
+        largest = np.maximum(np.maximum(beyond[:, 0], beyond[:, 1]), beyond[:, 2])
+        np.maximum(beyond, 0.0, out=beyond)
+        beyond *= beyond
+        squared = beyond[:, 0] + beyond[:, 1] + beyond[:, 2]
+        # A ball is deep if its centre is nearer than this, or, where it is negative, further inside.
+        least = (around.reach - depth)[:, None]
+        deep = (squared < np.maximum(least, 0.0) ** 2) | (largest < np.minimum(least, 0.0))
+        other, row, ball = deep.nonzero()
+        found[row] = around.pair[other, ball]
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """Boxes widened by a radius around a limb, ``m`` of them, for ``b`` balls.
+
+    Attributes:
+        turns: (m, 3, 3) from the limb's frame to that of the box.
+        places: (m, 3) of their centres, seen from the limb's frame in the axes of the box [m].
+        half: (m, 3) half sizes [m].
+        reach: (m, b) sum of the radii; minus infinity where a ball and a box may touch [m].
+        pair: (m, b) number of their pair.
+    """
+
+    turns: FloatArray
+    places: FloatArray
+    half: FloatArray
+    reach: FloatArray
+    pair: IntArray
+
+
+def _balls(
+    body: BodyModel, chain: LimbKinematics, angles: FloatArray, soft: tuple[str, ...]
+) -> tuple[FloatArray, FloatArray, list[str]]:
+    """Centres (n, b, 3) in the limb's frame, radii (b,) and shapes of balls along a limb at angles (n, k)."""
+    centres: list[FloatArray] = []
+    radii: list[float] = []
+    names: list[str] = []
+    for name, turns, places in chain.segment_placements(angles):
+        if name in soft or name == chain.limb.segments[-1]:
+            continue
+        for shape in body.segment(name).shapes:
+            if shape.kind is ShapeKind.CAPSULE:
+                for share in _ALONG:
+                    offset = shape.translation + share * shape.size[1] * shape.rotation[:, 2]
+                    centres.append(places + turns @ offset)
+                    radii.append(float(shape.size[0]))
+                    names.append(f"{name}/{shape.name}")
+    placed = np.stack(centres, axis=1) if centres else np.zeros((len(angles), 0, 3))
+    return placed, np.array(radii), names
+
+
+def _round_box(geometry: coal.CollisionGeometry) -> tuple[FloatArray, float] | None:
+    """Half sizes and radius of a box, capsule or ball; None for anything else."""
+    if isinstance(geometry, coal.Box):
+        return np.array(geometry.halfSide), 0.0
+    if isinstance(geometry, coal.Capsule):
+        return np.array([0.0, 0.0, geometry.halfLength]), float(geometry.radius)
+    if isinstance(geometry, coal.Sphere):
+        return np.zeros(3), float(geometry.radius)
+    return None

@@ -1,0 +1,401 @@
+"""Places for one limb along a guide: what the generator offers near where the limb should be.
+
+Also here. Places for a sole near a wanted one.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel, Configuration, Limb
+from manikin.body.limbs import is_further
+from manikin.contact import Contact, ContactKind, sole
+from manikin.errors import BodyError, ContactError
+from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_yaw
+from manikin.planning.contacts.candidates import Candidates, Situation
+from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
+from manikin.planning.contacts.depth_first import heading_of
+from manikin.planning.contacts.efort import Task
+from manikin.planning.contacts.generator import (
+    ContactGenerator,
+    GeneratedContact,
+    GeneratorSettings,
+    Hindrance,
+)
+from manikin.planning.contacts.heuristics import Efort, Heuristic
+from manikin.planning.contacts.samples import LimbSamples, sample_limbs
+from manikin.scene import Scene, Surface
+from manikin.scene.collision import collision_parts
+
+_REQUEST = coal.CollisionRequest()
+
+
+@dataclass(frozen=True)
+class FootholdSettings:
+    """Where footholds are looked for; the values are our choice.
+
+    Attributes:
+        reach: Farthest from the wanted place, along the heading and across it [m].
+        spacing: Between places that are tried [m].
+        edge: Distance of the sole to the edges of its surface [m].
+        clearance: Distance of the foot to other obstacles [m].
+        foot_height: Height of the foot above its sole that has to be free [m].
+        steepest: Largest slope of a surface to stand on [rad].
+        height_weight: What a difference in height counts beside one along the ground.
+        apart: Distance between two places of the same surface that are both offered [m].
+        offered: Most places of one surface that are offered.
+    """
+
+    reach: tuple[float, float] = (0.24, 0.06)
+    spacing: float = 0.02
+    edge: float = 0.005
+    clearance: float = 0.015
+    foot_height: float = 0.10
+    steepest: float = float(np.deg2rad(30.0))
+    height_weight: float = 0.7
+    apart: float = 0.08
+    offered: int = 2
+
+    def __post_init__(self) -> None:
+        for name in ("spacing", "foot_height", "apart"):
+            finite_number(getattr(self, name), f"foothold settings {name}", above=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Foothold:
+    """A place for a sole.
+
+    Attributes:
+        position: (3,) of the middle of the sole [m].
+        rotation: (3, 3) sole-to-world.
+        obstacle: Name of the obstacle that carries it.
+        cost: Weighted distance to the wanted place [m].
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+    obstacle: str
+    cost: float
+
+    def contact(self, effector: str, length: float, width: float, friction: float) -> Contact:
+        """The contact of a foot that stands there."""
+        return sole(
+            effector, self.position, length=length, width=width, friction=friction, rotation=self.rotation
+        )
+
+
+class Footholds:
+    """Looks for footholds in one scene.
+
+    A place is one where the whole sole lies on a surface and nothing else of the scene is in the way of
+    the foot. One instance works on buffers of its own: use one per thread.
+    """
+
+    def __init__(self, body: BodyModel, scene: Scene, settings: FootholdSettings | None = None) -> None:
+        """Prepare a scene.
+
+        Raises:
+            ContactError: If the body has no soles.
+        """
+        if body.sole_length is None or body.sole_width is None:
+            raise ContactError(f"body {body.name!r} has no soles; valid: a body that stands on feet")
+        self.length, self.width = body.sole_length, body.sole_width
+        self.settings = settings or FootholdSettings()
+        self._surfaces = scene.surfaces_facing((0.0, 0.0, 1.0), self.settings.steepest)
+        self._parts = [(item.name, part) for item in scene for part in collision_parts(item)]
+        gap = 2.0 * self.settings.clearance
+        self._foot = coal.Box(self.length + gap, self.width + gap, self.settings.foot_height)
+
+    def near(self, wanted: FloatArray, yaw: float) -> list[Foothold]:
+        """Footholds around a place, the nearest first.
+
+        Args:
+            wanted: (3,) where the middle of the sole should be [m].
+            yaw: Heading of the toes [rad].
+        """
+        found = [hold for surface in self._surfaces for hold in self._on(surface, wanted, yaw)]
+        return sorted(found, key=lambda hold: hold.cost)
+
+    def _on(self, surface: Surface, wanted: FloatArray, yaw: float) -> Iterator[Foothold]:
+        rotation = onto_normal(rotation_from_yaw(yaw), surface.normal)
+        places = self._places(surface, wanted, rotation)
+        lifted = np.abs(places[:, 2] - wanted[2]) * self.settings.height_weight
+        cost = np.hypot(np.linalg.norm(places[:, :2] - wanted[:2], axis=1), lifted)
+        taken: list[FloatArray] = []
+        for row in np.argsort(cost, kind="stable"):
+            place = places[row]
+            if any(np.linalg.norm(place - other) < self.settings.apart for other in taken):
+                continue
+            if self._is_free(place, rotation, surface):
+                taken.append(place)
+                yield Foothold(place, rotation, surface.obstacle, float(cost[row]))
+                if len(taken) == self.settings.offered:
+                    return
+
+    def _places(self, surface: Surface, wanted: FloatArray, rotation: FloatArray) -> FloatArray:
+        """(n, 3) places of a grid around the wanted one where the whole sole lies on the surface."""
+        steps = [self.settings.spacing * np.arange(-n, n + 1) for n in self._counts()]
+        along, across = (axis.ravel() for axis in np.meshgrid(*steps, indexing="ij"))
+        heading = rotation[:2, 0] / np.linalg.norm(rotation[:2, 0])
+        side = np.array([-heading[1], heading[0]])
+        places = np.empty((len(along), 3))
+        places[:, :2] = wanted[:2] + along[:, None] * heading + across[:, None] * side
+        base = surface.polygon[0]
+        places[:, 2] = base[2] - (places[:, :2] - base[:2]) @ surface.normal[:2] / surface.normal[2]
+        half = np.array([0.5 * self.length, 0.5 * self.width]) + self.settings.edge
+        corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * half @ rotation[:, :2].T
+        outside = surface.outside((places[:, None] + corners).reshape(-1, 3)).reshape(-1, 4)
+        return places[(outside <= 1e-9).all(axis=1)]
+
+    def _counts(self) -> tuple[int, int]:
+        along, across = (int(reach / self.settings.spacing) for reach in self.settings.reach)
+        return along, across
+
+    def _is_free(self, place: FloatArray, rotation: FloatArray, surface: Surface) -> bool:
+        """Whether nothing but the surface's own obstacle is in the foot's way, nor that one above it."""
+        lift = 0.5 * self.settings.foot_height + 2e-3
+        pose = coal.Transform3s(rotation, place + lift * surface.normal)
+        for _, part in self._parts:
+            result = coal.CollisionResult()
+            where = coal.Transform3s(part.rotation, part.translation)
+            coal.collide(self._foot, pose, part.geometry, where, _REQUEST, result)
+            if result.isCollision():
+                return False
+        return True
+
+
+def stature_of(body: BodyModel) -> float:
+    """Stature of a body that stands on feet [m].
+
+    Raises:
+        BodyError: If the body has none, as creatures have.
+    """
+    if body.stature is None:
+        raise BodyError(f"body {body.name!r} has no stature; valid: a human")
+    return body.stature
+
+
+FAR = 10.0
+"""Score that is taken off what lies too far from where the limb should be."""
+
+ROOM = 0.2
+"""Distance from where a limb should be that counts as much as all of EFORT, by its reach; our choice."""
+
+NEAREST = 3
+"""Most places that are offered beside those of the generator."""
+
+TOE_ROOM = 0.02
+"""Distance of the toes to the end of the hold that carries them [m]; our choice."""
+
+TURN_OUT = float(np.deg2rad(25.0))
+"""Angle by which a foot may stand turned out [rad]; our choice."""
+
+STEEPEST = float(np.deg2rad(40.0))
+"""Largest slope of a surface on which such a place may be [rad]; our choice."""
+
+FINGERS = 0.08
+"""Distance from an edge at which a hand has its fingers around it [m]; our choice."""
+
+GRASP_TILT = float(np.deg2rad(80.0))
+"""Largest angle between the palm and what a hand has its fingers around [rad]; our choice."""
+
+POINT_TILT = float(np.deg2rad(35.0))
+"""The same between a point's normal and the surface's [rad]; our choice."""
+
+
+@dataclass(frozen=True)
+class Near:
+    """Near a place, and of those the one that another preference likes best; ours.
+
+    Attributes:
+        place: (3,) where the effector should be [m].
+        room: Distance from there that counts as much as the whole other preference [m].
+        other: The other preference.
+        edges: Where there are edges, for a hand that has to have its fingers around one; None for others.
+    """
+
+    place: tuple[float, float, float]
+    room: float
+    other: Heuristic
+    edges: "Edges | None" = None
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """See :class:`Heuristic`."""
+        away = np.linalg.norm(candidates.points - np.array(self.place), axis=1) / self.room
+        liked = self.other.score(situation, candidates)
+        largest = np.abs(liked).max(initial=0.0)
+        score = (liked / largest if largest > 0.0 else 0.0) - away - FAR * (away > 2.0)
+        if self.edges is not None:
+            score -= FAR * ~self.edges.near(candidates)
+        return score
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Edges of a scene's surfaces.
+
+    Attributes:
+        polygons: (k, 3) corners of each surface [m].
+        reach: Distance from an edge at which fingers get around it [m].
+    """
+
+    polygons: tuple[FloatArray, ...]
+    reach: float
+
+    def near(self, candidates: Candidates) -> NDArray[np.bool_]:
+        """(n,) whether candidates lie near an edge of their surface."""
+        found = np.zeros(len(candidates), dtype=bool)
+        for number in np.unique(candidates.surfaces):
+            rows = np.flatnonzero(candidates.surfaces == number)
+            start = self.polygons[number]
+            along = np.roll(start, -1, axis=0) - start
+            away = candidates.points[rows, None] - start
+            share = np.einsum("nei,ei->ne", away, along) / np.maximum(np.sum(along**2, axis=1), 1e-18)
+            gap = away - np.clip(share, 0.0, 1.0)[..., None] * along
+            found[rows] = np.linalg.norm(gap, axis=2).min(axis=1) <= self.reach
+        return found
+
+
+class LimbPlaces:
+    """Offers contacts of limbs where they should be, in a body led along a guide.
+
+    Attributes:
+        limbs: Those that make contacts, by effector.
+        reach: Mean distance that these limbs reach [m].
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        limbs: tuple[Limb, ...],
+        kinds: Mapping[str, ContactKind],
+        rules: ContactRules,
+        reference: FloatArray,
+        samples: Mapping[str, LimbSamples] | None = None,
+    ) -> None:
+        """Prepare a scene.
+
+        Args:
+            body: The body.
+            scene: Its surroundings.
+            limbs: Limbs that make contacts.
+            kinds: How each touches, by name of the limb.
+            rules: What contacts can carry.
+            reference: (nq,) posture in which every limb is where it should be relative to the root.
+            samples: Of the limbs; made when omitted.
+        """
+        self.limbs = {limb.effector: limb for limb in limbs}
+        self._kinds = kinds
+        known = samples or sample_limbs(body, np.random.default_rng(0))
+        known = {limb.name: known[limb.name] for limb in limbs}
+        self._generators = {
+            kind: ContactGenerator(
+                body, scene, {limb.name: known[limb.name] for limb in limbs if kinds[limb.name] is kind},
+                _settings(kind), rules,
+            )
+            for kind in set(kinds.values())
+        }  # fmt: skip
+        self._body, self._rules = body, rules
+        self._level = scene.surfaces_facing((0.0, 0.0, 1.0), STEEPEST)
+        self._edges = Edges(tuple(surface.polygon for surface in scene.surfaces), FINGERS)
+        state = Configuration(body, reference)
+        root = pin.XYZQUATToSE3(reference[:7])
+        self._wanted = {
+            name: np.asarray(root.actInv(state.effector_placement(name)[1])) for name in self.limbs
+        }
+        ends = [limb for limb in limbs if not is_further(body, limb)] or limbs
+        self.reach = float(np.mean([known[limb.name].hull[1] for limb in ends]))
+        steps = np.linspace(-2.0, 2.0, 33) * ROOM * self.reach
+        grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+        self._grid = grid[np.argsort(np.linalg.norm(grid, axis=1), kind="stable")]
+
+    def wanted(self, effector: str, root: FloatArray) -> FloatArray:
+        """(3,) where an effector should be in a body whose root has a (7,) pose [m]."""
+        return np.asarray(pin.XYZQUATToSE3(root).act(self._wanted[effector]))
+
+    def find(
+        self, effector: str, q: FloatArray, root: FloatArray, direction: FloatArray, most: int
+    ) -> list[GeneratedContact]:
+        """Contacts of one limb, the best first; one answer without a contact where there is none.
+
+        Args:
+            effector: Of the limb.
+            q: (nq,) the body; all but the limb stays as it is.
+            root: (7,) pose of the root at which the limb should be where it should be.
+            direction: (3,) where the scene shall push the limb.
+            most: Largest number of contacts.
+        """
+        limb = self.limbs[effector]
+        kind = self._kinds[limb.name]
+        place = self.wanted(effector, root)
+        edges = self._edges if kind is ContactKind.GRASP else None
+        heuristic = Near((place[0], place[1], place[2]), ROOM * self.reach, Efort(), edges)
+        found = self._generators[kind].request_several(
+            q, limb.name, Task(direction), heuristic, kind=kind, most=most, apart=0.07 * self.reach
+        )
+        near = [item for item in found if item.contact is not None and item.score > 1.0 - FAR]
+        if len(near) < most and kind is not ContactKind.GRASP:
+            near += self._nearest(limb, kind, q, place, heading_of(root), near)
+        if near or not found[0].found:
+            return near or found
+        message = f"nothing for {limb.name} near {np.round(place, 2).tolist()} m"
+        return [replace(found[0], contact=None, q=None, failure=Hindrance.SURFACE, message=message)]
+
+    def _nearest(
+        self,
+        limb: Limb,
+        kind: ContactKind,
+        q: FloatArray,
+        wanted: FloatArray,
+        heading: float,
+        others: list[GeneratedContact],
+    ) -> list[GeneratedContact]:
+        """Places nearest to the wanted one, whether or not the limb alone can get there.
+
+        The generator moves the limb alone; the whole body can often reach what it cannot.
+        """
+        points = footprint(self._body, limb, kind, self._rules)
+        if kind is ContactKind.SOLE and self._rules.patch is not None and limb.patch is None:
+            # The tip of the toes keeps off what stands behind the hold.
+            toes = 0.5 * (self._body.sole_length or 0.0) + TOE_ROOM
+            points = np.column_stack(
+                [np.where(points[:, 0] > points[:, 0].mean(), toes, points[:, 0]), points[:, 1:]]
+            )
+        outward = float(np.sign(self._wanted[limb.effector][1])) * TURN_OUT
+        found: list[tuple[float, GeneratedContact]] = []
+        taken = [item.contact.position for item in others if item.contact is not None]
+        for surface in self._level:
+            for turn in (0.0, outward) if kind is ContactKind.SOLE else (0.0,):
+                rotation = onto_normal(rotation_from_yaw(heading + turn), surface.normal)
+                spot = self._spot(surface, wanted, points @ rotation.T)
+                if spot is None or any(np.linalg.norm(spot - other) < 0.07 * self.reach for other in taken):
+                    continue
+                contact = make_contact(self._body, limb, kind, spot, rotation, self._rules)
+                score = -float(np.linalg.norm(spot - wanted)) / (ROOM * self.reach)
+                item = GeneratedContact(limb.name, contact, q, surface.obstacle, score, 0, 0)
+                found.append((-score + (0.1 if turn else 0.0), item))
+        return [item for cost, item in sorted(found, key=lambda pair: pair[0])[:NEAREST] if cost < 2.0]
+
+    def _spot(self, surface: Surface, wanted: FloatArray, corners: FloatArray) -> FloatArray | None:
+        """(3,) place on a surface nearest to a wanted one, corners (c, 3) about it inside, or None."""
+        normal = surface.normal
+        flat = wanted - ((wanted - surface.polygon[0]) @ normal) * normal
+        if np.linalg.norm(flat - wanted) > 2.0 * ROOM * self.reach:
+            return None
+        places = flat + self._grid @ surface.rotation[:, :2].T
+        outside = surface.outside((places[:, None] + corners).reshape(-1, 3)).reshape(len(places), -1)
+        inside = places[(outside <= 0.0).all(axis=1)]
+        return inside[0] if len(inside) else None
+
+
+def _settings(kind: ContactKind) -> GeneratorSettings:
+    """A hand has its fingers around an edge at any angle; a tip may lean."""
+    if kind is ContactKind.SOLE:
+        return GeneratorSettings()
+    tilt = GRASP_TILT if kind is ContactKind.GRASP else POINT_TILT
+    return GeneratorSettings(max_tilt=tilt, point_tilt=tilt)

@@ -1,0 +1,192 @@
+"""Balanced, free postures on given contacts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.balance.static import StaticRegion
+from manikin.body import BodyModel, Configuration, with_root
+from manikin.contact import Contact, ContactModel, FrictionModel, Stance
+from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
+from manikin.numerics.spatial import FloatArray
+from manikin.scene import Proximity, Scene
+
+LEARNT_MARGIN = 0.01
+"""Angle that such postures keep to the surface of a learnt volume [rad]; our choice."""
+
+
+@dataclass(frozen=True)
+class PostureFinderSettings:
+    """What the postures of a contact plan keep to; the values are our choice.
+
+    Attributes:
+        clearance: Distance to obstacles and between body parts [m].
+        range_margin: Angle to the ends of the joint ranges [rad].
+        natural: Whether hips and shoulders of a human keep to their learnt volumes as well.
+        inset: Distance of the centre of mass to the edges of the region where it may rest [m].
+        root_weight: Of the distance between the root and the guide [1/m^2].
+        turn_weight: Of the angle between the root and the guide [1/rad^2].
+        tolerance: Largest residual of a contact [m, rad].
+        iterations: Of each search.
+        friction_model: Of the stances on which the body has to be able to rest.
+    """
+
+    clearance: float = 0.014
+    range_margin: float = 0.05
+    natural: bool = False
+    inset: float = 0.045
+    root_weight: float = 2.0
+    turn_weight: float = 2.0
+    tolerance: float = 2e-4
+    iterations: int = 40
+    friction_model: FrictionModel = "outer"
+
+    @property
+    def learnt_margin(self) -> float | None:
+        """Angle to the learnt ranges [rad]; None where they do not count."""
+        return LEARNT_MARGIN if self.natural else None
+
+    def scaled(self, factor: float) -> "PostureFinderSettings":
+        """The same for a body of another size: lengths times a factor."""
+        return replace(
+            self, clearance=factor * self.clearance, inset=factor * self.inset,
+            root_weight=self.root_weight / factor**2,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A posture, or why there is none.
+
+    Attributes:
+        q: (nq,) or None.
+        reason: In one line, where there is none.
+    """
+
+    q: FloatArray | None
+    reason: str = ""
+
+
+class PostureFinder:
+    """Finds postures of a body in a scene, and counts them.
+
+    Attributes:
+        searches: Postures looked for so far.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        reference: FloatArray | None = None,
+        settings: PostureFinderSettings | None = None,
+    ) -> None:
+        """Prepare a scene.
+
+        Args:
+            body: The body.
+            scene: Its surroundings.
+            reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
+            settings: What to keep to.
+        """
+        self.body, self._root = with_root(body)
+        self.scene, self._reference = scene, reference
+        self.settings = settings or PostureFinderSettings()
+        self.searches = 0
+        standing = np.array(body.standing_posture())
+        self._model = ContactModel.of_body(body.mass, self.settings.friction_model)
+        self._ahead = np.zeros(3) if body.stature else Configuration(body, standing).com - standing[:3]
+        self._proximity = Proximity(self.body, scene)
+        self._regions: dict[frozenset[Contact], StaticRegion] = {}
+        self._touched: dict[Contact, str] = {}
+
+    def pose(
+        self,
+        held: Mapping[str, Contact],
+        carrying: Mapping[str, Contact],
+        start: FloatArray,
+        guide: FloatArray | None = None,
+        *,
+        place: FloatArray | None = None,
+        inset: float | None = None,
+        restarts: bool = False,
+        placements: Mapping[str, Placement] | None = None,
+    ) -> Posed:
+        """Find a posture that holds contacts and rests on some of them alone.
+
+        Args:
+            held: Contacts that are held.
+            carrying: Those that carry the body.
+            start: (nq,) where to begin.
+            guide: (7,) pose of the root to be near; none when omitted.
+            place: (2,) where the centre of mass has to be [m]; near the guide, or where it is, when omitted.
+            inset: Distance of that place to the edges of where it may rest [m]; the settings' when omitted.
+            restarts: Whether to try again from crouched postures.
+            placements: Where further effectors should be, by name.
+        """
+        if place is None:
+            near = Configuration(self.body, start).com[:2] if guide is None else self._over(guide)
+            place = self._region(carrying).nearest(
+                np.asarray(near), self.settings.inset if inset is None else inset
+            )
+        if place is None:
+            return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
+        self.searches += 1
+        problem = PostureProblem(
+            self.body,
+            tuple(held.values()),
+            {**self._wish(guide), **(placements or {})},
+            com=np.array([*place, np.nan]),
+            proximity=self._proximity,
+            clearance=self.settings.clearance,
+            self_clearance=self.settings.clearance,
+            ignore=self._touching(held),
+            range_margin=self.settings.range_margin,
+            learnt_margin=self.settings.learnt_margin,
+            reference=self._reference,
+        )
+        once = SolverSettings(
+            tolerance=self.settings.tolerance,
+            iterations=self.settings.iterations,
+            restarts=False,
+            explain=False,
+        )
+        if guide is not None:
+            # The guide's trunk is free, so that from there no obstacle is passed on its wrong side.
+            led = np.concatenate([guide, start[7:]])
+            found = generate_posture(problem, led, settings=once)
+            if found.succeeded:
+                return Posed(found.q)
+        found = generate_posture(problem, start, settings=replace(once, restarts=restarts))
+        return Posed(found.q) if found.succeeded else Posed(None, found.failure or "no posture")
+
+    def _over(self, guide: FloatArray) -> FloatArray:
+        """(2,) where the centre of mass is in a body whose root has a (7,) pose: a person's over the root."""
+        return guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
+
+    def _wish(self, guide: FloatArray | None) -> dict[str, Placement]:
+        if guide is None:
+            return {}
+        pose = pin.XYZQUATToSE3(guide)
+        return {
+            self._root: Placement(
+                pose.translation, pose.rotation, self.settings.turn_weight, self.settings.root_weight
+            )
+        }
+
+    def _touching(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
+        for contact in held.values():
+            if contact not in self._touched:
+                self._touched[contact] = self.scene.touched_obstacle(contact)
+        return touching_pairs(self.body, [(name, self._touched[item]) for name, item in held.items()])
+
+    def _region(self, carrying: Mapping[str, Contact]) -> StaticRegion:
+        """Where the body may rest; asked again and again for the same contacts."""
+        key = frozenset(carrying.values())
+        if key not in self._regions:
+            self._regions[key] = StaticRegion.of(
+                Stance(tuple(carrying.values()), model=self._model), self.body.mass
+            )
+        return self._regions[key]

@@ -1,0 +1,352 @@
+"""One task-efficient contact of a scenario: what ``manikin contact`` answers.
+
+Also here. Contacts of all limbs of a body that is moved by hand: what the viewer's interactive mode shows.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.body import BodyModel, Configuration, limb_named
+from manikin.body.limbs import parent_segment
+from manikin.contact import ContactKind
+from manikin.errors import BodyError, InputError
+from manikin.kinematics import LimbKinematics
+from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.planning.contacts.contact_plan import ContactRules
+from manikin.planning.contacts.efort import Task, efort
+from manikin.planning.contacts.generator import ContactGenerator, GeneratedContact
+from manikin.planning.contacts.heuristics import Heuristic, heuristic_named
+from manikin.planning.contacts.samples import sample_limb, sample_limbs
+from manikin.scene import Scene
+
+SOME_EFORT = 1e-9
+"""What is less comes from rounding, as on a face along the task [N per N.m]."""
+
+
+class Role(StrEnum):
+    """What a limb does with its contact; decides the sign of EFORT's direction."""
+
+    AUTO = "auto"
+    """The body where some contact scores above zero that way, else the object; feet: the body."""
+    BODY = "body"
+    """Moves or braces the body along the task."""
+    OBJECT = "object"
+    """Pushes an object along the task."""
+
+
+@dataclass(frozen=True)
+class ContactQuestion:
+    """What is asked of one limb.
+
+    Attributes:
+        limb: Name of the limb.
+        task: Direction of the task in the world; its length does not count.
+        role: What the limb does.
+        pulling: Whether it holds on and pulls instead of pressing (5.13).
+        heuristic: Name of the preference, one of :data:`manikin.planning.contacts.HEURISTICS`.
+        kind: How the effector touches; its own way when None.
+        samples: Number of samples of the limb.
+        seed: Of the samples and of the random heuristic.
+    """
+
+    limb: str
+    task: tuple[float, float, float]
+    role: Role = Role.AUTO
+    pulling: bool = False
+    heuristic: str = "efort"
+    kind: ContactKind | None = None
+    samples: int = 10_000
+    seed: int = 0
+
+    @staticmethod
+    def of(
+        limb: str,
+        task: tuple[float, float, float],
+        role: str = "auto",
+        pulling: bool = False,
+        heuristic: str = "efort",
+        kind: str | None = None,
+        samples: int = 10_000,
+        seed: int = 0,
+    ) -> "ContactQuestion":
+        """Question from words.
+
+        Raises:
+            InputError: If a word is not known.
+        """
+        if role not in list(Role):
+            raise InputError(f"role is {role!r}; valid: {', '.join(Role)}")
+        if kind is not None and kind not in list(ContactKind):
+            raise InputError(f"kind is {kind!r}; valid: {', '.join(ContactKind)}")
+        touch = None if kind is None else ContactKind(kind)
+        return ContactQuestion(limb, task, Role(role), pulling, heuristic, touch, samples, seed)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactAnswer:
+    """The contact found, or why there is none.
+
+    Attributes:
+        question: What was asked.
+        q: (nq,) the body before.
+        result: The generator's answer.
+        role: The role that was taken, never ``auto``.
+        efort: EFORT of the posture found, with the sign of that role [N per N.m]; None without one.
+        prepare_wall_s: Wall time of the samples, the scene's preparation and a first request [s].
+        wall_s: Wall time of the request, made again [s].
+    """
+
+    question: ContactQuestion
+    q: FloatArray
+    result: GeneratedContact
+    role: Role
+    efort: float | None
+    prepare_wall_s: float
+    wall_s: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON; the keys are documented in ``docs/json.md``."""
+        found, contact = self.result, self.result.contact
+        return {
+            "found": found.found,
+            "position": None if contact is None else contact.position,
+            "normal": None if contact is None else contact.normal,
+            "obstacle": found.obstacle,
+            "efort": self.efort,
+            "candidates": found.candidates,
+            "wall_ms": 1e3 * self.wall_s,
+            "failure": None if found.found else found.message,
+            "hindrance": None if found.failure is None else str(found.failure),
+            "limb": found.limb,
+            "kind": None if contact is None else str(contact.kind),
+            "role": str(self.role),
+            "heuristic": self.question.heuristic,
+            "score": found.score if found.found else None,
+            "gap_m": found.gap if found.found else None,
+            "tried": found.tried,
+            "samples": self.question.samples,
+            "seed": self.question.seed,
+            "prepare_wall_ms": 1e3 * self.prepare_wall_s,
+            "q": found.q,
+        }
+
+
+def find_contact(
+    body: BodyModel,
+    scene: Scene,
+    q: FloatArray,
+    question: ContactQuestion,
+    rules: ContactRules | None = None,
+) -> ContactAnswer:
+    """Answer one question about a body in a scene.
+
+    Args:
+        body: A body with limbs.
+        scene: Its surroundings.
+        q: (nq,) the body; all but the limb stays as it is.
+        question: What is asked.
+        rules: What contacts can carry.
+
+    Raises:
+        InputError: If the limb or the heuristic is not known, the direction is zero, or the limb has
+            no such contact.
+    """
+    check_limbs(body)
+    limb = limb_named(body, question.limb)
+    roles = _roles(question, limb.kind)
+    tasks = [_task(question, role) for role in roles]
+    heuristic = heuristic_named(question.heuristic, question.seed, pulling=question.pulling)
+    started = time.perf_counter()
+    samples = sample_limb(body, limb, np.random.default_rng(question.seed), question.samples)
+    generator = ContactGenerator(body, scene, {limb.name: samples}, rules=rules)
+    _ask(generator, q, question, heuristic, roles, tasks)  # as in a dialogue, where caches are filled
+    prepared = time.perf_counter()
+    found, wall = _ask(generator, q, question, heuristic, roles, tasks)
+    role, result, score = max(found, key=lambda item: -np.inf if item[2] is None else item[2])
+    return ContactAnswer(question, np.array(q), result, role, score, prepared - started, wall)
+
+
+def check_limbs(body: BodyModel) -> None:
+    """Check that a body has limbs that can make contacts.
+
+    Raises:
+        BodyError: If it has none.
+    """
+    if not body.limbs:
+        raise BodyError(f"body {body.name!r} has no limbs; valid: a body with limbs, such as a human")
+
+
+def _ask(
+    generator: ContactGenerator,
+    q: FloatArray,
+    question: ContactQuestion,
+    heuristic: Heuristic,
+    roles: tuple[Role, ...],
+    tasks: list[Task],
+) -> tuple[list[tuple[Role, GeneratedContact, float | None]], float]:
+    """Answers for one role after the other, until one has a positive EFORT; wall time of the requests [s]."""
+    kind = question.kind or (ContactKind.GRASP if question.pulling else None)
+    found: list[tuple[Role, GeneratedContact, float | None]] = []
+    wall = 0.0
+    for role, task in zip(roles, tasks, strict=True):
+        started = time.perf_counter()
+        result = generator.request(q, question.limb, task, heuristic, kind=kind)
+        wall += time.perf_counter() - started
+        found.append((role, result, reached_efort(generator.body, result, task, pulling=question.pulling)))
+        if (found[-1][2] or 0.0) > SOME_EFORT:
+            break
+    return found, wall
+
+
+def reached_efort(
+    body: BodyModel, result: GeneratedContact, task: Task, *, pulling: bool = False
+) -> float | None:
+    """EFORT (5.12) of the posture of a contact that was found, or None without one [N per N.m]."""
+    if result.q is None or result.contact is None:
+        return None
+    limb = limb_named(body, result.limb)
+    chain = LimbKinematics(body, limb)
+    jacobian = chain.place(result.q[None, chain.slots]).jacobians[0]
+    turn, _ = Configuration(body, result.q).segment_placement(parent_segment(body, limb))
+    direction, normal = task.reaction_on(limb.name) @ turn, result.contact.normal @ turn
+    value = float(efort((jacobian @ jacobian.T)[None], direction, normal[None])[0])
+    return -value if pulling else value
+
+
+def _roles(question: ContactQuestion, kind: ContactKind) -> tuple[Role, ...]:
+    if question.role is not Role.AUTO:
+        return (question.role,)
+    return (Role.BODY,) if kind is ContactKind.SOLE else (Role.BODY, Role.OBJECT)
+
+
+def _task(question: ContactQuestion, role: Role) -> Task:
+    try:
+        return Task(question.task, {question.limb} if role is Role.OBJECT else ())
+    except InputError as error:
+        raise InputError(str(error).replace("task direction", "task", 1)) from None
+
+
+@dataclass(frozen=True, eq=False)
+class LiveAnswer:
+    """What every limb found.
+
+    Attributes:
+        q: (nq,) the body with each limb that found a contact in it.
+        answers: The limbs' answers by their names, in the order in which they were asked.
+        efforts: EFORT of each posture found [N per N.m].
+        wall_s: Wall time of all requests [s].
+    """
+
+    q: FloatArray
+    answers: dict[str, GeneratedContact]
+    efforts: dict[str, float]
+    wall_s: float
+
+
+class LiveContacts:
+    """The pose of a body, a task, and the contacts that follow from both.
+
+    Attributes:
+        body: The body.
+        scene: Its surroundings.
+        q: (nq,) the body as it was put, before any limb is moved.
+        azimuth_deg: Of the task about the vertical, from world x [deg].
+        elevation_deg: Of the task above the horizon [deg].
+        limbs: Names of the limbs that are asked.
+        heuristic: Name of the preference.
+        role: What the limbs do with their contacts.
+        pulling: Whether they hold on and pull.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        q: ArrayLike,
+        *,
+        samples: int = 10_000,
+        seed: int = 0,
+        rules: ContactRules | None = None,
+    ) -> None:
+        """Sample the limbs and prepare the scene.
+
+        Args:
+            body: A body with limbs.
+            scene: Its surroundings.
+            q: (nq,) where it begins.
+            samples: Number of samples of each limb.
+            seed: Of the samples.
+            rules: What contacts can carry.
+
+        Raises:
+            BodyError: If the body has no limbs.
+        """
+        check_limbs(body)
+        self.body, self.scene = body, scene
+        self.q = np.array(q, dtype=np.float64)
+        self.azimuth_deg, self.elevation_deg = 0.0, 90.0
+        self.limbs: tuple[str, ...] = tuple(limb.name for limb in body.limbs)
+        self.heuristic = "efort"
+        self.role = Role.AUTO
+        self.pulling = False
+        self._generator = ContactGenerator(
+            body, scene, sample_limbs(body, np.random.default_rng(seed), samples), rules=rules
+        )
+
+    def move(self, position: ArrayLike, quaternion: ArrayLike) -> None:
+        """Put the root elsewhere.
+
+        Args:
+            position: (3,) of the root [m].
+            quaternion: (4,) xyzw of the root; normalised here.
+        """
+        turn = frozen_array(quaternion, "quaternion", (4,))
+        self.q[:3] = frozen_array(position, "position [m]", (3,))
+        self.q[3:7] = turn / np.linalg.norm(turn)
+
+    def aim(self, azimuth_deg: float, elevation_deg: float) -> None:
+        """Turn the task: azimuth about the vertical from world x, elevation above the horizon [deg]."""
+        self.azimuth_deg, self.elevation_deg = float(azimuth_deg), float(elevation_deg)
+
+    @property
+    def direction(self) -> FloatArray:
+        """(3,) unit direction of the task in the world."""
+        azimuth, elevation = np.deg2rad([self.azimuth_deg, self.elevation_deg])
+        level = np.cos(elevation)
+        return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+
+    def ask(self, limbs: Sequence[str]) -> None:
+        """Choose the limbs that are asked, in the body's own order."""
+        self.limbs = tuple(limb.name for limb in self.body.limbs if limb.name in limbs)
+
+    def answer(self) -> LiveAnswer:
+        """Ask one limb after the other; each sees the postures of those before it."""
+        started = time.perf_counter()
+        heuristic = heuristic_named(self.heuristic, pulling=self.pulling)
+        kind = ContactKind.GRASP if self.pulling else None
+        q, answers, efforts = np.array(self.q), {}, {}
+        for name in self.limbs:
+            for role in self._roles(name):
+                task = Task(self.direction, {name} if role is Role.OBJECT else ())
+                found = self._generator.request(q, name, task, heuristic, kind=kind)
+                effort = reached_efort(self.body, found, task, pulling=self.pulling)
+                if name not in answers or (effort is not None and effort > efforts.get(name, -np.inf)):
+                    answers[name] = found
+                    efforts |= {} if effort is None else {name: effort}
+                if (effort or 0.0) > SOME_EFORT:
+                    break
+            reached = answers[name].q
+            q = q if reached is None else np.array(reached)
+        return LiveAnswer(q, answers, efforts, time.perf_counter() - started)
+
+    def _roles(self, name: str) -> tuple[Role, ...]:
+        if self.role is not Role.AUTO:
+            return (self.role,)
+        feet = {limb.name for limb in self.body.limbs if limb.kind is ContactKind.SOLE}
+        return (Role.BODY,) if name in feet else (Role.BODY, Role.OBJECT)

@@ -1,0 +1,61 @@
+"""Guides for the root: reachability roadmaps, queries and shortcuts ([Tonneau2015]_ chapter 6)."""
+
+from manikin.planning.guide.abstraction import Abstraction, LimbReach, TrunkShape, abstraction_of
+from manikin.planning.guide.checker import NO_MARGINS, Margins, ReachabilityChecker
+from manikin.planning.guide.comfort import ComfortSettings, nearest_fit, relax
+from manikin.planning.guide.condition import Condition, LimbRule, UsableSurface
+from manikin.planning.guide.guide import (
+    GuideResult,
+    GuideSettings,
+    GuideTask,
+    GuideWorld,
+    load_roadmap,
+    offline_roadmap,
+    plan_guide,
+    roadmap_for,
+    save_roadmap,
+)
+from manikin.planning.guide.guide_restarts import plan_guide_with_restarts
+from manikin.planning.guide.roadmap import Roadmap, RoadmapSettings, Route, request
+from manikin.planning.guide.root_path import RootLimits, RootPath, ShortcutSettings
+from manikin.planning.guide.root_pose import root_pose
+from manikin.planning.guide.sampler import PoseSampler, SamplerSettings, SamplingRegion
+from manikin.planning.guide.steering import LocalPlanner
+
+__all__ = [
+    "NO_MARGINS",
+    "Abstraction",
+    "ComfortSettings",
+    "Condition",
+    "GuideResult",
+    "GuideSettings",
+    "GuideTask",
+    "GuideWorld",
+    "LimbReach",
+    "LimbRule",
+    "LocalPlanner",
+    "Margins",
+    "PoseSampler",
+    "ReachabilityChecker",
+    "Roadmap",
+    "RoadmapSettings",
+    "RootLimits",
+    "RootPath",
+    "Route",
+    "SamplerSettings",
+    "SamplingRegion",
+    "ShortcutSettings",
+    "TrunkShape",
+    "UsableSurface",
+    "abstraction_of",
+    "load_roadmap",
+    "nearest_fit",
+    "offline_roadmap",
+    "plan_guide",
+    "plan_guide_with_restarts",
+    "relax",
+    "request",
+    "roadmap_for",
+    "root_pose",
+    "save_roadmap",
+]

@@ -1,0 +1,282 @@
+"""The creature as its trunk and what its limbs can reach ([Tonneau2015]_ 4.3.4, 6.1).
+
+``A = A_trunk U A_ROM`` is rigid and described by the pose of the root alone: the trunk's shapes
+in one posture, slightly enlarged so that the limbs' own roots have room, and for each limb the
+convex hull of the places its effector can take.
+"""
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, QhullError
+
+from manikin.body.model import BodyModel
+from manikin.body.segments import Shape, ShapeKind
+from manikin.errors import BodyError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+
+TRUNK_SCALE = 1.1
+"""Factor on the radii and sides of the trunk's shapes; our choice, the thesis gives none."""
+
+
+class LimbName(Protocol):
+    """What is read of a limb."""
+
+    @property
+    def name(self) -> str:
+        """Unique name of the limb."""
+        ...
+
+    @property
+    def segments(self) -> tuple[str, ...]:
+        """Names of its segments, from its root to the effector's own."""
+        ...
+
+
+class LimbVolume(Protocol):
+    """What is read of a limb's reach: vertices of its hull in the frame of the segment it hangs on."""
+
+    @property
+    def limb(self) -> LimbName:
+        """The limb."""
+        ...
+
+    @property
+    def segment(self) -> str:
+        """Segment to which the volume is fixed."""
+        ...
+
+    @property
+    def vertices(self) -> FloatArray:
+        """(n, 3) in that segment's frame [m]."""
+        ...
+
+
+class TrunkShape(Shape):
+    """A shape of the trunk in the frame of the root instead of its segment's, named ``"segment/shape"``."""
+
+    @property
+    def radius_about_root(self) -> float:
+        """Largest distance of a point of the shape from the root's origin, or more [m]."""
+        half = {
+            ShapeKind.SPHERE: lambda size: size[0],
+            ShapeKind.CAPSULE: lambda size: size[0] + 0.5 * size[1],
+            ShapeKind.BOX: lambda size: 0.5 * np.linalg.norm(size),
+        }[self.kind]
+        return float(np.linalg.norm(self.translation) + half(self.size))
+
+    def enlarged(self, factor: float, margin: float = 0.0) -> "TrunkShape":
+        """The shape with radii or sides times ``factor`` and a skin of ``margin`` [m].
+
+        The length between the ends of a capsule stays.
+        """
+        size = np.array(self.size)
+        if self.kind is ShapeKind.BOX:
+            size = size * factor + 2.0 * margin
+        else:
+            size[0] = size[0] * factor + margin
+        return TrunkShape(self.name, self.kind, size, self.translation, self.rotation)
+
+
+@dataclass(frozen=True, eq=False)
+class LimbReach:
+    """Where one limb's effector can be, as a convex volume in the frame of the root.
+
+    Attributes:
+        name: Name of the limb.
+        vertices: (n, 3) corners of the hull [m].
+        normals: (m, 3) unit normals of its faces, outward.
+        offsets: (m,) so that the volume is ``normals x <= offsets`` [m].
+        centre: (3,) centre of the largest ball inside ([Tonneau2015]_ 4.1.2) [m].
+        radius: Radius of that ball [m].
+    """
+
+    name: str
+    vertices: FloatArray
+    normals: FloatArray
+    offsets: FloatArray
+    centre: FloatArray
+    radius: float
+
+    def __init__(self, name: str, vertices: ArrayLike) -> None:
+        """Take the hull of points.
+
+        Args:
+            name: Name of the limb.
+            vertices: (n, 3) points in the root's frame, not all in one plane [m].
+
+        Raises:
+            BodyError: If the points have no volume.
+        """
+        points = frozen_array(vertices, f"reach of limb {name!r} [m]", (None, 3), BodyError)
+        try:
+            hull = ConvexHull(points)
+        except (QhullError, ValueError):
+            raise BodyError(
+                f"reach of limb {name!r} has {len(points)} points without volume; "
+                "valid: at least four that do not lie in one plane"
+            ) from None
+        rows = hull.equations
+        centre, radius = _inscribed_ball(rows[:, :3], -rows[:, 3])
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "vertices", frozen_array(points[hull.vertices], "vertices"))
+        object.__setattr__(self, "normals", frozen_array(rows[:, :3], "normals"))
+        object.__setattr__(self, "offsets", frozen_array(-rows[:, 3], "offsets"))
+        object.__setattr__(self, "centre", frozen_array(centre, "centre"))
+        object.__setattr__(self, "radius", radius)
+
+    def contains(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Whether each of (k, 3) points of the root's frame lies inside."""
+        return np.all(points @ self.normals.T <= self.offsets, axis=1)
+
+    def coarse(self, directions: int) -> FloatArray:
+        """(k, 3) vertices that are outermost in evenly spread directions, k <= ``directions``.
+
+        Their hull lies inside the volume and is quicker to test.
+        """
+        height = (np.arange(directions) + 0.5) / directions * 2.0 - 1.0
+        angle = np.pi * (1.0 + np.sqrt(5.0)) * np.arange(directions)
+        ring = np.sqrt(1.0 - height**2)
+        spread = np.column_stack([ring * np.cos(angle), ring * np.sin(angle), height])
+        return self.vertices[np.unique(np.argmax(self.vertices @ spread.T, axis=0))]
+
+    def shrunk(self, margin: float, vertices: FloatArray | None = None) -> FloatArray:
+        """(n, 3) vertices drawn towards the centre so that each has ``margin`` [m] to every face.
+
+        With the ball's radius r the factor is ``1 - margin / r``, at least 1/2: a volume less than
+        ``2 margin`` deep loses less.
+        """
+        factor = max(0.5, 1.0 - margin / self.radius)
+        drawn = self.vertices if vertices is None else vertices
+        return self.centre + factor * (drawn - self.centre)
+
+    def kept_margin(self, margin: float) -> float:
+        """Margin [m] that :meth:`shrunk` really keeps."""
+        return min(margin, 0.5 * self.radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Abstraction:
+    """Trunk and reach of a creature in the frame of its root.
+
+    Attributes:
+        trunk: Shapes that must not meet the scene.
+        limbs: What each limb reaches.
+    """
+
+    trunk: tuple[TrunkShape, ...]
+    limbs: tuple[LimbReach, ...]
+
+    def __post_init__(self) -> None:
+        if not self.trunk:
+            raise BodyError("abstraction has no trunk shape; valid: at least one")
+        if not self.limbs:
+            raise BodyError("abstraction has no limb; valid: at least one")
+        twice = sorted({name for name in self.limb_names if self.limb_names.count(name) > 1})
+        if twice:
+            raise BodyError(f"abstraction has limb {twice[0]!r} twice; valid: one volume per limb")
+
+    @property
+    def limb_names(self) -> tuple[str, ...]:
+        """Names of the limbs, in order."""
+        return tuple(limb.name for limb in self.limbs)
+
+    @cached_property
+    def signature(self) -> str:
+        """Digest of every shape and volume; equal abstractions have equal signatures."""
+        digest = hashlib.sha256()
+        for shape in self.trunk:
+            digest.update(f"{shape.name}|{shape.kind}|".encode())
+            digest.update(np.concatenate([shape.size, shape.translation, shape.rotation.ravel()]).tobytes())
+        for limb in self.limbs:
+            digest.update(f"{limb.name}|".encode() + limb.vertices.tobytes())
+        return digest.hexdigest()
+
+
+def abstraction_of(
+    body: BodyModel,
+    volumes: Sequence[LimbVolume],
+    *,
+    angles: Mapping[str, float] | None = None,
+    trunk_scale: float = TRUNK_SCALE,
+    trunk_segments: Iterable[str] | None = None,
+) -> Abstraction:
+    """Abstraction of a body whose trunk is held in one posture.
+
+    Args:
+        body: The body.
+        volumes: Reach of each limb to be used.
+        angles: Hinge angles of the trunk by name [rad]; the standing posture's where left out.
+        trunk_scale: Factor on the radii and sides of the trunk's shapes, > 0.
+        trunk_segments: Segments that make up the trunk; those of no limb, and hanging on none, when omitted.
+
+    Raises:
+        BodyError: If a name is unknown, or there is no volume or no shape.
+    """
+    factor = finite_number(trunk_scale, "trunk_scale", above=0.0, error=BodyError)
+    wanted = _outside_limbs(body, volumes) if trunk_segments is None else list(trunk_segments)
+    frames = _segment_frames(body, angles)
+    shapes = [
+        _in_root(frames[name], f"{name}/{shape.name}", shape).enlarged(factor)
+        for name in wanted
+        for shape in body.segment(name).shapes
+    ]
+    limbs = [
+        LimbReach(volume.limb.name, frames[body.segment(volume.segment).name].act_points(volume.vertices))
+        for volume in volumes
+    ]
+    return Abstraction(tuple(shapes), tuple(limbs))
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """Placement of a segment in the root's frame."""
+
+    rotation: FloatArray
+    translation: FloatArray
+
+    def act_points(self, points: FloatArray) -> FloatArray:
+        return np.asarray(points, dtype=np.float64) @ self.rotation.T + self.translation
+
+
+def _segment_frames(body: BodyModel, angles: Mapping[str, float] | None) -> dict[str, _Frame]:
+    """Frame of every segment in the root's frame in a posture."""
+    q = np.zeros(body.nq)
+    q[6] = 1.0
+    for name, angle in {**body.standing_angles, **(angles or {})}.items():
+        q[7 + body.joint_index(name)] = finite_number(angle, f"angle of {name!r} [rad]", error=BodyError)
+    model = body.pinocchio
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    root = data.oMf[body.segment_frame(body.segments[0].name)].inverse()
+    placed = {s.name: root * data.oMf[body.segment_frame(s.name)] for s in body.segments}
+    return {name: _Frame(frame.rotation.copy(), frame.translation.copy()) for name, frame in placed.items()}
+
+
+def _outside_limbs(body: BodyModel, volumes: Sequence[LimbVolume]) -> list[str]:
+    """Names of the segments that belong to no limb and hang on none, as toes do; the root always."""
+    in_limbs = {name for volume in volumes for name in volume.limb.segments} - {body.segments[0].name}
+    for segment in body.segments:
+        if segment.parent in in_limbs:
+            in_limbs.add(segment.name)
+    return [segment.name for segment in body.segments if segment.name not in in_limbs]
+
+
+def _in_root(frame: _Frame, name: str, shape: Shape) -> TrunkShape:
+    place = frame.act_points(shape.translation)
+    return TrunkShape(name, shape.kind, shape.size, place, frame.rotation @ shape.rotation)
+
+
+def _inscribed_ball(normals: FloatArray, offsets: FloatArray) -> tuple[FloatArray, float]:
+    """Centre and radius of the largest ball inside ``normals x <= offsets``."""
+    rows = np.hstack([normals, np.ones((len(normals), 1))])
+    bounds = [(None, None)] * 3 + [(0.0, None)]
+    found = linprog([0.0, 0.0, 0.0, -1.0], rows, offsets, bounds=bounds)
+    return found.x[:3], float(found.x[3])

@@ -1,0 +1,346 @@
+"""Whether poses satisfy the reachability condition, and motions between them.
+
+The collision queries run in Coal. A pose of a plan is checked with a skin around the trunk and
+with the limbs' volumes drawn in; a motion whose checked poses are so close that nothing moves
+farther than that between them then satisfies the plain condition everywhere, not only where it
+was checked.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from manikin.body.segments import ShapeKind
+from manikin.numerics.spatial import FloatArray, finite_number
+from manikin.planning.guide.abstraction import Abstraction, LimbReach, TrunkShape
+from manikin.planning.guide.condition import Condition, SceneTriangles, UsableSurface, endless
+from manikin.planning.guide.root_pose import angles_between, tilt
+from manikin.scene.collision import CollisionPart, collision_parts, convex_geometry, triangle_geometry
+from manikin.scene.scene import Scene
+
+TRUNK_MARGIN = 0.02
+"""Skin around the trunk while planning [m]; our choice."""
+
+REACH_MARGIN = 0.03
+"""By how much a limb's volume is drawn in while planning [m]; our choice."""
+
+DIRECTIONS = 128
+"""Directions whose outermost corners stand for a limb's volume while planning; a human's lose 3 %."""
+
+
+@dataclass(frozen=True)
+class Margins:
+    """What planning keeps in hand so that nothing is missed between checked poses.
+
+    Attributes:
+        trunk: Skin around the trunk's shapes [m].
+        reach: By how much the limbs' volumes are drawn in [m].
+    """
+
+    trunk: float = TRUNK_MARGIN
+    reach: float = REACH_MARGIN
+
+    def __post_init__(self) -> None:
+        finite_number(self.trunk, "margins trunk [m]", at_least=0.0)
+        finite_number(self.reach, "margins reach [m]", at_least=0.0)
+
+
+NO_MARGINS = Margins(0.0, 0.0)
+"""The plain condition, for certificates."""
+
+
+class ReachabilityChecker:
+    """Checks poses of one abstraction in one scene.
+
+    One instance works on buffers of its own: use one per thread. Answers do not depend on earlier
+    queries.
+
+    Attributes:
+        abstraction: The creature.
+        scene: The obstacles.
+        condition: What is asked.
+        margins: What is kept in hand.
+    """
+
+    def __init__(
+        self,
+        abstraction: Abstraction,
+        scene: Scene,
+        condition: Condition | None = None,
+        margins: Margins | None = None,
+    ) -> None:
+        """Prepare the queries.
+
+        Raises:
+            InputError: If the condition names a limb that the abstraction lacks.
+        """
+        self.abstraction, self.scene = abstraction, scene
+        self.condition = condition or Condition()
+        self.condition.check_names(abstraction.limb_names)
+        self.margins = margins or Margins()
+        self._parts = tuple(part for item in scene for part in collision_parts(item))
+        self._trunk = _Queries(
+            [_trunk_object(shape.enlarged(1.0, self.margins.trunk)) for shape in abstraction.trunk],
+            [[(part.geometry, _place(part)) for part in self._parts]] * len(abstraction.trunk),
+        )
+        triangles = SceneTriangles.of(scene)
+        targets: dict[str, list[_Target]] = {}
+        for limb in abstraction.limbs:
+            surface = self.condition.surface(limb.name)
+            if surface.key not in targets:
+                targets[surface.key] = _targets(scene, triangles, surface)
+        self._limbs = _Queries(
+            [_volume_object(limb, self.margins.reach) for limb in abstraction.limbs],
+            [targets[self.condition.surface(limb.name).key] for limb in abstraction.limbs],
+        )
+        self._trunk_radius = max(shape.radius_about_root for shape in abstraction.trunk)
+        self._reach_radius = max(np.linalg.norm(limb.vertices, axis=1).max() for limb in abstraction.limbs)
+        self._reach_margin = min(limb.kept_margin(self.margins.reach) for limb in abstraction.limbs)
+        index = {name: number for number, name in enumerate(abstraction.limb_names)}
+        self._rules = [
+            (
+                rule,
+                [index[name] for name in rule.required],
+                [number for name, number in index.items() if name not in rule.required],
+            )
+            for rule in self.condition.rules
+        ]
+
+    def holds(self, pose: FloatArray) -> bool:
+        """Whether a pose (7,) keeps the trunk free and the limbs within reach of the scene.
+
+        A trunk wholly inside a closed mesh that is not convex counts as free here, because such
+        meshes are hollow to Coal; see :meth:`inside_solid`.
+        """
+        return self.trunk_is_free(pose) and self.limbs_reach(pose)
+
+    def admits(self, pose: FloatArray) -> bool:
+        """Whether a pose satisfies the condition and is not inside something hollow to Coal."""
+        return self.holds(pose) and not self.inside_solid(pose)
+
+    def trunk_is_free(self, pose: FloatArray) -> bool:
+        """Whether no trunk shape meets an obstacle."""
+        return not self._trunk.any(pose)
+
+    def limbs_reach(self, pose: FloatArray) -> bool:
+        """Whether every rule about the limbs holds."""
+        lean = tilt(pose)
+        self._limbs.place(pose)
+        known: dict[int, bool] = {}
+        return all(
+            self._rule_holds(rule.at_least, required, optional, known)
+            for rule, required, optional in self._rules
+            if rule.holds_at(lean, self._tilt_slack)
+        )
+
+    def reaching(self, pose: FloatArray) -> tuple[str, ...]:
+        """Names of the limbs whose volume meets a surface that counts for them."""
+        self._limbs.place(pose)
+        return tuple(name for row, name in enumerate(self.abstraction.limb_names) if self._limbs.meets(row))
+
+    def blocking(self, pose: FloatArray) -> tuple[str, str] | None:
+        """(trunk shape, obstacle) of the first pair that meets, or None."""
+        pair = self._trunk.first(pose)
+        if pair is None:
+            return None
+        return self.abstraction.trunk[pair[0]].name, self._parts[pair[1]].obstacle
+
+    def inside_solid(self, pose: FloatArray) -> str | None:
+        """Name of a closed, non-convex mesh in which a trunk shape's centre lies, or None."""
+        rotation, origin = _matrix(pose), pose[:3]
+        for part in self._parts:
+            if part.surface is None:
+                continue
+            for shape in self.abstraction.trunk:
+                point = part.rotation.T @ (origin + rotation @ shape.translation - part.translation)
+                inside = np.all(point > part.low) and np.all(point < part.high)
+                if inside and part.surface.signed(point)[0] < 0.0:
+                    return part.obstacle
+        return None
+
+    def explain(self, pose: FloatArray) -> str | None:
+        """Say in words why a pose does not satisfy the condition, or None if it does."""
+        pair = self.blocking(pose)
+        if pair is not None:
+            skin = f" (with a skin of {self.margins.trunk:g} m)" if self.margins.trunk > 0.0 else ""
+            return f"the trunk's {pair[0]!r} meets {pair[1]!r}{skin}"
+        solid = self.inside_solid(pose)
+        if solid is not None:
+            return f"the trunk is inside {solid!r}"
+        lean, found = tilt(pose), self.reaching(pose)
+        have = f"within reach: {', '.join(found) or 'none'}"
+        for rule in self.condition.rules:
+            if not rule.holds_at(lean, self._tilt_slack):
+                continue
+            missing = [name for name in rule.required if name not in found]
+            if missing:
+                return f"limb {missing[0]!r} reaches no usable surface ({have})"
+            if len(found) < rule.at_least:
+                return f"{len(found)} limbs reach a usable surface and {rule.at_least} are wanted ({have})"
+        return None
+
+    def steps(self, way: float, angle: float) -> int:
+        """Into how many steps a motion is cut so that nothing is missed between checked poses.
+
+        Between two poses every point moves by at most ``way + radius angle``, so that it is never
+        farther from where it was checked than half of that.
+
+        Args:
+            way: Length of the path of the root's origin [m].
+            angle: Angle turned [rad].
+
+        The margins must not be zero.
+        """
+        trunk = (way + self._trunk_radius * angle) / (2.0 * self.margins.trunk)
+        reach = (way + self._reach_radius * angle) / (2.0 * self._reach_margin)
+        return max(1, int(np.ceil(max(trunk, reach))))
+
+    def steps_between(self, first: FloatArray, second: FloatArray) -> int:
+        """:meth:`steps` of the straight way between two poses (7,)."""
+        way = float(np.linalg.norm(second[:3] - first[:3]))
+        return self.steps(way, float(angles_between(first, second)))
+
+    def triangle_in_reach(self, pose: FloatArray, corners: FloatArray) -> bool:
+        """Whether some limb's volume meets one triangle (3, 3) [m]."""
+        triangle = coal.TriangleP(*corners)
+        place = coal.Transform3s(_matrix(pose), pose[:3])
+        for geometry in self._limbs.moving:
+            result = coal.CollisionResult()
+            coal.collide(geometry, place, triangle, _HERE, _REQUEST, result)
+            if result.isCollision():
+                return True
+        return False
+
+    @property
+    def reach_radius(self) -> float:
+        """Distance from the root's origin beyond which no limb reaches [m]."""
+        return float(self._reach_radius)
+
+    @property
+    def _tilt_slack(self) -> float:
+        """By how much the tilt may differ between a checked pose and its neighbours [rad]."""
+        return 2.0 * self.margins.trunk / self._trunk_radius if self.margins.trunk > 0.0 else 0.0
+
+    def _rule_holds(
+        self, at_least: int, required: Sequence[int], optional: Sequence[int], known: dict[int, bool]
+    ) -> bool:
+        if not all(self._asked(row, known) for row in required):
+            return False
+        wanted = at_least - len(required)
+        for left, row in zip(range(len(optional), 0, -1), optional, strict=True):
+            if wanted <= 0 or wanted > left:
+                break
+            wanted -= self._asked(row, known)
+        return wanted <= 0
+
+    def _asked(self, row: int, known: dict[int, bool]) -> bool:
+        if row not in known:
+            known[row] = self._limbs.meets(row)
+        return known[row]
+
+
+_Target = tuple[coal.CollisionGeometry, pin.SE3]
+_HERE = coal.Transform3s.Identity()
+_REQUEST = coal.CollisionRequest()
+_FEW_PAIRS = 100  # up to this many, asking all is quicker than a tree of bounding boxes
+
+
+class _Queries:
+    """Rigid group of geometries on a free root against fixed targets, a list for each."""
+
+    def __init__(self, moving: Sequence[_Target], targets: Sequence[Sequence[_Target]]) -> None:
+        self.moving = [geometry for geometry, _ in moving]
+        self._model = pin.Model()
+        root = self._model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+        self._shapes = pin.GeometryModel()
+        for row, (geometry, place) in enumerate(moving):
+            self._shapes.addGeometryObject(pin.GeometryObject(f"moving/{row}", root, 0, place, geometry))
+        known: dict[int, int] = {}
+        self.rows: list[list[int]] = []
+        self._pairs: list[tuple[int, int]] = []
+        for row, fixed in enumerate(targets):
+            self.rows.append([])
+            for number, (geometry, place) in enumerate(fixed):
+                index = known.setdefault(id(geometry), len(moving) + len(known))
+                if index == len(self._shapes.geometryObjects):
+                    item = pin.GeometryObject(f"fixed/{index}", 0, 0, place, geometry)
+                    self._shapes.addGeometryObject(item)
+                self.rows[-1].append(len(self._pairs))
+                self._pairs.append((row, number))
+                self._shapes.addCollisionPair(pin.CollisionPair(row, index))
+        self._data = self._model.createData()
+        self._found = pin.GeometryData(self._shapes)
+        self._tree = None
+        if len(self._pairs) > _FEW_PAIRS:
+            tree = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager
+            self._tree = tree(self._model, self._shapes, self._found)
+
+    def any(self, pose: FloatArray) -> bool:
+        """Whether any pair meets at a pose (7,)."""
+        if not self._pairs:
+            return False
+        if self._tree is not None:
+            return pin.computeCollisions(self._model, self._data, self._tree, pose, True)
+        return pin.computeCollisions(self._model, self._data, self._shapes, self._found, pose, True)
+
+    def first(self, pose: FloatArray) -> tuple[int, int] | None:
+        """First pair (row, number of the target) that meets, or None."""
+        self.place(pose)
+        for index, pair in enumerate(self._pairs):
+            if pin.computeCollision(self._shapes, self._found, index):
+                return pair
+        return None
+
+    def place(self, pose: FloatArray) -> None:
+        """Move the group to a pose (7,)."""
+        pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._found, pose)
+
+    def meets(self, row: int) -> bool:
+        """Whether one of the group meets one of its targets where it was placed."""
+        return any(pin.computeCollision(self._shapes, self._found, index) for index in self.rows[row])
+
+
+def _trunk_object(shape: TrunkShape) -> _Target:
+    if shape.kind is ShapeKind.SPHERE:
+        geometry = coal.Sphere(shape.size[0])
+    elif shape.kind is ShapeKind.CAPSULE:
+        geometry = coal.Capsule(shape.size[0], shape.size[1])
+    else:
+        geometry = coal.Box(*shape.size)
+    return geometry, pin.SE3(np.array(shape.rotation), np.array(shape.translation))
+
+
+def _volume_object(limb: LimbReach, margin: float) -> _Target:
+    """A limb's volume; drawn in for planning, and then with fewer corners, which lie inside it."""
+    vertices = limb.shrunk(margin, limb.coarse(DIRECTIONS)) if margin > 0.0 else limb.vertices
+    return convex_geometry(vertices), pin.SE3.Identity()
+
+
+def _targets(scene: Scene, triangles: SceneTriangles, surface: UsableSurface) -> list[_Target]:
+    """What counts for a limb: endless shapes one by one, all triangles as one mesh."""
+    found = []
+    for item in scene:
+        if endless(item) and surface.allows_obstacle(item.name):
+            (part,) = collision_parts(item)
+            two_sided = isinstance(part.geometry, coal.Plane)
+            if surface.allows_normal(item.world_plane[0], two_sided=two_sided):
+                found.append((part.geometry, _place(part)))
+    kept: NDArray[np.bool_] = triangles.usable(scene, surface)
+    if kept.any():
+        corners = triangles.corners[kept].reshape(-1, 3)
+        vertices, inverse = np.unique(corners, axis=0, return_inverse=True)
+        mesh = triangle_geometry(vertices, inverse.reshape(-1, 3).astype(np.int64))
+        found.append((mesh, pin.SE3.Identity()))
+    return found
+
+
+def _place(part: CollisionPart) -> pin.SE3:
+    return pin.SE3(np.array(part.rotation), np.array(part.translation))
+
+
+def _matrix(pose: FloatArray) -> FloatArray:
+    return pin.XYZQUATToSE3(pose).rotation

@@ -1,0 +1,236 @@
+"""Random poses near obstacles: Algorithm 3 of [Tonneau2015]_, corrected.
+
+A random triangle of the scene is chosen, the root is put on a random point of it and moved off in
+a random direction, step by step, turning at random, until the reachability condition holds or the
+triangle is out of the limbs' reach.  Corrections: the inner counter starts anew for every triangle
+(in print the inner loop runs for the first triangle only), and the first step is taken before the
+limbs' reach is asked, because a limb's volume need not hold the root itself.  Our own: from the
+surface of something solid the root moves to the free side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.planning.guide.checker import ReachabilityChecker
+from manikin.planning.guide.condition import SceneTriangles, endless
+from manikin.scene.obstacle import HalfSpace, Obstacle
+from manikin.scene.scene import Scene
+
+AROUND = 1.0
+"""How much larger than the obstacles the default region is on every side [m]."""
+
+_BLOCK = 64  # candidates drawn at once
+_FULL_TURN = (-float(np.pi), float(np.pi))
+
+
+@dataclass(frozen=True, eq=False)
+class SamplingRegion:
+    """Where roots are drawn, and how they may be turned.
+
+    The turn is ``Rz(yaw) Ry(pitch) Rx(roll)``; without bounds on it, it is uniform over all turns.
+
+    Attributes:
+        lower: (3,) lower corner of the box of positions [m].
+        upper: (3,) upper corner [m].
+        yaw: Smallest and largest angle [rad], or None.
+        pitch: The same; positive leans forward.
+        roll: The same.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    yaw: tuple[float, float] | None
+    pitch: tuple[float, float] | None
+    roll: tuple[float, float] | None
+
+    def __init__(
+        self,
+        lower: ArrayLike,
+        upper: ArrayLike,
+        yaw: Sequence[float] | None = None,
+        pitch: Sequence[float] | None = None,
+        roll: Sequence[float] | None = None,
+    ) -> None:
+        object.__setattr__(self, "lower", frozen_array(lower, "sampling region lower [m]", (3,)))
+        object.__setattr__(self, "upper", frozen_array(upper, "sampling region upper [m]", (3,)))
+        if not np.all(self.lower < self.upper):
+            raise InputError(
+                f"sampling region spans {self.lower.tolist()} to {self.upper.tolist()}; valid: lower < upper"
+            )
+        for name, pair in (("yaw", yaw), ("pitch", pitch), ("roll", roll)):
+            object.__setattr__(self, name, None if pair is None else _angle_range(pair, name))
+
+    @classmethod
+    def around(
+        cls,
+        scene: Scene,
+        poses: Sequence[FloatArray] = (),
+        *,
+        margin: float = AROUND,
+        yaw: Sequence[float] | None = None,
+        pitch: Sequence[float] | None = None,
+        roll: Sequence[float] | None = None,
+    ) -> "SamplingRegion":
+        """Box around the finite obstacles and some poses (7,), ``margin`` [m] larger on every side.
+
+        Raises:
+            InputError: If there is neither a finite obstacle nor a pose.
+        """
+        boxes = [np.stack(item.bounds) for item in scene if not endless(item)]
+        corners = np.vstack([*boxes, *(pose[None, :3] for pose in poses)] or [np.empty((0, 3))])
+        if not len(corners):
+            raise InputError("sampling region has nothing to lie around; valid: a finite obstacle or a pose")
+        return cls(corners.min(axis=0) - margin, corners.max(axis=0) + margin, yaw, pitch, roll)
+
+    @property
+    def key(self) -> str:
+        """Text that is equal for equal values."""
+        return repr((self.lower.tolist(), self.upper.tolist(), self.yaw, self.pitch, self.roll))
+
+    def turns(self, count: int, rng: np.random.Generator) -> FloatArray:
+        """(count, 4) random quaternions xyzw within the bounds."""
+        if self.yaw is None and self.pitch is None and self.roll is None:
+            raw = rng.normal(size=(count, 4))
+            return raw / np.linalg.norm(raw, axis=1, keepdims=True)
+        angles = [rng.uniform(*(pair or _FULL_TURN), count) for pair in (self.yaw, self.pitch, self.roll)]
+        return Rotation.from_euler("ZYX", np.column_stack(angles)).as_quat()
+
+    def holds(self, position: FloatArray) -> bool:
+        """Whether a (3,) position lies in the box."""
+        return bool(np.all(position >= self.lower) and np.all(position <= self.upper))
+
+
+@dataclass(frozen=True)
+class SamplerSettings:
+    """The numbers that Algorithm 3 leaves to its user; all are our choice.
+
+    Attributes:
+        triangles: LIMIT1, triangles tried for one pose.
+        turns: LIMIT2, tries per triangle.
+        uniform_share: s, share of triangles drawn uniformly; the others by their area.
+        step: Largest step away from the triangle [m]; the thesis has 1.
+    """
+
+    triangles: int = 20
+    turns: int = 8
+    uniform_share: float = 0.5
+    step: float = 0.6
+
+    def __post_init__(self) -> None:
+        finite_number(self.triangles, "sampler triangles", at_least=1)
+        finite_number(self.turns, "sampler turns", at_least=1)
+        finite_number(self.uniform_share, "sampler uniform_share", at_least=0.0, at_most=1.0)
+        finite_number(self.step, "sampler step [m]", above=0.0)
+
+
+class PoseSampler:
+    """GENERATECONFIGURATION for one checker and region.
+
+    Attributes:
+        corners: (n, 3, 3) triangles drawn from [m].
+    """
+
+    def __init__(
+        self, checker: ReachabilityChecker, region: SamplingRegion, settings: SamplerSettings | None = None
+    ) -> None:
+        """Collect the triangles of the scene; planes are cut to the region.
+
+        Raises:
+            InputError: If no triangle lies in the region.
+        """
+        self._checker, self._region = checker, region
+        self._settings = settings or SamplerSettings()
+        finite = SceneTriangles.of(checker.scene)
+        parts = [(finite.corners, finite.normals, finite.closed)]
+        parts += [_cut_plane(item, region) for item in checker.scene if endless(item)]
+        corners, normals, closed = (np.concatenate([part[row] for part in parts]) for row in range(3))
+        reach = checker.reach_radius
+        near = np.all(corners.min(axis=1) <= region.upper + reach, axis=1) & np.all(
+            corners.max(axis=1) >= region.lower - reach, axis=1
+        )
+        if not near.any():
+            raise InputError("sampling region holds no surface within reach; valid: a region near the scene")
+        self.corners: FloatArray = corners[near]
+        self._normals, self._closed = normals[near], closed[near]
+        edges = self.corners[:, 1:] - self.corners[:, :1]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        self._cumulative = np.cumsum(area) / area.sum()
+
+    def pick(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """(count,) indices of triangles, a share of them uniform and the others by area."""
+        uniform = rng.uniform(size=count) < self._settings.uniform_share
+        by_area = np.searchsorted(self._cumulative, rng.uniform(size=count), side="right")
+        anyone = rng.integers(0, len(self.corners), count)
+        return np.where(uniform, anyone, np.minimum(by_area, len(self.corners) - 1))
+
+    def draw(self, rng: np.random.Generator) -> FloatArray | None:
+        """Draw one pose (7,) that satisfies the condition, or None after so many triangles."""
+        limits = self._settings
+        for triangle in self.pick(limits.triangles, rng):
+            points, directions = self._departures(int(triangle), limits.turns, rng)
+            turns = self._region.turns(limits.turns, rng)
+            steps = limits.step * (1.0 - rng.uniform(size=(limits.turns, limits.turns)))
+            pose = self._search(int(triangle), points, directions, turns, steps)
+            if pose is not None:
+                return pose
+        return None
+
+    def _search(
+        self, triangle: int, points: FloatArray, directions: FloatArray, turns: FloatArray, steps: FloatArray
+    ) -> FloatArray | None:
+        """Inner loops of Algorithm 3 over one triangle, on numbers drawn before."""
+        tries = 0
+        while tries < len(points):
+            position = np.array(points[tries])
+            direction, steps_now = directions[tries], steps[tries]
+            for step in steps_now:
+                if tries == len(points):
+                    break
+                position = position + step * direction
+                pose = np.concatenate([position, turns[tries]])
+                tries += 1
+                if self._region.holds(position) and self._checker.admits(pose):
+                    return pose
+                if not self._checker.triangle_in_reach(pose, self.corners[triangle]):
+                    break
+        return None
+
+    def _departures(
+        self, triangle: int, count: int, rng: np.random.Generator
+    ) -> tuple[FloatArray, FloatArray]:
+        """Random points of a triangle and directions away from it, (count, 3) each."""
+        a, b, c = self.corners[triangle]
+        u, v = rng.uniform(size=(2, count, 1))
+        root = np.sqrt(u)
+        points = (1.0 - root) * a + root * (1.0 - v) * b + root * v * c
+        directions = rng.normal(size=(count, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        if self._closed[triangle]:
+            height = directions @ self._normals[triangle]
+            directions -= 2.0 * np.minimum(height, 0.0)[:, None] * self._normals[triangle]
+        return points, directions
+
+
+def _cut_plane(item: Obstacle, region: SamplingRegion) -> tuple[FloatArray, FloatArray, np.ndarray]:
+    """Two triangles of a plane that cover the region's shadow on it, normals, and whether solid."""
+    normal, offset = item.world_plane
+    across = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
+    across /= np.linalg.norm(across)
+    axes = np.stack([across, np.cross(normal, across)])
+    corners = np.array(np.meshgrid(*np.stack([region.lower, region.upper]).T)).reshape(3, -1).T
+    flat = corners @ axes.T
+    (left, low), (right, high) = flat.min(axis=0), flat.max(axis=0)
+    square = np.array([(left, low), (right, low), (right, high), (left, high)]) @ axes + offset * normal
+    triangles = square[[[0, 1, 2], [0, 2, 3]]]
+    return triangles, np.stack([normal, normal]), np.full(2, isinstance(item.shape, HalfSpace))
+
+
+def _angle_range(pair: Sequence[float], name: str) -> tuple[float, float]:
+    low = finite_number(pair[0], f"sampling region {name}[0] [rad]")
+    return low, finite_number(pair[1], f"sampling region {name}[1] [rad]", at_least=low)

@@ -1,0 +1,191 @@
+"""Local planners: whether a simple way joins two poses ([Tonneau2015]_ 6.2.3).
+
+Along the whole way the condition must hold.  The two ends of a task may satisfy it without the
+margins that planning keeps elsewhere (a standing person's legs are nearly at the end of their
+reach), so near them the plain condition counts, checked at closer poses.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.guide.checker import NO_MARGINS, ReachabilityChecker
+from manikin.planning.guide.root_pose import angles_between, between
+
+NEAR_WAY = 0.3
+"""Distance from an end of the task within which the plain condition is enough [m]; our choice."""
+
+NEAR_ANGLE = 0.5
+"""Turn away from that end within which it is [rad]; our choice."""
+
+FINER = 8
+"""Checked poses per step where only the plain condition holds."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """How two poses are joined.
+
+    Attributes:
+        turn_at: Share of the way at which the root turns on the spot, or None when straight.
+    """
+
+    turn_at: float | None
+
+    def reversed(self) -> "Way":
+        """The same way from the other end."""
+        return self if self.turn_at is None else Way(1.0 - self.turn_at)
+
+
+class LocalPlanner:
+    """Straight and rotate-at-s ways between poses.
+
+    Attributes:
+        checker: Decides about poses, with the margins of planning.
+        ends: Poses near which the plain condition is enough.
+        asked: Number of poses decided about so far.
+    """
+
+    def __init__(self, checker: ReachabilityChecker, ends: Sequence[FloatArray] = ()) -> None:
+        """Take a checker whose margins say how densely a way is checked.
+
+        Raises:
+            InputError: If a margin is zero.
+        """
+        if min(checker.margins.trunk, checker.margins.reach) <= 0.0:
+            raise InputError(f"local planner has {checker.margins}; valid: margins > 0")
+        self.checker = checker
+        self.ends = tuple(ends)
+        self.asked = 0
+        self._plain: ReachabilityChecker | None = None
+
+    @property
+    def plain(self) -> ReachabilityChecker:
+        """The same condition without margins."""
+        if self._plain is None:
+            kept = self.checker
+            self._plain = ReachabilityChecker(kept.abstraction, kept.scene, kept.condition, NO_MARGINS)
+        return self._plain
+
+    def holds(self, pose: FloatArray) -> bool:
+        """Whether a pose (7,) satisfies the condition, near an end of the task the plain one."""
+        self.asked += 1
+        return self.checker.holds(pose) or (self.near_end(pose) and self.plain.holds(pose))
+
+    def near_end(self, pose: FloatArray) -> bool:
+        """Whether a pose is so near an end of the task that the plain condition is enough."""
+        return any(
+            np.linalg.norm(pose[:3] - end[:3]) <= NEAR_WAY and angles_between(pose, end) <= NEAR_ANGLE
+            for end in self.ends
+        )
+
+    def straight(self, first: FloatArray, second: FloatArray) -> bool:
+        """Whether the condition holds along the straight way between two poses that satisfy it.
+
+        The answer does not depend on the order of the two.
+        """
+        first, second = _ordered(first, second)
+        count = self.checker.steps_between(first, second)
+        poses = between(first, second, np.arange(count + 1) / count)
+        return self.poses_hold(poses, ends_hold=True)
+
+    def poses_hold(self, poses: FloatArray, *, ends_hold: bool = False) -> bool:
+        """Whether the condition holds along a densely sampled motion.
+
+        The poses are asked in bit-reversed order, because a way that fails mostly fails near its
+        middle.
+
+        Args:
+            poses: (n, 7), as close to each other as :meth:`ReachabilityChecker.steps` tells.
+            ends_hold: Whether the first and the last are known to satisfy it.
+        """
+        last = len(poses) - 1
+        plain_only = []
+        for index in _middle_first(len(poses)):
+            if ends_hold and not self.ends and index in (0, last):
+                continue
+            self.asked += 1
+            if self.checker.holds(poses[index]):
+                continue
+            if not (self.near_end(poses[index]) and self.plain.holds(poses[index])):
+                return False
+            plain_only.append(index)
+        shares = np.arange(1, FINER) / FINER
+        return all(
+            self.plain.holds(pose)
+            for index in plain_only
+            for neighbour in (index - 1, index + 1)
+            if 0 <= neighbour <= last
+            for pose in between(poses[index], poses[neighbour], shares)
+        )
+
+    def waypoints(self, first: FloatArray, second: FloatArray, turn_at: float | None) -> FloatArray:
+        """Poses that straight ways join on the way from one pose to another.
+
+        Args:
+            first: (7,) where the way begins.
+            second: (7,) where it ends.
+            turn_at: Share of the way at which the root turns on the spot, or None for the
+                straight way.
+
+        Returns:
+            (2, 7) or (4, 7), both ends included.
+        """
+        if turn_at is None:
+            return np.stack([first, second])
+        before = np.concatenate([(1.0 - turn_at) * first[:3] + turn_at * second[:3], first[3:]])
+        after = np.concatenate([before[:3], second[3:]])
+        return np.stack([first, before, after, second])
+
+    def rotate_at(self, first: FloatArray, second: FloatArray, turn_at: float) -> bool:
+        """Whether the condition holds along the rotate-at-s way.
+
+        The thesis turns the root "suddenly"; here the turn on the spot is a part of the way and
+        checked like the rest.  From the other end the same way has ``1 - turn_at``.
+        """
+        points = self.waypoints(first, second, turn_at)
+        if not (self.holds(points[1]) and self.holds(points[2])):
+            return False
+        return all(self.straight(a, b) for a, b in itertools.pairwise(points))
+
+    def connect(self, first: FloatArray, second: FloatArray, turn_at: float) -> "Way | None":
+        """SIMPLEPATH: try the straight way, then rotate-at-s.
+
+        Args:
+            first: (7,) pose that satisfies the condition.
+            second: (7,) another.
+            turn_at: s in (0, 1), drawn by the caller.
+
+        Returns:
+            The way, or None when neither holds.
+        """
+        if self.straight(first, second):
+            return Way(None)
+        if angles_between(first, second) > 1e-9 and self.rotate_at(first, second, turn_at):
+            return Way(turn_at)
+        return None
+
+
+def _ordered(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The two in an order that does not depend on how they came."""
+    return (first, second) if tuple(first) <= tuple(second) else (second, first)
+
+
+_ORDERS: dict[int, list[int]] = {}
+
+
+def _middle_first(count: int) -> list[int]:
+    """0 ... count - 1 in an order that halves the gaps again and again."""
+    if count not in _ORDERS:
+        order, intervals = [0, count - 1] if count > 1 else [0], [(0, count - 1)]
+        for low, high in intervals:
+            if high - low > 1:
+                middle = (low + high) // 2
+                order.append(middle)
+                intervals += [(low, middle), (middle, high)]
+        _ORDERS[count] = order[:count]
+    return _ORDERS[count]

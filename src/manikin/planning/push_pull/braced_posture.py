@@ -1,0 +1,391 @@
+"""The posture that acts: trunk, hands and feet by EFORT, then balance, strength and obstacles.
+
+Also here. From the way to an act to the act: the last contacts of a contact plan.
+"""
+
+import itertools
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.body import BodyModel, Configuration
+from manikin.body.limbs import PELVIS as ROOT
+from manikin.contact import Contact, FrictionModel, grasp
+from manikin.kinematics import (
+    Placement,
+    PostureProblem,
+    Preferences,
+    SolverSettings,
+    generate_posture,
+    touching_pairs,
+)
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.contacts import (
+    ContactGenerator,
+    ContactPlan,
+    ContactRules,
+    Efort,
+    GeneratedContact,
+    Heuristic,
+    LimbSamples,
+    PostureFinderSettings,
+    Stage,
+    WeightedSum,
+)
+from manikin.planning.contacts.limb_places import stature_of
+from manikin.planning.push_pull.act import Act, ActKind, BracedForces, largest_force, share_force
+from manikin.planning.push_pull.stance_heuristics import Footing, Loads, Mirrored, Natural
+from manikin.scene import Proximity, Scene, Surface
+
+ARMS = ("left_arm", "right_arm")
+LEGS = ("right_leg", "left_leg")
+"""Limbs in the order in which they are asked; the first leg braces, the second one balances."""
+
+BALANCED = 1e3
+"""Weight of balance beside EFORT: among balanced places EFORT decides."""
+
+
+FLAT_PALMS = 3.0
+"""Weight of the palms' turn against the face [1/rad^2]."""
+
+
+HANDS_ROOM = 0.2
+"""Distance of the body's middle to the sides of what it acts on [m]; our choice."""
+
+UNBALANCED = "no stance of the feet is balanced without and with the force"
+
+_HANDS, _FEET, _POSTURE, _STRENGTH = _STEPS = range(4)
+"""What is looked for in turn; the farthest step that was reached explains a failure."""
+
+
+@dataclass(frozen=True)
+class BraceSettings:
+    """Where the trunk is tried; lengths are those of a body of 1.75 m, the values are our choice.
+
+    Attributes:
+        distances: Of the root from the face that is acted on [m].
+        heights: Of the root, relative to standing.
+        leans: Pitch of the root the way of the act [rad].
+        margin: Least margin of the feet about the CoM with no force and with all of it [N.m].
+        torque_share: Largest share of a joint's strength.
+        enough: Postures that act after which the best one is taken.
+        palm_room: Distance of the palms to the face [m]: the wrist of our shapes is thicker than the hand.
+        samples: Of each limb.
+        friction: Coulomb coefficient.
+        friction_model: Of feet and palms.
+    """
+
+    distances: tuple[float, ...] = (0.60, 0.52, 0.68, 0.44, 0.76, 0.36, 0.30)
+    heights: tuple[float, ...] = (0.95, 0.88, 0.98)
+    leans: tuple[float, ...] = (0.3, 0.2, 0.1, 0.0)
+    margin: float = 10.9
+    torque_share: float = 0.9
+    enough: int = 8
+    palm_room: float = 0.02
+    samples: int = 10_000
+    friction: float = 0.7
+    friction_model: FrictionModel = "outer"
+
+
+@dataclass(frozen=True, eq=False)
+class Brace:
+    """A posture that acts.
+
+    Attributes:
+        q: (nq,).
+        feet: Contacts by effector.
+        hands: Contacts by effector, holds at which the object's reaction is felt.
+        forces: With the act's force, torques as even as can be.
+        largest: With the largest force the posture can exert.
+        margin: Least margin of the feet alone with no force and with all of it [N.m].
+    """
+
+    q: FloatArray
+    feet: Mapping[str, Contact]
+    hands: Mapping[str, Contact]
+    forces: BracedForces
+    largest: BracedForces
+    margin: float
+
+    @property
+    def contacts(self) -> dict[str, Contact]:
+        """Feet and hands."""
+        return {**self.feet, **self.hands}
+
+
+@dataclass(frozen=True, eq=False)
+class BraceResult:
+    """A posture that acts, or why there is none.
+
+    Attributes:
+        brace: The posture, or None.
+        tried: Places of the trunk.
+        strongest: Largest force of any balanced posture that was found [N]; 0 without one.
+        failure: None, or the reason in one line.
+    """
+
+    brace: Brace | None
+    tried: int
+    strongest: float
+    failure: str | None = None
+
+
+def find_braced_posture(
+    body: BodyModel,
+    scene: Scene,
+    samples: Mapping[str, LimbSamples],
+    act: Act,
+    near: FloatArray,
+    *,
+    level: float = 0.0,
+    settings: BraceSettings | None = None,
+    hands_by: Heuristic | None = None,
+    feet_by: Heuristic | None = None,
+    reference: FloatArray | None = None,
+) -> BraceResult:
+    """Find where hands and feet act with EFORT, and a posture that can.
+
+    Args:
+        body: A body with arms, legs and soles.
+        scene: Its surroundings.
+        samples: Of its limbs.
+        act: What is to be done.
+        near: (2,) where the body comes from; it acts on the part of the object nearest to there [m].
+        level: Height of the ground [m].
+        settings: Where to try.
+        hands_by: What hands prefer; EFORT, pulling EFORT for a pull, when omitted.
+        feet_by: What feet prefer; EFORT when omitted.
+        reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
+    """
+    search = _Search(body, scene, samples, act, settings or BraceSettings(), reference)
+    return search.run(np.append(near, level), hands_by or act.hand_heuristic(), feet_by or Efort())
+
+
+class _Search:
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        samples: Mapping[str, LimbSamples],
+        act: Act,
+        settings: BraceSettings,
+        reference: FloatArray | None,
+    ) -> None:
+        self._body, self._scene, self._act, self._settings = body, scene, act, settings
+        self._rules = ContactRules(friction=settings.friction)
+        self._generator = ContactGenerator(body, scene, samples, rules=self._rules)
+        self._poser = PostureFinderSettings(natural=any(item.natural for item in samples.values()))
+        self._proximity = Proximity(body, scene)
+        self._reference = body.standing_posture() if reference is None else reference
+        self._reasons: dict[int, Counter[str]] = {step: Counter() for step in _STEPS}
+        self._tried = 0
+        self._strongest = 0.0
+
+    def run(self, near: FloatArray, hands_by: Heuristic, feet_by: Heuristic) -> BraceResult:
+        faces = self._faces()
+        if not faces:
+            return self._failed(f"{self._act.obstacle} has no face against {self._act.kind}ing hands")
+        found: list[Brace] = []
+        for q in self._trunks(faces, near):
+            self._tried += 1
+            brace = self._at(q, hands_by, feet_by)
+            if brace is not None:
+                found.append(brace)
+            if len(found) >= self._settings.enough:
+                break
+        if not found:
+            return self._failed(self._why())
+        best = min(found, key=lambda item: item.forces.torque_share)
+        return BraceResult(best, self._tried, self._strongest)
+
+    def _faces(self) -> list[Surface]:
+        """Surfaces of the object that look at the body."""
+        return [
+            face
+            for face in self._scene.surfaces
+            if face.obstacle == self._act.obstacle and float(face.normal @ self._act.facing) < -0.7
+        ]
+
+    def _trunks(self, faces: list[Surface], near: FloatArray) -> Iterator[FloatArray]:
+        """Postures before the nearest face, the trunk at the settings' places."""
+        act, settings = self._act, self._settings
+        facing = act.facing
+        across = np.array([-facing[1], facing[0], 0.0])
+        yaw = float(np.arctan2(facing[1], facing[0]))
+        face = min(faces, key=lambda item: float((item.polygon @ facing).min()))
+        depth = float((face.polygon @ facing).min())
+        middle = _beside(face.polygon @ across, float(near @ across))
+        size = stature_of(self._body) / 1.75
+        forwards = 1.0 if act.kind is ActKind.PUSH else -1.0
+        places = itertools.product(settings.leans, settings.heights, settings.distances)
+        for lean, height, distance in places:
+            q = np.array(self._reference)
+            q[:2] = ((depth - distance * size) * facing + middle * across)[:2]
+            q[2] = near[2] + height * q[2]
+            q[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, forwards * lean, yaw)).coeffs()
+            yield q
+
+    def _at(self, q: FloatArray, hands_by: Heuristic, feet_by: Heuristic) -> Brace | None:
+        """Contacts and posture of one trunk, or None."""
+        posture, hands = self._hands(q, hands_by)
+        if hands is None:
+            return None
+        held = tuple(hands.values())
+        both = np.array([np.zeros(6), self._act.load(held)])
+        loads = Loads(self._body.mass, both, self._settings.friction_model)
+        posture, feet = self._feet(posture, loads, feet_by)
+        if feet is None:
+            return None
+        near = Configuration(self._body, posture).com
+        place, margin = loads.best_place(list(feet.values()), near, np.array([0.14, 0.1]))
+        if margin < self._settings.margin:
+            self._reasons[_FEET][UNBALANCED] += 1
+            return None
+        found = self._pose({**feet, **hands}, posture, q[:7], place)
+        return None if found is None else self._strong(found, feet, hands, margin)
+
+    def _pose(
+        self, contacts: dict[str, Contact], start: FloatArray, root: FloatArray, place: FloatArray
+    ) -> FloatArray | None:
+        """Posture on the contacts with its centre of mass over a place, free of obstacles, or None."""
+        pose, settings = pin.XYZQUATToSE3(root), self._poser
+        touching = [(name, self._scene.touched_obstacle(contact)) for name, contact in contacts.items()]
+        problem = PostureProblem(
+            self._body,
+            tuple(contacts.values()),
+            {ROOT: Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)},
+            com=np.array([*place, np.nan]),
+            proximity=self._proximity,
+            clearance=settings.clearance,
+            self_clearance=settings.clearance,
+            ignore=touching_pairs(self._body, touching),
+            range_margin=settings.range_margin,
+            learnt_margin=settings.learnt_margin,
+            reference=self._reference,
+            preferences=Preferences(grasp=FLAT_PALMS),
+        )
+        found = generate_posture(problem, start, settings=SolverSettings(
+            tolerance=settings.tolerance, iterations=settings.iterations, restarts=False, explain=False,
+        ))  # fmt: skip
+        if not found.succeeded:
+            self._reasons[_POSTURE][found.failure or "no posture"] += 1
+            return None
+        return np.array(found.q)
+
+    def _strong(
+        self, q: FloatArray, feet: dict[str, Contact], hands: dict[str, Contact], margin: float
+    ) -> Brace | None:
+        """The posture, if it can exert the force, or None."""
+        contacts = [*feet.values(), *hands.values()]
+        rub = self._settings.friction, self._settings.friction_model
+        largest = largest_force(self._body, q, contacts, self._act, *rub)
+        self._strongest = max(self._strongest, 0.0 if largest is None else largest.force)
+        forces = share_force(self._body, q, contacts, self._act, *rub)
+        if largest is None or forces is None or forces.torque_share > self._settings.torque_share:
+            joint = "friction" if forces is None else forces.tightest
+            self._reasons[_STRENGTH][f"{joint} is too weak"] += 1
+            return None
+        return Brace(q, feet, hands, forces, largest, margin)
+
+    def _hands(self, q: FloatArray, heuristic: Heuristic) -> tuple[FloatArray, dict[str, Contact] | None]:
+        task, found = self._act.hand_task(ARMS), {}
+        middle, across = np.array(q[:3]), np.array([-self._act.facing[1], self._act.facing[0], 0.0])
+        order = heuristic
+        for arm in ARMS:
+            answer = self._generator.request(q, arm, task, order, kind=self._act.touch)
+            if answer.contact is None or answer.q is None:
+                self._reasons[_HANDS][answer.message] += 1
+                return q, None
+            if answer.obstacle != self._act.obstacle:
+                self._reasons[_HANDS][f"{arm} prefers {answer.obstacle}"] += 1
+                return q, None
+            q = answer.q
+            found[answer.contact.effector] = self._hold(answer.contact)
+            if len(found) == 2 and answer.score < 0.5 * BALANCED:
+                self._reasons[_HANDS]["the hands cannot act side by side"] += 1
+                return q, None
+            alike = Mirrored(answer.contact.position, middle, across)
+            order = WeightedSum([(1.0, heuristic), (BALANCED, alike)])
+        return q, found
+
+    def _hold(self, contact: Contact) -> Contact:
+        """The contact as one at which any force up to a hand's strength is felt."""
+        away = self._settings.palm_room * contact.normal
+        return grasp(
+            contact.effector, contact.position + away, max_force=self._rules.grasp_force,
+            rotation=contact.rotation_contact_to_world,
+        )  # fmt: skip
+
+    def _feet(
+        self, q: FloatArray, loads: Loads, heuristic: Heuristic
+    ) -> tuple[FloatArray, dict[str, Contact] | None]:
+        task = self._act.foot_task(self._body)
+        natural = Natural(float(np.arctan2(self._act.facing[1], self._act.facing[0])))
+        order = WeightedSum([(1.0, heuristic), (BALANCED, natural)])
+        first = self._generator.request(q, LEGS[0], task, order)
+        if first.contact is None or first.q is None:
+            return q, self._no_foot(first)
+        balance = Footing(loads, first.contact, self._settings.margin, rules=self._rules)
+        order = WeightedSum([(1.0, heuristic), (BALANCED, natural), (BALANCED, balance)])
+        second = self._generator.request(first.q, LEGS[1], task, order)
+        if second.contact is None or second.q is None:
+            return q, self._no_foot(second)
+        if min(first.score, second.score - BALANCED) < 0.5 * BALANCED:
+            self._reasons[_FEET][UNBALANCED] += 1
+            return q, None
+        return second.q, {item.effector: item for item in (first.contact, second.contact)}
+
+    def _no_foot(self, answer: GeneratedContact) -> None:
+        self._reasons[_FEET][answer.message] += 1
+
+    def _why(self) -> str:
+        act = self._act
+        farthest = max((step for step in _STEPS if self._reasons[step]), default=_HANDS)
+        most = self._reasons[farthest].most_common(1)
+        why = f"; nearest to it: {most[0][0]}" if most else ""
+        best = f" (the strongest balanced one {self._strongest:.0f} N)" if self._strongest > 0.0 else ""
+        return (
+            f"none of {self._tried} places of the trunk has a posture to {act.kind} {act.obstacle} "
+            f"with {act.force:g} N{best}{why}"
+        )
+
+    def _failed(self, reason: str) -> BraceResult:
+        return BraceResult(None, self._tried, self._strongest, reason)
+
+
+def _beside(sides: FloatArray, wanted: float) -> float:
+    """Place across a face that is nearest to a wanted one and leaves room for both hands [m]."""
+    low, high = float(sides.min()) + HANDS_ROOM, float(sides.max()) - HANDS_ROOM
+    return 0.5 * (low + high) if low >= high else float(np.clip(wanted, low, high))
+
+
+REACHING_TIME = 1.2
+"""Shortest time in which the hands go to the object [s]; our choice."""
+
+TOUCHING_TIME = 0.5
+"""Shortest time from their touch to the act [s]."""
+
+ROOM = (0.02, 0.02, 0.02)
+"""How far from that of the posture the centre of mass may be when the hands touch [m]."""
+
+
+def arrival(body: BodyModel, brace: Brace) -> Stage:
+    """Goal of the way: the feet of the act, the hands still free."""
+    return Stage.of(body, brace.feet, brace.q, REACHING_TIME)
+
+
+def with_hands(body: BodyModel, way: ContactPlan, brace: Brace) -> ContactPlan:
+    """The way to the act and the hands put to the object, both at once.
+
+    Args:
+        body: The body.
+        way: Contacts from the start to the feet of the act.
+        brace: The posture that acts, on the feet of the way's last stage.
+    """
+    last = way.stages[-1]
+    reaching = Stage.of(body, last.contacts, last.q, REACHING_TIME, last.com_room)
+    acting = Stage.of(body, {**last.contacts, **brace.hands}, brace.q, TOUCHING_TIME, ROOM)
+    return ContactPlan.of(body, [*way.stages[:-1], reaching, acting], brace.q)

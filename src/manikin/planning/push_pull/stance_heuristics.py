@@ -1,0 +1,151 @@
+"""Where the feet can stand against a load on the hands: a heuristic of the contact generator."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from manikin.balance import pseudo_wrench, stability_margins, wrench_polytopes
+from manikin.contact import Contact, ContactModel, FrictionModel, Stance
+from manikin.numerics.spatial import GRAVITY, FloatArray, wrench_about
+from manikin.planning.contacts import Candidates, ContactRules, Situation
+from manikin.planning.contacts.heuristics import cached_score, contact_at
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Wrenches on the hands that feet have to stand against.
+
+    Attributes:
+        mass: Of the body [kg].
+        wrenches: (k, 6) force and moment about the world origin on the hands [N, N.m], of each load.
+        friction_model: Of the feet.
+    """
+
+    mass: float
+    wrenches: FloatArray
+    friction_model: FrictionModel = "outer"
+
+    def margins(self, feet: list[Contact], places: FloatArray) -> FloatArray:
+        """(n,) least margin about the CoM of all loads at each place (n, 3) of it [N.m]."""
+        if any(self._slides(feet, load) for load in self.wrenches):
+            return np.full(len(places), -np.inf)
+        model = ContactModel.of_body(self.mass, self.friction_model)
+        (polytope,) = wrench_polytopes([Stance(feet, model=model)])
+        weight = pseudo_wrench(self.mass, places, np.zeros(3))
+        return np.min(
+            [
+                stability_margins(
+                    polytope, wrench_about(weight - load, polytope.reference), places
+                ).wrench_about_com
+                for load in self.wrenches
+            ],
+            axis=0,
+        )
+
+    def _slides(self, feet: list[Contact], load: FloatArray) -> bool:
+        """Whether feet on parallel surfaces slide under a load, wherever the centre of mass is."""
+        normal = feet[0].normal
+        if any(float(foot.normal @ normal) < 1.0 - 1e-9 for foot in feet):
+            return False
+        force = np.array([0.0, 0.0, self.mass * GRAVITY]) - load[:3]
+        pressing = float(force @ normal)
+        sideways = float(np.linalg.norm(force - pressing * normal))
+        return sideways > max(foot.friction for foot in feet) * pressing
+
+    def best_place(
+        self, feet: list[Contact], near: FloatArray, reach: FloatArray
+    ) -> tuple[FloatArray, float]:
+        """(2,) place of the centre of mass with the largest least margin, and that margin [N.m].
+
+        Args:
+            feet: Contacts that carry.
+            near: (3,) middle of the places that are looked at, at the height of the CoM [m].
+            reach: (2,) how far they go along x and y [m].
+        """
+        x, y = (np.linspace(-r, r, 2 * int(np.ceil(r / 0.02)) + 1) for r in reach)
+        grid = np.stack(np.meshgrid(near[0] + x, near[1] + y, indexing="ij"), axis=-1).reshape(-1, 2)
+        margins = self.margins(feet, np.column_stack([grid, np.full(len(grid), near[2])]))
+        best = int(np.argmax(margins))
+        return grid[best], float(margins[best])
+
+
+@dataclass(frozen=True)
+class Natural:
+    """A foot that points ahead, on its own side: 1 or 0; our choice.
+
+    Attributes:
+        yaw: Heading of the body [rad].
+        turn: Largest angle between a foot and that heading [rad].
+        aside: Least distance from the middle of the body to its own side [m].
+    """
+
+    yaw: float
+    turn: float = float(np.deg2rad(25.0))
+    aside: float = 0.07
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """See :class:`manikin.planning.contacts.Heuristic`."""
+        ahead = np.array([np.cos(self.yaw), np.sin(self.yaw), 0.0])
+        across = np.array([-ahead[1], ahead[0], 0.0])
+        side = 1.0 if situation.limb.name.startswith("left") else -1.0
+        toes = (situation.rotation @ candidates.rotations)[:, :, 0]
+        level = np.linalg.norm(toes[:, :2], axis=1)
+        straight = toes @ ahead >= np.cos(self.turn) * level
+        beside = side * ((candidates.points - situation.state.q[:3]) @ across) >= self.aside
+        return (straight & beside).astype(np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Mirrored:
+    """A hand near where the other one is on the other side: 1 or 0; our choice.
+
+    Attributes:
+        place: (3,) of the other hand [m].
+        middle: (3,) a point of the body's plane of symmetry [m].
+        across: (3,) unit normal of that plane.
+        within: Largest distance from the mirrored place [m].
+    """
+
+    place: FloatArray
+    middle: FloatArray
+    across: FloatArray
+    within: float = 0.10
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:  # noqa: ARG002
+        """See :class:`manikin.planning.contacts.Heuristic`."""
+        image = self.place - 2.0 * float((self.place - self.middle) @ self.across) * self.across
+        return (np.linalg.norm(candidates.points - image, axis=1) <= self.within).astype(np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """Balance of two feet under every load ([Tonneau2015]_ 7.5-7.6 with a force on the hands): 1 or 0.
+
+    The centre of mass may be moved within ``reach`` of where the body has it. Candidates within
+    ``spacing`` on one surface share one answer.
+
+    Attributes:
+        loads: What the feet stand against.
+        other: Contact of the other foot.
+        margin: Least margin that counts as balance [N.m].
+        reach: (2,) how far the centre of mass may be moved [m].
+        spacing: [m].
+        rules: Friction.
+    """
+
+    loads: Loads
+    other: Contact
+    margin: float
+    reach: tuple[float, float] = (0.12, 0.08)
+    spacing: float = 0.1
+    rules: ContactRules = field(default_factory=ContactRules)
+
+    def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
+        """See :class:`manikin.planning.contacts.Heuristic`."""
+        return cached_score(candidates, self.spacing, lambda row: self._stands(situation, candidates, row))
+
+    def _stands(self, situation: Situation, candidates: Candidates, row: int) -> bool:
+        contact = contact_at(situation, candidates, row, situation.limb.kind, self.rules)
+        near = situation.state.com
+        _, margin = self.loads.best_place([self.other, contact], near, np.array(self.reach))
+        return margin >= self.margin

@@ -1,0 +1,332 @@
+"""The objective of the whole-body fit at its samples, with its Gauss-Newton terms.
+
+    sum_s |x_effector(q_s) - target_s|^2 + |c(q_s) - c_s|^2 + [d_safe - d(q_s)]_+^2
+        + |q_s - q_reference|^2 + joint ranges and speeds + |a_s|^2 + |hdot(q_s, v_s, a_s) - hdot_s|^2,
+
+each residual divided by the scale at which it matters (:class:`FitScales`).
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from scipy.special import expit
+
+from manikin.body import BodyModel
+from manikin.motion.dynamics import MomentumRate, MotionSampler, MotionSamples
+from manikin.numerics.banded import BlockBandedSystem, SampledBasis
+from manikin.numerics.spatial import FloatArray, rotation_vector, rotation_vector_jacobian
+from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
+from manikin.planning.whole_body.fit_targets import EffectorTarget, FitTargets
+from manikin.scene import Proximity
+from manikin.scene.distance import ProximitySamples
+from manikin.scene.distance_bounds import KnownDistances
+
+LEAST_MARGIN = 10.0
+"""Planned margins below this do not make the scale of the moments any finer [N.m]."""
+
+LEAST_FORCE_WEIGHT = 0.25
+"""Importance of the linear momentum's rate where the centre of mass only shows the way."""
+
+_RADIAL_SCALE = 0.05
+"""Deviation of a raw quaternion's length from one that costs one unit."""
+
+
+@dataclass(eq=False)
+class FitLinearisation:
+    """Residuals of all samples with their Gauss-Newton terms.
+
+    Attributes:
+        sample_cost: (n,) half the squared residuals at each sample.
+        hessian: (n, nq, nq) Gauss-Newton matrices by order of the spline's derivative.
+        gradient: (n, nq) gradients by order.
+        diagonal: (n, nq) diagonals of the matrices and gradients, for orders without other terms.
+        task_residual: (n, m) scaled residuals of effectors and centre of mass.
+        task_jacobian: (n, m, nq) their derivatives by the raw coordinates.
+        momentum: Scaled residual (n, 6) of the momentum's rate with its derivatives.
+        support_error: Largest error of an effector in contact [m].
+        support_turn: Largest angle of one that must keep its orientation [rad].
+        com_error: Largest error of the centre of mass [m].
+        clearance: Least distance among the close pairs [m].
+        closest: Names of that pair.
+    """
+
+    sample_cost: FloatArray
+    hessian: dict[int, FloatArray] = field(default_factory=dict)
+    gradient: dict[int, FloatArray] = field(default_factory=dict)
+    diagonal: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    task_residual: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    task_jacobian: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    momentum: MomentumRate | None = None
+    support_error: float = 0.0
+    support_turn: float = 0.0
+    com_error: float = 0.0
+    clearance: float = np.inf
+    closest: tuple[str, str] = ("", "")
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of all squared residuals."""
+        return float(self.sample_cost.sum())
+
+    def add(self, order: int, jacobian: FloatArray, residual: FloatArray) -> None:
+        """Add residuals (n, m) with derivatives (n, m, k) by the raw derivative of ``order``.
+
+        The derivatives are by the first ``k`` coordinates; for the first residuals of an order, by all.
+        """
+        transposed = jacobian.transpose(0, 2, 1)
+        self._add_terms(order, transposed @ jacobian, (transposed @ residual[:, :, None])[:, :, 0])
+        self.sample_cost += 0.5 * np.sum(residual**2, axis=1)
+
+    def add_diagonal(self, order: int, weight: FloatArray, residual: FloatArray) -> None:
+        """Add residuals (n, nq), one per coordinate, with derivative ``weight`` (n, nq)."""
+        if order in self.hessian:
+            diagonal = np.einsum("nii->ni", self.hessian[order])
+            diagonal += weight**2
+            self.gradient[order] += weight * residual
+        else:
+            before, gradient = self.diagonal.get(order, (0.0, 0.0))
+            self.diagonal[order] = (before + weight**2, gradient + weight * residual)
+        self.sample_cost += 0.5 * np.sum(residual**2, axis=1)
+
+    def shift_tasks(self, before: FloatArray, after: FloatArray) -> None:
+        """Replace the constants (n, m) that are added to the task residuals."""
+        old, new = self.task_residual + before, self.task_residual + after
+        self.sample_cost += 0.5 * np.sum(new**2 - old**2, axis=1)
+        self.gradient[0] += np.einsum("nmq,nm->nq", self.task_jacobian, new - old)
+
+    def assemble(self, system: BlockBandedSystem) -> None:
+        """Put every term into the normal equations."""
+        system.reset()
+        for order, gradient in self.gradient.items():
+            system.add(self.hessian[order], gradient, order)
+        for order, (weight, gradient) in self.diagonal.items():
+            system.add_diagonal(weight, gradient, order)
+        if self.momentum is not None:
+            system.add_coupled(self.momentum.jacobians, self.momentum.value)
+
+    def _add_terms(self, order: int, hessian: FloatArray, gradient: FloatArray) -> None:
+        if order in self.hessian:
+            count = gradient.shape[1]
+            self.hessian[order][:, :count, :count] += hessian
+            self.gradient[order][:, :count] += gradient
+        else:
+            self.hessian[order], self.gradient[order] = hessian, gradient
+
+
+class MotionObjective:
+    """Evaluates and linearises the objective of a spline's control points.
+
+    Args:
+        body: The body.
+        proximity: Distances of the body to the scene and to itself, or None to ignore them.
+        targets: What to do.
+        basis: The spline's basis at the targets' times.
+    """
+
+    def __init__(
+        self, body: BodyModel, proximity: Proximity | None, targets: FitTargets, basis: SampledBasis
+    ) -> None:
+        self._body, self._proximity, self._targets = body, proximity, targets
+        self._sampler = MotionSampler(body, tuple(targets.effectors), basis)
+        self._known = KnownDistances()
+        meeting = targets.meeting
+        self._ignored = targets.ignored if meeting is None else meeting.without(targets.ignored)
+        self._last: tuple[FloatArray, MotionSamples] | None = None
+        with np.errstate(divide="ignore"):
+            self._reference_weight = np.atleast_2d(1.0 / targets.reference_scale)
+        self.task_rows = 6 * len(targets.effectors) + 3
+        held = [_held_rows(target) for target in targets.effectors.values()]
+        self.exact_rows = np.hstack([*held, np.repeat(targets.com_weight[:, None] >= 1.0, 3, axis=1)])
+        """(n, task_rows) whether a task has to be met exactly: contacts and centre of mass."""
+
+    def linearise(self, points: FloatArray, scales: MotionScales, shift: FloatArray) -> FitLinearisation:
+        """Evaluate every term.
+
+        Args:
+            points: (k, nq) control points.
+            scales: Scales of the residuals.
+            shift: (n, task_rows) constants added to the scaled task residuals (multipliers).
+        """
+        motion = self._sampled(points)
+        raw = motion.raw
+        out = FitLinearisation(np.zeros(len(motion.com)))
+        self._add_tasks(out, motion, scales, shift)
+        self._add_clearance(out, motion, scales)
+        self._add_reference(out, motion)
+        self._add_radial(out, raw[0], motion.tangent)
+        self._add_ranges(out, raw[0], scales)
+        self._add_rates(out, raw[1], scales)
+        self._add_accelerations(out, raw[2], scales)
+        self._add_dynamics(out, motion, scales)
+        return out
+
+    def _sampled(self, points: FloatArray) -> MotionSamples:
+        """The spline at its samples; those of the last one, when only the scales have changed since."""
+        if self._last is None or not np.array_equal(self._last[0], points):
+            self._last = points.copy(), self._sampler.sample(points)
+        return self._last[1]
+
+    def _add_tasks(
+        self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales, shift: FloatArray
+    ) -> None:
+        """Places of the effectors and of the centre of mass."""
+        n, nv = motion.com_jacobian.shape[0], motion.com_jacobian.shape[2]
+        jacobian, residual = np.zeros((n, self.task_rows, nv)), np.zeros((n, self.task_rows))
+        for number, target in enumerate(self._targets.effectors.values()):
+            rows = slice(6 * number, 6 * number + 6)
+            place = motion.frames[:, number]
+            by_joints = self._sampler.frame_jacobian(motion, number)
+            jacobian[:, rows], residual[:, rows] = _effector_rows(target, place, by_joints, scales)
+            error = np.linalg.norm(place[:, :3, 3] - target.position, axis=1)
+            out.support_error = max(out.support_error, float(error[target.weight >= 1.0].max(initial=0.0)))
+            turn = np.linalg.norm(residual[:, rows][:, 3:], axis=1) * scales.rotation
+            out.support_turn = max(out.support_turn, float(turn[_held_rows(target)[:, 3]].max(initial=0.0)))
+        weight = self._targets.com_weight
+        error = motion.com - self._targets.com
+        scaled = self._com_weight(scales)
+        jacobian[:, -3:] = scaled[:, None, None] * motion.com_jacobian
+        residual[:, -3:] = scaled[:, None] * error
+        out.com_error = float(np.linalg.norm(error[weight >= 1.0], axis=1).max(initial=0.0))
+        out.task_residual, out.task_jacobian = residual, to_raw(jacobian, motion.tangent)
+        out.add(0, out.task_jacobian, residual + shift)
+
+    def _com_weight(self, scales: MotionScales) -> FloatArray:
+        """(n,) weight of the centre of mass's error [1/m]."""
+        assert isinstance(scales, FitScales)
+        return self._targets.com_weight / scales.com
+
+    def _add_clearance(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> None:
+        if self._proximity is None:
+            return
+        reach = scales.safe_distance + 4.0 * scales.softness
+        found = self._proximity.evaluate_placed(motion.shapes, reach, self._ignored, self._known)
+        if len(found.distance) == 0:
+            return
+        meeting = self._targets.meeting
+        met = np.zeros(len(found.distance), dtype=np.bool_) if meeting is None else meeting.rows(found)
+        apart = np.where(met, np.inf, found.distance)
+        worst = int(np.argmin(apart))
+        out.clearance, out.closest = float(apart[worst]), found.pairs[worst]
+        # A softened hinge: it also holds back what is about to come too close.
+        missing = (self._wanted_distance(found, scales) - found.distance) / scales.softness
+        value = scales.softness * np.logaddexp(0.0, missing) / scales.clearance
+        rows = -expit(missing)[:, None] * found.gradient / scales.clearance
+        if meeting is not None and np.any(met):
+            weight = meeting.importance(found, met) / scales.position
+            value = np.where(met, weight * found.distance, value)
+            rows = np.where(met[:, None], weight[:, None] * found.gradient, rows)
+        jacobian, residual = _padded(found.sample, rows, value, len(motion.com))
+        out.add(0, to_raw(jacobian, motion.tangent), residual)
+
+    def _wanted_distance(self, found: ProximitySamples, scales: MotionScales) -> FloatArray | float:
+        """Wanted clearance of close pairs [m]."""
+        del found
+        return scales.safe_distance
+
+    def _add_reference(self, out: FitLinearisation, motion: MotionSamples) -> None:
+        """Deviation from the reference posture; the pelvis' place does not count."""
+        q, reference, weight = motion.states.q, self._targets.reference, self._reference_weight
+        relative = Rotation.from_quat(reference[:, 3:7]).inv() * Rotation.from_quat(q[:, 3:7])
+        turn = relative.as_rotvec()
+        out.add(
+            0,
+            weight[:, 3:6, None] * (rotation_vector_jacobian(turn) @ motion.tangent[:, 3:6]),
+            weight[:, 3:6] * turn,
+        )
+        diagonal, residual = np.zeros_like(q), np.zeros_like(q)
+        diagonal[:, 7:] = weight[:, 6:]
+        residual[:, 7:] = weight[:, 6:] * (q[:, 7:] - reference[:, 7:])
+        out.add_diagonal(0, diagonal, residual)
+
+    def _add_radial(self, out: FitLinearisation, raw: FloatArray, tangent: FloatArray) -> None:
+        """Keep the raw quaternions near unit length, where the spline is well conditioned."""
+        size = np.linalg.norm(raw[:, 3:7], axis=1)
+        out.add(0, tangent[:, 6:] / _RADIAL_SCALE, (size - 1.0)[:, None] / _RADIAL_SCALE)
+
+    def _add_ranges(self, out: FitLinearisation, raw: FloatArray, scales: MotionScales) -> None:
+        buffer = np.minimum(scales.joint_buffer, 0.25 * (self._body.upper - self._body.lower))
+        lower, upper = self._body.lower + buffer, self._body.upper - buffer
+        outside = np.minimum(raw[:, 7:] - lower, 0.0) + np.maximum(raw[:, 7:] - upper, 0.0)
+        weight, residual = np.zeros_like(raw), np.zeros_like(raw)
+        weight[:, 7:] = (outside != 0.0) / scales.joint_limit
+        residual[:, 7:] = outside / scales.joint_limit
+        out.add_diagonal(0, weight, residual)
+
+    def _add_rates(self, out: FitLinearisation, rate: FloatArray, scales: MotionScales) -> None:
+        limit = scales.velocity_share * self._body.velocity_limit
+        excess = np.sign(rate[:, 7:]) * np.maximum(np.abs(rate[:, 7:]) - limit, 0.0)
+        weight, residual = np.zeros_like(rate), np.zeros_like(rate)
+        weight[:, 7:] = (excess != 0.0) / scales.joint_velocity
+        residual[:, 7:] = excess / scales.joint_velocity
+        for end in (0, -1):
+            weight[end], residual[end] = 1.0 / scales.rest, rate[end] / scales.rest
+        out.add_diagonal(1, weight, residual)
+
+    def _add_accelerations(self, out: FitLinearisation, second: FloatArray, scales: MotionScales) -> None:
+        if self._targets.reference_second is not None:
+            second = second - self._targets.reference_second
+        weight = np.full_like(second, 1.0 / scales.acceleration)
+        weight[:, :7] = 1.0 / scales.pelvis_acceleration
+        out.add_diagonal(2, weight, weight * second)
+
+    def _add_dynamics(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> None:
+        """Rate of the centroidal momentum against what the planned trajectory needs."""
+        assert isinstance(scales, FitScales)
+        targets, momentum = self._targets, motion.momentum
+        scale = np.full((len(targets.time), 6), scales.force)
+        scale[:, :3] /= np.maximum(targets.com_weight, LEAST_FORCE_WEIGHT)[:, None]
+        scale[:, 3:] = scales.moment_share * np.maximum(targets.margin, LEAST_MARGIN)[:, None]
+        residual = momentum.value.copy()
+        residual[:, :3] -= self._body.mass * targets.com_acceleration
+        if targets.turning is not None:
+            residual[:, 3:] -= targets.turning
+        first, second, third = (jacobian / scale[:, :, None] for jacobian in momentum.jacobians)
+        out.momentum = MomentumRate(residual / scale, (first, second, third))
+        out.sample_cost += 0.5 * np.sum(out.momentum.value**2, axis=1)
+
+
+def _effector_rows(
+    target: EffectorTarget, place: FloatArray, by_joints: FloatArray, scales: MotionScales
+) -> tuple[FloatArray, FloatArray]:
+    """Scaled residuals (n, 6) of an effector at its places (n, 4, 4) and their derivatives (n, 6, nv)."""
+    along = np.eye(3) if target.along is None else target.along
+    along = (target.weight / scales.position)[:, None, None] * along
+    error = place[:, :3, 3] - target.position
+    jacobian, residual = np.zeros_like(by_joints), np.zeros((len(error), 6))
+    jacobian[:, :3] = along @ by_joints[:, :3]
+    residual[:, :3] = (along @ error[:, :, None])[:, :, 0]
+    if target.rotation is not None:
+        relative = place[:, :3, :3] @ target.rotation.transpose(0, 2, 1)
+        turn = rotation_vector(relative)
+        weight = np.where(target.weight > 0.0, target.rotation_weight / scales.rotation, 0.0)
+        # Turning the world axes is a left perturbation: log(exp(w) E) = log(E exp(E^T w)).
+        by_turn = rotation_vector_jacobian(turn) @ relative.transpose(0, 2, 1)
+        jacobian[:, 3:] = weight[:, None, None] * by_turn @ by_joints[:, 3:]
+        residual[:, 3:] = weight[:, None] * turn
+    return jacobian, residual
+
+
+def _held_rows(target: EffectorTarget) -> NDArray[np.bool_]:
+    """(n, 6) whether position and orientation have to be met exactly; a grasp holds its position only."""
+    position = target.weight >= 1.0
+    rows = (position, position & (target.rotation_weight >= 1.0))
+    return np.repeat(np.stack(rows, axis=1), 3, axis=1)
+
+
+def to_raw(jacobian: FloatArray, tangent: FloatArray) -> FloatArray:
+    """Map tangent Jacobians (n, m, nv) to raw coordinates (n, m, nq)."""
+    return np.concatenate([jacobian[:, :, :6] @ tangent[:, :6, :], jacobian[:, :, 6:]], axis=2)
+
+
+def _padded(
+    sample: NDArray[np.int64], rows: FloatArray, values: FloatArray, n: int
+) -> tuple[FloatArray, FloatArray]:
+    """Lay out rows (k, nv) and values (k,), ordered by sample, as (n, most, ...), padded with zeros."""
+    start = np.searchsorted(sample, np.arange(n))
+    place = np.arange(len(sample)) - start[sample]
+    jacobian = np.zeros((n, int(place.max()) + 1, rows.shape[1]))
+    residual = np.zeros(jacobian.shape[:2])
+    jacobian[sample, place], residual[sample, place] = rows, values
+    return jacobian, residual

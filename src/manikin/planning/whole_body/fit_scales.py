@@ -1,0 +1,178 @@
+"""How much the residuals of every whole-body spline matter, and how long its fit iterates.
+
+Also here. How much each residual of the whole-body fit matters. How much each term of the refinement matters.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+from manikin.body import BodyModel
+
+
+@dataclass(frozen=True)
+class MotionScales:
+    """Size at which each residual costs one unit, and the iteration's limits.
+
+    Attributes:
+        position: Effector position [m].
+        rotation: Effector orientation [rad].
+        clearance: Missing clearance [m].
+        safe_distance: Wanted clearance [m].
+        softness: Width of the bend of the softened clearance penalty [m].
+        joint_limit: Violation of a joint range, or of its buffer [rad].
+        joint_buffer: Distance kept from the joint ranges [rad].
+        joint_velocity: Violation of the velocity limits [rad/s].
+        velocity_share: Share of the velocity limits that may be used.
+        acceleration: Joint acceleration [rad/s^2].
+        pelvis_acceleration: Linear [m/s^2] and angular [rad/s^2] pelvis acceleration.
+        rest: Velocity at both ends [m/s, rad/s].
+        max_iterations: Upper bound of Gauss-Newton steps.
+        decrease: Relative decrease of the objective below which the iteration stops.
+        stages: Factors by which the tasks' scales are loosened, one solution after the other.
+        iterations_per_round: Steps between two updates of the multipliers.
+        multiplier_rounds: Most updates of the multipliers of contacts and centre of mass.
+        tolerance: Largest error of the contacts at convergence [m]; three times that for the
+            centre of mass.
+        turn_tolerance: Largest angle of a sole from its contact at convergence [rad].
+    """
+
+    position: float = 1.0e-3
+    rotation: float = 4.0e-3
+    clearance: float = 1.0e-3
+    safe_distance: float = 0.028
+    softness: float = 0.006
+    joint_limit: float = 3.0e-3
+    joint_buffer: float = 0.03
+    joint_velocity: float = 0.1
+    velocity_share: float = 0.9
+    acceleration: float = 8.0
+    pelvis_acceleration: float = 4.0
+    rest: float = 1.0e-3
+    max_iterations: int = 30
+    decrease: float = 0.06
+    stages: tuple[float, ...] = (3.0, 1.0, 0.3)
+    iterations_per_round: int = 3
+    multiplier_rounds: int = 12
+    tolerance: float = 5.0e-4
+    turn_tolerance: float = 3.5e-3
+
+    def are_met(self, support_error: float, support_turn: float, com_error: float) -> bool:
+        """Whether contacts and centre of mass are exact enough.
+
+        Args:
+            support_error: Of contacts [m].
+            support_turn: Of soles [rad].
+            com_error: Of the centre of mass [m].
+        """
+        return (
+            support_error < self.tolerance
+            and support_turn < self.turn_tolerance
+            and com_error < 3.0 * self.tolerance
+        )
+
+    def loosened(self, factor: float) -> Self:
+        """Return the same scales with contacts ``factor`` times looser."""
+        return replace(self, position=self.position * factor, rotation=self.rotation * factor)
+
+
+@dataclass(frozen=True)
+class FitScales(MotionScales):
+    """Size at which each residual of the whole-body fit along a planned centre of mass costs one unit.
+
+    Attributes:
+        com: Centre of mass [m].
+        force: Rate of linear momentum, against the planned one [N].
+        moment_share: Rate of angular momentum about the centre of mass that costs one unit, as
+            a share of the planned margin: where balance is scarce, the body turns less.
+    """
+
+    com: float = 3.0e-3
+    force: float = 20.0
+    moment_share: float = 0.15
+
+    def loosened(self, factor: float) -> Self:
+        """Return the same scales with contacts and centre of mass ``factor`` times looser."""
+        return replace(super().loosened(factor), com=self.com * factor)
+
+
+PERSON_ROOT = 0.92
+"""Height of the root of the person whose scales these are [m]."""
+
+PERSON_MASS = 75.0
+"""Mass of that person [kg]."""
+
+LEAST_NEAR = 0.25
+"""Least factor on distances for safety."""
+
+
+@dataclass(frozen=True)
+class RefineScales(MotionScales):
+    """Size at which each residual of the refinement costs one unit.
+
+    Attributes:
+        missing_wrench: Wrench that no contact supplies, moments divided by :data:`ARM` [N].
+        force: Contact force that costs one unit, relative to the body's weight, at a contact variable of 1.
+        margin: Wanted margin of the wrench about the CoM [N.m].
+        margin_violation: Missing margin [N.m].
+        margin_softness: Width of the bend of its softened penalty [N.m].
+        slide: Speed of an effector at a contact variable of 1 [m/s].
+        approach: Distance to the normal through its contact at a contact variable of 1, in flight [m].
+        efort: Square root of ``c / alpha`` (7.8).
+        touching: Depth from which an effector is pushed out of what it leaves or reaches, at the ends of a
+            flight [m].
+        guide: Deviation of a joint from the input [rad].
+        guide_position: Deviation of the pelvis from the input [m].
+        knee_flexion: Least one that is wanted: a leg that is almost straight turns about its own axis in the
+            execution at the slightest cause [rad].
+        straight: What a knee lacks of it [rad].
+        toes: Angle of the toes of what stands on soles [rad].
+        end_position: Deviation of the pelvis from the input at both ends [m].
+        end_angle: Deviation of a joint, or of the pelvis' attitude, there [rad].
+    """
+
+    stages: tuple[float, ...] = (3.0, 1.0)
+    safe_distance: float = 0.02
+    softness: float = 0.004
+    acceleration: float = 6.0
+    pelvis_acceleration: float = 3.0
+    missing_wrench: float = 10.0
+    force: float = 1.0
+    margin: float = 22.0
+    margin_violation: float = 1.0
+    margin_softness: float = 3.0
+    slide: float = 0.1
+    approach: float = 0.02
+    efort: float = 3.0
+    touching: float = 8.0e-3
+    guide: float = 0.4
+    guide_position: float = 0.03
+    knee_flexion: float = 0.35
+    straight: float = 0.1
+    toes: float = 0.02
+    end_position: float = 0.01
+    end_angle: float = 0.05
+
+    @classmethod
+    def of(cls, body: BodyModel) -> "RefineScales":
+        """The scales for a body; a creature's are those of a person, brought to its size and mass.
+
+        With lengths by ``l`` and masses by ``m``, at the same gravity, forces go by ``m``, moments by ``m l``
+        and accelerations of the joints by ``1 / l``. Distances for safety shrink to a quarter at most.
+
+        Args:
+            body: The body.
+        """
+        plain = cls()
+        if body.stature is not None:
+            return plain
+        length = float(body.standing_posture()[2]) / PERSON_ROOT
+        force, near = body.mass / PERSON_MASS, max(length, LEAST_NEAR)
+        return replace(
+            plain,
+            safe_distance=plain.safe_distance * near, softness=plain.softness * near,
+            clearance=plain.clearance * near, touching=plain.touching * near, approach=plain.approach * near,
+            acceleration=plain.acceleration / length, guide_position=plain.guide_position * near,
+            missing_wrench=plain.missing_wrench * force, margin=plain.margin * force * length,
+            margin_violation=plain.margin_violation * force * length,
+            margin_softness=plain.margin_softness * force * length,
+        )  # fmt: skip

@@ -1,0 +1,358 @@
+"""What a whole-body motion has to do, sample by sample.
+
+Also here. Where the knots and the samples of a whole-body spline lie in time.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manikin.body import BodyModel
+from manikin.body.limbs import hanging_segment
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown
+from manikin.planning.whole_body.swing_planner import PlannedSwing, hangs, touch_pairs
+from manikin.scene import Scene
+
+SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09, 0.13])
+"""Further knots around a touch-down at speed, from it [s]."""
+
+CLOSEST_KNOTS = 4.0e-3
+"""Knots closer than this are one [s]."""
+
+NEAR_INSTANT = 0.1
+"""Distance from a key instant up to which refined knots lie closer [s]."""
+
+
+def touch_downs_at_speed(schedule: ContactSchedule) -> FloatArray:
+    """(k,) times at which a contact is made that still has to settle [s]."""
+    found = [
+        float(start)
+        for number, (phase, start) in enumerate(zip(schedule.sequence, schedule.instants, strict=False))
+        if any(
+            item.settle > 0.0 and (number == 0 or item.effector not in schedule.sequence[number - 1].stance)
+            for item in phase.stance
+        )
+    ]
+    return np.array(found)
+
+
+def phase_knots(
+    instants: FloatArray, spacing: float, degree: int, sudden: FloatArray | Sequence[float] = ()
+) -> FloatArray:
+    """Clamped knots with every key instant among them and at most ``spacing`` [s] apart.
+
+    Args:
+        instants: (phases + 1,) key instants [s].
+        spacing: Largest distance of two knots [s].
+        degree: Of the spline.
+        sudden: Times around which the knots lie closer, because the motion changes suddenly [s].
+    """
+    fine = np.concatenate([np.zeros(0), *(time + SUDDEN_KNOTS for time in sudden)])
+    breaks = np.unique(np.concatenate([instants, fine[(fine > instants[0]) & (fine < instants[-1])]]))
+    breaks = breaks[np.append(True, np.diff(breaks) > CLOSEST_KNOTS)]
+    inner: list[float] = []
+    for start, end in itertools.pairwise(breaks):
+        count = max(1, int(np.ceil((end - start) / spacing)))
+        inner.extend(np.linspace(start, end, count, endpoint=False))
+    ends = np.full(degree, instants[0]), np.full(degree + 1, instants[-1])
+    return np.concatenate([ends[0], inner, ends[1]])
+
+
+def refined(knots: FloatArray, instants: FloatArray, degree: int, within: float = NEAR_INSTANT) -> FloatArray:
+    """Clamped knots with every span that is near a key instant split in two.
+
+    Args:
+        knots: Clamped knots of a spline of ``degree`` [s].
+        instants: Key instants [s].
+        degree: Of the spline.
+        within: Distance up to which a span's middle is near [s].
+    """
+    breaks = np.unique(knots)
+    middle = 0.5 * (breaks[:-1] + breaks[1:])
+    near = np.abs(middle[:, None] - instants).min(axis=1) < within
+    inner = np.sort(np.concatenate([breaks, middle[near & (np.diff(breaks) > 2.0 * CLOSEST_KNOTS)]]))
+    return np.concatenate([np.full(degree, breaks[0]), inner, np.full(degree, breaks[-1])])
+
+
+def sample_times(knots: FloatArray, per_span: int) -> FloatArray:
+    """Times that split every knot span into equal parts, both ends included."""
+    breaks = np.unique(knots)
+    spans = [np.linspace(a, b, per_span, endpoint=False) for a, b in itertools.pairwise(breaks)]
+    return np.append(np.concatenate(spans), breaks[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class EffectorTarget:
+    """Where an effector has to be at each sample.
+
+    Attributes:
+        position: (n, 3) in the world [m].
+        rotation: (n, 3, 3) effector-to-world, or None when only the position counts.
+        weight: (n,) importance of the position: 1 in contact, less in flight, 0 where free.
+        rotation_weight: (n,) importance of the orientation, likewise.
+        along: (n, 3, 3) applied to the position error before it is weighted: the identity, or
+            less than it along the surface of a contact that is still settling; None for the identity.
+    """
+
+    position: FloatArray
+    rotation: FloatArray | None
+    weight: FloatArray
+    rotation_weight: FloatArray
+    along: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FitTargets:
+    """What the motion has to do.
+
+    Attributes:
+        time: (n,) [s].
+        effectors: Target of each controlled effector.
+        com: (n, 3) centre of mass [m].
+        com_weight: (n,) importance of the centre of mass: 1 where it is required, less where the
+            trajectory only shows the way.
+        com_acceleration: (n, 3) its acceleration [m/s^2].
+        margin: (n,) balance margin of the planned centre of mass [N.m].
+        reference: (n, nq) preferred configuration.
+        reference_scale: (nv,), or (n, nv) by sample, deviation of the tangent [m, rad] that costs as
+            much as one unit of every other residual; infinite entries are free.
+        ignored: Pairs whose distance does not count, per sample.
+        meeting: What is met at speed, per sample, or None without.
+        turning: (n, 3) rate of the angular momentum about the centre of mass [N.m]; None for that of a point
+            mass, zero.
+        reference_second: (n, nq) second derivatives of the reference, from which accelerations count; None
+            where any acceleration costs.
+    """
+
+    time: FloatArray
+    effectors: Mapping[str, EffectorTarget]
+    com: FloatArray
+    com_weight: FloatArray
+    com_acceleration: FloatArray
+    margin: FloatArray
+    reference: FloatArray
+    reference_scale: FloatArray
+    ignored: tuple[Ignored, ...]
+    meeting: SlidingTouchdown | None = None
+    turning: FloatArray | None = None
+    reference_second: FloatArray | None = None
+
+
+def effector_targets(
+    schedule: ContactSchedule, swings: Sequence[PlannedSwing], time: FloatArray
+) -> dict[str, EffectorTarget]:
+    """Placement of every effector of the schedule at every time; free where it has no task."""
+    phases = schedule.phase_at(time)
+    targets = {}
+    for name in schedule.sequence.effectors:
+        position, rotation = np.zeros((len(time), 3)), np.tile(np.eye(3), (len(time), 1, 1))
+        weight, rotation_weight = np.zeros(len(time)), np.ones(len(time))
+        settling = schedule.settling(time, name)
+        along = np.tile(np.eye(3), (len(time), 1, 1)) if np.any(settling) else None
+        for index, phase in enumerate(schedule.sequence):
+            if name in phase.stance:
+                contact, rows = phase.stance[name], phases == index
+                position[rows], rotation[rows] = contact.position, contact.rotation_contact_to_world
+                weight[rows] = np.where(settling[rows], ALMOST, 1.0)
+                if contact.kind is ContactKind.GRASP:
+                    rotation_weight[rows] = GRASP_ROTATION_WEIGHT if contact.oriented else 0.0
+                if along is not None:
+                    share = settled_share(schedule, index, contact, time[rows])
+                    along[rows] = settling_map(contact, share)
+                    rotation_weight[rows] = share
+        for item in swings:
+            if item.swing.effector == name:
+                start, end = item.interval
+                _place(item, time, position, rotation, (start, end))
+                rows = (time >= start) & (time < end)
+                share = (time[rows] - start) / (end - start)
+                place, turn, leave = (
+                    min(0.25, longest / (end - start))
+                    for longest in (POSITION_RAMP, ROTATION_RAMP, LEAVING_RAMP)
+                )
+                if end - start < LONG_FLIGHT:
+                    place = turn = leave = 0.25
+                weight[rows] = flight_weight(share, FLIGHT_POSITION_WEIGHT, place, place)
+                rotation_weight[rows] = flight_weight(share, FLIGHT_ROTATION_WEIGHT, leave, turn)
+                if item.method == "reach":
+                    held = share if item.swing.start is None else 1.0 - share
+                    weight[rows] = _reach_weight(held, place)
+                    rotation_weight[rows] = GRASP_ROTATION_WEIGHT * held
+                hold = item.swing.end or item.swing.start
+                if hold is not None and hold.kind is ContactKind.GRASP and not hold.oriented:
+                    rotation_weight[rows] = 0.0
+        targets[name] = EffectorTarget(position, rotation, weight, rotation_weight, along)
+    return targets
+
+
+def _place(
+    item: PlannedSwing,
+    time: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    interval: tuple[float, float],
+) -> None:
+    """Write the effector's placement during a flight, and while it rolls before and after it."""
+    start, end = interval if item.roll is None else (item.roll.instants[0], item.roll.instants[3])
+    rows = (time >= start) & (time < end)
+    state = item.curve.evaluate(time[rows])
+    position[rows], rotation[rows] = state.position, state.rotation
+    if item.roll is not None:
+        position[rows], rotation[rows] = item.roll.pose(state.position, state.rotation, time[rows])
+
+
+def toe_angles(body: BodyModel, swings: Sequence[PlannedSwing], time: FloatArray) -> dict[int, FloatArray]:
+    """Angle (n,) of each joint of toes that stay flat while their foot rolls [rad], by joint index."""
+    found: dict[int, FloatArray] = {}
+    for item in swings:
+        toes = hanging_segment(body, body.effector(item.swing.effector).segment)
+        if item.roll is None or toes is None:
+            continue
+        joint = body.joint_index(toes.hinges[0].name)
+        rows = (time >= item.roll.instants[0]) & (time < item.roll.instants[2])
+        found.setdefault(joint, np.zeros(len(time)))[rows] = item.roll.toe_extension(time[rows])
+    return found
+
+
+def flat_share(body: BodyModel, schedule: ContactSchedule, time: FloatArray) -> dict[int, FloatArray]:
+    """How much (n,) each joint of toes has to be straight, by joint index: wholly while their sole is held.
+
+    What a foot stands on does not count as an obstacle: nothing else keeps its toes out of it.
+    """
+    found: dict[int, FloatArray] = {}
+    for name in schedule.sequence.effectors:
+        toes = hanging_segment(body, body.effector(name).segment)
+        if toes is None:
+            continue
+        held = np.zeros(len(time))
+        for phase, start, end in zip(
+            schedule.sequence, schedule.instants[:-1], schedule.instants[1:], strict=True
+        ):
+            if name in phase.stance and phase.stance[name].part is SolePart.FULL:
+                coming = 1.0 - np.clip((start - time - STRAIGHT) / STRAIGHTENING, 0.0, 1.0)
+                leaving = 1.0 - np.clip((time - end) / STRAIGHT, 0.0, 1.0)
+                held = np.maximum(held, np.minimum(coming, leaving))
+        for hinge in toes.hinges:
+            found[body.joint_index(hinge.name)] = held
+    return found
+
+
+STRAIGHT = 0.1
+"""Time before a landing in which toes are straight already, and after a lift-off until they may bend [s]."""
+
+STRAIGHTENING = 0.2
+"""Time before that in which they become straight [s]."""
+
+
+def settled_share(schedule: ContactSchedule, phase: int, contact: Contact, time: FloatArray) -> FloatArray:
+    """(n,) how far a contact of a phase has settled at each time: 0 at its touch-down, 1 at its place."""
+    first = phase
+    while first > 0 and contact.effector in schedule.sequence[first - 1].stance:
+        first -= 1
+    if contact.settle == 0.0:
+        return np.ones(len(time))
+    share = np.clip((time - schedule.instants[first]) / contact.settle, 0.0, 1.0)
+    return share**2 * (3.0 - 2.0 * share)
+
+
+def settling_map(contact: Contact, share: FloatArray) -> FloatArray:
+    """(n, 3, 3) map of a settling contact's position error: soon whole along the normal, later across it."""
+    normal = np.outer(contact.normal, contact.normal)
+    down = np.clip(LANDED_PER_SHARE * share, LEAST_SETTLED, 1.0)[:, None, None]
+    return down * normal + np.maximum(share, LEAST_SETTLED)[:, None, None] * (np.eye(3) - normal)
+
+
+LANDED_PER_SHARE = 10.0
+"""How much sooner a settling contact is down on its surface than at its place."""
+
+LEAST_SETTLED = 0.01
+"""Importance of the place along the surface at the touch-down of a contact that settles."""
+
+ALMOST = 1.0 - 1e-9
+"""Weight of what matters fully but is not required exactly."""
+
+
+FLIGHT_POSITION_WEIGHT = 0.1
+"""Importance of an effector's position in the middle of a flight."""
+
+FLIGHT_ROTATION_WEIGHT = 0.05
+"""Importance of its orientation there: a hint, so that the ankle may follow the shank."""
+
+
+GRASP_ROTATION_WEIGHT = 0.03
+"""Importance of a grasping hand's orientation: a hint, for a grasp holds a point."""
+
+LONG_FLIGHT = 1.0
+"""The ends of a shorter flight are a quarter of it each [s]."""
+
+POSITION_RAMP = 0.2
+"""Longest time near the ends of a flight in which the position matters more [s]."""
+
+ROTATION_RAMP = 0.12
+"""The same for the orientation before the landing [s]."""
+
+LEAVING_RAMP = 0.04
+"""The same for the orientation after the lift-off to a long flight: the foot may roll off at once [s]."""
+
+
+def _reach_weight(share: FloatArray, ramp: float) -> FloatArray:
+    """Importance from a free end (0) to the contact (1): none, then that of a flight, then full."""
+    blend = np.clip(share / 0.75, 0.0, 1.0)
+    rising = blend**2 * (3.0 - 2.0 * blend)
+    return rising * flight_weight(np.maximum(share, 0.5), FLIGHT_POSITION_WEIGHT, ramp, ramp)
+
+
+def flight_weight(share: FloatArray, middle: float, leaving: float, landing: float) -> FloatArray:
+    """Importance during a flight: full at its ends, so that contacts are left and met well."""
+    blend = np.clip(np.minimum(share / leaving, (1.0 - share) / landing), 0.0, 1.0)
+    inside = ALMOST - (1.0 - middle) * blend**2 * (3.0 - 2.0 * blend)
+    return np.where(blend > 0.0, inside, 1.0)
+
+
+TAKING_HOLD = 0.35
+"""Time before its first contact in which an effector that was free may come close to it [s]."""
+
+
+def ignored_pairs(
+    body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
+) -> tuple[Ignored, ...]:
+    """Segments that may touch an obstacle at each time: those on, leaving or reaching a support."""
+    sequence = schedule.sequence
+    touching = [
+        {contact.effector: touch_pairs(body, scene, contact) for contact in phase.stance}
+        for phase in sequence
+    ]
+    per_phase = []
+    for index in range(len(sequence)):
+        pairs: set[tuple[str, str]] = set()
+        for found in touching[index].values():
+            pairs |= found
+        per_phase.append(pairs)
+    landing: list[tuple[float, float, set[tuple[str, str]]]] = []
+    for swing in sequence.swings():
+        if swing.end is not None and not hangs(body, swing.effector):
+            end = schedule.swing_interval(swing)[1]
+            landing.append((end - SITTING_DOWN, end, set(touch_pairs(body, scene, swing.end))))
+            continue
+        if swing.end is not None and swing.start is None:
+            end = schedule.swing_interval(swing)[1]
+            landing.append((end - TAKING_HOLD, end, set(touch_pairs(body, scene, swing.end))))
+            continue
+        for index in range(swing.first_phase, swing.last_phase + 1):
+            for contact in (swing.start, swing.end):
+                if contact is not None:
+                    per_phase[index] |= touch_pairs(body, scene, contact)
+    known: dict[tuple[int, tuple[bool, ...]], Ignored] = {}
+    found = []
+    for instant, index in zip(time, schedule.phase_at(time), strict=True):
+        near = tuple(start <= instant < end for start, end, _ in landing)
+        key = int(index), near
+        if key not in known:
+            extra = (pairs for (_, _, pairs), close in zip(landing, near, strict=True) if close)
+            known[key] = frozenset(per_phase[index].union(*extra))
+        found.append(known[key])
+    return tuple(found)

@@ -1,0 +1,155 @@
+"""How a foot pitches from the rise of its heel to its next flat landing.
+
+The foot tilts about the hinge of its toes, which stay flat, until it leaves the ground; flies; lands
+on the edge of its heel and tilts down onto its sole. One pitch, twice continuously differentiable,
+covers all of it, so that the foot does not stop at lift-off or landing. Where the foot is follows
+from the point about which it tilts: the hinge before lift-off, the heel's edge after landing, and in
+flight a point that moves from one to the other along the swing's curve. The angles and their
+timing are our own choice.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import BPoly
+
+from manikin.body import BodyModel
+from manikin.body.limbs import hanging_segment
+from manikin.contact import Contact, ContactSchedule, SolePart, Swing
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.whole_body.swing_path import Pose
+
+PUSH_OFF_PITCH = float(np.deg2rad(24.0))
+"""Pitch at lift-off, heel up [rad]."""
+
+HEEL_STRIKE_PITCH = float(np.deg2rad(10.0))
+"""Pitch at landing, toes up [rad]."""
+
+PUSH_OFF_RATE = 1.2
+"""Pitch rate at lift-off relative to the mean since the heel rose."""
+
+HEEL_STRIKE_RATE = 1.0
+"""Pitch rate at landing relative to the mean until the sole lies flat."""
+
+TOE_RETURN = 0.6
+"""Share of the flight after which the toes are straight again."""
+
+
+PIVOT_SHIFT = (0.2, 0.85)
+"""Shares of the flight between which the point that the curve describes moves from hinge to heel: while
+the heel is up the toes are the lowest, while the toes are up the heel is."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootRoll:
+    """Pitch of one foot about one flight.
+
+    Attributes:
+        instants: (4,) heel up, lift-off, landing, sole flat [s].
+        start: Pose of the sole before, lying flat.
+        end: Pose of the sole afterwards, lying flat.
+        hinge: (3,) hinge of the toes in the sole's frame [m].
+        heel: (3,) middle of the heel's edge in the sole's frame [m].
+    """
+
+    instants: FloatArray
+    start: Pose
+    end: Pose
+    hinge: FloatArray
+    heel: FloatArray
+
+    @property
+    def pivots(self) -> tuple[Pose, Pose]:
+        """Where the hinge lies before the flight and the heel's edge after it."""
+        return (
+            Pose(self.start.position + self.start.rotation @ self.hinge, self.start.rotation),
+            Pose(self.end.position + self.end.rotation @ self.heel, self.end.rotation),
+        )
+
+    def pitch(self, time: FloatArray) -> FloatArray:
+        """(n,) turn of the foot about its own y axis, heel up when positive [rad]."""
+        return _held(self._pitch, self.instants[[0, 3]], time)
+
+    def toe_extension(self, time: FloatArray) -> FloatArray:
+        """(n,) angle of the toes that keeps them flat before lift-off, back to 0 in flight [rad]."""
+        curve = self._toe_return
+        return np.where(time < curve.x[0], self.pitch(time), _held(curve, curve.x, time))
+
+    def pose(
+        self, position: FloatArray, rotation: FloatArray, time: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Place the sole's frame from its pivot.
+
+        Args:
+            position: (n, 3) of the pivot in the world [m].
+            rotation: (n, 3, 3) of the sole without its pitch.
+            time: (n,) [s].
+
+        Returns:
+            Positions (n, 3) and rotations (n, 3, 3) of the sole's frame.
+        """
+        turn, offset = self.tilt(time)
+        return position - np.einsum("nij,nj->ni", rotation, offset), rotation @ turn
+
+    def tilt(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Turns (n, 3, 3) by the pitch, and the pivot (n, 3) seen from the sole's origin before them [m]."""
+        angle = self.pitch(time)
+        turn = np.zeros((len(time), 3, 3))
+        turn[:, 0, 0] = turn[:, 2, 2] = np.cos(angle)
+        turn[:, 0, 2], turn[:, 2, 0] = np.sin(angle), -np.sin(angle)
+        turn[:, 1, 1] = 1.0
+        _, off, land, _ = self.instants
+        first, last = PIVOT_SHIFT
+        share = np.clip(((time - off) / (land - off) - first) / (last - first), 0.0, 1.0)[:, None]
+        blend = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        pivot = (1.0 - blend) * self.hinge + blend * self.heel
+        return turn, np.einsum("nij,nj->ni", turn, pivot)
+
+    @property
+    def _at_lift_off(self) -> list[float]:
+        up, off, _, _ = self.instants
+        angle = PUSH_OFF_PITCH if off > up else 0.0
+        return [angle, PUSH_OFF_RATE * angle / max(off - up, 1e-9), 0.0]
+
+    @cached_property
+    def _toe_return(self) -> BPoly:
+        _, off, land, _ = self.instants
+        back = off + TOE_RETURN * (land - off)
+        return BPoly.from_derivatives([off, back], [self._at_lift_off, [0.0, 0.0, 0.0]])
+
+    @cached_property
+    def _pitch(self) -> BPoly:
+        up, off, land, flat = self.instants
+        angle = HEEL_STRIKE_PITCH if flat > land else 0.0
+        at_landing = [-angle, HEEL_STRIKE_RATE * angle / max(flat - land, 1e-9), 0.0]
+        rest = [0.0, 0.0, 0.0]
+        knots = {float(up): rest, float(off): self._at_lift_off}
+        knots |= {float(land): at_landing, float(flat): rest}
+        return BPoly.from_derivatives(list(knots), list(knots.values()))
+
+
+def foot_roll(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> FootRoll | None:
+    """Roll of a flight between two soles, or None when the foot leaves and lands flat."""
+    start, end = swing.start, swing.end
+    if start is None or end is None or {start.part, end.part} == {SolePart.FULL}:
+        return None
+    frame = body.effector(swing.effector)
+    toes = hanging_segment(body, frame.segment)
+    off, land = schedule.swing_interval(swing)
+    up = schedule.instants[swing.first_phase - 1] if start.part is SolePart.TOES else off
+    flat = schedule.instants[swing.last_phase + 2] if end.part is SolePart.HEEL else land
+    hinge = np.zeros(3) if toes is None else frame.rotation.T @ (toes.origin - frame.translation)
+    return FootRoll(
+        np.array([up, off, land, flat]), _flat_pose(start), _flat_pose(end), hinge,
+        np.array([-0.5 * (body.sole_length or start.length), 0.0, 0.0]),
+    )  # fmt: skip
+
+
+def _flat_pose(contact: Contact) -> Pose:
+    return Pose(contact.position, contact.rotation_contact_to_world)
+
+
+def _held(curve: BPoly, ends: FloatArray, time: FloatArray) -> FloatArray:
+    """Value of a curve, held beyond its ends."""
+    return np.asarray(curve(np.clip(time, ends[0], ends[1])), dtype=np.float64)

@@ -1,0 +1,147 @@
+"""The motion of a point mass on massless feet: its CoM trajectory with the contact forces.
+
+There is nothing to fit: the ball is at the CoM and does not turn.  The forces are shared among
+the soles' corners with the least square, within the friction pyramids and the caps.
+"""
+
+from collections.abc import Sequence
+from ctypes import c_int
+
+import daqp
+import numpy as np
+
+from manikin.balance import WrenchPolytope, motion_margin
+from manikin.balance.contact_forces import ContactGenerators
+from manikin.balance.motion_forces import load_shares
+from manikin.contact import ContactKind, Stance
+from manikin.motion import Motion
+from manikin.numerics.spatial import FloatArray, skew
+from manikin.planning.com import CentroidalProblem, CentroidalTrajectory
+
+STEP = 5e-3
+"""Distance of the samples [s]."""
+
+
+def point_mass_motion(
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
+) -> Motion:
+    """Sample a CoM trajectory with its margin and contact forces.
+
+    Args:
+        problem: What was planned.
+        trajectory: The plan.
+        polytopes: W_i of the phases.
+
+    Returns:
+        The motion of :func:`manikin.body.further_bodies.point_mass`, every :data:`STEP` and at the key
+        instants; ``tau`` is zero.
+    """
+    schedule = trajectory.schedule
+    grid = np.arange(0.0, trajectory.duration, STEP)
+    time = np.unique(np.concatenate([grid, schedule.instants]))
+    time = time[np.append(np.diff(time) > 1e-9, True)]
+    names = schedule.sequence.effectors
+    com, rest = trajectory.position(time), np.zeros((len(time), 3))
+    turn = np.tile([0.0, 0.0, 0.0, 1.0], (len(time), 1))
+    return Motion(
+        time=time,
+        q=np.hstack([com, turn]),
+        v=np.hstack([trajectory.velocity(time), rest]),
+        a=np.hstack([trajectory.acceleration(time), rest]),
+        tau=np.zeros((len(time), 6)),
+        com=com,
+        angular_momentum=rest,
+        margin=_margins(problem, trajectory, polytopes, time),
+        support=schedule.support(time, names),
+        contact_force=point_mass_forces(trajectory, time),
+        contact_names=names,
+        joint_names=(),
+        margin_unit=problem.margin_unit,
+    )
+
+
+def _margins(
+    problem: CentroidalProblem,
+    trajectory: CentroidalTrajectory,
+    polytopes: Sequence[WrenchPolytope],
+    time: FloatArray,
+) -> FloatArray:
+    """(n,) margin in the phase of each instant; at a key instant the smaller of both phases."""
+    schedule = trajectory.schedule
+    starts = np.searchsorted(time, schedule.instants - 1e-9)
+    owners = [np.arange(starts[k], starts[k + 1] + 1) for k in range(len(polytopes))]
+    rows, phases = np.concatenate(owners), np.repeat(np.arange(len(polytopes)), [len(own) for own in owners])
+    stances = [phase.stance for phase in schedule.sequence]
+    wrench, com = trajectory.pseudo_wrench(time), trajectory.position(time)
+    found = motion_margin(stances, phases, wrench[rows], com[rows], polytopes=polytopes)
+    margin = np.full(len(time), np.inf)
+    np.minimum.at(margin, rows, found.force if problem.margin_space == "force" else found.margin)
+    return margin
+
+
+def point_mass_forces(trajectory: CentroidalTrajectory, time: FloatArray) -> FloatArray:
+    """(n, c, 6) contact forces of a CoM trajectory, with moments about each contact's origin [N, N.m].
+
+    Args:
+        trajectory: The plan.
+        time: (n,) [s].
+    """
+    names = trajectory.schedule.sequence.effectors
+    schedule = trajectory.schedule
+    corners = [_Corners(phase.stance, names) for phase in schedule.sequence]
+    wrench, phases = trajectory.pseudo_wrench(time), schedule.phase_at(time)
+    shares = load_shares(schedule, time, names)
+    forces = np.zeros((len(time), len(names), 6))
+    for sample, phase in enumerate(phases):
+        forces[sample] = corners[phase].share(wrench[sample], shares[sample])
+    return forces
+
+
+class _Corners:
+    """The edges of the friction pyramids at every corner of one stance."""
+
+    def __init__(self, stance: Stance, names: tuple[str, ...]) -> None:
+        self._count = len(names)
+        generators = ContactGenerators.of(stance, grasp_moments=False)
+        owners = [names.index(contact.effector) for contact in stance]
+        self._owner = np.array(owners, dtype=np.int64)[generators.contact]
+        limited = np.isfinite(generators.upper)
+        self._unit, self._upper = np.where(limited, generators.upper, 1.0), np.where(limited, 1.0, 1e30)
+        self._wrenches = self._unit * generators.about(np.zeros(3))
+        self._normal = generators.normal
+        origin = {names.index(contact.effector): contact.position for contact in stance}
+        self._origin = origin
+        self._limits, self._caps = self._rows(stance, names)
+
+    def _rows(self, stance: Stance, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+        """Sums of the normal forces, and what caps each."""
+        rows, caps = [], []
+        for contact in stance:
+            if contact.kind is not ContactKind.GRASP and contact.normal_force_cap is not None:
+                rows.append((self._owner == names.index(contact.effector)).astype(float))
+                caps.append(contact.normal_force_cap)
+        if stance.normal_force_cap is not None:
+            rows.append(self._normal)
+            caps.append(stance.normal_force_cap)
+        return np.array(rows).reshape(-1, len(self._owner)), np.array(caps)
+
+    def share(self, wrench: FloatArray, shares: FloatArray) -> FloatArray:
+        """(c, 6) forces and moments that supply the wrench about the world origin."""
+        size = len(self._owner)
+        if not size:
+            return np.zeros((self._count, 6))
+        cost = np.diag(1.0 / shares[self._owner])
+        upper = np.concatenate([self._upper, wrench, self._caps])
+        lower = np.concatenate([np.zeros(size), wrench, np.full(len(self._caps), -1e30)])
+        sense = np.zeros(len(upper), dtype=c_int)
+        sense[size : size + 6] = 5  # equalities
+        rows = np.ascontiguousarray(np.vstack([self._wrenches, self._limits]))
+        magnitude, _, flag, _ = daqp.solve(cost, np.zeros(size), rows, upper, lower, sense)
+        if flag < 1:  # on the edge of what is possible rounding decides; the least square of all is near
+            magnitude = np.maximum(np.linalg.lstsq(self._wrenches, wrench, rcond=None)[0], 0.0)
+        out = np.zeros((self._count, 6))
+        for index, origin in self._origin.items():
+            total = self._wrenches[:, self._owner == index] @ magnitude[self._owner == index]
+            out[index, :3] = total[:3]
+            out[index, 3:] = total[3:] - skew(origin) @ total[:3]
+        return out

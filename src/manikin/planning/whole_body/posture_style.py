@@ -1,0 +1,420 @@
+"""How a body carries itself where the task leaves freedom.
+
+Also here. Postures along the motion that guide the whole-body fit. The posture a person would keep where the
+task leaves freedom.
+
+At the key instants and every fraction of a second between them the posture generator finds a
+collision-free posture on the contacts, the swings and the centre of mass.  Like the key
+postures of [Qiu2012]_ 7.2.3 they tell, before the motion is fitted, whether it can be done,
+and they are what the fitted motion stays near.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.body import BodyModel
+from manikin.body.configuration import Configuration
+from manikin.contact import Contact, ContactSchedule, SolePart
+from manikin.errors import InputError
+from manikin.kinematics import (
+    Placement,
+    PostureProblem,
+    PostureResult,
+    Preferences,
+    SolverSettings,
+    generate_posture,
+)
+from manikin.motion.configuration_spline import align_quaternions
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.com import CentroidalTrajectory
+from manikin.planning.whole_body.fit_targets import EffectorTarget, settled_share
+from manikin.planning.whole_body.sliding_touchdown import Ignored
+from manikin.scene import Proximity
+
+LEAST_WEIGHT = 0.05
+"""Targets of less importance than this are left to the fit."""
+
+
+@dataclass(frozen=True, eq=False)
+class GuideFailure:
+    """The first guide posture that could not be found.
+
+    Attributes:
+        time: [s].
+        phase: Index of the phase.
+        reason: What it misses, in one line.
+    """
+
+    time: float
+    phase: int
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Guide:
+    """Guide postures.
+
+    Attributes:
+        time: (k,) [s].
+        configurations: (k, nq), quaternions in one half-space.
+        failures: Postures that could not be found exactly; their best attempts are used.
+    """
+
+    time: FloatArray
+    configurations: FloatArray
+    failures: tuple[GuideFailure, ...]
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """(n, nq) linear interpolation; quaternions are normalised."""
+        rows = np.stack([np.interp(time, self.time, column) for column in self.configurations.T], axis=1)
+        rows[:, 3:7] /= np.linalg.norm(rows[:, 3:7], axis=1, keepdims=True)
+        return rows
+
+
+def guide_times(instants: FloatArray, spacing: float) -> FloatArray:
+    """Every key instant, and equal parts of at most ``spacing`` [s] between them."""
+    parts = [
+        np.linspace(start, end, max(1, int(np.ceil((end - start) / spacing))), endpoint=False)
+        for start, end in itertools.pairwise(instants)
+    ]
+    return np.append(np.concatenate(parts), instants[-1])
+
+
+def plan_guide(
+    body: BodyModel,
+    proximity: Proximity,
+    schedule: ContactSchedule,
+    time: FloatArray,
+    effectors: dict[str, EffectorTarget],
+    com: FloatArray,
+    ignored: tuple[Ignored, ...],
+    reference: FloatArray,
+    clearance: float,
+    preferences: Preferences | None = None,
+    exact: Sequence[int] = (),
+) -> Guide:
+    """Find a posture at each time, each one starting from the one before.
+
+    Args:
+        body: The body.
+        proximity: Distances of the body to the scene and itself.
+        schedule: Contacts in time.
+        time: (k,) [s].
+        effectors: Targets at these times.
+        com: (k, 3) centre of mass [m]; NaN leaves it free.
+        ignored: Pairs that may touch, per time.
+        reference: (k, nq) preferred postures, the first of which starts the search.
+        clearance: Wanted distance to everything [m].
+        preferences: What the postures should look like; the generator's own when omitted.
+        exact: Joints that keep to the reference whatever the posture before.
+    """
+    q = reference[0]
+    found: list[FloatArray] = []
+    failures: list[GuideFailure] = []
+    touched: dict[str, FloatArray] = {}
+    settings = SolverSettings(tolerance=1e-4, clearance_tolerance=2e-3, explain=False)
+    for k, instant in enumerate(time):
+        contacts, placements = _requirements(schedule, float(instant), effectors, k)
+        placements.update(_settling(body, schedule, float(instant), q, touched))
+        # Half way to the posture before: neighbouring postures must not jump.
+        wanted = np.array(reference[k])
+        if k > 0:
+            wanted[7:] = 0.5 * (reference[k][7:] + q[7:])
+            wanted[[7 + joint for joint in exact]] = reference[k][[7 + joint for joint in exact]]
+        problem = PostureProblem(
+            body, contacts, placements, com=com[k], proximity=proximity, clearance=clearance,
+            self_clearance=clearance, ignore=ignored[k], reference=wanted,
+            preferences=preferences or Preferences(),
+        )  # fmt: skip
+        result = generate_posture(problem, q, settings=settings)
+        flying = [name for name in placements if effectors[name].weight[k] < 1.0]
+        if not result.succeeded and flying:
+            # In flight an effector need not pass exactly where its curve does.
+            loose = {n: _loosened(item) if n in flying else item for n, item in placements.items()}
+            retry = generate_posture(replace(problem, placements=loose), q, settings=settings)
+            result = retry if retry.succeeded else result
+        if not result.succeeded:
+            failures.append(_failure(schedule, float(instant), result))
+        q = result.q
+        found.append(q)
+    return Guide(np.asarray(time), align_quaternions(np.array(found)), tuple(failures))
+
+
+def _requirements(
+    schedule: ContactSchedule, time: float, effectors: dict[str, EffectorTarget], k: int
+) -> tuple[tuple[Contact, ...], dict[str, Placement]]:
+    held = {
+        c.effector: c
+        for c in schedule.stance_at(time)
+        if c.part is SolePart.FULL and not schedule.settling(time, c.effector)[0]
+    }
+    settling = {name for name in effectors if schedule.settling(time, name)[0]}
+    placements = {}
+    for name, target in effectors.items():
+        if name not in held and name not in settling and target.weight[k] >= LEAST_WEIGHT:
+            turn = (
+                target.rotation[k]
+                if target.rotation is not None and target.rotation_weight[k] > 0.5
+                else None
+            )
+            placements[name] = Placement(target.position[k], turn)
+    return tuple(held.values()), placements
+
+
+def _settling(
+    body: BodyModel, schedule: ContactSchedule, time: float, q: FloatArray, touched: dict[str, FloatArray]
+) -> dict[str, Placement]:
+    """Places of the contacts that are still settling, on their way from where they touched.
+
+    Args:
+        body: The body.
+        schedule: Contacts in time.
+        time: [s].
+        q: (nq,) posture before.
+        touched: Where each of them touched, kept from posture to posture [m].
+    """
+    placements = {}
+    phase = int(schedule.phase_at(time))
+    for contact in schedule.sequence[phase].stance:
+        if schedule.settling(time, contact.effector)[0]:
+            if contact.effector not in touched:
+                _, here = Configuration(body, q).effector_placement(contact.effector)
+                touched[contact.effector] = here
+            start = touched[contact.effector]
+            share = float(settled_share(schedule, phase, contact, np.array([time]))[0])
+            placements[contact.effector] = Placement(
+                start + share * (contact.position - start),
+                contact.rotation_contact_to_world,
+                rotation_weight=SETTLING_TURN,
+            )
+    return placements
+
+
+LOOSE_FLIGHT = 100.0
+"""Weight of the place of a flying effector where it cannot be exact [1/m^2]."""
+
+
+def _loosened(placement: Placement) -> Placement:
+    return replace(placement, position_weight=LOOSE_FLIGHT)
+
+
+SETTLING_TURN = 10.0
+"""Weight of its orientation [1/rad^2]."""
+
+
+def _failure(schedule: ContactSchedule, time: float, result: PostureResult) -> GuideFailure:
+    return GuideFailure(time, int(schedule.phase_at(time)), result.failure or "posture not found")
+
+
+@dataclass(frozen=True, eq=False)
+class PostureStyle:
+    """Preferred posture and how firmly each joint keeps to it; all numbers are our choice.
+
+    Attributes:
+        name: Short name, as in a scenario.
+        angles: Joint angles that differ from the standing posture, by a part of the joint's name [rad].
+        scales: Deviation of a joint from its preferred angle that costs one unit, by a part of
+            the joint's name [rad].
+        trunk_scale: The same of the pelvis' orientation [rad].
+        arm_swing: Flexion of a shoulder per metre that the other side's foot is ahead [rad/m].
+        moment_factor: How much more angular momentum than usual the limbs may carry without the
+            trunk or the arms making up for it (:attr:`FitScales.moment_share` times this).
+        preferences: Of the guide postures.
+    """
+
+    name: str
+    angles: Mapping[str, float]
+    scales: Mapping[str, float]
+    trunk_scale: float = 0.3
+    arm_swing: float = 0.0
+    moment_factor: float = 1.0
+    preferences: Preferences = field(default_factory=Preferences)
+
+    def posture(self, body: BodyModel) -> FloatArray:
+        """(nq,) standing posture with the preferred angles."""
+        q = np.array(body.standing_posture())
+        for index, name in enumerate(body.joint_names):
+            for key, angle in self.angles.items():
+                if key in name:
+                    q[7 + index] = angle
+        return q
+
+    def scale(self, body: BodyModel) -> FloatArray:
+        """(nv,) deviations of the tangent that cost one unit [rad]; infinite for the pelvis' place."""
+        scale = np.full(body.nv, np.inf)
+        scale[3:6] = self.trunk_scale
+        for index, name in enumerate(body.joint_names):
+            scale[6 + index] = next((s for key, s in self.scales.items() if key in name), 0.5)
+        return scale
+
+
+READY = PostureStyle(
+    "ready",
+    MappingProxyType({
+        "shoulder_flexion": np.deg2rad(20.0),
+        "shoulder_abduction": np.deg2rad(25.0),
+        "elbow_flexion": np.deg2rad(60.0),
+    }),
+    MappingProxyType({
+        "toe": 0.01, "hip": 1.0, "knee": 1.5, "ankle": 1.0, "lumbar": 0.35, "thorax": 0.35, "neck": 0.25,
+        "shoulder": 0.35, "elbow": 0.35, "wrist": 0.1,
+    }),
+)  # fmt: skip
+"""Arms of a person who steps over something: slightly raised and bent, clear of the thighs."""
+
+WALKING = PostureStyle(
+    "walking",
+    MappingProxyType({"shoulder_flexion": np.deg2rad(3.0), "elbow_flexion": np.deg2rad(22.0)}),
+    MappingProxyType({
+        "toe": 0.01, "hip": 1.0, "knee": 1.5, "ankle": 1.0, "lumbar": 0.12, "thorax": 0.12, "neck": 0.1,
+        "shoulder": 0.12, "elbow": 0.15, "wrist": 0.1,
+    }),
+    trunk_scale=0.15,
+    arm_swing=0.7,
+    moment_factor=1.6,
+    preferences=Preferences(
+        hinges=MappingProxyType({"shoulder": 0.5, **Preferences().hinges}),
+        pelvis=2.0, trunk=2.0, head=1.0, arms=0.0,
+    ),
+)  # fmt: skip
+"""An upright trunk and hanging arms that swing against the legs."""
+
+CLOSE = PostureStyle(
+    "close",
+    MappingProxyType(
+        {
+            "shoulder_flexion": np.deg2rad(25.0),
+            "shoulder_abduction": np.deg2rad(15.0),
+            "elbow_flexion": np.deg2rad(80.0),
+        }
+    ),
+    MappingProxyType({**READY.scales, "shoulder": 0.15, "elbow": 0.2}),
+    preferences=Preferences(
+        hinges=MappingProxyType({"shoulder": 0.5, "elbow": 0.3, **Preferences().hinges}), arms=0.3
+    ),
+)
+"""Arms kept close to the body, as in a narrow place."""
+
+CLIMBING = PostureStyle(
+    "climbing",
+    MappingProxyType(
+        {
+            "shoulder_flexion": np.deg2rad(115.0),
+            "shoulder_abduction": np.deg2rad(20.0),
+            "elbow_flexion": np.deg2rad(70.0),
+            "hip_flexion": np.deg2rad(45.0),
+            "hip_abduction": np.deg2rad(25.0),
+            "hip_rotation": np.deg2rad(-20.0),
+            "knee_flexion": np.deg2rad(65.0),
+        }
+    ),
+    MappingProxyType({**READY.scales, "shoulder": 1.0, "elbow": 1.0, "wrist": 0.5}),
+    preferences=Preferences(arms=0.0, grasp=0.0),
+)  # fmt: skip
+"""Raised arms and bent, spread legs of a person on a wall."""
+
+HANGING = PostureStyle(
+    "hanging",
+    MappingProxyType(
+        {
+            "shoulder_flexion": np.deg2rad(5.0),
+            "shoulder_abduction": np.deg2rad(12.0),
+            "elbow_flexion": np.deg2rad(25.0),
+        }
+    ),
+    CLOSE.scales,
+    preferences=CLOSE.preferences,
+)
+"""Arms that hang, as of a person who comes near to something."""
+
+MANNERS: Mapping[str, PostureStyle] = MappingProxyType(
+    {manner.name: manner for manner in (READY, WALKING, CLOSE, HANGING, CLIMBING)}
+)
+"""Every manner by its name."""
+
+
+def posture_style_of(name: str) -> PostureStyle:
+    """Return the manner of a name.
+
+    Raises:
+        InputError: If there is none.
+    """
+    if name not in MANNERS:
+        raise InputError(f"manner is {name!r}; valid: {', '.join(MANNERS)}")
+    return MANNERS[name]
+
+
+def heading_of(schedule: ContactSchedule, time: FloatArray) -> FloatArray:
+    """(n,) heading of the body [rad]: mean direction of the soles, interpolated over the phases."""
+    feet = {name for name in schedule.sequence.effectors if name.endswith("foot")}
+    middles = 0.5 * (schedule.instants[:-1] + schedule.instants[1:])
+    headings = []
+    for phase in schedule.sequence:
+        directions = [c.rotation_contact_to_world[:2, 0] for c in phase.stance if c.effector in feet]
+        mean = np.sum(directions, axis=0) if directions else np.array([1.0, 0.0])
+        headings.append(np.arctan2(mean[1], mean[0]))
+    return np.interp(time, middles, np.unwrap(headings))
+
+
+def foot_lead(schedule: ContactSchedule, time: FloatArray) -> FloatArray:
+    """(n,) how far the left foot is ahead of the right one along the heading [m]; 0 without both."""
+    heading = heading_of(schedule, time)
+    forward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    places = [_foot_path(schedule, f"{side}_foot", time) for side in ("left", "right")]
+    if places[0] is None or places[1] is None:
+        return np.zeros(len(time))
+    return np.sum(forward * (places[0] - places[1]), axis=1)
+
+
+def _foot_path(schedule: ContactSchedule, effector: str, time: FloatArray) -> FloatArray | None:
+    """(n, 2) where an effector is, seen from above; smoothly from one contact to the next."""
+    known: list[float] = []
+    places: list[FloatArray] = []
+    for index, phase in enumerate(schedule.sequence):
+        if effector in phase.stance:
+            known.extend(schedule.instants[index : index + 2])
+            places.extend([phase.stance[effector].position[:2]] * 2)
+    if not known:
+        return None
+    after = np.clip(np.searchsorted(known, time, side="right"), 1, len(known) - 1)
+    start, end = np.array(known)[after - 1], np.array(known)[after]
+    share = np.clip((time - start) / np.maximum(end - start, 1e-9), 0.0, 1.0)[:, None]
+    blend = share**2 * (3.0 - 2.0 * share)
+    return (1.0 - blend) * np.array(places)[after - 1] + blend * np.array(places)[after]
+
+
+def reference_motion(
+    body: BodyModel, trajectory: CentroidalTrajectory, time: FloatArray, manner: PostureStyle = READY
+) -> FloatArray:
+    """(n, nq) preferred posture carried along the centre of mass, facing as the feet do.
+
+    Args:
+        body: The body.
+        trajectory: Centre of mass and contacts in time.
+        time: (n,) [s].
+        manner: Preferred posture and swing of the arms.
+    """
+    standing = manner.posture(body)
+    model = body.pinocchio
+    offset = pin.centerOfMass(model, model.createData(), standing) - standing[:3]
+    com = trajectory.position(time)
+    out = np.tile(standing, (len(time), 1))
+    for row, yaw, centre in zip(out, heading_of(trajectory.schedule, time), com, strict=True):
+        turn = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.0, float(yaw)))
+        row[:3] = centre - turn.matrix() @ offset
+        row[3:7] = (turn * pin.Quaternion(*standing[[6, 3, 4, 5]])).coeffs()
+    _swing_arms(body, out, manner.arm_swing * foot_lead(trajectory.schedule, time))
+    return align_quaternions(out)
+
+
+def _swing_arms(body: BodyModel, configurations: FloatArray, angle: FloatArray) -> None:
+    """Add the shoulders' flexion (n,) [rad], the right forward and the left back when positive."""
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        name = f"{side}_shoulder_flexion"
+        if name in body.joint_names:
+            configurations[:, 7 + body.joint_index(name)] += sign * angle

@@ -1,0 +1,368 @@
+"""Every term of the refinement, measured on samples of a motion without its spline or solver.
+
+Velocities and accelerations are differences of the sampled configurations, so that the input, whose
+velocity jumps at its keys, and the refined motion are measured with the same yardstick.
+
+Also here. Obstacles in the refinement: what may touch, and how far an effector in flight keeps off its
+supports.
+
+An effector may touch what it holds, and that alone.  In flight it begins and ends at distance zero from
+its supports; in between it has to keep off them like everything else.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields, replace
+
+import daqp
+import numpy as np
+import pinocchio as pin
+
+from manikin.balance import MotionMargin, motion_margin
+from manikin.body import BodyModel
+from manikin.body.limbs import end_segments
+from manikin.contact import ContactKind, ContactSchedule, Stance
+from manikin.motion.dynamics import centroidal_motion
+from manikin.numerics.spatial import FloatArray, wrench_map
+from manikin.planning.contacts.efort import Task
+from manikin.planning.whole_body.refine_contacts import (
+    LEAST,
+    contact_variables,
+    efort_with_derivative,
+    limb_directions,
+)
+from manikin.planning.whole_body.refine_input import KeyPath
+from manikin.planning.whole_body.refine_physics import MarginCost, centre_of
+from manikin.planning.whole_body.sliding_touchdown import Ignored
+from manikin.planning.whole_body.swing_planner import touch_pairs
+from manikin.scene import Proximity, Scene
+from manikin.scene.distance import ProximitySamples, moves_by_joint, segment_of
+
+RISE = 0.3
+"""Share of a flight in which the wanted clearance to what was left, or is to be reached, rises or falls."""
+
+HELD_SHARE = 0.4
+"""Share of the wanted clearance that an effector in contact has to keep from other obstacles."""
+
+GRASPED = -0.05
+"""Distance at which a hand that holds on to something begins to be pushed off it [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One end of a flight.
+
+    Attributes:
+        pairs: Segments and the obstacle that they leave or reach.
+        away: (n,) 0 at the contact, 1 far from it; 1 outside the flight.
+        grasped: Whether the hand has its fingers around the obstacle.
+    """
+
+    pairs: Ignored
+    away: FloatArray
+    grasped: bool
+
+
+class RefineObstacles:
+    """What may be near what, at samples of a motion.
+
+    Args:
+        body: The body.
+        scene: The obstacles.
+        schedule: Contacts in time.
+        time: (n,) [s].
+        padded: Obstacles that any part of the body may touch.
+
+    Attributes:
+        ignored: Pairs of segment and obstacle that may touch at each sample, because they are in contact.
+
+    Raises:
+        ContactError: If a contact lies on no obstacle.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        schedule: ContactSchedule,
+        time: FloatArray,
+        padded: Sequence[str] = (),
+    ) -> None:
+        leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
+        held = [
+            leaning.union(*(touch_pairs(body, scene, contact) for contact in phase.stance))
+            for phase in schedule.sequence
+        ]
+        self.ignored: tuple[Ignored, ...] = tuple(held[phase] for phase in schedule.phase_at(time))
+        self._obstacles = [obstacle.name for obstacle in scene]
+        self._ends = {name: end_segments(body, name) for name in schedule.sequence.effectors}
+        self._sides = list[_Side]()
+        self._near = {
+            name: np.where(schedule.support(time, (name,))[:, 0], 0.0, 1.0)
+            for name in schedule.sequence.effectors
+        }
+        for swing in schedule.sequence.swings():
+            start, end = schedule.swing_interval(swing)
+            rows = (time >= start) & (time < end)
+            for contact, gone in ((swing.start, time - start), (swing.end, end - time)):
+                if contact is not None:
+                    share = np.clip(gone / (RISE * (end - start)), 0.0, 1.0)
+                    away = np.where(rows, share**2 * (3.0 - 2.0 * share), 1.0)
+                    self._near[swing.effector] = np.minimum(self._near[swing.effector], away)
+                    grasped = contact.kind is ContactKind.GRASP
+                    self._sides.append(_Side(touch_pairs(body, scene, contact), away, grasped))
+
+    def touching(self) -> tuple[Ignored, ...]:
+        """Pairs that may go into each other at each sample: those in contact, and a hand about a grasp."""
+        return self._with([side for side in self._sides if side.grasped])
+
+    def during_flights(self) -> tuple[Ignored, ...]:
+        """Pairs that do not count as clearance at each sample: in contact, leaving it or reaching it."""
+        return self._with(self._sides)
+
+    def _with(self, sides: list[_Side]) -> tuple[Ignored, ...]:
+        known: dict[tuple[Ignored, tuple[bool, ...]], Ignored] = {}
+        found = []
+        for sample, held in enumerate(self.ignored):
+            near = tuple(bool(side.away[sample] < 1.0) for side in sides)
+            if (held, near) not in known:
+                pairs = (side.pairs for side, close in zip(sides, near, strict=True) if close)
+                known[held, near] = held.union(*pairs)
+            found.append(known[held, near])
+        return tuple(found)
+
+    def wanted(self, found: ProximitySamples, safe: float, touching: float) -> FloatArray:
+        """(k,) wanted distance of close pairs [m].
+
+        Where an effector is held its distance to other obstacles is given as well, and less of it is wanted:
+        a push that ended with the contact would tear it off.
+
+        Args:
+            found: The pairs.
+            safe: Wanted far from contacts [m].
+            touching: Wanted where a flight begins or ends [m].
+        """
+        wanted = np.full(len(found.distance), safe)
+        named = np.array([(segment_of(shape), segment_of(other)) for shape, other in found.pairs])
+        for name, ends in self._ends.items():
+            rows = np.isin(named[:, 0], ends) & np.isin(named[:, 1], self._obstacles)
+            share = np.maximum(self._near[name][found.sample[rows]], HELD_SHARE)
+            wanted[rows] = np.minimum(wanted[rows], share * safe)
+        for side in self._sides:
+            rows = np.zeros(len(wanted), dtype=bool)
+            for segment, obstacle in side.pairs:
+                rows |= (named[:, 0] == segment) & (named[:, 1] == obstacle)
+            share = side.away[found.sample[rows]]
+            inside = GRASPED if side.grasped else touching
+            wanted[rows] = np.minimum(wanted[rows], share * safe + (1.0 - share) * inside)
+        return wanted
+
+
+STEP = 0.01
+"""Spacing of the samples that are measured [s]."""
+
+_GRAM = 1e-3
+"""Margin below which the missing wrench is computed [N.m]; above, it is zero."""
+
+
+@dataclass(frozen=True)
+class RefineMeasures:
+    """What every term of the refinement measures on a motion.
+
+    Attributes:
+        duration_s: [s].
+        squared_accelerations: Integral of the squared joint accelerations [rad^2/s^3].
+        squared_pelvis_accelerations: Integral of the pelvis' squared linear acceleration [m^2/s^3].
+        physics_violation: Mean over time of the wrench that no admissible contact force supplies, about
+            the stance's mean contact point with 1 m [N].
+        max_physics_violation: Largest of it [N].
+        min_clearance_m: Least signed distance between what is not in contact; flights count as far as
+            they keep off what they leave or reach [m].
+        max_penetration_m: Depth of anything in anything but what it holds on to [m].
+        contact_error_m: Mean over time of ``sum c |e|``, see
+            :mod:`~manikin.planning.whole_body.refine_contacts` [m].
+        contact_slide_mps: Mean over time of ``sum c |e'|`` [m/s].
+        efort_cost: Mean over time of ``sum c / alpha`` (7.9), alpha clamped.
+        max_joint_limit_violation_rad: [rad].
+        max_velocity_share: Largest share of a joint's velocity limit.
+        min_margin: Least margin of the whole body's wrench about the CoM [N.m].
+    """
+
+    duration_s: float
+    squared_accelerations: float
+    squared_pelvis_accelerations: float
+    physics_violation: float
+    max_physics_violation: float
+    min_clearance_m: float
+    max_penetration_m: float
+    contact_error_m: float
+    contact_slide_mps: float
+    efort_cost: float
+    max_joint_limit_violation_rad: float
+    max_velocity_share: float
+    min_margin: float
+
+    def as_dict(self) -> dict[str, float]:
+        """The measures by name."""
+        return asdict(self)
+
+    def table(self, other: "RefineMeasures") -> str:
+        """Lines ``name  this -> other``."""
+        return "\n".join(
+            f"{item.name:32s}{getattr(self, item.name):12.4g} -> {getattr(other, item.name):12.4g}"
+            for item in fields(self)
+        )
+
+
+def sample_uniformly(schedule: ContactSchedule, step: float) -> FloatArray:
+    """Times from the first to the last instant, both included, at most ``step`` apart [s]."""
+    start, end = float(schedule.instants[0]), float(schedule.instants[-1])
+    return np.linspace(start, end, max(2, int(np.ceil((end - start) / step - 1e-9))) + 1)
+
+
+def differences(body: BodyModel, time: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Velocities and accelerations (n, nv) of samples at a constant step, by central differences.
+
+    Before and after the motion the body rests.
+    """
+    model, step = body.pinocchio, float(time[1] - time[0])
+    extended = [q[0], *q, q[-1]]
+    rate = np.array([pin.difference(model, a, b) for a, b in itertools.pairwise(extended)])
+    rate /= step
+    return 0.5 * (rate[1:] + rate[:-1]), (rate[1:] - rate[:-1]) / step
+
+
+def physics_violation(room: MarginCost, stance_wrench: FloatArray) -> FloatArray:
+    """(n,) distance of wrenches (n, 6) about the mean contact point to the polytope of a stance [N].
+
+    The polytope holds what all admissible contact forces can supply; the nearest point of it is found
+    by a quadratic program for each wrench outside.
+    """
+    H, h = np.array(room.polytope.H), room.polytope.h
+    missing = np.zeros(len(stance_wrench))
+    # Around the wrench itself, in units of the body's weight, the program is well scaled.
+    for k in np.flatnonzero(room.polytope.margin(stance_wrench) < -_GRAM):
+        unit = max(1.0, float(np.abs(stance_wrench[k]).max()))
+        bound = (h - H @ stance_wrench[k]) / unit
+        found, _, flag, _ = daqp.solve(
+            np.eye(6), np.zeros(6), H, bound, np.full(len(h), -1e30),
+            np.zeros(len(h), dtype=np.int32),
+        )  # fmt: skip
+        missing[k] = unit * np.linalg.norm(found) if flag > 0 else max(0.0, -bound.min() * unit)
+    return missing
+
+
+def rooms_of(schedule: ContactSchedule, friction_share: float = 1.0) -> tuple[MarginCost, ...]:
+    """Wrench polytope of each phase, with a share of the friction."""
+    return tuple(room_of(phase.stance, friction_share) for phase in schedule.sequence)
+
+
+def room_of(stance: Stance, friction_share: float = 1.0) -> MarginCost:
+    """Wrench polytope of a stance, with a share of the friction."""
+    contacts = [replace(contact, friction=friction_share * contact.friction) for contact in stance]
+    return MarginCost(stance.with_contacts(contacts))
+
+
+def balance_of(
+    schedule: ContactSchedule,
+    rooms: tuple[MarginCost, ...],
+    time: FloatArray,
+    wrench: FloatArray,
+    com: FloatArray,
+) -> tuple[MotionMargin, FloatArray]:
+    """Margins and (n,) physics violation of wrenches (n, 6) about the world origin with CoM (n, 3)."""
+    phases, violation = schedule.phase_at(time), np.zeros(len(time))
+    for number, (phase, room) in enumerate(zip(schedule.sequence, rooms, strict=True)):
+        rows = phases == number
+        if np.any(rows):
+            violation[rows] = physics_violation(room, wrench[rows] @ wrench_map(centre_of(phase.stance)).T)
+    polytopes = [room.polytope for room in rooms]
+    found = motion_margin([one.stance for one in polytopes], phases, wrench, com, polytopes=polytopes)
+    return found, violation
+
+
+def measure(
+    body: BodyModel,
+    proximity: Proximity,
+    obstacles: RefineObstacles,
+    path: KeyPath,
+    schedule: ContactSchedule,
+    rooms: tuple[MarginCost, ...],
+    time: FloatArray,
+    q: FloatArray,
+    task: Task | None = None,
+) -> RefineMeasures:
+    """Measure every term.
+
+    Args:
+        body: The body.
+        proximity: Distances of the body to the scene and to itself.
+        obstacles: What may touch at the samples.
+        path: The input, for the directions of EFORT.
+        schedule: Contacts in time.
+        rooms: Wrench polytope of each phase.
+        time: (n,) samples at a constant step [s].
+        q: (n, nq) configurations.
+        task: As for :func:`~manikin.planning.whole_body.refine.refine_motion`.
+    """
+    v, a = differences(body, time, q)
+    step = float(time[1] - time[0])
+    found = centroidal_motion(body, q, v, a)
+    margin, violation = balance_of(schedule, rooms, time, found.wrench, found.com)
+    error, slide, cost = _contact_terms(body, path, schedule, time, q, v, task)
+    outside = np.maximum(body.lower - q[:, 7:], q[:, 7:] - body.upper).max()
+    clearance = proximity.minimum_over(q, obstacles.during_flights(), tolerance=1e-5)
+    flying = proximity.minimum_over(q, obstacles.touching(), tolerance=1e-5)
+    return RefineMeasures(
+        duration_s=float(time[-1] - time[0]),
+        squared_accelerations=step * float(np.sum(a[:, 6:] ** 2)),
+        squared_pelvis_accelerations=step * float(np.sum(a[:, :3] ** 2)),
+        physics_violation=float(violation.mean()),
+        max_physics_violation=float(violation.max()),
+        min_clearance_m=float(clearance.distance),
+        max_penetration_m=max(0.0, -float(flying.distance)),
+        contact_error_m=error,
+        contact_slide_mps=slide,
+        efort_cost=cost,
+        max_joint_limit_violation_rad=max(0.0, float(outside)),
+        max_velocity_share=float((np.abs(v[:, 6:]) / body.velocity_limit).max(initial=0.0)),
+        min_margin=float(margin.margin.min()),
+    )
+
+
+def _contact_terms(
+    body: BodyModel,
+    path: KeyPath,
+    schedule: ContactSchedule,
+    time: FloatArray,
+    q: FloatArray,
+    v: FloatArray,
+    task: Task | None,
+) -> tuple[float, float, float]:
+    """Means over time of the contact-invariant term's distance and speed, and of EFORT's cost."""
+    model, data = body.pinocchio, body.pinocchio.createData()
+    names = schedule.sequence.effectors
+    place, jacobian = np.empty((len(q), len(names), 3)), np.empty((len(q), len(names), 6, model.nv))
+    for k, state in enumerate(q):
+        pin.computeJointJacobians(model, data, state)
+        pin.updateFramePlacements(model, data)
+        for column, name in enumerate(names):
+            frame = body.effector_frame(name)
+            place[k, column] = data.oMf[frame].translation
+            jacobian[k, column] = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+    variables, limbs = contact_variables(schedule, time), limb_directions(body, path, schedule, time, task)
+    moves, phases = moves_by_joint(model), schedule.phase_at(time)
+    error = slide = cost = 0.0
+    for column, name in enumerate(names):
+        variable = variables[name]
+        for number, phase in enumerate(schedule.sequence):
+            if name in phase.stance:
+                away = place[phases == number, column] - phase.stance[name].position
+                error += float(np.linalg.norm(away, axis=1).sum()) / len(time)
+        speed = np.linalg.norm((jacobian[:, column, :3] @ v[:, :, None])[:, :, 0], axis=1)
+        slide += float(np.mean(variable * speed))
+        if name in limbs:
+            chain = np.flatnonzero(moves[model.frames[body.effector_frame(name)].parentJoint])
+            alpha, _ = efort_with_derivative(limbs[name], jacobian[:, column], chain)
+            cost += float(np.mean(variable / np.maximum(alpha, LEAST)))
+    return error, slide, cost

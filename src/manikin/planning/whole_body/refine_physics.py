@@ -1,0 +1,233 @@
+"""Physics violation: the wrench that a motion needs and that no admissible contact force supplies.
+
+The contact forces of each sample are the solution of a quadratic program ([Tonneau2015]_ 7.3.1, in the
+form of [Mordatch2012]_):
+
+    min_x |b - A x|^2 / (2 s^2) + sum_j (k x_j / c_j)^2 / 2,   0 <= x_j <= u_j,
+
+with the wrench ``b`` that the whole body needs, the edges ``A`` of the friction pyramids and the axes of
+the grasps, and the contact variable ``c_j`` of each: the larger it is, the less its force costs.  Here it
+rises and falls within the time that the contact is held, so that load passes smoothly from one contact to
+the next.  Caps on sums of forces are left to the margin.
+
+Also here. Balance with room to spare: the margin of the whole body's wrench in the polytope of its stance.
+
+What the contact-force program allows may lie on the very edge of what friction and soles admit.  Here
+the distance to every facet of the stance's wrench polytope ([Qiu2012]_ 4.36), its caps included and moments
+about the CoM, is wanted to be larger than a margin.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import expit
+
+from manikin.balance import stability_margins, wrench_polytope
+from manikin.balance.contact_forces import ContactGenerators, share
+from manikin.balance.margin import wrench_levers
+from manikin.contact import Stance
+from manikin.motion.dynamics import MotionSamples
+from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, skew, wrench_map
+
+ARM = 0.25
+"""Length that makes moments comparable with forces [m]."""
+
+LEAST_VARIABLE = 0.05
+"""Contact variables below this do not make a force any costlier."""
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchSamples:
+    """Wrench that the whole body needs at samples of a motion, moments about the world origin.
+
+    Attributes:
+        value: (n, 6) force and moment [N, N.m].
+        jacobians: Three (n, 6, nq) derivatives, by the raw coordinates, their rates and second derivatives.
+        com_jacobian: (n, 3, nq) derivative of the CoM by the raw coordinates.
+    """
+
+    value: FloatArray
+    jacobians: tuple[FloatArray, FloatArray, FloatArray]
+    com_jacobian: FloatArray
+
+    @classmethod
+    def of(cls, motion: MotionSamples, mass: float) -> "WrenchSamples":
+        """``[m (c'' - g); c x m (c'' - g) + L']`` ([Qiu2012]_ 4.51) with its derivatives."""
+        rate = motion.momentum
+        force = rate.value[:, :3] - mass * GRAVITY_VECTOR
+        moment = rate.value[:, 3:] + np.cross(motion.com, force)
+        arm = skew(motion.com)
+        jacobians = [
+            np.concatenate([part[:, :3], part[:, 3:] + arm @ part[:, :3]], axis=1) for part in rate.jacobians
+        ]
+        tangent = motion.tangent[:, :6]
+        by_com = np.concatenate(
+            [motion.com_jacobian[:, :, :6] @ tangent, motion.com_jacobian[:, :, 6:]], axis=2
+        )
+        jacobians[0][:, 3:] -= skew(force) @ by_com
+        return cls(np.hstack([force, moment]), (jacobians[0], jacobians[1], jacobians[2]), by_com)
+
+
+def centre_of(stance: Stance) -> FloatArray:
+    """(3,) mean position of the contacts; the world origin without any [m]."""
+    return np.mean([contact.position for contact in stance], axis=0) if len(stance) else np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class WrenchCost:
+    """A convex function of wrenches with its second-order model.
+
+    Attributes:
+        value: (n,).
+        gradient: (n, 6).
+        curvature: (n, 6, 6) positive semi-definite.
+        by_com: (n, 3) derivative by the CoM at the same wrench.
+    """
+
+    value: FloatArray
+    gradient: FloatArray
+    curvature: FloatArray
+    by_com: FloatArray
+
+    def __add__(self, other: "WrenchCost") -> "WrenchCost":
+        return WrenchCost(
+            self.value + other.value, self.gradient + other.gradient, self.curvature + other.curvature,
+            self.by_com + other.by_com,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ForceShare:
+    """Contact forces of many samples of one stance.
+
+    Attributes:
+        magnitude: (n, g) of each generator [N, N.m].
+        missing: (n, 6) wrench that they do not supply, about the centre, moments divided by :data:`ARM` [N].
+        cost: Least value of the program at the wrenches about the world origin, with its derivatives.
+    """
+
+    magnitude: FloatArray
+    missing: FloatArray
+    cost: WrenchCost
+
+
+class RefinedForces:
+    """The contact forces that a stance can give.
+
+    Args:
+        stance: The contacts.
+        names: Effectors in the order of the contact variables' columns.
+
+    Attributes:
+        columns: (g,) column of each generator of forces.
+    """
+
+    def __init__(self, stance: Stance, names: tuple[str, ...]) -> None:
+        self.centre = centre_of(stance)
+        generators = ContactGenerators.of(stance)
+        columns = [names.index(contact.effector) for contact in stance]
+        scale = np.repeat([1.0, 1.0 / ARM], 3)
+        self._to_local = scale[:, None] * wrench_map(self.centre)
+        self._matrix = scale[:, None] * generators.about(self.centre)
+        self._limit = generators.upper
+        self.columns = np.array(columns, dtype=np.int64)[generators.contact]
+
+    def share(
+        self, wrench: FloatArray, variables: FloatArray, *, tolerance: float, force: float
+    ) -> ForceShare:
+        """Solve the program for many samples at once.
+
+        See :func:`~manikin.balance.contact_forces.share`. The gradient of the least value by ``b`` is the
+        multiplier of the wrench, its second derivative the inverse of Newton's matrix.
+
+        Args:
+            wrench: (n, 6) needed, about the world origin.
+            variables: (n, effectors) contact variables.
+            tolerance: ``s``, missing wrench that costs one unit [N].
+            force: ``1 / k``, force that costs one unit [N].
+        """
+        target = wrench @ self._to_local.T
+        gain = (force * np.maximum(variables, LEAST_VARIABLE)[:, self.columns]) ** 2
+        found = share(self._matrix, target, gain, tolerance**2, upper=self._limit)
+        magnitude, multiplier = found.magnitude, found.multiplier
+        value = 0.5 * tolerance**2 * np.sum(multiplier**2, axis=1)
+        value += 0.5 * np.sum(magnitude**2 / gain, axis=1)
+        curvature = self._to_local.T @ np.linalg.inv(found.system) @ self._to_local
+        cost = WrenchCost(value, multiplier @ self._to_local, curvature, np.zeros((len(value), 3)))
+        return ForceShare(magnitude, tolerance**2 * multiplier, cost)
+
+
+FLAT = 1.0
+"""Radius of the largest ball in a polytope below which it is flat: it has no inside to stay in [N.m]."""
+
+SHARE = 0.4
+"""Most of the largest margin of any wrench that is wanted as margin."""
+
+
+class MarginCost:
+    """The margin of one stance.
+
+    Args:
+        stance: The contacts with their caps.
+
+    Attributes:
+        polytope: Its wrenches about the mean contact point.
+        is_flat: Whether the stance's wrenches fill no volume, as without contacts or on two points.
+    """
+
+    def __init__(self, stance: Stance) -> None:
+        self._to_local = wrench_map(centre_of(stance))
+        self.polytope = wrench_polytope(stance, reference=centre_of(stance))
+        self.is_flat = self.polytope.inscribed_ball()[1] < FLAT
+
+    def wanted(self, margin: float, com: FloatArray) -> float:
+        """A wanted margin, or :data:`SHARE` of the largest one of any wrench when that is less [N.m].
+
+        Args:
+            margin: [N.m].
+            com: (3,) where the CoM is about, about which the moments are [m].
+        """
+        if self.is_flat:
+            return margin
+        return min(margin, SHARE * self.polytope.at_reference(com).inscribed_ball()[1])
+
+    def margin(self, wrench: FloatArray, com: FloatArray) -> FloatArray:
+        """(n,) margin about the CoM (n, 3) of wrenches (n, 6) about the world origin [N.m]."""
+        found = stability_margins(self.polytope, wrench @ self._to_local.T, com)
+        return found.wrench_about_com
+
+    def cost(
+        self, wrench: FloatArray, com: FloatArray, wanted: float, violation: float, softness: float
+    ) -> WrenchCost:
+        """Softened squares of what the distances to the facets lack, with derivatives by wrench and CoM.
+
+        Args:
+            wrench: (n, 6) about the world origin.
+            com: (n, 3) CoM [m].
+            wanted: Margin, see :meth:`wanted` [N.m].
+            violation: Missing margin that costs one unit [N.m].
+            softness: Width of the bend of the penalty [N.m].
+        """
+        n = len(wrench)
+        if self.is_flat:
+            return WrenchCost(np.zeros(n), np.zeros((n, 6)), np.zeros((n, 6, 6)), np.zeros((n, 3)))
+        H = self.polytope.H
+        arm = com - self.polytope.reference
+        length = wrench_levers(H, arm)
+        distance = self.polytope.distances(wrench @ self._to_local.T) / length
+        near = np.flatnonzero(np.any(distance < wanted + 6.0 * softness, axis=0))
+        rows, missing = H[near] @ self._to_local, (wanted - distance[:, near]) / softness
+        residual = softness * np.logaddexp(0.0, missing) / violation
+        length = length[:, near]
+        slope = expit(missing) / violation / length
+        # A row's length l has the derivative (H1 + H2 arm^) x H2 / l by the CoM.
+        moment = H[near, 3:]
+        at_com = H[near, :3] + cross(moment, arm[:, None, :])
+        by_length = residual * slope * distance[:, near] / length
+        outer = (rows[:, :, None] * rows[:, None, :]).reshape(len(near), 36)
+        return WrenchCost(
+            0.5 * np.sum(residual**2, axis=1),
+            (residual * slope) @ rows,
+            (slope**2 @ outer).reshape(n, 6, 6),
+            np.einsum("nf,nfc->nc", by_length, cross(at_com, moment)),
+        )

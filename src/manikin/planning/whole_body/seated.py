@@ -1,0 +1,124 @@
+"""Continue a motion on the seat: from the touch of the buttocks to sitting at rest.
+
+Once a body sits it hardly loses its balance, so [Qiu2012]_ 7.2.2 ends the centre-of-mass plan
+at the touch and moves hands and feet to their places without it.  Here the centre of mass of
+that part is planned as well, from the velocity of the touch to rest in a final sitting
+posture, but a whole body need only follow it loosely.
+"""
+
+from dataclasses import dataclass, replace
+
+from manikin.body import BodyModel
+from manikin.body.configuration import Configuration
+from manikin.contact import StanceSequence
+from manikin.kinematics import PostureProblem, PostureResult, generate_posture
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, Weights, plan_com
+from manikin.planning.whole_body.posture_style import READY
+from manikin.planning.whole_body.swing_planner import touch_pairs
+from manikin.scene import Proximity, Scene
+
+WEIGHTS = Weights(
+    margin=0.0,
+    smoothness=1.0,
+    duration=1.0,
+    velocity=(20.0, 20.0, 20.0),
+    acceleration=(0.1, 0.1, 0.1),
+    jerk=(1e-2, 1e-2, 1e-2),
+)
+"""Of the seated part: smooth, and not longer than it has to be."""
+
+CLEARANCES = (0.02, 0.0105)
+"""Distances that the final posture keeps to the scene [m], tried in order; within the body the
+last one."""
+
+
+LONGEST_SHARE = 2.0
+"""Longest duration of the seated part, in sums of its shortest phases."""
+
+
+@dataclass(frozen=True, eq=False)
+class SeatedContinuation:
+    """The part of a motion after the body has sat down.
+
+    Attributes:
+        trajectory: The whole motion: the given part, then the seated one, which does not bind.
+        posture: The final posture.
+        centroidal: The plan of the seated part; None where the final posture failed.
+        failure: Why there is no seated part, or None.
+    """
+
+    trajectory: CentroidalTrajectory | None
+    posture: PostureResult
+    centroidal: CentroidalResult | None
+    failure: str | None
+
+
+def continue_seated(
+    body: BodyModel, scene: Scene, trajectory: CentroidalTrajectory, phases: StanceSequence
+) -> SeatedContinuation:
+    """Plan the phases in which the body sits and join them to the trajectory that led there.
+
+    Args:
+        body: The body.
+        scene: The obstacles.
+        trajectory: Centre of mass up to the touch of the seat.
+        phases: The phases after it.
+    """
+    posture = final_posture(body, scene, phases, trajectory)
+    if not posture.succeeded:
+        return SeatedContinuation(None, posture, None, f"no final sitting posture: {posture.failure}")
+    end = trajectory.duration
+    problem = CentroidalProblem(
+        trajectory.mass,
+        phases,
+        trajectory.position(end),
+        Configuration(body, posture.q).com,
+        start_velocity=trajectory.velocity(end),
+        start_acceleration=trajectory.acceleration(end),
+        goal_acceleration=(0.0, 0.0, 0.0),
+        degree=trajectory.spline.degree,
+        weights=WEIGHTS,
+        max_duration=LONGEST_SHARE * sum(phase.min_duration for phase in phases),
+    )
+    result = plan_com(problem)
+    if result.trajectory is None:
+        reason = "not found" if result.failure is None else result.failure.reason
+        return SeatedContinuation(None, posture, result, f"no centre of mass on the seat: {reason}")
+    joined = replace(trajectory.followed_by(result.trajectory), binding_until=end)
+    return SeatedContinuation(joined, posture, result, None)
+
+
+def final_posture(
+    body: BodyModel, scene: Scene, phases: StanceSequence, trajectory: CentroidalTrajectory
+) -> PostureResult:
+    """The sitting posture on the contacts of the last phase, its centre of mass left free."""
+    contacts = tuple(phases[len(phases) - 1].stance)
+    pairs: set[tuple[str, str]] = set()
+    for contact in contacts:
+        pairs |= touch_pairs(body, scene, contact)
+    problem = PostureProblem(
+        body,
+        contacts,
+        proximity=Proximity(body, scene),
+        clearance=CLEARANCES[0],
+        self_clearance=CLEARANCES[-1],
+        ignore=frozenset(pairs),
+        reference=_sitting(body, trajectory.position(trajectory.duration)),
+    )
+    result = generate_posture(problem)
+    for clearance in CLEARANCES[1:]:
+        if not result.succeeded:
+            result = generate_posture(replace(problem, clearance=clearance))
+    return result
+
+
+def _sitting(body: BodyModel, com: FloatArray) -> FloatArray:
+    """(nq,) ready posture with bent hips and knees about a centre of mass."""
+    q = READY.posture(body)
+    for index, name in enumerate(body.joint_names):
+        for key, angle in (("hip_flexion", 1.4), ("knee_flexion", 1.3)):
+            if name.endswith(key):
+                q[7 + index] = angle
+    q[:3] = com
+    return q

@@ -1,0 +1,469 @@
+"""Find a smooth swing that keeps clear of everything: simple curves first, then a local optimisation.
+
+The first way of [Qiu2012]_ 6.2.3 to move a flying effector, made stronger: a small family of
+curves over one apex is tried from the least to the most effort; where none keeps the wanted
+clearance, the control points of the best one are moved by sequential quadratic programming
+(least squared jerk, linearised distances) until it does.  The Bi-RRT is for what remains.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import daqp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.planning.whole_body.swing_curve import (
+    RESTING,
+    SwingCurve,
+    SwingState,
+    basis,
+    block_rows,
+    jerk_energy,
+)
+from manikin.planning.whole_body.swing_path import Pose
+
+__all__ = [
+    "Clearance",
+    "SwingCheck",
+    "SwingCurve",
+    "SwingLimits",
+    "SwingPlan",
+    "SwingState",
+    "check_swing",
+    "plan_swing",
+    "required_clearance",
+]
+
+
+Clearance = Callable[[float, Pose], float]
+"""Signed distance [m] of an effector at a pose and a time [s] to everything it must not touch."""
+
+HEIGHTS = (0.06, 0.10, 0.15, 0.22, 0.30, 0.42, 0.56, 0.70)
+"""Apex heights above the higher end that are tried [m]."""
+
+LATERALS = (0.0, 0.10, -0.10, 0.20, -0.20)
+"""Lateral offsets of the apex that are tried [m]."""
+
+APEXES = (0.5, 0.4, 0.6)
+"""Shares of the duration at which the apex is passed that are tried."""
+
+COARSE = 13
+"""Instants at which a curve of the family is looked at before it is checked densely."""
+
+
+@dataclass(frozen=True)
+class SwingLimits:
+    """What a swing must keep.
+
+    Attributes:
+        clearance: Distance to everything once the effector is away from its two contacts [m].
+        speed: Largest linear speed [m/s].
+        angular_speed: Largest angular speed [rad/s].
+        departure: Clearance gained per metre moved away from a contact: near its ends the
+            effector may be as close to its surface as the contact itself, and must have
+            gained this share of the distance travelled.
+        time_step: Spacing of the instants that are checked [s].
+    """
+
+    clearance: float = 0.025
+    speed: float = 3.0
+    angular_speed: float = 8.0
+    departure: float = 0.5
+    time_step: float = 0.004
+
+    def __post_init__(self) -> None:
+        finite_number(self.clearance, "swing limits clearance [m]", at_least=0.0)
+        finite_number(self.speed, "swing limits speed [m/s]", above=0.0)
+        finite_number(self.angular_speed, "swing limits angular_speed [rad/s]", above=0.0)
+        finite_number(self.departure, "swing limits departure", at_least=0.0, at_most=1.0)
+        finite_number(self.time_step, "swing limits time_step [s]", above=0.0)
+
+
+@dataclass(frozen=True)
+class SwingCheck:
+    """How a curve stands against its limits.
+
+    Attributes:
+        slack: Smallest distance minus the distance required there [m]; negative is too close.
+        slack_time: When [s].
+        clearance: Smallest distance while away from the two contacts [m].
+        speed: Peak speed [m/s].
+        angular_speed: Peak angular speed [rad/s].
+        failure: None, or what is not kept, where and when.
+    """
+
+    slack: float
+    slack_time: float
+    clearance: float
+    speed: float
+    angular_speed: float
+    failure: str | None
+
+    @property
+    def kept(self) -> bool:
+        """Whether every limit is kept."""
+        return self.failure is None
+
+
+@dataclass(frozen=True, eq=False)
+class SwingPlan:
+    """Result of :func:`plan_swing`.
+
+    Attributes:
+        curve: The curve found, or the best attempt when none keeps the limits.
+        check: How it stands against the limits.
+        candidates: Curves of the family that were tried.
+        refinements: Iterations of the optimisation.
+    """
+
+    curve: SwingCurve
+    check: SwingCheck
+    candidates: int = 0
+    refinements: int = 0
+    limits: SwingLimits = field(default_factory=SwingLimits)
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the curve keeps every limit."""
+        return self.check.kept
+
+    @property
+    def failure(self) -> str | None:
+        """What the best attempt does not keep, or None."""
+        return self.check.failure
+
+
+def plan_swing(
+    start: Pose,
+    goal: Pose,
+    start_time: float,
+    end_time: float,
+    clearance: Clearance,
+    *,
+    limits: SwingLimits | None = None,
+    start_normal: ArrayLike = (0.0, 0.0, 1.0),
+    end_normal: ArrayLike = (0.0, 0.0, 1.0),
+    pitch: float = 0.0,
+    refine: int = 20,
+    controls: int = 20,
+    heights: Sequence[float] = HEIGHTS,
+) -> SwingPlan:
+    """Find a smooth flight from ``start`` to ``goal`` that keeps clear.
+
+    Args:
+        start: Pose at lift-off.
+        goal: Pose at touch-down.
+        start_time: Lift-off [s].
+        end_time: Touch-down [s].
+        clearance: Signed distance of the effector at a time and pose [m].
+        limits: What to keep.
+        start_normal: (3,) normal of the surface that is left.
+        end_normal: (3,) normal of the surface that is reached.
+        pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
+        refine: Largest number of iterations of the optimisation; 0 tries the family only.
+        controls: Number of control poses of the curves.
+        heights: Apex heights above the higher end that are tried [m].
+
+    Returns:
+        A plan that says whether it succeeded and, if not, what its best attempt breaks.
+
+    Raises:
+        InputError: If the times or normals are not usable.
+    """
+    limits = limits or SwingLimits()
+    normals = (
+        frozen_array(start_normal, "swing start_normal", (3,)),
+        frozen_array(end_normal, "swing end_normal", (3,)),
+    )
+    if end_time <= start_time:
+        raise InputError(f"swing ends at {end_time} s; valid: after its start at {start_time} s")
+    family = (
+        SwingCurve.lift(
+            start, goal, start_time, end_time, height=height, lateral=lateral, apex=apex,
+            start_normal=normals[0], end_normal=normals[1], pitch=pitch, controls=controls,
+        )
+        for height, lateral, apex in _choices(heights)
+    )  # fmt: skip
+    best, best_check, tried = _first_clear(family, clearance, limits)
+    best, best_check, iterations = _refine(best, best_check, clearance, limits, normals, refine)
+    return SwingPlan(best, best_check, tried, iterations, limits)
+
+
+def check_swing(
+    curve: SwingCurve, clearance: Clearance, limits: SwingLimits, *, instants: int | None = None
+) -> SwingCheck:
+    """Measure a curve against its limits, densely in time.
+
+    Args:
+        curve: The flight.
+        clearance: Signed distance of the effector at a time and pose [m].
+        limits: What to keep.
+        instants: How many instants to look at; every ``limits.time_step`` when omitted.
+    """
+    state = curve.evaluate(_instants(curve, limits, instants))
+    distance = _distances(state, clearance)
+    required = _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
+    slack = (distance - required)[1:-1]  # at the contacts themselves it is zero by definition
+    worst = int(np.argmin(slack)) + 1
+    in_flight = required >= limits.clearance
+    smallest = float(distance[in_flight].min() if np.any(in_flight) else distance[1:-1].min())
+    failure = None
+    if slack[worst - 1] < -TOLERANCE:
+        place = ", ".join(f"{x:.3f}" for x in state.position[worst])
+        failure = (
+            f"clearance is {distance[worst]:.4f} m at t = {state.time[worst]:.3f} s with the effector at "
+            f"[{place}]; required {required[worst]:.4f} m"
+        )
+    else:
+        failure = _hurry(curve, limits)
+    return SwingCheck(
+        float(slack[worst - 1]), float(state.time[worst]), smallest,
+        curve.peak_speed, curve.peak_angular_speed, failure,
+    )  # fmt: skip
+
+
+def _hurry(curve: SwingCurve, limits: SwingLimits) -> str | None:
+    """Which speed is above its limit, if one is."""
+    if curve.peak_speed > limits.speed:
+        return f"speed reaches {curve.peak_speed:.2f} m/s; limit {limits.speed:.2f} m/s"
+    if curve.peak_angular_speed > limits.angular_speed:
+        return (
+            f"angular speed reaches {curve.peak_angular_speed:.2f} rad/s; "
+            f"limit {limits.angular_speed:.2f} rad/s"
+        )
+    return None
+
+
+def _first_clear(
+    family: Iterator[SwingCurve], clearance: Clearance, limits: SwingLimits
+) -> tuple[SwingCurve, SwingCheck, int]:
+    """First curve that keeps the limits, or else the first of those nearest to clear; how many were tried.
+
+    A curve is given up at the first instant at which it is too near and no better than the best one before
+    it. Instants at which curves were given up are looked at first.
+    """
+    best, least, tried = None, -np.inf, 0
+    coarse, dense = _Slack(clearance, limits, COARSE), _Slack(clearance, limits)
+    for curve in family:
+        tried += 1
+        slack = coarse.least(curve, least)
+        if slack >= -TOLERANCE and _hurry(curve, limits) is None:
+            slack = dense.least(curve, least)
+            if slack >= -TOLERANCE:
+                return curve, check_swing(curve, clearance, limits), tried
+        if best is None or min(slack, 0.0) > least:
+            best, least = curve, min(slack, 0.0)
+    assert best is not None  # a family has members
+    return best, check_swing(best, clearance, limits), tried
+
+
+class _Slack:
+    """Smallest slack of curves over the same instants, those first that were the nearest before.
+
+    Args:
+        clearance: Signed distance of the effector at a time and pose [m].
+        limits: What to keep.
+        count: Of the instants; every ``limits.time_step`` when omitted.
+    """
+
+    def __init__(self, clearance: Clearance, limits: SwingLimits, count: int | None = None) -> None:
+        self._clearance, self._limits, self._count = clearance, limits, count
+        self._order: list[int] = []
+
+    def least(self, curve: SwingCurve, known: float) -> float:
+        """Smallest slack [m]; of what is neither clear nor better than ``known``, the first that shows it."""
+        state = curve.evaluate(_instants(curve, self._limits, self._count))
+        last = len(state.time) - 1
+        self._order = self._order or list(range(1, last))
+        at_contact = self._distance(state, 0), self._distance(state, last)
+        required = _required(curve, state, at_contact, self._limits)
+        smallest, enough = np.inf, min(known + TOLERANCE, -TOLERANCE)
+        for place, index in enumerate(self._order):
+            smallest = min(smallest, self._distance(state, index) - float(required[index]))
+            if smallest < enough:
+                self._order.insert(0, self._order.pop(place))
+                break
+        return smallest
+
+    def _distance(self, state: SwingState, index: int) -> float:
+        return self._clearance(float(state.time[index]), Pose(state.position[index], state.rotation[index]))
+
+
+def _choices(heights: Sequence[float]) -> list[tuple[float, float, float]]:
+    """Heights, lateral offsets and apexes of the family, from the least to the most effort."""
+    return sorted(
+        itertools.product(heights, LATERALS, APEXES),
+        key=lambda choice: choice[0] + 0.5 * abs(choice[1]) + 0.2 * abs(choice[2] - 0.5),
+    )
+
+
+def _instants(curve: SwingCurve, limits: SwingLimits, count: int | None = None) -> FloatArray:
+    count = count or max(33, int(np.ceil(curve.duration / limits.time_step)) + 1)
+    return np.linspace(curve.start_time, curve.end_time, count)
+
+
+def _distances(state: SwingState, clearance: Clearance) -> FloatArray:
+    poses = zip(state.time, state.position, state.rotation, strict=True)
+    return np.array([clearance(float(t), Pose(p, r)) for t, p, r in poses])
+
+
+def required_clearance(
+    moved: tuple[FloatArray, FloatArray], at_contact: tuple[float, float], limits: SwingLimits
+) -> FloatArray:
+    """Distance wanted: the full one in flight, less near the two contacts.
+
+    Args:
+        moved: (k,) distances from the pose at lift-off and from the one at touch-down [m].
+        at_contact: Clearances at these two poses [m].
+        limits: Clearance in flight and how it is gained.
+    """
+    wanted = np.full(len(moved[0]), limits.clearance)
+    for away, contact in zip(moved, at_contact, strict=True):
+        wanted = np.minimum(wanted, contact + limits.departure * away)
+    return wanted
+
+
+def _required(
+    curve: SwingCurve, state: SwingState, at_contact: tuple[float, float], limits: SwingLimits
+) -> FloatArray:
+    """Distance wanted at each instant of a curve, from those at its two contacts."""
+    from_start = np.linalg.norm(state.position - curve.start.position, axis=1)
+    to_end = np.linalg.norm(state.position - curve.end.position, axis=1)
+    return required_clearance((from_start, to_end), at_contact, limits)
+
+
+def _refine(
+    best: SwingCurve,
+    best_check: SwingCheck,
+    clearance: Clearance,
+    limits: SwingLimits,
+    normals: tuple[FloatArray, FloatArray],
+    iterations: int,
+) -> tuple[SwingCurve, SwingCheck, int]:
+    """Move the control points until the curve keeps clear, at the least squared jerk."""
+    n = len(best.control_position)
+    free = _free_directions(normals, n)
+    curve, done = best, 0
+    while done < iterations:
+        done += 1
+        step = _best_step(curve, clearance, limits, free)
+        moved = curve.control_position + (free @ step).reshape(n, 3)
+        curve = SwingCurve(curve.start_time, curve.end_time, moved, curve.control_rotation)
+        check = check_swing(curve, clearance, limits)
+        if _rank(curve, check) > _rank(best, best_check):
+            best, best_check = curve, check
+        if np.abs(step).max() < (SETTLED if check.kept else STATIONARY):
+            break
+    return best, best_check, done
+
+
+def _rank(curve: SwingCurve, check: SwingCheck) -> tuple[bool, float]:
+    """Order of preference: a curve that keeps the limits, then the least effort or the least violation."""
+    return check.kept, -curve.effort if check.kept else check.slack
+
+
+def _free_directions(normals: tuple[FloatArray, FloatArray], n: int) -> FloatArray:
+    """(3n, f) directions in which the control points may move: all inner ones, the lifts along the normal."""
+    columns = []
+    for index in range(RESTING, n - RESTING):
+        lifts = {RESTING: normals[0], n - RESTING - 1: normals[1]}
+        block = lifts[index][:, None] / np.linalg.norm(lifts[index]) if index in lifts else np.eye(3)
+        column = np.zeros((n, 3, block.shape[1]))
+        column[index] = block
+        columns.append(column.reshape(3 * n, -1))
+    return np.hstack(columns)
+
+
+UNIT_JERK = 720.0
+"""Least integral of squared jerk of a rest-to-rest flight of 1 m in 1 s: the unit of effort."""
+
+TRUST = 0.05
+"""Largest change of a control coordinate in one iteration [m]."""
+
+ROW_STEP = 0.012
+"""Spacing of the instants at which the optimisation linearises the distances [s]."""
+
+SETTLED = 0.004
+"""Change of the control coordinates below which the optimisation stops [m]."""
+
+STATIONARY = 1e-5
+"""The same where no curve keeps the limits: another iteration would lead to the same curve [m]."""
+
+TOLERANCE = 1e-5
+"""Accuracy expected of measured distances [m]."""
+
+BUFFER = 0.003
+"""Aimed at beyond the required clearance, for what lies between the samples [m]."""
+
+
+def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, free: FloatArray) -> FloatArray:
+    """One quadratic programme: least squared jerk under linearised distances and speeds."""
+    n = len(curve.control_position)
+    energy = block_rows(jerk_energy(n) / UNIT_JERK)
+    distance_rows, distance_lower = _distance_rows(curve, clearance, limits)
+    speed_rows, speed_lower = _speed_rows(curve, limits)
+    rows = np.vstack([distance_rows, speed_rows]) @ free
+    lower = np.concatenate([distance_lower, speed_lower])
+    count = free.shape[1]
+    # One last unknown: the worst violation, costly but allowed.
+    hessian = np.zeros((count + 1, count + 1))
+    hessian[:count, :count] = free.T @ energy @ free + 1e-6 * np.eye(count)
+    hessian[count, count] = 1.0
+    gradient = np.concatenate([free.T @ (energy @ curve.control_position.ravel()), [1e3]])
+    matrix = np.hstack([rows, np.ones((len(rows), 1))])
+    bounds_upper = np.concatenate([np.full(count, TRUST), [1e3]])
+    bounds_lower = np.concatenate([np.full(count, -TRUST), [0.0]])
+    solution, _, flag, _ = daqp.solve(
+        np.ascontiguousarray(hessian),
+        gradient,
+        np.ascontiguousarray(matrix),
+        np.concatenate([bounds_upper, np.full(len(rows), 1e30)]),
+        np.concatenate([bounds_lower, lower]),
+        np.zeros(count + 1 + len(rows), dtype=np.int32),
+    )
+    return np.asarray(solution[:count]) if flag > 0 else np.zeros(count)
+
+
+def _distance_rows(
+    curve: SwingCurve, clearance: Clearance, limits: SwingLimits
+) -> tuple[FloatArray, FloatArray]:
+    """Rows G and bounds l of ``G dx >= l`` from the distances near the required ones."""
+    state = curve.evaluate(_instants(curve, limits, max(33, int(curve.duration / ROW_STEP))))
+    distance = _distances(state, clearance)
+    required = _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
+    weights = basis((state.time - curve.start_time) / curve.duration, len(curve.control_position))
+    rows, lower = [], []
+    for index in np.flatnonzero(distance - required < 0.1)[1:-1]:
+        pose = Pose(state.position[index], state.rotation[index])
+        slope = _slope(clearance, float(state.time[index]), pose, float(distance[index]))
+        rows.append(np.kron(weights[index], slope))
+        # Near its contacts the effector cannot have gained the whole buffer yet.
+        buffer = BUFFER * min(1.0, max(0.0, required[index]) / max(limits.clearance, BUFFER))
+        lower.append(required[index] + buffer - distance[index])
+    if not rows:
+        return np.zeros((0, 3 * len(curve.control_position))), np.zeros(0)
+    return np.array(rows), np.array(lower)
+
+
+def _slope(clearance: Clearance, time: float, pose: Pose, distance: float) -> FloatArray:
+    """Gradient of the clearance with the position, by forward differences."""
+    step = 1e-4
+    moved = (Pose(pose.position + step * axis, pose.rotation) for axis in np.eye(3))
+    return np.array([(clearance(time, other) - distance) / step for other in moved])
+
+
+def _speed_rows(curve: SwingCurve, limits: SwingLimits) -> tuple[FloatArray, FloatArray]:
+    """Rows and bounds that keep the speed, linearised along the current velocity."""
+    share = np.linspace(0.0, 1.0, 41)
+    weights = basis(share, len(curve.control_position), 1) / curve.duration
+    velocity = weights @ curve.control_position
+    speed = np.linalg.norm(velocity, axis=1)
+    fast = np.flatnonzero(speed > 0.7 * limits.speed)
+    rows = [np.kron(weights[i], -velocity[i] / speed[i]) for i in fast]
+    # In metres per a tenth of a second: comparable with the distances in the shared violation.
+    matrix = 0.1 * np.array(rows).reshape(len(fast), 3 * len(curve.control_position))
+    return matrix, 0.1 * (speed[fast] - 0.98 * limits.speed)

@@ -1,0 +1,432 @@
+"""A smooth flight of an effector between two poses, in closed form.
+
+Positions are a clamped B-spline of degree 5 on uniform knots, rotations the cumulative
+B-spline of the same degree on SO(3) ([Kim1995]_: products of exponentials, so a turn about
+one axis is exactly the shortest rotation, SLERP).  Both are four times continuously
+differentiable.  The first four and the last four control poses are equal, so velocity,
+acceleration and jerk vanish at both ends; the fifth one from either end lies on the
+surface normal, so the curve leaves and meets the surface along its normal.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BSpline
+from scipy.spatial.transform import Rotation
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, cross, finite_number, frozen_array
+from manikin.planning.whole_body.swing_path import EffectorPath, Pose
+
+DEGREE = 5
+"""Degree of the curves: four continuous derivatives."""
+
+RESTING = 4
+"""Equal control poses at each end: velocity, acceleration and jerk are zero there."""
+
+MIN_CONTROLS = 2 * RESTING + 2
+"""Fewest control poses: the resting ones and one normal lift at each end."""
+
+
+@dataclass(frozen=True, eq=False)
+class SwingState:
+    """An effector's motion at some instants, in the world frame.
+
+    Attributes:
+        time: (k,) [s].
+        position: (k, 3) [m].
+        rotation: (k, 3, 3) effector-to-world.
+        velocity: (k, 3) [m/s].
+        angular_velocity: (k, 3) [rad/s].
+        acceleration: (k, 3) [m/s^2].
+        angular_acceleration: (k, 3) [rad/s^2].
+    """
+
+    time: FloatArray
+    position: FloatArray
+    rotation: FloatArray
+    velocity: FloatArray
+    angular_velocity: FloatArray
+    acceleration: FloatArray
+    angular_acceleration: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class SwingCurve:
+    """A flight from rest to rest, C4 in time.
+
+    Use :meth:`through`, :meth:`lift` or :meth:`along` to make one.
+
+    Attributes:
+        start_time: Lift-off [s].
+        end_time: Touch-down [s].
+        control_position: (n, 3) control points [m].
+        control_rotation: (n, 3, 3) control rotations, effector-to-world.
+    """
+
+    start_time: float
+    end_time: float
+    control_position: FloatArray
+    control_rotation: FloatArray
+
+    def __post_init__(self) -> None:
+        start = finite_number(self.start_time, "swing start_time [s]")
+        finite_number(self.end_time, "swing end_time [s]", above=start)
+        positions = frozen_array(self.control_position, "swing control_position [m]", (None, 3))
+        n = len(positions)
+        if n < MIN_CONTROLS:
+            raise InputError(f"swing has {n} control poses; valid: at least {MIN_CONTROLS}")
+        object.__setattr__(self, "control_position", positions)
+        object.__setattr__(
+            self, "control_rotation", frozen_array(self.control_rotation, "swing control_rotation", (n, 3, 3))
+        )
+
+    @classmethod
+    def through(
+        cls,
+        start: Pose,
+        goal: Pose,
+        start_time: float,
+        end_time: float,
+        via: Sequence[tuple[float, ArrayLike]] = (),
+        *,
+        start_normal: ArrayLike = (0.0, 0.0, 1.0),
+        end_normal: ArrayLike = (0.0, 0.0, 1.0),
+        pitch: float = 0.0,
+        controls: int = 20,
+    ) -> "SwingCurve":
+        """Smoothest curve (least integral of squared jerk) from ``start`` to ``goal`` through via-points.
+
+        The rotation follows the shortest turn with the timing of a straight flight.
+
+        Args:
+            start: Pose at lift-off.
+            goal: Pose at touch-down.
+            start_time: Lift-off [s].
+            end_time: Touch-down [s].
+            via: Points to pass: share of the duration in (0, 1) and (3,) position [m].
+            start_normal: (3,) surface normal along which the curve leaves.
+            end_normal: (3,) surface normal along which it arrives, reversed.
+            pitch: Extra turn about the effector's own y axis in early flight, toes down when
+                positive [rad], as of a foot whose heel comes up first.
+            controls: Number of control poses.
+
+        Raises:
+            InputError: If a via-point or a time is not usable or there are too many via-points.
+        """
+        shares = [finite_number(share, "via-point share", above=0.0, at_most=1.0) for share, _ in via]
+        points = [frozen_array(point, "via-point [m]", (3,)) for _, point in via]
+        if len(via) > controls - MIN_CONTROLS:
+            raise InputError(f"swing has {len(via)} via-points; valid: at most {controls - MIN_CONTROLS}")
+        ends = end_conditions(start.position, goal.position, start_normal, end_normal, controls)
+        through = block_rows(basis(np.asarray(shares, dtype=np.float64), controls))
+        matrix = np.vstack([ends[0], through])
+        target = np.concatenate([ends[1], *points])
+        positions = _least_norm(jerk_energy(controls), matrix, target)
+        rotations = _turning(start.rotation, goal.rotation, pitch, controls)
+        return cls(start_time, end_time, positions, rotations)
+
+    @classmethod
+    def lift(
+        cls,
+        start: Pose,
+        goal: Pose,
+        start_time: float,
+        end_time: float,
+        *,
+        height: float = 0.08,
+        lateral: float = 0.0,
+        apex: float = 0.5,
+        start_normal: ArrayLike = (0.0, 0.0, 1.0),
+        end_normal: ArrayLike = (0.0, 0.0, 1.0),
+        pitch: float = 0.0,
+        controls: int = 20,
+    ) -> "SwingCurve":
+        """Curve over one apex.
+
+        Args:
+            start: Pose at lift-off.
+            goal: Pose at touch-down.
+            start_time: Lift-off [s].
+            end_time: Touch-down [s].
+            height: Of the apex above the higher end, along the mean normal [m].
+            lateral: Offset of the apex to the left of the travel, seen from above [m].
+            apex: Share of the duration at which the apex is passed.
+            start_normal: (3,) surface normal at lift-off.
+            end_normal: (3,) surface normal at touch-down.
+            pitch: As for :meth:`through` [rad].
+            controls: Number of control poses.
+        """
+        up, left = _flight_axes(start.position, goal.position, start_normal, end_normal)
+        share = 0.5 + 0.6 * (apex - 0.5)  # where along the way: close to the middle even for early apexes
+        middle = (1.0 - share) * start.position + share * goal.position
+        top = max(float(up @ start.position), float(up @ goal.position)) + height
+        point = middle + (top - float(up @ middle)) * up + lateral * left
+        return cls.through(
+            start, goal, start_time, end_time, [(apex, point)],
+            start_normal=start_normal, end_normal=end_normal, pitch=pitch, controls=controls,
+        )  # fmt: skip
+
+    @classmethod
+    def along(cls, path: EffectorPath, controls: int = 20, sharpening: int = 0) -> "SwingCurve":
+        """Curve that follows a polyline of timed poses, rounding its corners.
+
+        The control poses are taken from the path (Schoenberg's variation-diminishing
+        approximation): the curve has no more wiggles than the path, stays in the convex hull
+        of any few neighbouring control points and converges to the path as ``controls`` grows.
+
+        Args:
+            path: Timed poses, as found by the Bi-RRT.
+            controls: Number of control poses; fewer are smoother, more are closer.
+            sharpening: How often the remaining offset from the path is added to the control
+                points; the curve then passes ever closer to the corners, swinging around
+                them on the outside rather than cutting them.
+        """
+        if controls < MIN_CONTROLS:
+            raise InputError(f"swing has {controls} control poses; valid: at least {MIN_CONTROLS}")
+        places = _greville(controls)
+        first, last = places[RESTING - 1], places[-RESTING]
+        shares = np.clip((places - first) / (last - first), 0.0, 1.0)
+        target, rotation = path.sample(path.time[0] + shares * path.duration)
+        inner, weights = slice(RESTING, controls - RESTING), basis(places, controls)
+        position = target.copy()
+        for _ in range(sharpening):
+            position[inner] += (target - weights @ position)[inner]
+        return cls(float(path.time[0]), float(path.time[-1]), position, rotation)
+
+    @property
+    def duration(self) -> float:
+        """Time of flight [s]."""
+        return self.end_time - self.start_time
+
+    @property
+    def start(self) -> Pose:
+        """Pose at lift-off."""
+        return Pose(self.control_position[0], self.control_rotation[0])
+
+    @property
+    def end(self) -> Pose:
+        """Pose at touch-down."""
+        return Pose(self.control_position[-1], self.control_rotation[-1])
+
+    def evaluate(self, time: ArrayLike) -> SwingState:
+        """Pose, velocity and acceleration at the given times; at rest before and after the flight.
+
+        Args:
+            time: Scalar or (k,) [s].
+        """
+        times = np.atleast_1d(np.asarray(time, dtype=np.float64))
+        share = np.clip((times - self.start_time) / self.duration, 0.0, 1.0)
+        rate = 1.0 / self.duration
+        weights = [basis(share, len(self.control_position), order) * rate**order for order in range(3)]
+        rotation, angular_velocity, angular_acceleration = self._turn(weights)
+        return SwingState(
+            times,
+            weights[0] @ self.control_position,
+            rotation,
+            weights[1] @ self.control_position,
+            angular_velocity,
+            weights[2] @ self.control_position,
+            angular_acceleration,
+        )
+
+    def at(self, time: float) -> Pose:
+        """Pose at one time [s]."""
+        state = self.evaluate(time)
+        return Pose(state.position[0], state.rotation[0])
+
+    @cached_property
+    def peak_speed(self) -> float:
+        """Largest linear speed [m/s], sampled at 1 % of the flight."""
+        return float(np.linalg.norm(self._dense.velocity, axis=1).max())
+
+    @cached_property
+    def peak_angular_speed(self) -> float:
+        """Largest angular speed [rad/s], sampled at 1 % of the flight."""
+        return float(np.linalg.norm(self._dense.angular_velocity, axis=1).max())
+
+    @cached_property
+    def peak_acceleration(self) -> float:
+        """Largest linear acceleration [m/s^2], sampled at 1 % of the flight."""
+        return float(np.linalg.norm(self._dense.acceleration, axis=1).max())
+
+    @cached_property
+    def effort(self) -> float:
+        """Root mean square of the linear acceleration over the flight [m/s^2]."""
+        return float(np.sqrt(np.mean(np.sum(self._dense.acceleration**2, axis=1))))
+
+    @cached_property
+    def _dense(self) -> SwingState:
+        return self.evaluate(np.linspace(self.start_time, self.end_time, 101))
+
+    def _turn(self, weights: list[FloatArray]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rotation, angular velocity and acceleration in the world from the basis and its rates."""
+        count = len(weights[0])
+        rotation = np.broadcast_to(self.control_rotation[0], (count, 3, 3)).copy()
+        velocity, acceleration = np.zeros((count, 3)), np.zeros((count, 3))  # in the turning frame
+        relative = np.swapaxes(self.control_rotation[:-1], 1, 2) @ self.control_rotation[1:]
+        turns = Rotation.from_matrix(relative).as_rotvec()
+        turning = np.flatnonzero(np.any(np.abs(turns) > 1e-14, axis=1))
+        # Cumulative basis: the sum of the basis functions from this control pose on.
+        shares = [[w[:, index + 1 :].sum(axis=1)[:, None] for w in weights] for index in turning]
+        angles = np.array([b * turns[index] for index, (b, _, _) in zip(turning, shares, strict=True)])
+        steps = Rotation.from_rotvec(angles.reshape(-1, 3)).as_matrix().reshape(-1, count, 3, 3)
+        for index, step, (_, b1, b2) in zip(turning, steps, shares, strict=True):
+            turn = turns[index]
+            carried = np.einsum("kji,kj->ki", step, velocity)
+            acceleration = np.einsum("kji,kj->ki", step, acceleration) + cross(carried, b1 * turn) + b2 * turn
+            velocity = carried + b1 * turn
+            rotation = rotation @ step
+        return (
+            rotation,
+            np.einsum("kij,kj->ki", rotation, velocity),
+            np.einsum("kij,kj->ki", rotation, acceleration),
+        )
+
+
+def basis(share: FloatArray, controls: int, derivative: int = 0) -> FloatArray:
+    """(k, controls) B-spline basis on [0, 1], or its derivative by the share of the duration."""
+    if not len(share):
+        return np.zeros((0, controls))
+    return _spline(controls, derivative)(share)
+
+
+@lru_cache(maxsize=256)
+def _spline(controls: int, derivative: int) -> BSpline:
+    spline = BSpline(_knots(controls), np.eye(controls), DEGREE)
+    return spline.derivative(derivative) if derivative else spline
+
+
+def _knots(controls: int) -> FloatArray:
+    inner = np.linspace(0.0, 1.0, controls - DEGREE + 1)
+    return np.concatenate([np.zeros(DEGREE), inner, np.ones(DEGREE)])
+
+
+def _greville(controls: int) -> FloatArray:
+    """Where each control point acts: averages of DEGREE neighbouring knots."""
+    knots = _knots(controls)
+    return np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(controls)])
+
+
+@lru_cache(maxsize=64)
+def jerk_energy(controls: int) -> FloatArray:
+    """(controls, controls) matrix of the integral of squared jerk over a unit duration."""
+    nodes, weights = np.polynomial.legendre.leggauss(3)  # exact: the squared jerk has degree 4
+    edges = np.linspace(0.0, 1.0, controls - DEGREE + 1)
+    middle, half = (edges[1:] + edges[:-1]) / 2, (edges[1:] - edges[:-1]) / 2
+    share = (middle[:, None] + half[:, None] * nodes).ravel()
+    rows = basis(share, controls, 3)
+    energy = rows.T @ ((half[:, None] * weights).ravel()[:, None] * rows)
+    energy.setflags(write=False)
+    return energy
+
+
+def end_conditions(
+    start: FloatArray, goal: FloatArray, start_normal: ArrayLike, end_normal: ArrayLike, controls: int
+) -> tuple[FloatArray, FloatArray]:
+    """Matrix (8 x 3 + 4, 3 controls) and target that put the end control points where they belong.
+
+    The unknowns are the control points, flattened row by row.
+    """
+    rows: list[FloatArray] = []
+    target: list[FloatArray] = []
+    sides = ((range(RESTING), start, start_normal), (range(controls - RESTING, controls), goal, end_normal))
+    for indices, point, _ in sides:
+        for index in indices:
+            rows.append(_select(index, np.eye(3), controls))
+            target.append(point)
+    for index, point, normal in ((RESTING, start, start_normal), (controls - RESTING - 1, goal, end_normal)):
+        across = normal_tangents(normal)
+        rows.append(_select(index, across, controls))
+        target.append(across @ point)
+    return np.vstack(rows), np.concatenate(target)
+
+
+def block_rows(weights: FloatArray) -> FloatArray:
+    """(3k, 3n) weights for control points flattened row by row, from (k, n) weights of one coordinate."""
+    return np.asarray(np.kron(weights, np.eye(3)), dtype=np.float64)
+
+
+def _select(index: int, block: FloatArray, controls: int) -> FloatArray:
+    rows = np.zeros((len(block), 3 * controls))
+    rows[:, 3 * index : 3 * index + 3] = block
+    return rows
+
+
+def normal_tangents(normal: ArrayLike) -> FloatArray:
+    """(2, 3) orthonormal directions across a normal."""
+    n = frozen_array(normal, "surface normal", (3,))
+    length = float(np.linalg.norm(n))
+    if length < 1e-12:
+        raise InputError(f"surface normal is {n.tolist()}; valid: a direction that is not zero")
+    n = n / length
+    helper = np.eye(3)[int(np.argmin(np.abs(n)))]
+    first = np.cross(n, helper)
+    first = first / np.linalg.norm(first)
+    return np.array([first, np.cross(n, first)], dtype=np.float64)
+
+
+def _least_norm(energy: FloatArray, matrix: FloatArray, target: FloatArray) -> FloatArray:
+    """Control points (n, 3) of least energy among those that meet ``matrix x = target``."""
+    gain = _least_norm_gain(len(energy), energy.tobytes(), matrix.tobytes())
+    return (gain @ target).reshape(len(energy), 3)
+
+
+@lru_cache(maxsize=64)
+def _least_norm_gain(n: int, energy_bytes: bytes, matrix_bytes: bytes) -> FloatArray:
+    """(3n, m) linear map from the targets to the control points of least energy; cached by its matrices."""
+    energy = np.frombuffer(energy_bytes).reshape(n, n)
+    matrix = np.frombuffer(matrix_bytes).reshape(-1, 3 * n)
+    hessian = block_rows(energy / np.trace(energy)) + 1e-12 * np.eye(3 * n)
+    m = len(matrix)
+    system = np.block([[hessian, matrix.T], [matrix, np.zeros((m, m))]])
+    targets = np.vstack([np.zeros((3 * n, m)), np.eye(m)])
+    return np.asarray(np.linalg.solve(system, targets)[: 3 * n], dtype=np.float64)
+
+
+PITCH_DECLINE = 2.0
+"""How much longer the extra pitch takes to fade than to grow: it peaks at a third of the turn."""
+
+
+def _turning(start: FloatArray, goal: FloatArray, pitch: float, controls: int) -> FloatArray:
+    """Control rotations of the shortest turn, timed like a straight flight, and the extra pitch."""
+    share = _straight_shares(controls)
+    turn = Rotation.from_matrix(start.T @ goal).as_rotvec()
+    peak = 1.0 / (1.0 + PITCH_DECLINE)
+    bell = share * (1.0 - share) ** PITCH_DECLINE / (peak * (1.0 - peak) ** PITCH_DECLINE)
+    straight = Rotation.from_rotvec(share[:, None] * turn)
+    nod = Rotation.from_rotvec(bell[:, None] * np.array([0.0, pitch, 0.0]))
+    rotations = start @ (straight * nod).as_matrix()
+    rotations[: RESTING + 1], rotations[-RESTING - 1 :] = start, goal
+    return rotations
+
+
+@lru_cache(maxsize=64)
+def _straight_shares(controls: int) -> FloatArray:
+    """(controls,) control values of the smoothest flight from 0 to 1, with one more resting at each end."""
+    matrix = np.zeros((2 * RESTING + 2, controls))
+    resting = RESTING + 1
+    matrix[:resting, :resting] = np.eye(resting)
+    matrix[resting:, controls - resting :] = np.eye(resting)
+    target = np.concatenate([np.zeros(resting), np.ones(resting)])
+    energy = jerk_energy(controls)
+    system = np.block([[energy / np.trace(energy), matrix.T], [matrix, np.zeros((len(target), len(target)))]])
+    solution = np.linalg.lstsq(system, np.concatenate([np.zeros(controls), target]), rcond=None)[0]
+    shares = np.asarray(np.clip(solution[:controls], 0.0, 1.0), dtype=np.float64)
+    shares.setflags(write=False)
+    return shares
+
+
+def _flight_axes(
+    start: FloatArray, goal: FloatArray, start_normal: ArrayLike, end_normal: ArrayLike
+) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors up (mean normal) and left of the travel."""
+    up = np.asarray(start_normal, dtype=np.float64) + np.asarray(end_normal, dtype=np.float64)
+    length = float(np.linalg.norm(up))
+    up = up / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+    left = np.cross(up, goal - start)
+    size = float(np.linalg.norm(left))
+    return up, left / size if size > 1e-9 else normal_tangents(up)[0]

@@ -1,0 +1,399 @@
+"""A curve for every flight of a motion: smooth curves first, the Bi-RRT where they fail.
+
+Also here. Postures inside the flights of effectors: along a curve that is clear, not swung around.
+
+The key postures of a contact plan lie at the changes of contact, at most with one between.  Joined by
+lines they drag an effector through what it leaves, reaches or passes, and an optimisation that pushes it
+out may as well swing the limb aside as bend it, or be caught on the wrong side.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from manikin.body import BodyModel, Configuration
+from manikin.body.limbs import end_segments
+from manikin.contact import Contact, ContactSchedule, Swing
+from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.com import CentroidalTrajectory
+from manikin.planning.whole_body.birrt import Feasible, FlightLimits
+from manikin.planning.whole_body.fit_scales import RefineScales
+from manikin.planning.whole_body.foot_roll import FootRoll, foot_roll
+from manikin.planning.whole_body.refine_input import KeyPath
+from manikin.planning.whole_body.swing import HEIGHTS, SwingLimits, plan_swing
+from manikin.planning.whole_body.swing_curve import SwingCurve
+from manikin.planning.whole_body.swing_path import EffectorClearance, Pose
+from manikin.planning.whole_body.swing_search import ClearFlight, PostureCheck, search_swing
+from manikin.scene import Proximity, Scene
+
+SHARES = (0.25, 0.5, 0.75)
+"""Shares of a flight at which a posture is looked for; our choice."""
+
+SAME_TIME = 0.01
+"""A given posture this near to a new one is replaced by it [s]."""
+
+DEPARTURE = 0.1
+"""Distance that a given path has to gain per metre from a contact to count as clear."""
+
+LOOKS = 13
+"""Instants at which the given path is looked at: a flight that is clear already needs no curve."""
+
+TIME_STEP = 0.02
+"""Spacing of the instants at which a curve is checked [s]: it is a beginning, not the motion."""
+
+SEARCHES = 600
+"""Most random poses of a search for a way around."""
+
+ROOM = 0.01
+"""Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
+
+REFINEMENTS = 20
+"""Most steps by which a curve is improved."""
+
+TURN_WEIGHT = 0.3
+"""Weight of the effector's attitude on its curve, which is wished, not required [1/rad^2]."""
+
+COM_WEIGHT = 30.0
+"""Weight of a centre of mass between those at both ends [1/m^2]."""
+
+SETTINGS = SolverSettings(tolerance=1e-3, explain=False)
+"""A flight without such a posture needs no reason, and a guess no exact contacts."""
+
+POSTURE_SHARE = 0.75
+"""Share of the wanted distance that such a posture keeps from everything that is not touched."""
+
+
+def with_mid_flights(
+    body: BodyModel, scene: Scene, schedule: ContactSchedule, path: KeyPath, padded: Sequence[str] = ()
+) -> KeyPath:
+    """Add postures along a clear curve inside each flight from a contact to another one.
+
+    Args:
+        body: The body.
+        scene: The obstacles and the floor.
+        schedule: Contacts in time.
+        path: Key configurations at least at both ends of each flight.
+        padded: Obstacles that any part of the body may lean on.
+
+    Returns:
+        The path with the postures that were found; a flight for which there is none stays as it is.
+    """
+    proximity, distance = Proximity(body, scene), RefineScales.of(body).safe_distance
+    limits = SwingLimits(clearance=distance, time_step=TIME_STEP)
+    leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
+    keys = dict(zip(path.time.tolist(), path.q, strict=True))
+    for swing in schedule.sequence.swings():
+        if swing.start is None or swing.end is None or not hangs(body, swing.effector):
+            continue
+        curve = _curve(body, scene, schedule, path, swing, limits)
+        if curve is None:
+            continue
+        touched = leaning.union(
+            *(touch_pairs(body, scene, item) for item in standing_during(schedule, swing))
+        )
+        for share in SHARES:
+            time = curve.start_time + share * curve.duration
+            pose, guess = curve.at(time), path.at(np.array([time]))[0]
+            com = Configuration(body, guess).com
+            problem = PostureProblem(
+                body, tuple(schedule.stance_at(time)),
+                {swing.effector: Placement(pose.position, pose.rotation, TURN_WEIGHT)},
+                com=np.array([com[0], com[1], np.nan]), com_weight=COM_WEIGHT,
+                proximity=proximity, clearance=POSTURE_SHARE * distance, ignore=touched, reference=guess,
+            )  # fmt: skip
+            found = generate_posture(problem, guess, settings=SETTINGS)
+            if found.succeeded:
+                keys = {other: q for other, q in keys.items() if abs(other - time) > SAME_TIME}
+                keys[time] = found.q
+    times = sorted(keys)
+    return KeyPath(times, np.array([keys[time] for time in times]))
+
+
+def _curve(
+    body: BodyModel,
+    scene: Scene,
+    schedule: ContactSchedule,
+    path: KeyPath,
+    swing: Swing,
+    limits: SwingLimits,
+) -> SwingCurve | None:
+    """A curve of the effector that keeps off everything; None where there is none, or none is needed."""
+    assert swing.start is not None
+    assert swing.end is not None
+    start, end = schedule.swing_interval(swing)
+    times = np.linspace(start, end, LOOKS)
+    given = path.at(times)
+    coms = np.array([Configuration(body, q).com for q in given])
+
+    def com(time: float) -> FloatArray:
+        return np.array([np.interp(time, times, column) for column in coms.T])
+
+    clearance = EffectorClearance(body, scene, swing.effector, standing_during(schedule, swing), com)
+    first, last = (Pose(item.position, item.rotation_contact_to_world) for item in (swing.start, swing.end))
+    is_clear = ClearFlight(clearance, first, last, start, end, replace(limits, departure=DEPARTURE))
+    between = zip(times[1:-1].tolist(), given[1:-1], strict=True)
+    if all(is_clear(time, _mid_flights_pose(body, q, swing)) for time, q in between):
+        return None
+    plan = plan_swing(
+        first, last, start, end, clearance, limits=limits,
+        start_normal=swing.start.normal, end_normal=swing.end.normal, refine=REFINEMENTS,
+    )  # fmt: skip
+    return plan.curve if plan.succeeded else _searched(clearance, first, last, (start, end), limits)
+
+
+def _searched(
+    clearance: EffectorClearance, first: Pose, last: Pose, interval: tuple[float, float], limits: SwingLimits
+) -> SwingCurve | None:
+    """A curve found by the Bi-RRT, which asks for a clear effector only; its draws are always the same."""
+
+    def check(extra: float) -> Feasible:
+        is_clear = ClearFlight(clearance, first, last, *interval, limits, extra)
+
+        def feasible(pose: Pose, time: float, _hint: object) -> FloatArray | None:
+            return np.zeros(0) if is_clear(time, pose) else None
+
+        return feasible
+
+    found = search_swing(
+        first, last, *interval, check(0.0), np.random.default_rng(0), roomy=check(ROOM), iterations=SEARCHES
+    )
+    return found.curve
+
+
+def _mid_flights_pose(body: BodyModel, q: FloatArray, swing: Swing) -> Pose:
+    rotation, position = Configuration(body, q).effector_placement(swing.effector)
+    return Pose(np.array(position), np.array(rotation))
+
+
+LEVEL_BEHIND = 0.08
+"""A foot this far behind the centre of mass at lift-off is still swung level [m]."""
+
+PITCH_PER_METRE = 3.0
+"""Further behind than that, its toes are turned down by this much [rad/m]."""
+
+MOST_PITCH = 0.9
+"""Largest such turn [rad]."""
+
+REACHING_TIME = 0.7
+"""A free hand begins to reach for its grasp this long before [s], and is put away as slowly."""
+
+
+ROLLING_CLEARANCE = 0.6
+"""Clearance of a rolling foot relative to that of a level one: people lift their toes by 1.5 cm."""
+
+ROLLING_DEPARTURE = 0.4
+"""Clearance it gains per metre, relative to that of a level one: it turns before it rises."""
+
+ROLLING_HEIGHTS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, *HEIGHTS[1:])
+"""Apex heights of the point about which a rolling foot tilts: the ankle is lifted by the tilt already [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedSwing:
+    """A flight and the curve found for it.
+
+    Attributes:
+        swing: The flight.
+        curve: Its curve, or the best attempt.
+        method: ``"smooth"``, ``"bi-rrt"``, or ``"reach"`` for an effector that is free at one end.
+        failure: None, or what the best attempt does not keep.
+        roll: How the foot pitches; the curve is then that of the point it tilts about.
+    """
+
+    swing: Swing
+    curve: SwingCurve
+    method: str
+    failure: str | None = None
+    roll: FootRoll | None = None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """First and last instant of the curve [s]: the whole flight unless one end is free."""
+        return self.curve.start_time, self.curve.end_time
+
+
+class FlightPlanner:
+    """Plans the flights of one motion.
+
+    Args:
+        body: The body.
+        scene: The obstacles.
+        trajectory: Centre of mass and contacts in time.
+        limits: What a smooth swing must keep.
+        rng: Source of all randomness of the search.
+        reference: (time) -> (nq,) preferred posture, for the posture checks.
+    """
+
+    def __init__(
+        self,
+        body: BodyModel,
+        scene: Scene,
+        trajectory: CentroidalTrajectory,
+        limits: SwingLimits,
+        rng: np.random.Generator,
+        reference: Callable[[float], FloatArray],
+    ) -> None:
+        self._body, self._scene, self._trajectory = body, scene, trajectory
+        self._limits, self._rng, self._reference = limits, rng, reference
+        self._proximity = Proximity(body, scene)
+        self._touching: dict[int, frozenset[tuple[str, str]]] = {}  # by identity of the schedule's contacts
+
+    @property
+    def schedule(self) -> ContactSchedule:
+        """Contacts in time."""
+        return self._trajectory.schedule
+
+    def flights(self) -> tuple[Swing, ...]:
+        """Every flight from a contact or to one; the trunk is not flown."""
+        swings = self.schedule.sequence.swings()
+        return tuple(swing for swing in swings if hangs(self._body, swing.effector))
+
+    def plan(self, swing: Swing) -> PlannedSwing:
+        """Find a smooth curve, or else search one."""
+        if swing.start is None or swing.end is None:
+            return self._reach(swing)
+        start, end = self.schedule.swing_interval(swing)
+        roll = foot_roll(self._body, self.schedule, swing)
+        if roll is not None:
+            return self._plan_rolling(swing, roll)
+        plan = plan_swing(
+            _pose(swing.start), _pose(swing.end), start, end, self._clearance(swing), limits=self._limits,
+            start_normal=swing.start.normal, end_normal=swing.end.normal, pitch=self._pitch(swing, start),
+        )  # fmt: skip
+        smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure)
+        return smooth if plan.succeeded else self.search(swing, smooth)
+
+    def _reach(self, swing: Swing) -> PlannedSwing:
+        """Curve between a contact and where the effector is in the preferred posture.
+
+        Only the end at the contact has to be kept; the rest is a hint, see
+        :func:`~manikin.planning.whole_body.fit_targets.effector_targets`.
+        """
+        start, end = self.schedule.swing_interval(swing)
+        if swing.start is None:
+            start = max(start, end - REACHING_TIME)
+        else:
+            end = min(end, start + REACHING_TIME)
+        contact = swing.end or swing.start
+        assert contact is not None
+        first, last = (
+            self._free_pose(swing.effector, time) if held is None else _pose(held)
+            for held, time in ((swing.start, start), (swing.end, end))
+        )
+        plan = plan_swing(
+            first, last, start, end, self._clearance(swing), limits=self._limits,
+            start_normal=contact.normal, end_normal=contact.normal, refine=0,
+        )  # fmt: skip
+        return PlannedSwing(swing, plan.curve, "reach")
+
+    def _free_pose(self, effector: str, time: float) -> Pose:
+        rotation, position = Configuration(self._body, self._reference(time)).effector_placement(effector)
+        return Pose(np.array(position), np.array(rotation))
+
+    def _plan_rolling(self, swing: Swing, roll: FootRoll) -> PlannedSwing:
+        """Find a smooth curve of the point about which the foot tilts."""
+        assert swing.start is not None
+        assert swing.end is not None
+        distance = self._clearance(swing, lambda time: float(roll.toe_extension(np.array([time]))[0]))
+
+        @cache
+        def tilt(time: float) -> tuple[FloatArray, FloatArray]:
+            turn, offset = roll.tilt(np.array([time]))
+            return turn[0], offset[0]
+
+        def clearance(time: float, pivot: Pose) -> float:
+            turn, offset = tilt(time)
+            return distance(time, Pose(pivot.position - pivot.rotation @ offset, pivot.rotation @ turn))
+
+        start, end = self.schedule.swing_interval(swing)
+        limits = replace(
+            self._limits,
+            clearance=ROLLING_CLEARANCE * self._limits.clearance,
+            departure=ROLLING_DEPARTURE * self._limits.departure,
+        )
+        plan = plan_swing(
+            *roll.pivots, start, end, clearance, limits=limits,
+            start_normal=swing.start.normal, end_normal=swing.end.normal, heights=ROLLING_HEIGHTS,
+        )  # fmt: skip
+        return PlannedSwing(swing, plan.curve, "smooth", plan.failure, roll)
+
+    def search(self, swing: Swing, fallback: PlannedSwing, iterations: int = 2000) -> PlannedSwing:
+        """Search a curve with the Bi-RRT and posture checks; ``fallback`` when there is none."""
+        assert swing.start is not None
+        assert swing.end is not None
+        start, end = self.schedule.swing_interval(swing)
+        ends = _pose(swing.start), _pose(swing.end)
+        clearance = self._clearance(swing)
+
+        def check(extra: float) -> PostureCheck:
+            screen = ClearFlight(clearance, *ends, start, end, self._limits, extra)
+            return PostureCheck(
+                swing.effector, lambda time: self._problem(swing, time), screen, rotation_weight=0.3
+            )
+
+        # What a smooth swing may do, its substitute may do too.
+        limits = FlightLimits(speed=self._limits.speed, angular_speed=self._limits.angular_speed)
+        found = search_swing(
+            *ends, start, end, check(0.0), self._rng, roomy=check(0.01), limits=limits, iterations=iterations
+        )
+        if found.curve is None:
+            reason = f"{fallback.failure or 'the smooth curve failed'}; Bi-RRT: {found.failure}"
+            return PlannedSwing(swing, fallback.curve, fallback.method, reason)
+        return PlannedSwing(swing, found.curve, "bi-rrt")
+
+    def _pitch(self, swing: Swing, lift_off: float) -> float:
+        """Turn the toes down where the foot is left far behind: a level foot has no posture there [rad]."""
+        assert swing.start is not None
+        yaw = swing.start.yaw
+        away = self._trajectory.position(lift_off) - swing.start.position
+        behind = float(np.cos(yaw) * away[0] + np.sin(yaw) * away[1])
+        return float(np.clip(PITCH_PER_METRE * (behind - LEVEL_BEHIND), 0.0, MOST_PITCH))
+
+    def _clearance(self, swing: Swing, bend: Callable[[float], float] | None = None) -> EffectorClearance:
+        return EffectorClearance(
+            self._body, self._scene, swing.effector, standing_during(self.schedule, swing),
+            self._trajectory.position, bend,
+        )  # fmt: skip
+
+    def _touch_pairs(self, contact: Contact) -> frozenset[tuple[str, str]]:
+        if id(contact) not in self._touching:
+            self._touching[id(contact)] = touch_pairs(self._body, self._scene, contact)
+        return self._touching[id(contact)]
+
+    def _problem(self, swing: Swing, time: float) -> PostureProblem:
+        stance = self.schedule.stance_at(time)
+        others = [contact for contact in stance if contact.effector != swing.effector]
+        touching = [*others, *(contact for contact in (swing.start, swing.end) if contact is not None)]
+        return PostureProblem(
+            self._body, tuple(others), com=self._trajectory.position(time), proximity=self._proximity,
+            ignore=frozenset().union(*(self._touch_pairs(item) for item in touching)),
+            reference=self._reference(time),
+        )  # fmt: skip
+
+
+def hangs(body: BodyModel, effector: str) -> bool:
+    """Whether an effector is at the end of a limb, so that it can reach by itself."""
+    root = next(segment.name for segment in body.segments if segment.parent is None)
+    return body.effector(effector).segment != root
+
+
+def standing_during(schedule: ContactSchedule, swing: Swing) -> tuple[Contact, ...]:
+    """Every contact held at some time of a flight."""
+    found: dict[tuple[str, bytes], Contact] = {}
+    for index in range(swing.first_phase, swing.last_phase + 1):
+        for contact in schedule.sequence[index].stance:
+            found[(contact.effector, contact.position.tobytes())] = contact
+    return tuple(found.values())
+
+
+def touch_pairs(body: BodyModel, scene: Scene, contact: Contact) -> frozenset[tuple[str, str]]:
+    """Pairs of end segment and obstacle that a contact brings together."""
+    obstacle = scene.touched_obstacle(contact, tolerance=0.02)
+    return frozenset((segment, obstacle) for segment in end_segments(body, contact.effector))
+
+
+def _pose(contact: Contact) -> Pose:
+    return Pose(contact.position, contact.rotation_contact_to_world)

@@ -1,0 +1,1 @@
+"""Wrenches, forces, torques and margins of recorded motions."""

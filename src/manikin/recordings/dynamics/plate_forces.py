@@ -1,0 +1,325 @@
+"""Forces that plates measured, beside those that a recorded motion needs.
+
+Plates tell all that pushes a person only while every support is wholly on one of them. A plate that is not
+loaded tells its own offset, which is taken off.
+
+Also here. Joint torques by force plates, beside those of a recorded motion alone.
+
+With the plates' forces on the feet the torques of a leg follow from its own motion. Without plates the motion
+of the whole body tells the sum of the forces, and how feet that both carry share it has to be assumed
+(:mod:`manikin.recordings.dynamics.recorded_forces`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.balance import zero_moment_point
+from manikin.contact import Contact, ContactKind, ContactSchedule
+from manikin.motion import Motion
+from manikin.numerics.signals import low_passed
+from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
+from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
+from manikin.recordings.dynamics.recorded_forces import torques_of
+from manikin.recordings.dynamics.recorded_margins import RecordedMargins, margins_of_wrenches
+from manikin.recordings.readers.markers import ForcePlate
+
+CUTOFF = 20.0
+"""Low-pass of the plates, of second order, forward and backward [Hz]."""
+
+LEAST_UNLOADED = 0.1
+"""Time without load that tells the offset of a plate [s]."""
+
+OVERHANG = 0.02
+"""How far a sole may be beyond the edge of the plate that is to carry it [m]."""
+
+BESIDE = 0.1
+"""How far beside a sole the centre of pressure may be that is its own [m]."""
+
+UNSURE = 0.03
+"""Time about a support off the plates whose frames are left out: supports are known that well [s]."""
+
+SHORTEST = 0.3
+"""Shortest time on the plates from which a mass is told [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlateForces:
+    """What plates say at the instants of a motion.
+
+    Attributes:
+        wrench: (n, 6) of all plates about the world's origin, without their offsets [N, N.m].
+        covered: (n,) whether every support is on a plate, so that the wrench is all there is.
+        single: (n,) whether one foot alone supports.
+        effectors: The c effectors of the schedule.
+        of_effector: (n, c, 6) the part of the wrench on each of them; 0 where no plate carries it.
+        apart: (n,) whether it is told what is on each: all is covered, and no plate carries two of them.
+    """
+
+    wrench: FloatArray
+    covered: NDArray[np.bool_]
+    single: NDArray[np.bool_]
+    effectors: tuple[str, ...]
+    of_effector: FloatArray
+    apart: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class PlateComparison:
+    """Forces of a motion beside those of plates, in frames in which all supports are on plates.
+
+    Attributes:
+        frames: Compared.
+        single_frames: Of them in single support.
+        vertical_rms: Of the vertical force, per body weight.
+        vertical_rms_single: The same in single support.
+        cop_rms: Distance of the centres of pressure in single support, root mean square [m].
+        cop_mean: Mean offset of ours in world x and y [m].
+        margin_share: Share of the frames in which the plates' wrench has a positive margin on our stances.
+        margin_difference: Median of how far the margins are apart, about the centre of mass [N.m].
+    """
+
+    frames: int
+    single_frames: int
+    vertical_rms: float
+    vertical_rms_single: float
+    cop_rms: float
+    cop_mean: tuple[float, float]
+    margin_share: float
+    margin_difference: float
+
+
+def plate_forces(
+    plates: Sequence[ForcePlate], times: FloatArray, schedule: ContactSchedule, cutoff: float = CUTOFF
+) -> PlateForces:
+    """The wrench of all plates at the instants of a motion, and where it is all there is.
+
+    A foot is on a plate if its sole is within the plate's edges, where they are known, and its centre of
+    pressure stays close to the sole for most of the support.
+
+    Args:
+        plates: Of the same recording, at least one.
+        times: (n,) instants on their clock [s].
+        schedule: Stances on the same clock.
+        cutoff: Of the low-pass [Hz].
+    """
+    wrenches = np.array([_sampled(plate, times, cutoff) for plate in plates])
+    phases = schedule.phase_at(times)
+    covered, single = np.ones(len(times), dtype=bool), np.zeros(len(times), dtype=bool)
+    held = _held(schedule)
+    carried = [[one for one in held if _carries(plate, one.contact, schedule)] for plate in plates]
+    on_plates = {id(one.contact) for ones in carried for one in ones}
+    for number, phase in enumerate(schedule.sequence):
+        begin, end = schedule.instants[number : number + 2]
+        single[phases == number] = len(phase.stance) == 1
+        known = [one for one in held if one.begin <= begin and one.end >= end]
+        if not len(phase.stance) or not all(id(one.contact) in on_plates for one in known):
+            covered[(times > begin - UNSURE) & (times < end + UNSURE)] = False
+    names = schedule.sequence.effectors
+    parts, apart = np.zeros((len(times), len(names), 6)), covered.copy()
+    for ones, each in zip(carried, wrenches, strict=True):
+        if not ones:
+            continue
+        # A plate may be loaded a moment before its foot is found on it, and after.
+        away = np.array([np.maximum(np.maximum(one.begin - times, times - one.end), 0.0) for one in ones])
+        apart &= ~((np.sum(away == 0.0, axis=0) > 1) & each.any(axis=1))
+        owner = np.array([names.index(one.contact.effector) for one in ones])[np.argmin(away, axis=0)]
+        parts[np.arange(len(times)), owner] += each
+    return PlateForces(
+        frozen_array(wrenches.sum(axis=0), "wrench"), covered, single, names,
+        frozen_array(parts, "wrenches of the effectors"), apart,
+    )  # fmt: skip
+
+
+def mass_on_plates(dynamics: RecordedDynamics, measured: PlateForces) -> float | None:
+    """Mass of a person by the forces under them; None where too little of the motion is on plates.
+
+    The impulse of the plates over all covered frames, divided by that of a body of one kilogram with the
+    recorded motion of the centre of mass: weight, and change of velocity.
+    """
+    step = float(dynamics.time[1] - dynamics.time[0])
+    if measured.covered.sum() * step < SHORTEST:
+        return None
+    per_mass = dynamics.com_acceleration[measured.covered, 2] + GRAVITY
+    return float(measured.wrench[measured.covered, 2].sum() / per_mass.sum())
+
+
+def compare_with_plates(
+    dynamics: RecordedDynamics, margins: RecordedMargins, measured: PlateForces, height: float = 0.0
+) -> PlateComparison | None:
+    """Compare forces, centres of pressure and margins; None where no frame is covered in single support.
+
+    Args:
+        dynamics: The motion, with the person's mass.
+        margins: Its margins.
+        measured: The plates.
+        height: Of the plates' surfaces, where centres of pressure are compared [m].
+    """
+    both = measured.covered & measured.single
+    if not both.any():
+        return None
+    weight = GRAVITY * dynamics.body.mass
+    lift = (dynamics.vertical_force - measured.wrench[:, 2]) / weight
+    apart = dynamics.zero_moment_point(height)[both] - zero_moment_point(measured.wrench[both], height)
+    theirs = margins_of_wrenches(margins.polytopes, margins.phase, measured.wrench, dynamics.com).margin
+    mean = apart.mean(axis=0)
+    return PlateComparison(
+        int(measured.covered.sum()), int(both.sum()), _rms(lift[measured.covered]), _rms(lift[both]),
+        _rms(np.linalg.norm(apart, axis=1)), (float(mean[0]), float(mean[1])),
+        float(np.mean(theirs[measured.covered] > 0.0)),
+        float(np.median(np.abs(theirs - margins.whole_body)[measured.covered])),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A contact and the time for which it is made [s]."""
+
+    contact: Contact
+    begin: float
+    end: float
+
+
+def _held(schedule: ContactSchedule) -> list[_Held]:
+    """Contacts in the order of their beginnings; one that lasts for several phases is one."""
+    found: list[_Held] = []
+    for phase, begin, end in zip(
+        schedule.sequence, schedule.instants[:-1], schedule.instants[1:], strict=True
+    ):
+        for contact in phase.stance:
+            same = [
+                number
+                for number, one in enumerate(found)
+                if one.end == begin
+                and one.contact.effector == contact.effector
+                and one.contact.same_place(contact)
+            ]
+            if same:
+                found[same[0]] = replace(found[same[0]], end=float(end))
+            else:
+                found.append(_Held(contact, float(begin), float(end)))
+    return found
+
+
+def _sampled(plate: ForcePlate, times: FloatArray, cutoff: float) -> FloatArray:
+    """(n, 6) low-passed wrench of one plate without its offset; 0 while nobody is on it."""
+    wrenches, free = plate.wrenches, ~plate.pressed
+    if free.sum() >= LEAST_UNLOADED * plate.rate:
+        wrenches = wrenches - wrenches[free].mean(axis=0)
+    if 2.0 * cutoff < plate.rate and len(plate) > 4:
+        wrenches = low_passed(wrenches, cutoff, plate.rate)
+    loaded = np.interp(times, plate.time, plate.pressed) > 0.5
+    found = np.stack([np.interp(times, plate.time, column) for column in wrenches.T], axis=1)
+    return np.where(loaded[:, None], found, 0.0)
+
+
+def _carries(plate: ForcePlate, contact: Contact, schedule: ContactSchedule) -> bool:
+    """Whether a plate carries a contact over the time for which it is held."""
+    if contact.kind is not ContactKind.SOLE or not _within(plate, contact.points_in_world):
+        return False
+    held = [phase.stance for phase in schedule.sequence]
+    mine = [contact.effector in stance and stance[contact.effector].same_place(contact) for stance in held]
+    alone = np.array([here and len(stance) == 1 for here, stance in zip(mine, held, strict=True)])
+    phases = schedule.phase_at(plate.time)
+    inside = (plate.time >= schedule.instants[0]) & (plate.time <= schedule.instants[-1])
+    frames = inside & (alone if alone.any() else np.array(mine))[phases]
+    if not frames.any() or np.mean(plate.pressed[frames]) < 0.5:
+        return False
+    local = (plate.cop[frames & plate.pressed] - contact.position) @ contact.rotation_contact_to_world
+    near = np.abs(local[:, :2]) < 0.5 * np.array([contact.length, contact.width]) + BESIDE
+    return bool(np.mean(near.all(axis=1)) > 0.5)
+
+
+def _within(plate: ForcePlate, points: FloatArray) -> bool:
+    if plate.corners is None:
+        return True
+    corners = plate.corners[:, :2]
+    sides = np.roll(corners, -1, axis=0) - corners
+    turning = sides[0, 0] * sides[1, 1] - sides[0, 1] * sides[1, 0]
+    inward = np.sign(turning) * np.stack([-sides[:, 1], sides[:, 0]], axis=1)
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    depth = np.einsum("pkj,kj->pk", points[:, None, :2] - corners, inward)
+    return bool(depth.min() > -OVERHANG)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+JOINTS = ("hip_flexion", "hip_abduction", "knee_flexion", "ankle_dorsiflexion")
+"""Hinges of a leg that are compared."""
+
+SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class TorqueComparison:
+    """Torques of one hinge, of both sides, while the foot below it is on a plate.
+
+    Attributes:
+        joint: The hinge, without its side.
+        frames: Compared, of both sides.
+        rms: Root mean square of the difference [N.m].
+        mean: Of the difference, ours minus the plates' [N.m].
+        peak: Largest magnitude of ours [N.m].
+        peak_by_plates: Of theirs [N.m].
+    """
+
+    joint: str
+    frames: int
+    rms: float
+    mean: float
+    peak: float
+    peak_by_plates: float
+
+
+def plate_torques(dynamics: RecordedDynamics, measured: PlateForces) -> FloatArray:
+    """(n, nv) generalised forces of a motion if the plates are all that pushes; told where ``apart``.
+
+    The first six are what the plates' forces lack of the motion's, in the pelvis' frame [N, N.m].
+
+    Args:
+        dynamics: The motion.
+        measured: The plates at its instants.
+    """
+    return torques_of(dynamics, measured.effectors, measured.of_effector)
+
+
+def compare_torques(
+    dynamics: RecordedDynamics, motion: Motion, measured: PlateForces
+) -> tuple[TorqueComparison, ...]:
+    """Compare the torques of legs with those by plates; none where no foot is on a plate of its own.
+
+    Args:
+        dynamics: The motion.
+        motion: The same with forces and torques, of
+            :func:`manikin.recordings.dynamics.recorded_forces.motion_on_contacts`.
+        measured: The plates at its instants.
+    """
+    theirs, names = plate_torques(dynamics, measured), motion.joint_names
+    feet = [f"{side}_foot" for side in SIDES]
+    held = {
+        foot: measured.apart & motion.support[:, motion.contact_names.index(foot)]
+        for foot in feet
+        if foot in motion.contact_names
+    }
+    found = []
+    for joint in JOINTS:
+        ours, others = [np.zeros(0)], [np.zeros(0)]
+        for side, foot in zip(SIDES, feet, strict=True):
+            if foot in held:
+                column = 6 + names.index(f"{side}_{joint}")
+                ours.append(motion.tau[held[foot], column])
+                others.append(theirs[held[foot], column])
+        mine, plates = np.concatenate(ours), np.concatenate(others)
+        if len(mine):
+            apart = mine - plates
+            found.append(
+                TorqueComparison(
+                    joint, len(mine), float(np.sqrt(np.mean(apart**2))), float(apart.mean()),
+                    float(np.abs(mine).max()), float(np.abs(plates).max()),
+                )
+            )  # fmt: skip
+    return tuple(found)

@@ -1,0 +1,340 @@
+"""What has to push a recorded person so that they move as they did: the external wrench, frame by frame.
+
+Everything follows from the smoothed postures, their velocities and accelerations: one pass of the recursive
+Newton-Euler equations gives the torques that a body without contacts would need, and its first six
+components, those of the free pelvis, are the wrench that the ground has to supply.
+
+Also here. A reconstruction without the noise of its recording, and with velocities and accelerations.
+Smoothing without delay whose cutoff rises for a moment at each touch-down.
+
+A foot that lands stops within a few hundredths of a second, the rest of a step is slow. One cutoff for all of
+it smears the impact over the end of the single support before, or lets the noise of the markers through
+where nothing happens. Here the cutoff is a function of time: the smooth values ``x`` minimise
+
+    ``sum |x - y|^2 + sum lambda_k |x_(k-1) - 2 x_k + x_(k+1)|^2``,
+
+which for one ``lambda`` is the filter of second order run forward and backward (the amplitude is halved at
+the cutoff), and one banded system of equations for any other (Eilers, "A perfect smoother", Anal. Chem. 75,
+2003).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+from scipy.linalg import solveh_banded
+from scipy.spatial.transform import Rotation
+
+from manikin.balance import pseudo_wrench, zero_moment_point
+from manikin.body import BodyModel
+from manikin.body.human import body_from_signature
+from manikin.body.limbs import with_knees_and_elbows
+from manikin.errors import InputError
+from manikin.kinematics.point_targets import PostureCost
+from manikin.motion.dynamics import FreeDynamics
+from manikin.motion.motion import Motion
+from manikin.numerics.signals import low_passed
+from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, finite_number, frozen_array
+from manikin.recordings.reconstruction.proportions import Reconstruction
+from manikin.recordings.supports.recorded_supports import RecordedSupports
+from manikin.recordings.supports.support_levels import JOINTS
+
+MOTION_CUTOFF = 6.0
+"""Frequency above which a walk has little but noise [Hz] (Winter, Biomechanics and Motor Control, 2.2.4)."""
+
+FEWEST_FRAMES = 4
+
+HIGHEST_SHARE = 0.45
+"""Highest cutoff at a touch-down, per rate of the recording: what is faster cannot be told from slower."""
+
+
+def smoothed(found: Reconstruction, cutoff: float = MOTION_CUTOFF) -> Reconstruction:
+    """The same without fast changes: Butterworth of second order, forward and backward, so without delay.
+
+    Filtered are place, hinges, and the turn of the pelvis as a quaternion of continuous sign, set to length 1
+    again; hinges are kept to their limits. Residuals are those of the filtered postures.
+
+    Args:
+        found: At least four instants at an even rate.
+        cutoff: Where each of the two passes halves the power [Hz].
+
+    Raises:
+        InputError: If there are too few instants, or the cutoff is not below half their rate.
+    """
+    q = smoothed_postures(found, cutoff)
+    residual = PostureCost(found.body, found.targets).distances(q, found.targets.positions)
+    return replace(found, q=q, residual=residual)
+
+
+def smoothed_postures(
+    found: Reconstruction,
+    cutoff: float = MOTION_CUTOFF,
+    limits: bool = True,
+    touch_downs: Sequence[float] = (),
+) -> FloatArray:
+    """(n, nq) postures of :func:`smoothed`, without their residuals.
+
+    Args:
+        found: As there.
+        cutoff: As there [Hz].
+        limits: Whether hinges are kept to their limits afterwards. Where a smooth angle meets its limit it
+            gets a kink, so what is differentiated twice had better overshoot a little.
+        touch_downs: Instants at which the cutoff rises for a moment, on the clock of ``found`` [s], see
+            :mod:`manikin.recordings.dynamics.recorded_dynamics`; none for the Butterworth filter.
+
+    Raises:
+        InputError: As there.
+    """
+    rate = _rate(found)
+    finite_number(cutoff, "cutoff [Hz]", above=0.0)
+    if cutoff >= 0.5 * rate:
+        raise InputError(f"cutoff is {cutoff:g} Hz; valid: below half the rate, {0.5 * rate:g} Hz")
+    q = np.array(found.q)
+    flips = np.cumprod(np.where(np.sum(q[1:, 3:7] * q[:-1, 3:7], axis=1) < 0.0, -1.0, 1.0))
+    q[1:, 3:7] *= flips[:, None]
+    if len(touch_downs):
+        ceiling = np.minimum(local_cutoff(found.time, touch_downs, cutoff), HIGHEST_SHARE * rate)
+        q = smooth(q, rate, ceiling)
+    else:
+        q = low_passed(q, cutoff, rate)
+    q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+    if limits:
+        q[:, 7:] = np.clip(q[:, 7:], found.body.lower, found.body.upper)
+    return q
+
+
+def motion_of(found: Reconstruction, cutoff: float | None = MOTION_CUTOFF) -> Motion:
+    """A motion of the recorded postures, smoothed, with velocities and accelerations by central differences.
+
+    Differences are taken on the configuration space: the pelvis' parts are in its own frame. Contacts and
+    forces are not known of a recording: there are none, and ``tau`` and ``margin`` are NaN.
+
+    Args:
+        found: At least four instants at an even rate.
+        cutoff: Of :func:`smoothed` [Hz]; None for the postures as they are.
+
+    Raises:
+        InputError: As :func:`smoothed`.
+    """
+    _rate(found)
+    q = found.q if cutoff is None else smoothed_postures(found, cutoff)
+    v, a = rates_of(found, q)
+    model, data, n = found.body.pinocchio, found.body.pinocchio.createData(), len(q)
+    com, spin = np.empty((n, 3)), np.empty((n, 3))
+    for frame in range(n):
+        momentum = pin.computeCentroidalMomentum(model, data, q[frame], v[frame])
+        com[frame], spin[frame] = data.com[0], momentum.angular
+    return Motion(
+        time=found.time, q=q, v=v, a=a, tau=np.full_like(v, np.nan), com=com, angular_momentum=spin,
+        margin=np.full(n, np.nan), support=np.zeros((n, 0), dtype=bool), contact_force=np.zeros((n, 0, 6)),
+        contact_names=(), joint_names=tuple(found.body.joint_names),
+    )  # fmt: skip
+
+
+def rates_of(found: Reconstruction, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, nv) velocities and accelerations of postures at the instants of a reconstruction.
+
+    By central differences on the configuration space; at both ends velocities continue the line of the
+    next two.
+
+    Raises:
+        InputError: If there are too few instants.
+    """
+    model, rate = found.body.pinocchio, _rate(found)
+    inner = [0.5 * pin.difference(model, before, after) for before, after in zip(q[:-2], q[2:], strict=True)]
+    first, last = pin.difference(model, q[0], q[1]), pin.difference(model, q[-2], q[-1])
+    v = rate * np.vstack([2.0 * first - inner[0], inner, 2.0 * last - inner[-1]])
+    return v, np.gradient(v, 1.0 / rate, axis=0, edge_order=2)
+
+
+def level_heading(q: FloatArray) -> float:
+    """Direction on the level into which a person looks on the whole, from the world's x [rad].
+
+    That of the pelvis' x axis, or, of who lies on the back or the front, of its z axis: from the hips to the
+    head.
+
+    Args:
+        q: (n, nq) postures.
+    """
+    turn = Rotation.from_quat(q[:, 3:7])
+    ahead, above = (turn.apply(axis).mean(axis=0)[:2] for axis in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]))
+    way = ahead if np.hypot(*ahead) >= np.hypot(*above) else above
+    return float(np.arctan2(way[1], way[0]))
+
+
+def _rate(found: Reconstruction) -> float:
+    if len(found.time) < FEWEST_FRAMES:
+        raise InputError(f"reconstruction has {len(found.time)} instants; valid: at least {FEWEST_FRAMES}")
+    return (len(found.time) - 1) / float(found.time[-1] - found.time[0])
+
+
+TOUCH_DOWN_CUTOFF = 8.0
+"""Cutoff at a touch-down [Hz]."""
+
+TOUCH_DOWN_WIDTH = 0.08
+"""Time from a touch-down in which the cutoff falls to 1/e of its rise [s]."""
+
+
+def local_cutoff(
+    time: FloatArray,
+    touch_downs: Sequence[float],
+    cutoff: float,
+    peak: float = TOUCH_DOWN_CUTOFF,
+    width: float = TOUCH_DOWN_WIDTH,
+) -> FloatArray:
+    """(n,) cutoff at each instant [Hz]: a bell over each touch-down, the highest where they overlap.
+
+    Args:
+        time: (n,) instants [s].
+        touch_downs: Instants [s].
+        cutoff: Away from them [Hz].
+        peak: At one [Hz]; none below ``cutoff``.
+        width: Of the bell [s].
+    """
+    found = np.full(len(time), cutoff)
+    for instant in touch_downs:
+        found = np.maximum(found, cutoff + (peak - cutoff) * np.exp(-(((time - instant) / width) ** 2)))
+    return found
+
+
+def smooth(values: FloatArray, rate: float, cutoff: FloatArray) -> FloatArray:
+    """(n, k) columns without what is faster than the cutoff of each instant.
+
+    Both ends are continued as point reflections while smoothing, so that a straight line stays as it is.
+
+    Args:
+        values: (n, k), at least two instants at an even rate.
+        rate: Of the instants [Hz].
+        cutoff: (n,) frequency at which the amplitude is halved, below half the rate [Hz].
+    """
+    pad = min(len(values) - 1, int(np.ceil(2.0 * rate / float(cutoff.min()))))
+    first, last = 2.0 * values[0] - values[pad:0:-1], 2.0 * values[-1] - values[-2 : -pad - 2 : -1]
+    known = np.vstack([first, values, last])
+    weight = (2.0 * np.sin(np.pi * np.pad(cutoff, pad, mode="edge")[1:-1] / rate)) ** -4.0
+    second = np.array([1.0, -2.0, 1.0])
+    bands = np.zeros((3, len(known)))
+    bands[2] = 1.0
+    for row in range(3):
+        for column in range(row, 3):
+            end = len(known) - 2 + column
+            bands[2 + row - column, column:end] += weight * second[row] * second[column]
+    smoothed = np.asarray(solveh_banded(bands, known), dtype=np.float64)
+    return smoothed[pad : pad + len(values)]
+
+
+CUTOFF = 5.0
+"""Low-pass of postures that are differentiated twice, as [Qiu2012]_ 3.2.1, one for all recordings [Hz]. With
+4 Hz touch-downs reach too far, with 6 Hz and more the noise of the trunk takes over."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedDynamics:
+    """A recorded motion and the wrench that it needs; world frame, but ``v`` and ``a`` as in Pinocchio.
+
+    Attributes:
+        body: With the mass used.
+        time: (n,) instants, 0 at the first [s].
+        q: (n, nq) smoothed postures; hinges overshoot their limits by as much as smoothing makes them.
+        v: (n, nv) velocities.
+        a: (n, nv) accelerations.
+        com: (n, 3) centre of mass [m].
+        angular_momentum: (n, 3) about the centre of mass [kg.m^2/s].
+        free_torque: (n, nv) generalised forces without contacts [N, N.m]; the first six in the pelvis' frame.
+        wrench: (n, 6) external force [N] and moment about the world's origin [N.m], without gravity.
+        jacobians: (n, 6, nv) of all joints: velocity of the point at the world's origin, and angular one.
+    """
+
+    body: BodyModel
+    time: FloatArray
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+    com: FloatArray
+    angular_momentum: FloatArray
+    free_torque: FloatArray
+    wrench: FloatArray
+    jacobians: FloatArray
+
+    def __len__(self) -> int:
+        """Number of instants."""
+        return len(self.time)
+
+    @cached_property
+    def com_acceleration(self) -> FloatArray:
+        """(n, 3) of the centre of mass [m/s^2]."""
+        return frozen_array(self.wrench[:, :3] / self.body.mass + GRAVITY_VECTOR, "com_acceleration")
+
+    @cached_property
+    def angular_momentum_rate(self) -> FloatArray:
+        """(n, 3) about the centre of mass [N.m]."""
+        return frozen_array(self.wrench[:, 3:] - cross(self.com, self.wrench[:, :3]), "rate")
+
+    @cached_property
+    def point_mass_wrench(self) -> FloatArray:
+        """(n, 6) of a point mass, about the world's origin ([Qiu2012]_ 4.54, 4.56)."""
+        return frozen_array(pseudo_wrench(self.body.mass, self.com, self.com_acceleration), "wrench")
+
+    @property
+    def vertical_force(self) -> FloatArray:
+        """(n,) of the ground on the person [N]."""
+        return self.wrench[:, 2]
+
+    def zero_moment_point(self, height: float) -> FloatArray:
+        """(n, 2) centre of pressure on level ground of a height [m]; NaN without vertical force."""
+        return zero_moment_point(self.wrench, height)
+
+
+def dynamics_of(
+    found: Reconstruction, cutoff: float = CUTOFF, touch_downs: Sequence[float] = ()
+) -> RecordedDynamics:
+    """Smooth a reconstruction, differentiate it twice and find the wrench that it needs.
+
+    Args:
+        found: At least four instants at an even rate, not yet smoothed.
+        cutoff: Of the low-pass of the postures [Hz].
+        touch_downs: Instants at which it rises for a moment, on the clock of ``found`` [s], see
+            :func:`touch_downs_of`.
+
+    Raises:
+        InputError: If there are too few instants, or the cutoff is not below half their rate.
+    """
+    return dynamics_of_postures(
+        found, smoothed_postures(found, cutoff, limits=False, touch_downs=touch_downs)
+    )
+
+
+def touch_downs_of(supports: RecordedSupports) -> tuple[float, ...]:
+    """Instants at which a support begins, on the clock of the reconstruction [s]."""
+    return tuple(one.start - supports.start for one in supports.supports if one.start_seen)
+
+
+def dynamics_of_postures(found: Reconstruction, q: FloatArray) -> RecordedDynamics:
+    """The wrench that (n, nq) smooth postures at the instants of a reconstruction need.
+
+    Raises:
+        InputError: If there are too few instants.
+    """
+    v, a = rates_of(found, q)
+    model, data, n = found.body.pinocchio, found.body.pinocchio.createData(), len(q)
+    com, spin = np.empty((n, 3)), np.empty((n, 3))
+    for frame in range(n):
+        spin[frame] = pin.computeCentroidalMomentum(model, data, q[frame], v[frame]).angular
+        com[frame] = data.com[0]
+    free = FreeDynamics.of(found.body, q, v, a)
+    return RecordedDynamics(
+        found.body, found.time, q, v, a, com, spin, free.needed, free.wrench, free.jacobians
+    )
+
+
+def with_mass(found: Reconstruction, mass: float) -> Reconstruction:
+    """The same postures of a body of another mass [kg], its shares of segments and its effectors kept.
+
+    Raises:
+        BodyError: If it is not the mass of an adult.
+    """
+    body = body_from_signature(found.body.signature() | {"mass": mass})
+    if set(JOINTS) <= set(found.body.effectors):
+        body = with_knees_and_elbows(body)
+    return replace(found, body=body)

@@ -1,0 +1,346 @@
+"""Contact forces and joint torques of a recorded motion.
+
+The wrench that a motion needs is known, and shared among its contacts by
+:mod:`manikin.recordings.dynamics.recorded_forces`.
+
+Also here. Which contact supplies how much of the wrench that a recorded motion needs.
+
+One contact has to supply all of it. Several can share it in many ways. People load a foot bit by bit, from
+nothing at its touch-down on, and unload it until its lift-off; of all shares that add up to the wrench in
+every frame, those are wanted whose wrenches ``f_i`` at the contacts change least:
+
+    ``sum_i integral |f_i'|^2 + |f_i|^2 / T^2 dt``,
+
+with ``f_i = 0`` before the contact is made and after it is left. What one foot has to supply alone before
+and after, if for longer than supports are known to, continues into a double support that way, so that the
+foot behind keeps pushing ahead while the one in front brakes, as under people who walk; the least forces,
+which the second term asks for where little changes, would not have the feet push against each other at all.
+It is the thought of Ren, Jones and Howard ("Whole body inverse dynamics over a complete gait cycle based only
+on measured kinematics", J. Biomech. 41, 2008) for contacts of any number and kind.
+
+Shares that the contacts can give stay as they are. Others become pushes within the friction pyramids: with
+``G`` the wrenches of unit pushes at the corners, one a column, and ``l`` the pushes of each contact that come
+next to its share, the nearest to ``l`` that supply the wrench are ``max(0, l + G^T y)`` for the six
+multipliers ``y`` that solve ``G max(0, l + G^T y) + e y = w`` (:func:`manikin.balance.contact_forces.share`);
+caps and torsion limits of contacts are not regarded there. What they cannot supply, because
+the wrench is outside what the contacts admit, is added as the smallest wrenches at the contacts: the sum is
+always the whole wrench, so that the pelvis needs no hand from heaven, and a centre of pressure outside its
+sole is seen as such.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from manikin.balance.contact_forces import ContactGenerators, share
+from manikin.balance.friction import contact_limits
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule, Stance
+from manikin.motion.motion import Motion
+from manikin.numerics.signals import mask_runs
+from manikin.numerics.spatial import GRAVITY, FloatArray, wrench_about, wrench_map
+from manikin.recordings.dynamics.recorded_dynamics import RecordedDynamics
+from manikin.recordings.dynamics.recorded_margins import RecordedMargins, recorded_margins
+
+SOFTNESS = 1e-6
+"""``e``, per mean eigenvalue of ``G G^T``: so small that little of an admissible wrench is left."""
+
+LEVER = 0.1
+"""Length by which a moment counts as much as a force [m]: about half a sole."""
+
+SLOW = 0.2
+"""``T`` [s]: a double support of walking is short beside it, standing is long. Force plates under people who
+walk would have it longer, under one who stands after a step shorter."""
+
+ALONE = 0.05
+"""Time for which a contact has to carry alone to tell what it carries in the support of several beside [s]:
+instants of supports are known to some hundredths of a second."""
+
+
+def smooth_shares(wrench: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float) -> FloatArray:
+    """Share wrenches among contacts so that each is loaded smoothly, without regard to friction.
+
+    Args:
+        wrench: (n, 6) to be supplied, about the world's origin [N, N.m].
+        held: (n, c) which contacts are made.
+        points: (n, c, 3) where they are [m]; any value where they are not made.
+        step: Time between frames [s].
+
+    Returns:
+        (n, c, 6) of each contact, about the world's origin; their sum over the contacts is ``wrench`` where
+        any is made, and 0 elsewhere.
+    """
+    found = np.where(held[..., None], wrench[:, None], 0.0)
+    for first, end in mask_runs(held.sum(axis=1) > 1):
+        found[first:end] = _smooth_run(found, held, points, step, first, end)
+    return found
+
+
+def shared_wrenches(
+    stance: Stance, wrench: FloatArray, weight: float, near: FloatArray | None = None
+) -> FloatArray:
+    """Share wrenches among the contacts of a stance within their friction pyramids.
+
+    Args:
+        stance: At least one contact.
+        wrench: (n, 6) to be supplied, about the world's origin [N, N.m].
+        weight: Of the body [N], the scale of forces.
+        near: (n, c, 6) shares about the world's origin to stay near to, as of :func:`smooth_shares`; None
+            for the least forces.
+
+    Returns:
+        (n, c, 6) of each contact, about the world's origin; their sum over the contacts is ``wrench``.
+    """
+    if len(stance) == 1:
+        return np.array(wrench[:, None])
+    if near is None:
+        return _nearest(stance, wrench, weight, None)
+    shares = np.array(near)
+    wrong = np.flatnonzero(~_admissible(stance, near, weight))
+    if len(wrong):
+        shares[wrong] = _nearest(stance, wrench[wrong], weight, near[wrong])
+    return shares
+
+
+def _admissible(stance: Stance, shares: FloatArray, weight: float) -> NDArray[np.bool_]:
+    """(n,) whether every contact can give its share."""
+    fine = np.ones(len(shares), dtype=bool)
+    for contact, part in zip(stance, shares.swapaxes(0, 1), strict=True):
+        limits, turn = contact_limits(contact, stance.friction_model), contact.rotation_contact_to_world
+        there = wrench_about(part, contact.position)
+        local = np.hstack([there[:, :3] @ turn, there[:, 3:] @ turn])
+        fine &= (local @ limits.A.T - limits.b).max(axis=1) <= SOFTNESS * weight
+    return fine
+
+
+def _nearest(stance: Stance, wrench: FloatArray, weight: float, near: FloatArray | None) -> FloatArray:
+    """(n, c, 6) admissible shares of several contacts, nearest to given ones, or the least."""
+    middle = np.mean([contact.position for contact in stance], axis=0)
+    wanted = _scaled(wrench, middle, weight)
+    generators = _generators(stance, middle, weight)
+    columns = np.vstack(generators).T
+    known = np.zeros((len(wanted), columns.shape[1]))
+    if near is not None:
+        told = _scaled(near, middle, weight).swapaxes(0, 1)
+        known = np.hstack([_pushes(one.T, part) for one, part in zip(generators, told, strict=True)])
+    pushes = _pushes(columns, wanted, known)
+    ends = np.cumsum([0, *map(len, generators)])
+    shares = np.stack(
+        [pushes[:, a:b] @ part for a, b, part in zip(ends[:-1], ends[1:], generators, strict=True)],
+        axis=1,
+    )
+    shares += _smallest([contact.position - middle for contact in stance], wanted - shares.sum(axis=1))
+    shares = shares * weight
+    shares[..., 3:] *= LEVER
+    return wrench_about(shares, -middle)
+
+
+def _smooth_run(
+    found: FloatArray, held: NDArray[np.bool_], points: FloatArray, step: float, first: int, end: int
+) -> FloatArray:
+    """(k, c, 6) smooth shares in the frames from ``first`` up to ``end``, all with several contacts.
+
+    The wrenches about their own points, moments per lever, are the unknowns: their changes and sizes are
+    least squares, with one linear equation for the sum in every frame.
+    """
+    made = held[first:end]
+    places = np.where(made[..., None], points[first:end], 0.0)
+    count = int(made.sum())
+    index = np.full((end - first + 2, made.shape[1]), -1)
+    index[1:-1][made] = np.arange(count)
+    before, after = index[:-1], index[1:]
+    # A change from one frame to the next; none is asked for across an end of the recording.
+    inside = np.ones((len(before), 1), dtype=bool)
+    inside[0], inside[-1] = _telling(held[:first][::-1], step), _telling(held[end:], step)
+    changing = inside & ((before >= 0) | (after >= 0))
+    frames, who = np.nonzero(changing)
+    rows = np.arange(len(frames))
+    ours, theirs = after[frames, who], before[frames, who]
+    change = sparse.csr_array(
+        (np.r_[np.ones((ours >= 0).sum()), -np.ones((theirs >= 0).sum())],
+         (np.r_[rows[ours >= 0], rows[theirs >= 0]], np.r_[ours[ours >= 0], theirs[theirs >= 0]])),
+        shape=(len(rows), count),
+    )  # fmt: skip
+    known = np.zeros((len(rows), 6))
+    if first > 0:
+        start = frames == 0
+        known[start] = _about(found[first - 1, who[start]], places[0, who[start]])
+    if end < len(held):
+        last = frames == len(before) - 1
+        known[last] = -_about(found[end, who[last]], places[-1, who[last]])
+    cost = change.T @ change + (step / SLOW) ** 2 * sparse.eye_array(count)
+    frame, contact = np.nonzero(made)
+    middle = places.sum(axis=1) / made.sum(axis=1)[:, None]
+    total = _about(found[first:end][frame, contact], middle[frame])  # the whole wrench, once per contact
+    one = np.searchsorted(frame, np.arange(end - first))
+    sums = _sums(frame, places[frame, contact] - middle[frame], end - first)
+    system = sparse.block_array([[sparse.kron(cost, np.eye(6)), sums.T], [sums, None]])
+    right = np.concatenate([(change.T @ known).ravel(), total[one].ravel()])
+    solved = splu(sparse.csc_matrix(system)).solve(right)[: 6 * count].reshape(count, 6)
+    solved[:, 3:] *= LEVER
+    shares = np.zeros((end - first, made.shape[1], 6))
+    shares[frame, contact] = wrench_about(solved, -places[frame, contact])
+    return shares
+
+
+def _telling(beside: NDArray[np.bool_], step: float) -> bool:
+    """Whether the frames (n, c) beside a run, the nearest first, tell what is carried there.
+
+    In flight nothing is; one contact alone tells it if it is long enough, or lasts up to the recording's end.
+    """
+    if not len(beside):
+        return False
+    changed = np.flatnonzero((beside != beside[0]).any(axis=1))
+    return not beside[0].any() or not len(changed) or bool(changed[0] * step > ALONE)
+
+
+def _sums(frame: NDArray[np.int64], arm: FloatArray, frames: int) -> sparse.csr_array:
+    """(6 f, 6 k) sums over each frame's contacts of wrenches about points ``arm`` (k, 3) off its middle."""
+    carried = _carried(arm)
+    rows = 6 * frame[:, None, None] + np.arange(6)[:, None] + np.zeros(6, dtype=np.int64)
+    columns = 6 * np.arange(len(frame))[:, None, None] + np.zeros((6, 1), dtype=np.int64) + np.arange(6)
+    return sparse.csr_array((carried.ravel(), (rows.ravel(), columns.ravel())), (6 * frames, 6 * len(frame)))
+
+
+def _carried(arm: FloatArray) -> FloatArray:
+    """(k, 6, 6) which carry wrenches, moments per lever, from points (k, 3) away."""
+    return wrench_map(-arm / LEVER)
+
+
+def _about(wrench: FloatArray, point: FloatArray) -> FloatArray:
+    """(k, 6) about points (k, 3), moments per lever."""
+    moved = wrench_about(wrench, point)
+    moved[:, 3:] /= LEVER
+    return moved
+
+
+def _scaled(wrench: FloatArray, middle: FloatArray, weight: float) -> FloatArray:
+    """(..., 6) about a point, per body weight and lever."""
+    wanted = wrench_about(wrench, middle) / weight
+    wanted[..., 3:] /= LEVER
+    return wanted
+
+
+def _generators(stance: Stance, middle: FloatArray, weight: float) -> list[FloatArray]:
+    """(k, 6) wrenches of unit pushes of each contact about the middle, moments per lever.
+
+    A grasp's unit is its limit, in body weights.
+    """
+    found = ContactGenerators.of(stance, grasp_moments=False)
+    unit = np.where(np.isfinite(found.upper), found.upper / weight, 1.0)
+    wrenches = unit[:, None] * found.about(middle).T
+    wrenches[:, 3:] /= LEVER
+    return [wrenches[found.contact == number] for number in range(len(stance))]
+
+
+def _pushes(columns: FloatArray, wanted: FloatArray, known: FloatArray | float = 0.0) -> FloatArray:
+    """(n, k) pushes nearest to known ones that supply (n, 6) wrenches, as far as pushes can."""
+    soft = SOFTNESS * float(np.trace(columns @ columns.T)) / 6.0
+    return share(columns, wanted, np.ones((len(wanted), columns.shape[1])), soft, prior=known).magnitude
+
+
+def _smallest(arms: Sequence[FloatArray], missing: FloatArray) -> FloatArray:
+    """(n, c, 6) smallest wrenches at points ``arms`` away that add up to (n, 6) missing ones."""
+    maps = _carried(np.array(arms))
+    each = missing @ np.linalg.pinv(np.hstack(list(maps))).T
+    return np.stack(
+        [part @ one.T for part, one in zip(np.split(each, len(arms), axis=1), maps, strict=True)], axis=1
+    )
+
+
+def torques_of(dynamics: RecordedDynamics, effectors: tuple[str, ...], wrenches: FloatArray) -> FloatArray:
+    """(n, nv) generalised forces beside those of contacts: torques of the joints, and what the pelvis lacks.
+
+    Args:
+        dynamics: The motion.
+        effectors: c names.
+        wrenches: (n, c, 6) on each, about the world's origin [N, N.m].
+    """
+    torques = np.array(dynamics.free_torque)
+    for number, effector in enumerate(effectors):
+        moved = _moved_by(dynamics.body, effector)
+        torques[:, moved] -= np.einsum("nij,ni->nj", dynamics.jacobians[:, :, moved], wrenches[:, number])
+    return torques
+
+
+def contact_wrenches(dynamics: RecordedDynamics, schedule: ContactSchedule, start: float = 0.0) -> FloatArray:
+    """(n, c, 6) wrench on each effector of a schedule, about the world's origin [N, N.m]; 0 off its contacts.
+
+    Args:
+        dynamics: The motion.
+        schedule: Its stances.
+        start: The schedule's clock at the motion's first instant [s].
+    """
+    names, times = schedule.sequence.effectors, dynamics.time + start
+    phases = schedule.phase_at(times)
+    held, points = schedule.support(times, names), np.zeros((len(times), len(names), 3))
+    for number, phase in enumerate(schedule.sequence):
+        for contact in phase.stance:
+            points[phases == number, names.index(contact.effector)] = contact.position
+    step = float(dynamics.time[1] - dynamics.time[0])
+    wrenches, weight = smooth_shares(dynamics.wrench, held, points, step), GRAVITY * dynamics.body.mass
+    for number, phase in enumerate(schedule.sequence):
+        frames = np.flatnonzero(phases == number)
+        if len(frames) and len(phase.stance) > 1:
+            columns = [names.index(name) for name in phase.stance.effectors]
+            near = wrenches[frames[:, None], columns]
+            wrenches[frames[:, None], columns] = shared_wrenches(
+                phase.stance, dynamics.wrench[frames], weight, near
+            )
+    return wrenches
+
+
+def motion_on_contacts(
+    dynamics: RecordedDynamics,
+    schedule: ContactSchedule,
+    start: float = 0.0,
+    margins: RecordedMargins | None = None,
+) -> Motion:
+    """The recorded motion with contacts, their forces, joint torques and the margin of balance.
+
+    The margin is that of the whole body about its centre of mass, see
+    :func:`manikin.recordings.dynamics.recorded_margins.recorded_margins`. In flight no contact can push: the
+    torques are those that the motion would need with nothing to push against, and the margin is minus the
+    length of the wrench that is missing. The pelvis' six generalised forces are zero: with contacts exactly
+    (but for rounding), in flight what is missing is left out.
+
+    Args:
+        dynamics: The motion.
+        schedule: Its stances, of :func:`manikin.recordings.supports.recorded_stances.recorded_schedule`.
+        start: The schedule's clock at the motion's first instant [s].
+        margins: Of the same motion on the same stances, where they are known already.
+    """
+    names = schedule.sequence.effectors
+    times = dynamics.time + start
+    phases = schedule.phase_at(times)
+    wrenches = contact_wrenches(dynamics, schedule, start)
+    forces = np.zeros_like(wrenches)
+    for number, phase in enumerate(schedule.sequence):
+        frames = phases == number
+        for contact in phase.stance:
+            column = names.index(contact.effector)
+            forces[frames, column] = wrench_about(wrenches[frames, column], contact.position)
+    torques = torques_of(dynamics, names, wrenches)
+    torques[:, :6] = 0.0
+    return Motion(
+        time=dynamics.time, q=dynamics.q, v=dynamics.v, a=dynamics.a, tau=torques, com=dynamics.com,
+        angular_momentum=dynamics.angular_momentum,
+        margin=(margins or recorded_margins(dynamics, schedule, start)).whole_body,
+        support=schedule.support(times, names), contact_force=forces, contact_names=names,
+        joint_names=tuple(dynamics.body.joint_names),
+    )  # fmt: skip
+
+
+def _moved_by(body: BodyModel, effector: str) -> list[int]:
+    """Indices of the velocities that move an effector."""
+    model = body.pinocchio
+    joint = model.frames[body.effector_frame(effector)].parentJoint
+    return [
+        place
+        for one in model.supports[joint]
+        for place in range(model.idx_vs[one], model.idx_vs[one] + model.nvs[one])
+        if one
+    ]

@@ -1,0 +1,1 @@
+"""Readers of BVH, ASF with AMC, C3D, TRC and MOT files."""

@@ -1,0 +1,274 @@
+"""Markers, force plates and events in C3D files, by the library ezc3d.
+
+The file declares the unit of length, the rates, and the axis that points up on the screen
+(``POINT:Y_SCREEN``, z where it is missing). Points that are angles, forces, moments or powers, computed by
+other programs, are left out. Events and the first frame are on the clock of the trial from which the file
+may be cut.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, wrench_about
+from manikin.recordings.readers.c3d_layout import C3dLayout, c3d_layout, plate_load
+from manikin.recordings.readers.markers import (
+    Event,
+    ForcePlate,
+    MarkerRecording,
+    unique_names,
+    without_unseen,
+)
+from manikin.recordings.readers.skeleton_recording import Subject
+from manikin.recordings.readers.text_files import LARGEST, metres_per, rotation_to_z_up
+
+NO_PLACES = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "ENERGIES")
+"""Parameters of ``POINT`` that list the points which are no places."""
+
+CHANNELS = {1: 6, 2: 6, 3: 8, 4: 6}
+"""Channels of the types of force plates that can be read."""
+
+
+def read_c3d(path: str | Path, up: str | None = None, plates: bool = True) -> MarkerRecording:
+    """Read a C3D file.
+
+    Args:
+        path: The file.
+        up: The file's axis that points up; None for the one that it declares.
+        plates: Whether force plates are read.
+
+    Raises:
+        InputError: If the file is missing, damaged or cut short, a force plate is of a type that is not
+            known or wrongly described, or ezc3d is not installed.
+    """
+    file = str(path)
+    ezc3d = _library(file)
+    layout = c3d_layout(_content(path), file)
+    with_plates = plates and _has_plates(layout)
+    try:
+        found = ezc3d.c3d(file)
+    except (OSError, RuntimeError, ValueError, IndexError, KeyError, TypeError, MemoryError) as error:
+        reason = " ".join(str(error).split())[:100]
+        raise InputError(f"{file}: cannot be read ({reason}); valid: a complete C3D file") from None
+    parameters, points = found["parameters"], found["data"]["points"]
+    if points.shape != (4, layout.points, layout.frames):
+        raise layout.error(f"data of shape {points.shape}", f"{layout.frames} frames, {layout.points} points")
+    unit = metres_per(next(iter(_texts(parameters, "POINT", "UNITS")), ""), f"{file}: POINT:UNITS")
+    if with_plates:
+        _check_moments(parameters, layout)
+    turn = rotation_to_z_up(up or _declared_up(parameters), f"{file}: POINT:Y_SCREEN")
+    rate = layout.real("POINT", "RATE")
+    start = (layout.first_frame - 1) / rate
+    names, kept = _markers(parameters, layout)
+    positions = unit * _finite(points[:3, kept], file, "a point").transpose(2, 1, 0) @ turn.T
+    return MarkerRecording(
+        Path(path).name, names, without_unseen(positions), rate, start,
+        _plates(parameters, found["data"]["analogs"][0], layout, unit, turn) if with_plates else (),
+        _events(parameters, layout), _subject(parameters, unit),
+    )  # fmt: skip
+
+
+def _library(file: str) -> Any:
+    try:
+        import ezc3d
+    except ModuleNotFoundError as error:
+        if error.name != "ezc3d":
+            raise
+        raise InputError(f"{file}: C3D files need ezc3d; install it with: pip install ezc3d") from None
+    return ezc3d
+
+
+def _content(path: str | Path) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}; valid: a C3D file") from None
+
+
+def _finite(values: FloatArray, file: str, what: str) -> FloatArray:
+    """Values, NaN in gaps, of which none is absurd."""
+    values = np.asarray(values, dtype=np.float64)
+    if np.any(np.abs(values) > LARGEST):
+        raise InputError(f"{file}: {what} beyond {LARGEST:g}; valid: finite numbers")
+    return values
+
+
+def _texts(parameters: Mapping[str, Any], group: str, name: str) -> list[str]:
+    values = parameters.get(group, {}).get(name, {}).get("value", [])
+    return [str(value).strip() for value in values] if isinstance(values, list) else []
+
+
+def _declared_up(parameters: Mapping[str, Any]) -> str:
+    return next(iter(_texts(parameters, "POINT", "Y_SCREEN")), "") or "+z"
+
+
+# --- points ------------------------------------------------------------------------------------
+
+
+def _markers(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[tuple[str, ...], list[int]]:
+    """Names and indices of the points that are places."""
+    labels = _texts(parameters, "POINT", "LABELS")
+    for number in range(2, 1 + layout.points // 255 + 1):
+        labels += _texts(parameters, "POINT", f"LABELS{number}")
+    labels = (labels + [""] * layout.points)[: layout.points]
+    others = {name for group in NO_PLACES for name in _texts(parameters, "POINT", group) if name}
+    kept = [place for place, label in enumerate(labels) if label not in others]
+    if not kept:
+        raise layout.error("no point is a place", "at least one marker")
+    return unique_names([labels[place] for place in kept]), kept
+
+
+def _subject(parameters: Mapping[str, Any], unit: float) -> Subject:
+    """Measures that Plug-in Gait leaves in ``PROCESSING``, in the unit of the points, means of both sides."""
+    given = {key.lower().replace(" ", ""): value for key, value in parameters.get("PROCESSING", {}).items()}
+
+    def measure(*names: str) -> float | None:
+        cells = [np.ravel(given[name].get("value", [])) for name in names if name in given]
+        found = [float(cell[0]) for cell in cells if cell.size and np.issubdtype(cell.dtype, np.number)]
+        found = [value for value in found if 0.0 < value < LARGEST]
+        return float(np.mean(found)) if found else None
+
+    def length(*names: str) -> float | None:
+        found = measure(*names)
+        return None if found is None else unit * found
+
+    diameter = length("markerdiameter")
+    offset = length("lshoulderoffset", "rshoulderoffset")
+    return Subject(
+        measure("bodymass"), length("height"), length("lkneewidth", "rkneewidth"),
+        length("lanklewidth", "ranklewidth"), length("lelbowwidth", "relbowwidth"), offset,
+        None if diameter is None else 0.5 * diameter,
+    )  # fmt: skip
+
+
+def _events(parameters: Mapping[str, Any], layout: C3dLayout) -> tuple[Event, ...]:
+    """Events, whose instants the file holds as minutes and seconds."""
+    declared = layout.parameters.get(("EVENT", "TIMES"))
+    if declared and declared.kind < 0:
+        raise layout.error("EVENT:TIMES are text", "two finite numbers per event")
+    times = np.asarray(parameters.get("EVENT", {}).get("TIMES", {}).get("value", []), dtype=np.float64)
+    if not times.size:
+        return ()
+    if times.ndim == 1 and times.size % 2 == 0:  # as some programs write them
+        times = times.reshape(-1, 2).T
+    if times.ndim != 2 or len(times) != 2 or not np.all(np.abs(times) <= LARGEST):
+        raise layout.error("EVENT:TIMES are no minutes and seconds", "two finite numbers per event")
+    instants = 60.0 * times[0] + times[1]
+    labels, contexts = (
+        (_texts(parameters, "EVENT", name) + [""] * len(instants))[: len(instants)]
+        for name in ("LABELS", "CONTEXTS")
+    )
+    return tuple(map(Event, labels, contexts, instants.tolist()))
+
+
+# --- force plates ------------------------------------------------------------------------------
+
+
+def _has_plates(layout: C3dLayout) -> bool:
+    """Whether there are force plates; what the library reads of them is complete."""
+    used = layout.integers("FORCE_PLATFORM", "USED")
+    count = int(used[0]) if len(used) else 0
+    if not count:
+        return False
+    types = layout.integers("FORCE_PLATFORM", "TYPE")[:count]
+    wrong = sorted(set(types.tolist()) - set(CHANNELS))
+    if wrong or len(types) < count:
+        raise layout.error(
+            f"force plates of type {wrong}, {len(types)} of {count}", "1 to 4, or plates=False"
+        )
+    for name, each in (("CORNERS", 12), ("ORIGIN", 3)):
+        if layout.count("FORCE_PLATFORM", name) < each * count:
+            raise layout.error(f"FORCE_PLATFORM:{name} has too few values", f"{each} for each of {count}")
+    _check_channels(layout, count, max(CHANNELS[kind] for kind in types.tolist()))
+    _check_matrices(layout, count, 4 in types)
+    if 3 in types and 0 < layout.count("FORCE_PLATFORM", "FPCOPPOLY") < 12 * count:
+        raise layout.error("FORCE_PLATFORM:FPCOPPOLY has too few values", f"12 for each of {count}")
+    if layout.count("FORCE_PLATFORM", "UNITS") == 0 and ("FORCE_PLATFORM", "UNITS") in layout.parameters:
+        raise layout.error("FORCE_PLATFORM:UNITS is empty", "a unit")
+    return True
+
+
+def _check_channels(layout: C3dLayout, count: int, each: int) -> None:
+    parameter = layout.parameters.get(("FORCE_PLATFORM", "CHANNEL"))
+    size = parameter.dimensions if parameter else ()
+    used = layout.integers("FORCE_PLATFORM", "CHANNEL")
+    if len(size) != 2 or size[0] < each or size[1] < count:
+        raise layout.error(f"FORCE_PLATFORM:CHANNEL is of size {size}", f"({each}, {count})")
+    used = used.reshape(size[1], size[0])[:count, :each]
+    if used.min() < 1 or used.max() > layout.channels:
+        raise layout.error("FORCE_PLATFORM:CHANNEL names no channel", f"1 to {layout.channels}")
+
+
+def _check_moments(parameters: Mapping[str, Any], layout: C3dLayout) -> None:
+    """The library adds moments and forces times lengths: their units have to agree, where they are told."""
+    lengths = _texts(parameters, "POINT", "UNITS")[0].lower()
+    units = _texts(parameters, "ANALOG", "UNITS")
+    for channel in np.unique(layout.integers("FORCE_PLATFORM", "CHANNEL")).tolist():
+        declared = units[channel - 1] if 0 < channel <= len(units) else ""
+        plain = "".join(letter for letter in declared.lower() if letter.isalpha())
+        if plain in ("nm", "nmm") and plain != f"n{lengths}":
+            raise layout.error(
+                f"moments in {declared} of lengths in {lengths}", f"N{lengths}, or plates=False"
+            )
+
+
+def _check_matrices(layout: C3dLayout, count: int, needed: bool) -> None:
+    parameter = layout.parameters.get(("FORCE_PLATFORM", "CAL_MATRIX"))
+    size = parameter.dimensions if parameter else ()
+    complete = len(size) == 3 and min(size[:2]) >= 6 and size[2] >= count
+    if not complete and (needed or (len(size) > 2 and parameter is not None and parameter.count)):
+        raise layout.error(f"FORCE_PLATFORM:CAL_MATRIX is of size {size}", f"(6, 6, {count})")
+
+
+def _plates(
+    parameters: Mapping[str, Any], channels: FloatArray, layout: C3dLayout, unit: float, turn: FloatArray
+) -> tuple[ForcePlate, ...]:
+    """Plates by their channels (c, n), their moments in the file's unit of length."""
+    types = layout.integers("FORCE_PLATFORM", "TYPE")
+    count = int(layout.integers("FORCE_PLATFORM", "USED")[0])
+    each = layout.parameters["FORCE_PLATFORM", "CHANNEL"].dimensions[0]
+    used = layout.integers("FORCE_PLATFORM", "CHANNEL").reshape(-1, each) - 1
+    corners, origins = (_reals(parameters, layout, name) for name in ("CORNERS", "ORIGIN"))
+    force_unit = next(iter(_texts(parameters, "FORCE_PLATFORM", "UNITS")), "N")
+    rate = layout.real("POINT", "RATE")
+    if force_unit not in ("N", "") or channels.shape[1] != layout.frames * layout.samples:
+        raise layout.error(f"force plates in {force_unit[:20]!r}", "N, every sample")
+    found = []
+    for plate, kind in enumerate(types[:count].tolist()):
+        name = f"force plate {plate + 1}"
+        calibration = _reals(parameters, layout, "CAL_MATRIX") if kind == 4 else None
+        if calibration is not None:
+            size = layout.parameters["FORCE_PLATFORM", "CAL_MATRIX"].dimensions
+            calibration = calibration.reshape(size, order="F")[:6, :6, plate]
+        surface = corners[12 * plate : 12 * plate + 12].reshape(4, 3)
+        own = _finite(channels[used[plate, : CHANNELS[kind]]], layout.file, name)
+        force, moment = plate_load(kind, own, surface, origins[3 * plate : 3 * plate + 3], calibration)
+        if any(np.isnan(values).any() for values in (force, moment, surface)):
+            raise layout.error(f"{name} is described or measured by NaN", "finite numbers")
+        surface, where = unit * surface @ turn.T, f"{layout.file}: {name}"
+        middle, normal = surface.mean(axis=0), _normal(surface, where)
+        wrenches = wrench_about(np.hstack([force @ turn.T, unit * moment @ turn.T]), -middle)
+        sampled, start = rate * layout.samples, (layout.first_frame - 1) / rate
+        found.append(ForcePlate(where, wrenches, middle, sampled, start, normal, surface))
+    return tuple(found)
+
+
+def _reals(parameters: Mapping[str, Any], layout: C3dLayout, name: str) -> FloatArray:
+    """(n,) values of a parameter of the force plates, none absurd."""
+    try:
+        values = np.ravel(parameters["FORCE_PLATFORM"][name]["value"], order="F").astype(np.float64)
+    except (KeyError, ValueError):
+        raise layout.error(f"FORCE_PLATFORM:{name} is no number", "numbers") from None
+    return _finite(values, layout.file, f"FORCE_PLATFORM:{name}")
+
+
+def _normal(corners: FloatArray, name: str) -> FloatArray:
+    """(3,) upward unit normal of the surface, by its diagonals."""
+    normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
+    size = float(np.linalg.norm(normal))
+    if size < 1e-6:
+        raise InputError(f"{name}: its corners enclose no surface; valid: four corners, one after the other")
+    return normal * (np.sign(normal[2]) or 1.0) / size

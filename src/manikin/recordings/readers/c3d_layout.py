@@ -1,0 +1,298 @@
+"""Header and parameters of a C3D file, checked against the size of the file.
+
+The C++ library that reads the data trusts the counts in a file, so that a damaged one could make it read
+outside its memory. What passes here is safe to hand over: every record of the parameters lies in its
+section, counts agree with each other, and the file is as long as they say (c3d.org, user guide).
+
+Also here. Force and moment on a force plate from the channels that a C3D file keeps of it (c3d.org, user
+guide).
+
+In a plate's own axes x points from its second corner to the first one, y from the fourth to the first, and
+z at right angles to both, into the ground of most plates. Its origin is the middle of the surface seen from
+that of its sensors, which lie deeper; some programs write the opposite, told by its sign.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import prod
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray
+
+
+def plate_load(
+    kind: int, channels: FloatArray, corners: FloatArray, origin: FloatArray, calibration: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """Force and moment about the middle of the corners, in the axes in which the corners are told.
+
+    Args:
+        kind: Type of the plate: 1 force, centre of pressure and free moment; 2 force and moment; 3 eight
+            forces of four sensors; 4 as 2 with a calibration matrix.
+        channels: (c, n) its channels.
+        corners: (4, 3).
+        origin: (3,).
+        calibration: (6, 6), used by type 4 only.
+
+    Returns:
+        (n, 3) and (n, 3), in the units of the channels.
+    """
+    axes, origin = _axes(corners), -origin if origin[2] > 0.0 else origin
+    if kind == 1:
+        force, zero = channels[:3].T, np.zeros(channels.shape[1])
+        place, free = np.stack([*channels[3:5], zero], axis=1), np.stack([zero, zero, channels[5]], axis=1)
+        return force @ axes.T, (np.cross(place, force) + free) @ axes.T
+    if kind == 3:
+        x12, x34, y14, y23, z1, z2, z3, z4 = channels[:8]
+        force = np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4], axis=1)
+        a, b, depth = origin
+        moment = np.stack(
+            [b * (z1 + z2 - z3 - z4), a * (z2 + z3 - z1 - z4), b * (x34 - x12) + a * (y14 - y23)], axis=1
+        )
+        return force @ axes.T, (moment + np.cross(force, [0.0, 0.0, depth])) @ axes.T
+    load = channels[:6] if kind == 2 or calibration is None else calibration @ channels[:6]
+    force, moment = load[:3].T, load[3:].T
+    return force @ axes.T, (moment + np.cross(force, origin)) @ axes.T
+
+
+def _axes(corners: FloatArray) -> FloatArray:
+    """(3, 3) with columns x, y, z; NaN where the corners enclose no surface."""
+    x, y = corners[0] - corners[1], corners[0] - corners[3]
+    z = np.cross(x, y)
+    columns = np.stack([x, np.cross(z, x), z], axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return columns / np.linalg.norm(columns, axis=0)
+
+
+BLOCK = 512
+_INTEL, _DEC, _MIPS = 84, 85, 86
+_SIZES = {-1: 1, 1: 1, 2: 2, 4: 4}
+_TEXT, _INTEGERS, _REAL = -1, (1, 2), 4
+_DIMENSIONS, _ENTRIES = 7, 65535  # of one parameter, the most that the format has room for
+_FASTEST = 1e6
+_SINGLE = (
+    ("POINT", "FRAMES"), ("POINT", "DATA_START"), ("ANALOG", "RATE"), ("ANALOG", "GEN_SCALE"),
+    ("FORCE_PLATFORM", "USED"),
+)  # fmt: skip
+_READ = ("POINT", "ANALOG", "FORCE_PLATFORM", "EVENT", "ROTATION")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter: its type (-1 text, 1 byte, 2 integer, 4 real), dimensions and raw values."""
+
+    kind: int
+    dimensions: tuple[int, ...]
+    raw: bytes
+
+    @property
+    def count(self) -> int:
+        """Number of values."""
+        return prod(self.dimensions)
+
+
+@dataclass(frozen=True)
+class C3dLayout:
+    """What a C3D file holds.
+
+    Attributes:
+        file: Its path, for messages.
+        points: Points per frame.
+        channels: Analog channels.
+        samples: Samples of each channel per frame.
+        first_frame: Number of the first frame, counted from 1.
+        frames: Number of frames.
+        processor: Kind of processor whose numbers these are: 84 Intel, 85 DEC, 86 MIPS.
+        parameters: By group and name, both in upper case.
+    """
+
+    file: str
+    points: int
+    channels: int
+    samples: int
+    first_frame: int
+    frames: int
+    processor: int
+    parameters: Mapping[tuple[str, str], Parameter]
+
+    def integers(self, group: str, name: str) -> NDArray[np.int64]:
+        """(n,) values of a whole-numbered parameter, n = 0 where it is missing.
+
+        Raises:
+            InputError: If it is of another type.
+        """
+        parameter = self.parameters.get((group, name))
+        if parameter is None:
+            return np.zeros(0, dtype=np.int64)
+        if parameter.kind not in _INTEGERS:
+            raise self.error(f"{group}:{name} is no whole number", "whole numbers")
+        kind = "u1" if parameter.kind == 1 else (">u2" if self.processor == _MIPS else "<u2")
+        return np.frombuffer(parameter.raw, kind).astype(np.int64)
+
+    def real(self, group: str, name: str) -> float:
+        """First value of a real parameter, 0 where it is missing.
+
+        Raises:
+            InputError: If it is of another type.
+        """
+        parameter = self.parameters.get((group, name))
+        if parameter is None or not parameter.count:
+            return 0.0
+        if parameter.kind != _REAL:
+            raise self.error(f"{group}:{name} is no real number", "a real number")
+        if self.processor == _DEC:  # the halves exchanged, the exponent greater by two
+            return float(np.frombuffer(parameter.raw[2:4] + parameter.raw[:2], "<f4")[0]) / 4.0
+        return float(np.frombuffer(parameter.raw[:4], ">f4" if self.processor == _MIPS else "<f4")[0])
+
+    def count(self, group: str, name: str) -> int:
+        """Number of values of a parameter, 0 where it is missing."""
+        parameter = self.parameters.get((group, name))
+        return parameter.count if parameter else 0
+
+    def error(self, wrong: str, valid: str) -> InputError:
+        """What is wrong with the file, as one line."""
+        return InputError(f"{self.file}: {wrong}; valid: {valid}")
+
+
+def c3d_layout(content: bytes, file: str) -> C3dLayout:
+    """Check header, parameters and size of a C3D file.
+
+    Args:
+        content: The whole file.
+        file: Its path, for messages.
+
+    Raises:
+        InputError: If it is no C3D file, cut short, or its counts contradict each other.
+    """
+    start = (content[0] - 1) * BLOCK if content else 0
+    if len(content) < 2 * BLOCK or content[1] != 0x50 or start < BLOCK or start + BLOCK > len(content):
+        raise InputError(f"{file}: is no C3D file; valid: a header, the parameters, the frames")
+    blocks, processor = content[start + 2], content[start + 3]
+    if processor not in (_INTEL, _DEC, _MIPS):
+        raise InputError(f"{file}: kind of processor is {processor}; valid: {_INTEL}, {_DEC}, {_MIPS}")
+    end = start + blocks * BLOCK
+    if not blocks or end > len(content):
+        raise InputError(f"{file}: {blocks} blocks of parameters; valid: as many as the file has")
+    big_endian = processor == _MIPS
+    words = np.frombuffer(content[:20], ">u2" if big_endian else "<u2").astype(int)
+    points, measured, first, last, samples = (int(words[k]) for k in (1, 2, 3, 4, 9))
+    layout = C3dLayout(
+        file, points, measured // max(samples, 1), samples, max(first, 1), last - first + 1, processor,
+        MappingProxyType(_parameters(content[:end], start + 4, big_endian, file)),
+    )  # fmt: skip
+    _check_counts(layout, measured)
+    # The sign of the scale says whether data are whole numbers or reals.
+    negative = content[{_INTEL: 15, _DEC: 13, _MIPS: 12}[processor]] & 0x80
+    wanted = layout.frames * (4 * points + measured) * (4 if negative else 2)
+    begin = (int(words[8]) - 1) * BLOCK
+    if begin < end or begin + wanted > len(content):
+        raise layout.error(
+            f"{len(content)} bytes for {layout.frames} frames of {points} points that begin at byte {begin}",
+            f"{begin + wanted} bytes (is it cut short?)",
+        )
+    return layout
+
+
+def _check_counts(layout: C3dLayout, measured: int) -> None:
+    """Header and parameters have to say the same."""
+    if layout.points < 1 or layout.frames < 1:
+        raise layout.error(f"{layout.points} points in {layout.frames} frames", "at least one of each")
+    if layout.channels * layout.samples != measured:
+        raise layout.error(f"{measured} samples for {layout.samples} instants", "a multiple of the instants")
+    pairs = (("POINT", layout.points), ("ANALOG", layout.channels))
+    for group, count in pairs:
+        used = layout.integers(group, "USED")
+        if (used[0] if len(used) else 0) != count:
+            raise layout.error(f"{group}:USED is {used[:1].tolist()} where the header has {count}", "equal")
+    for name in ("SCALE", "OFFSET"):
+        if layout.count("ANALOG", name) < layout.channels:
+            raise layout.error(f"ANALOG:{name} has too few values", f"{layout.channels}, one per channel")
+    rate, analog_rate = layout.real("POINT", "RATE"), layout.real("ANALOG", "RATE")
+    if not 0.0 < rate < _FASTEST:
+        raise layout.error(f"POINT:RATE is {rate:g} Hz", f"> 0 and < {_FASTEST:g}")
+    if layout.channels and not abs(analog_rate / rate - layout.samples) < 0.5:
+        raise layout.error(f"ANALOG:RATE is {analog_rate:g} Hz", f"{rate * layout.samples:g}")
+    if not all(layout.count("POINT", name) for name in ("UNITS", "SCALE")):
+        raise layout.error("no POINT:UNITS or POINT:SCALE", "a complete file")
+    empty = [name for name in _SINGLE if name in layout.parameters and not layout.count(*name)]
+    if empty:
+        raise layout.error(f"{':'.join(empty[0])} is empty", "a value")
+    if np.any(layout.integers("ROTATION", "USED")):
+        raise layout.error("holds rotations of segments", "markers")
+
+
+def _parameters(content: bytes, place: int, big_endian: bool, file: str) -> dict[tuple[str, str], Parameter]:
+    """Parameters by group and name; ``content`` ends where their section does."""
+    groups: dict[int, str] = {}
+    found: list[tuple[int, str, Parameter]] = []
+    while True:
+        here = _Reader(content, place, file)
+        letters = abs(here.signed())
+        if not letters:
+            break
+        group = here.signed()
+        name = here.take(letters).decode("latin-1").upper()
+        after = here.place
+        step = int.from_bytes(here.take(2), "big" if big_endian else "little")
+        if group < 0:
+            if -group in groups:
+                raise here.error(f"group {-group} occurs twice")
+            groups[-group] = name
+        elif group > 0:
+            found.append((group, name, _parameter(here)))
+        else:
+            raise here.error("group 0")
+        here.take(here.unsigned())
+        if not step:
+            break
+        place = after + step
+        if place < here.place:
+            raise here.error(f"record {name[:40]!r} overlaps the next one")
+    lost = [name for group, name, _ in found if group not in groups]
+    if lost:
+        raise InputError(f"{file}: parameter {lost[0][:40]!r} has no group; valid: a complete file")
+    names = list(groups.values())
+    twice = [name for name in _READ if names.count(name) > 1]
+    if twice:
+        raise InputError(f"{file}: parameters of {twice[0]} occur twice; valid: once")
+    return {(groups[group], name): parameter for group, name, parameter in found}
+
+
+def _parameter(here: "_Reader") -> Parameter:
+    kind = here.signed()
+    if kind not in _SIZES:
+        raise here.error(f"type {kind}")
+    dimensions = tuple(here.take(here.unsigned()))
+    # The library visits every entry of the leading dimensions, even where the last one is 0.
+    if len(dimensions) > _DIMENSIONS or prod(size for size in dimensions if size) > _ENTRIES:
+        raise here.error(f"{len(dimensions)} dimensions, {' x '.join(map(str, dimensions[:7]))}")
+    if kind == _TEXT and not dimensions:
+        raise here.error("text without a length")
+    return Parameter(kind, dimensions, here.take(prod(dimensions) * _SIZES[kind]))
+
+
+class _Reader:
+    """Bytes of the parameters, one after the other."""
+
+    def __init__(self, content: bytes, place: int, file: str) -> None:
+        self.place = place
+        self._content = content
+        self._file = file
+
+    def take(self, count: int) -> bytes:
+        if self.place + count > len(self._content):
+            raise self.error("a record that goes beyond their end")
+        self.place += count
+        return self._content[self.place - count : self.place]
+
+    def unsigned(self) -> int:
+        return self.take(1)[0]
+
+    def signed(self) -> int:
+        return int.from_bytes(self.take(1), "big", signed=True)
+
+    def error(self, wrong: str) -> InputError:
+        return InputError(f"{self._file}: {wrong} in the parameters; valid: a complete C3D file")

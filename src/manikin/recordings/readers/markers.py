@@ -1,0 +1,328 @@
+"""One recorded motion of markers: their places at an even rate, force plates and events beside them.
+
+Also here. Frames in which a marker was not seen: finding them, and filling the short ones. One force plate of
+a recording: wrenches of the ground on the person.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from manikin.errors import InputError
+from manikin.numerics.signals import mask_runs
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.recordings.readers.skeleton_recording import UNKNOWN, Subject
+from manikin.runtime.display import Displayed
+
+LONGEST_GAP = 0.1
+"""Longest gap that is filled when nothing else is said [s]: feet stay within about a centimetre."""
+
+NEIGHBOURS = 6
+"""Frames on either side of a gap that its filling looks at."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """One run of frames without a marker.
+
+    Attributes:
+        marker: Its name.
+        first: First frame without it.
+        stop: First frame with it again, or the number of frames.
+    """
+
+    marker: str
+    first: int
+    stop: int
+
+    def __len__(self) -> int:
+        """Number of frames without the marker."""
+        return self.stop - self.first
+
+
+def gaps_of(seen: NDArray[np.bool_], names: Sequence[str]) -> tuple[Gap, ...]:
+    """Gaps, marker by marker.
+
+    Args:
+        seen: (n, m) whether each marker was seen.
+        names: (m,) of the markers.
+    """
+    return tuple(
+        Gap(names[marker], first, stop)
+        for marker in np.flatnonzero(~seen.all(axis=0)).tolist()
+        for first, stop in mask_runs(~seen[:, marker])
+    )
+
+
+def filled(positions: FloatArray, longest: int) -> FloatArray:
+    """Positions with the gaps of up to ``longest`` frames filled.
+
+    A gap is filled by the cubic spline through the :data:`NEIGHBOURS` frames nearest to it on either side
+    in which the marker was seen. One with fewer than two such frames on a side, as at the ends of the
+    recording, stays.
+
+    Args:
+        positions: (n, m, 3) [m], NaN in gaps.
+        longest: Frames of the longest gap to be filled.
+
+    Returns:
+        (n, m, 3) [m].
+    """
+    found = np.array(positions)
+    for marker in range(positions.shape[1]):
+        seen = ~np.isnan(positions[:, marker, 0])
+        frames = np.flatnonzero(seen)
+        for first, stop in mask_runs(~seen):
+            after = int(np.searchsorted(frames, first))
+            used = frames[max(after - NEIGHBOURS, 0) : after + NEIGHBOURS]
+            if stop - first <= longest and 2 <= after <= len(frames) - 2:
+                found[first:stop, marker] = CubicSpline(used, positions[used, marker])(np.arange(first, stop))
+    return found
+
+
+LEAST_FORCE = 20.0
+"""Normal force below which no centre of pressure is told; noise would place it [N]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForcePlate:
+    """Wrenches that a plate applies to who stands on it, at an even rate; the world is z up.
+
+    Attributes:
+        name: How messages call it.
+        wrenches: (n, 6) force [N] and moment about the world's origin [N.m], world axes.
+        origin: (3,) a point of its surface [m].
+        rate: Samples per second [Hz].
+        start: Instant of the first sample on the recording's clock [s].
+        normal: (3,) unit normal of its surface, upward.
+        corners: (4, 3) [m], one after the other; None where the file does not hold them.
+    """
+
+    name: str
+    wrenches: FloatArray
+    origin: FloatArray
+    rate: float
+    start: float = 0.0
+    normal: FloatArray = (0.0, 0.0, 1.0)  # pyright: ignore[reportAssignmentType]
+    corners: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        where = f"force plate {self.name!r}"
+        finite_number(self.rate, f"{where} rate [Hz]", above=0.0)
+        finite_number(self.start, f"{where} start [s]")
+        shapes = {"wrenches": (None, 6), "origin": (3,), "normal": (3,)}
+        if self.corners is not None:
+            shapes["corners"] = (4, 3)
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen_array(getattr(self, name), f"{where} {name}", shape))
+        if not len(self.wrenches):
+            raise InputError(f"{where} has no sample; valid: at least one")
+        if abs(np.linalg.norm(self.normal) - 1.0) > 1e-6:
+            raise InputError(f"{where} normal is {self.normal.tolist()}; valid: a unit vector")
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return len(self.wrenches)
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """(n,) instants on the recording's clock [s]."""
+        return frozen_array(self.start + np.arange(len(self)) / self.rate, "time")
+
+    @property
+    def force(self) -> FloatArray:
+        """(n, 3) [N]."""
+        return self.wrenches[:, :3]
+
+    @cached_property
+    def pressed(self) -> NDArray[np.bool_]:
+        """(n,) whether the normal force reaches :data:`LEAST_FORCE`."""
+        return self.force @ self.normal >= LEAST_FORCE
+
+    @cached_property
+    def cop(self) -> FloatArray:
+        """(n, 3) centre of pressure, the point of the surface about which the moment is normal to it [m].
+
+        ``c = o + n x M_o / (n . F)`` with the moment ``M_o`` about the origin ``o``; NaN where the plate
+        is not :attr:`pressed`.
+        """
+        moment = self.wrenches[:, 3:] - np.cross(self.origin, self.force)
+        along = np.where(self.pressed, self.force @ self.normal, np.nan)
+        places = self.origin + np.cross(self.normal, moment) / along[:, None]
+        places.setflags(write=False)
+        return places
+
+    def cut(self, begin: float, end: float) -> "ForcePlate":
+        """Samples at instants from ``begin`` up to, not with, ``end`` [s].
+
+        Raises:
+            InputError: If no sample is left.
+        """
+        # A thousandth of a sample absorbs what is lost in dividing by the rate.
+        first, last = (
+            min(max(int(np.ceil((instant - self.start) * self.rate - 1e-3)), 0), len(self))
+            for instant in (begin, end)
+        )
+        return replace(self, wrenches=self.wrenches[first:last], start=self.start + first / self.rate)
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something marked in a recording by who made it, such as ``"Foot Strike"`` of ``"Left"``.
+
+    Attributes:
+        label: What happens.
+        context: Side or part that does it; empty where the file does not say.
+        time: Instant on the recording's clock [s].
+    """
+
+    label: str
+    context: str
+    time: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MarkerRecording(Displayed):
+    """Markers at n instants; the world is z up.
+
+    Attributes:
+        name: Where it comes from, for messages.
+        marker_names: (m,) unique names.
+        positions: (n, m, 3) [m]; NaN where a marker was not seen.
+        rate: Frames per second [Hz].
+        start: Instant of the first frame on the recording's clock [s].
+        plates: Force plates, on the same clock.
+        events: In the order of time.
+        subject: What the file says about the person.
+    """
+
+    name: str
+    marker_names: tuple[str, ...]
+    positions: FloatArray
+    rate: float
+    start: float = 0.0
+    plates: tuple[ForcePlate, ...] = ()
+    events: tuple[Event, ...] = ()
+    subject: Subject = UNKNOWN
+
+    def __post_init__(self) -> None:
+        where = f"recording {self.name!r}"
+        finite_number(self.rate, f"{where} rate [Hz]", above=0.0)
+        finite_number(self.start, f"{where} start [s]")
+        if len(set(self.marker_names)) != len(self.marker_names):
+            raise InputError(f"{where} has a marker name twice; valid: unique names")
+        positions = np.array(self.positions, dtype=np.float64)
+        if positions.ndim != 3 or positions.shape[1:] != (len(self.marker_names), 3) or not len(positions):
+            raise InputError(
+                f"{where} positions have shape {positions.shape}; "
+                f"valid: (n, {len(self.marker_names)}, 3) with at least one frame"
+            )
+        if np.any(np.isinf(positions)):
+            raise InputError(f"{where} has an infinite position; valid: finite numbers, NaN for gaps")
+        positions[np.any(np.isnan(positions), axis=2)] = np.nan
+        positions.setflags(write=False)
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "events", tuple(sorted(self.events, key=lambda event: event.time)))
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.positions)
+
+    @property
+    def duration(self) -> float:
+        """From the first frame to the last [s]."""
+        return (len(self) - 1) / self.rate
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """(n,) instants on the recording's clock [s]."""
+        return frozen_array(self.start + np.arange(len(self)) / self.rate, "time")
+
+    @cached_property
+    def seen(self) -> NDArray[np.bool_]:
+        """(n, m) whether each marker was seen."""
+        return ~np.isnan(self.positions[..., 0])
+
+    @cached_property
+    def gaps(self) -> tuple[Gap, ...]:
+        """Runs of frames in which a marker was not seen, marker by marker."""
+        return gaps_of(self.seen, self.marker_names)
+
+    def marker(self, name: str) -> FloatArray:
+        """(n, 3) places of one marker [m].
+
+        Raises:
+            InputError: If there is none of that name.
+        """
+        return self.positions[:, self.marker_index(name)]
+
+    def marker_index(self, name: str) -> int:
+        """Place of a marker among the markers.
+
+        Raises:
+            InputError: If there is none of that name.
+        """
+        try:
+            return self.marker_names.index(name)
+        except ValueError:
+            raise InputError(
+                f"recording {self.name!r} has no marker {name!r}; valid: {', '.join(self.marker_names)}"
+            ) from None
+
+    def chosen(self, names: Sequence[str]) -> "MarkerRecording":
+        """The same recording with these markers only, in this order.
+
+        Raises:
+            InputError: If one is not there or twice.
+        """
+        places = [self.marker_index(name) for name in names]
+        return replace(self, marker_names=tuple(names), positions=self.positions[:, places])
+
+    def cut(self, start: int, stop: int) -> "MarkerRecording":
+        """The frames from ``start`` up to, not with, ``stop``, the plates' samples and events in between.
+
+        Raises:
+            InputError: If no frame, or of a plate no sample, is left.
+        """
+        first, last, _ = slice(start, stop).indices(len(self))
+        begin, end = self.start + first / self.rate, self.start + last / self.rate
+        return replace(
+            self,
+            positions=self.positions[first:last],
+            start=begin,
+            plates=tuple(plate.cut(begin, end) for plate in self.plates),
+            events=tuple(event for event in self.events if begin <= event.time < end),
+        )
+
+    def with_gaps_filled(self, longest: float = LONGEST_GAP) -> "MarkerRecording":
+        """The same with short gaps filled by interpolation, see ``filled``.
+
+        :attr:`gaps` of the result are those that are left: longer ones, and those at the ends.
+
+        Args:
+            longest: Longest gap that is filled [s].
+        """
+        finite_number(longest, "longest gap [s]", at_least=0.0)
+        return replace(self, positions=filled(self.positions, int(longest * self.rate + 1e-6)))
+
+
+def unique_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Names of which the second ``RKNE`` is ``RKNE_2``; those without a name are ``marker_7`` by place."""
+    given, found = set(names), {}
+    counts: dict[str, int] = {}
+    for place, name in enumerate(names, start=1):
+        stem = wanted = name or f"marker_{place}"
+        while wanted in found or (wanted != name and wanted in given):
+            counts[stem] = counts.get(stem, 1) + 1
+            wanted = f"{stem}_{counts[stem]}"
+        found[wanted] = place
+    return tuple(found)
+
+
+def without_unseen(positions: FloatArray) -> FloatArray:
+    """Positions in which exact zeros are NaN: how many programs write a marker that was not seen."""
+    return np.where(np.all(positions == 0.0, axis=-1, keepdims=True), np.nan, positions)

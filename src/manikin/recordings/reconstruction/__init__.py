@@ -1,0 +1,1 @@
+"""A recorded skeleton or recorded markers as a motion of our human."""

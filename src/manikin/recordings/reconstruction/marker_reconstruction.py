@@ -1,0 +1,403 @@
+"""Recorded markers as a motion of our human.
+
+A person's lengths and the first postures follow from joint centres
+(:mod:`manikin.recordings.reconstruction.marker_reconstruction`). On some frames of these postures every
+marker of a known segment is placed on our human where it is seen on average; postures that follow the
+markers and places of the markers are then improved in turn, and at last all frames follow the markers
+themselves.
+
+Also here. Joint centres from markers on the skin.
+
+* Hips where the file has them; else by regression on the distance of the ASIS and the depth of the pelvis:
+  Harrington, Zavatsky, Lawson, Yuan, Theologis, "Prediction of the hip joint centre in adults, children, and
+  patients with cerebral palsy based on magnetic resonance imaging", Journal of Biomechanics 40 (2007).
+* Knees, ankles and elbows midway between two markers, or half the joint's width from the outer one, at a
+  right angle to the plane of the limb (after Davis, Ounpuu, Tyburski, Gage, "A gait analysis data collection
+  and reduction technique", Human Movement Science 10 (1991)).
+* Shoulders below the acromion: by the measured offset, or by 17 % of the distance of both acromia (Rab,
+  Petuskey, Bagley, "A method for determination of upper extremity kinematics", Gait & Posture 15 (2002)).
+* Wrists midway between two markers, or at the only one.
+
+Markers that are not seen make NaN.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from manikin.body import BodyModel
+from manikin.errors import InputError
+from manikin.kinematics.point_targets import PointTargets, SegmentPlacements
+from manikin.kinematics.tracking import follow, improved
+from manikin.numerics.spatial import FloatArray
+from manikin.recordings.readers.marker_sets import MarkerSet, marker_set
+from manikin.recordings.readers.markers import MarkerRecording
+from manikin.recordings.readers.skeleton_recording import Subject
+from manikin.recordings.reconstruction.anatomy import SIDES
+from manikin.recordings.reconstruction.orientation_targets import placing_targets
+from manikin.recordings.reconstruction.proportions import Reconstruction, frames, human_of, middle
+
+KNEE_WIDTH, ANKLE_WIDTH, ELBOW_WIDTH = 0.10, 0.07, 0.08
+"""Of a joint where neither the file nor a second marker tells [m]."""
+
+MARKER_RADIUS = 0.007
+"""Where the file does not say [m]."""
+
+SHOULDER_SHARE = 0.17
+"""Of the distance of both acromia: depth of a shoulder's centre below its acromion (Rab et al. 2002)."""
+
+PELVIS_WIDTHS = (0.12, 0.45)
+"""Distances of the ASIS that are believed [m]."""
+
+BENT = 0.12
+"""Share of a limb's length by which its middle joint is off the line of its ends when the bend is trusted."""
+
+_LIMBS = {
+    "leg": ("knee", "thigh", "foot", -1.0),
+    "forearm": ("elbow", "upper_arm", "hand", 1.0),
+}
+"""Segment below a hinge: name of its markers, segments at both ends of the limb, sense of the bend."""
+
+
+def landmarks(recording: MarkerRecording, found: MarkerSet) -> dict[str, FloatArray]:
+    """(n, 3) places [m] of the markers with a role, by role."""
+    return {role: recording.marker(name) for role, name in found.roles.items()}
+
+
+def pelvis_axes(marks: Mapping[str, FloatArray], where: str) -> FloatArray:
+    """(n, 3, 3) axes of the pelvis by its markers, to the world: y to the left ASIS, x forward in the plane.
+
+    Args:
+        marks: Of them both ASIS, and both PSIS or the sacrum.
+        where: What messages begin with.
+
+    Raises:
+        InputError: If a marker is missing or never seen with the others, or the ASIS are too far apart or too
+            close.
+    """
+    for side in SIDES:
+        if f"{side}_asis" not in marks:
+            raise InputError(
+                f"{where} has no marker that is known as the {side} ASIS; valid: both, and PSIS or sacrum"
+            )
+    y = marks["left_asis"] - marks["right_asis"]
+    x = 0.5 * (marks["left_asis"] + marks["right_asis"]) - _back(marks, where)
+    axes = frames(np.cross(x, y), y, keep_y=True)
+    width = np.linalg.norm(y, axis=1)
+    seen = ~np.isnan(axes[:, 0, 0])
+    if not seen.any():
+        raise InputError(
+            f"{where} never sees the markers of the pelvis at once; valid: in one frame at least"
+        )
+    low, high = PELVIS_WIDTHS
+    if not low <= (usual := float(np.median(width[seen]))) <= high:
+        raise InputError(
+            f"{where} has the ASIS {usual:.3g} m apart; "
+            f"valid: {low} to {high} m (is the unit of length right?)"
+        )
+    return axes
+
+
+def _back(marks: Mapping[str, FloatArray], where: str) -> FloatArray:
+    if "left_psis" in marks and "right_psis" in marks:
+        return 0.5 * (marks["left_psis"] + marks["right_psis"])
+    if "sacrum" not in marks:
+        raise InputError(f"{where} has no marker on the back of the pelvis; valid: both PSIS, or the sacrum")
+    return marks["sacrum"]
+
+
+def hip_centres(marks: Mapping[str, FloatArray], axes: FloatArray, where: str) -> dict[str, FloatArray]:
+    """(n, 3) hips by segment, fixed to the pelvis: the file's, or by Harrington et al. (2007)."""
+    front = 0.5 * (marks["left_asis"] + marks["right_asis"])
+    width = float(np.nanmedian(np.linalg.norm(marks["left_asis"] - marks["right_asis"], axis=1)))
+    depth = float(np.nanmedian(np.linalg.norm(front - _back(marks, where), axis=1)))
+    back, down, aside = -0.24 * depth - 0.0099, -0.30 * width - 0.0109, 0.33 * width + 0.0073
+    local = {
+        side: np.array([back, sign * aside, down]) for side, sign in zip(SIDES, (1.0, -1.0), strict=True)
+    }
+    if all(f"{side}_hip" in marks for side in SIDES):
+        for side in SIDES:
+            given = np.einsum("nji,nj->ni", axes, marks[f"{side}_hip"] - front)
+            given = given[~np.isnan(given[:, 0])]
+            local[side] = np.median(given, axis=0) if len(given) else local[side]
+    return {f"{side}_thigh": front + axes @ local[side] for side in SIDES}
+
+
+def marker_centres(
+    marks: Mapping[str, FloatArray], axes: FloatArray, subject: Subject, where: str
+) -> dict[str, FloatArray]:
+    """Joint centres in the world, (n, 3) [m], by the segment that begins there, of those that can be told.
+
+    Args:
+        marks: (n, 3) markers by role.
+        axes: (n, 3, 3) of the pelvis, by :func:`pelvis_axes`.
+        subject: Measures of the joints.
+        where: What messages begin with.
+    """
+    radius = MARKER_RADIUS if subject.marker_radius is None else subject.marker_radius
+    found = hip_centres(marks, axes, where) | _shoulders(marks, subject, radius)
+    widths = {"leg": subject.knee_width or KNEE_WIDTH, "forearm": subject.elbow_width or ELBOW_WIDTH}
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        found |= _ankle(marks, side, sign, axes, 0.5 * (subject.ankle_width or ANKLE_WIDTH) + radius)
+        found |= _wrist(marks, side)
+        for part, (joint, first, last, bend) in _LIMBS.items():
+            outer, inner = (marks.get(f"{side}_{joint}_{place}") for place in ("lateral", "medial"))
+            if outer is None:
+                continue
+            if inner is not None:
+                found[f"{side}_{part}"] = 0.5 * (outer + inner)
+                continue
+            begin, end = found.get(f"{side}_{first}"), found.get(f"{side}_{last}")
+            if begin is not None:
+                end = np.full_like(outer, np.nan) if end is None else end
+                reach = 0.5 * widths[part] + radius
+                found[f"{side}_{part}"] = _hinge(outer, begin, end, axes[:, :, 1], sign, bend, reach)
+    return {name: places for name, places in found.items() if not np.all(np.isnan(places[:, 0]))}
+
+
+def _hinge(
+    outer: FloatArray, begin: FloatArray, end: FloatArray, aside: FloatArray, sign: float, bend: float,
+    reach: float,
+) -> FloatArray:  # fmt: skip
+    """Centre at ``reach`` from an outer marker, at a right angle to the plane of the limb's two parts.
+
+    That plane holds both ends of the limb and the centre; a limb that is nearly straight has the pelvis'
+    left-right axis as that of its hinge.
+    """
+    along = _unit(outer - begin)
+    plain = sign * _unit(aside - np.sum(aside * along, axis=1, keepdims=True) * along)
+    line = _unit(end - begin)
+    off = outer - begin - np.sum((outer - begin) * line, axis=1, keepdims=True) * line
+    distance = np.linalg.norm(off, axis=1, keepdims=True)
+    share = np.minimum(reach / np.maximum(distance, 1e-9), 1.0)
+    unit = off / np.maximum(distance, 1e-9)
+    normal = share * unit + sign * bend * np.sqrt(1.0 - share**2) * np.cross(line, unit)
+    length = np.linalg.norm(end - begin, axis=1, keepdims=True)
+    trust = np.clip(np.sqrt(np.maximum(distance**2 - reach**2, 0.0)) / (BENT * length), 0.0, 1.0) ** 2
+    agrees = np.sum(normal * plain, axis=1, keepdims=True) > 0.3
+    trust = np.where(np.isnan(trust) | ~agrees, 0.0, trust)
+    normal = np.where(trust > 0.0, normal, plain)
+    return outer - reach * _unit(trust * normal + (1.0 - trust) * plain)
+
+
+def _ankle(
+    marks: Mapping[str, FloatArray], side: str, sign: float, axes: FloatArray, reach: float
+) -> dict[str, FloatArray]:
+    outer, inner = (marks.get(f"{side}_ankle_{place}") for place in ("lateral", "medial"))
+    if outer is None:
+        return {}
+    if inner is not None:
+        return {f"{side}_foot": 0.5 * (outer + inner)}
+    heel, toe, knee = (marks.get(f"{side}_{name}") for name in ("heel", "toe", "knee_lateral"))
+    aside = axes[:, :, 1]
+    if heel is not None and toe is not None and knee is not None:
+        across = np.cross(knee - outer, toe - heel)
+        aside = np.where(np.isnan(across), aside, _unit(across))
+    return {f"{side}_foot": outer - sign * reach * aside}
+
+
+def _wrist(marks: Mapping[str, FloatArray], side: str) -> dict[str, FloatArray]:
+    both = [marks[f"{side}_{name}"] for name in ("wrist_radius", "wrist_ulna") if f"{side}_{name}" in marks]
+    return {f"{side}_hand": sum(both[1:], both[0]) / len(both)} if both else {}
+
+
+def _shoulders(marks: Mapping[str, FloatArray], subject: Subject, radius: float) -> dict[str, FloatArray]:
+    if "left_shoulder" not in marks or "right_shoulder" not in marks:
+        return {}
+    left, right = marks["left_shoulder"], marks["right_shoulder"]
+    if np.all(np.isnan(left[:, 0] + right[:, 0])):
+        return {}
+    depth = SHOULDER_SHARE * float(np.nanmedian(np.linalg.norm(left - right, axis=1)))
+    if subject.shoulder_offset is not None:
+        depth = subject.shoulder_offset + radius
+    up = 0.5 * (left + right) - 0.5 * (marks["left_asis"] + marks["right_asis"])
+    thorax = frames(up, left - right, keep_y=True)
+    return {
+        "left_upper_arm": left - depth * thorax[:, :, 2],
+        "right_upper_arm": right - depth * thorax[:, :, 2],
+    }
+
+
+def check_sides(marks: Mapping[str, FloatArray], axes: FloatArray, where: str) -> None:
+    """Refuse markers whose left and right are swapped.
+
+    The pelvis is not turned inside out: left ASIS, back and the way up to the trunk or away from the ankles
+    make a right-handed frame; knees, ankles and shoulders are on the side of their ASIS, as a median.
+
+    Raises:
+        InputError: If they are not.
+    """
+    up = _upward(marks)
+    if up is not None and _median(np.sum(axes[:, :, 2] * up, axis=1)) < 0.0:
+        raise InputError(
+            f"{where} has left and right of the pelvis swapped; valid: left on the person's left"
+        )
+    for role in ("knee_lateral", "ankle_lateral", "shoulder", "elbow_lateral"):
+        left, right = marks.get(f"left_{role}"), marks.get(f"right_{role}")
+        if left is None or right is None:
+            continue
+        if _median(np.sum(axes[:, :, 1] * (left - right), axis=1)) < 0.0:
+            name = role.replace("_lateral", "")
+            raise InputError(f"{where} has left and right {name} swapped; valid: left on the person's left")
+
+
+def _upward(marks: Mapping[str, FloatArray]) -> FloatArray | None:
+    pelvis = 0.5 * (marks["left_asis"] + marks["right_asis"])
+    for names in (("left_shoulder", "right_shoulder"), ("c7",)):
+        if all(name in marks for name in names):
+            return sum((marks[name] for name in names[1:]), marks[names[0]]) / len(names) - pelvis
+    for name in ("knee_lateral", "ankle_lateral"):
+        if f"left_{name}" in marks and f"right_{name}" in marks:
+            return pelvis - 0.5 * (marks[f"left_{name}"] + marks[f"right_{name}"])
+    return None
+
+
+def _median(values: FloatArray) -> float:
+    seen = values[~np.isnan(values)]
+    return float(np.median(seen)) if seen.size else 0.0
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+
+
+PLACING_FRAMES = 40
+"""Frames on which markers are placed."""
+
+ROUNDS = 2
+"""Times that postures and places are improved in turn."""
+
+LEAST_SEEN = 0.5
+"""Share of the markers followed that the first and the last frame see."""
+
+COMPLETE = 0.9
+"""Markers are placed on frames that see this share of what the best frame sees."""
+
+
+def centres_of_markers(recording: MarkerRecording) -> dict[str, FloatArray]:
+    """(n, 3) joint centres [m] by segment, NaN where one is not known.
+
+    Raises:
+        InputError: If the pelvis is not marked, or left and right are swapped.
+    """
+    return _Marked(recording).centres
+
+
+def reconstruct_markers(
+    recording: MarkerRecording, body: BodyModel | None, sex: str, mass: float | None
+) -> Reconstruction:
+    """Motion of our human that follows markers; see ``reconstruct``.
+
+    Short gaps are filled (:mod:`manikin.recordings.readers.markers`); in longer ones a marker does not
+    count. Frames at the ends that see less than half of the markers are left out. Segments without markers
+    stay as in standing.
+    """
+    marked = _Marked(recording)
+    subject = recording.subject
+    if body is None:
+        body = human_of(marked.centres, sex, subject.mass if mass is None else mass, subject.stature)
+    placed = _placed(marked, body)
+    filled, seen = placed.positions, ~np.isnan(placed.positions[..., 0])
+    enough = np.flatnonzero(seen.mean(axis=1) >= LEAST_SEEN)
+    first, stop = int(enough[0]), int(enough[-1]) + 1
+    if stop - first < 2:
+        raise InputError(
+            f"recording {recording.name!r} sees half of its markers in one frame only; valid: in two at least"
+        )
+    starts = _starts(body, marked)[first:stop]
+    wanted = PointTargets(placed.names, placed.segments, placed.points, filled[first:stop], placed.weights)
+    q, residual = follow(body, wanted, starts, recording.rate)
+    recorded = recording.chosen(placed.names).positions[first:stop]
+    time = np.arange(stop - first) / recording.rate
+    followed = {*placed.names}
+    return Reconstruction(
+        body, time, q, PointTargets(placed.names, placed.segments, placed.points, recorded, placed.weights),
+        np.where(np.isnan(recorded[..., 0]), np.nan, residual), first,
+        tuple(name for name in recording.marker_names if name not in followed),
+        tuple(s.name for s in body.segments if s.hinges and not _told(body, s.name, {*placed.segments})),
+    )  # fmt: skip
+
+
+class _Marked:
+    """What the markers of a recording tell by their names."""
+
+    def __init__(self, recording: MarkerRecording) -> None:
+        where = f"recording {recording.name!r}"
+        if not recording.seen.any():
+            raise InputError(f"{where} sees no marker in any frame; valid: markers that are seen")
+        self.recording = recording.with_gaps_filled()
+        self.set: MarkerSet = marker_set(self.recording)
+        self.marks = landmarks(self.recording, self.set)
+        self.pelvis = pelvis_axes(self.marks, where)
+        check_sides(self.marks, self.pelvis, where)
+        self.centres = marker_centres(self.marks, self.pelvis, recording.subject, where)
+
+
+def _placed(marked: _Marked, body: BodyModel) -> PointTargets:
+    """The markers that can be followed, at their places on the body, in all frames."""
+    recording = marked.recording
+    wanted, pelvis = placing_targets(recording, marked.set, body, marked.marks, marked.centres, marked.pelvis)
+    names = tuple(marked.set.segments)
+    positions = recording.chosen(names).positions
+    frames = _frames(np.isnan(wanted.positions[..., 0]), np.isnan(positions[..., 0]))
+    names, positions = _seen_in(frames, names, positions)
+    segments = tuple(marked.set.segments[name] for name in names)
+    first = _present(wanted, frames)
+    q, _ = follow(body, first, _starts(body, marked, pelvis)[frames])
+    for number in range(ROUNDS + 1):
+        points = _local(body, q, segments, positions[frames])
+        placed = PointTargets(names, segments, points, positions, np.ones(len(names)))
+        if number < ROUNDS:
+            here = PointTargets(names, segments, points, positions[frames], placed.weights)
+            q = improved(body, here, q)
+    return placed
+
+
+def _frames(unknown: NDArray[np.bool_], unseen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Frames that see most targets and markers, spread evenly."""
+    known = (~unknown).sum(axis=1) + (~unseen).sum(axis=1)
+    good = np.flatnonzero((known >= COMPLETE * known.max()) & ~unknown.all(axis=1))
+    return good[np.unique(np.linspace(0, len(good) - 1, min(PLACING_FRAMES, len(good))).astype(int))]
+
+
+def _seen_in(
+    frames: NDArray[np.int64], names: tuple[str, ...], positions: FloatArray
+) -> tuple[tuple[str, ...], FloatArray]:
+    kept = np.flatnonzero(~np.isnan(positions[frames][..., 0]).all(axis=0))
+    return tuple(names[k] for k in kept), positions[:, kept]
+
+
+def _present(targets: PointTargets, frames: NDArray[np.int64]) -> PointTargets:
+    """Targets in some frames, without those that are not seen there."""
+    positions = targets.positions[frames]
+    kept = np.flatnonzero(~np.isnan(positions[..., 0]).all(axis=0))
+    return PointTargets(
+        tuple(targets.names[k] for k in kept), tuple(targets.segments[k] for k in kept),
+        targets.points[kept], positions[:, kept], targets.weights[kept],
+    )  # fmt: skip
+
+
+def _local(body: BodyModel, q: FloatArray, segments: tuple[str, ...], places: FloatArray) -> FloatArray:
+    """(k, 3) medians of places in the frames of their segments [m]."""
+    placed = SegmentPlacements(body, segments).of(q)
+    away = places.transpose(1, 2, 0) - placed.roots - placed.shifts
+    return np.nanmedian(np.einsum("kjin,kjn->kin", placed.turns, away), axis=2)
+
+
+def _starts(body: BodyModel, marked: _Marked, pelvis: FloatArray | None = None) -> FloatArray:
+    """(n, nq) standing postures put where the pelvis is, or was last seen."""
+    turns, hips = marked.pelvis if pelvis is None else pelvis, middle(marked.centres, "thigh")
+    known = np.flatnonzero(~np.isnan(turns[:, 0, 0]) & ~np.isnan(hips[:, 0]))
+    nearest = known[np.searchsorted(0.5 * (known[1:] + known[:-1]), np.arange(len(turns)))]
+    q = np.tile(body.standing_posture(), (len(turns), 1))
+    q[:, :3] = hips[nearest]
+    q[:, 3:7] = Rotation.from_matrix(turns[nearest]).as_quat()
+    return q
+
+
+def _told(body: BodyModel, segment: str, marked: set[str]) -> bool:
+    """Whether a segment, or one that it carries, has a marker."""
+    children = [one.name for one in body.segments if one.parent == segment]
+    return segment in marked or any(_told(body, child, marked) for child in children)

@@ -1,0 +1,382 @@
+"""What a skeleton tells beyond its joint centres: turns of pelvis, thorax and head, feet and hands.
+
+Each is expressed by points on our segments, as markers would be. They weigh less than joint centres,
+for they are placed by assumption: where the trunk is most extended, pelvis and thorax are taken to be
+aligned with it; on the mean of a recording the head looks where the chest points; a sole is flat where
+its ankle is lowest.
+
+Also here. Where points of our segments are while markers are being placed on them: joint centres, and turns.
+
+Anatomical markers tell the joint centres (:mod:`manikin.recordings.reconstruction.marker_reconstruction`)
+and, by assumption, the turns of pelvis, thorax, head, feet and forearms: pelvis and thorax are aligned with
+the trunk where it is most extended, with the vertical where the trunk has no markers; on the mean of a
+recording the head looks where the chest points; a sole is flat where its ankle is lowest; in the zero
+posture palms point inward.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manikin.body import BodyModel
+from manikin.kinematics.point_targets import PointTargets
+from manikin.numerics.spatial import FloatArray
+from manikin.recordings.readers.marker_sets import MarkerSet
+from manikin.recordings.readers.markers import MarkerRecording
+from manikin.recordings.readers.skeleton_recording import Recording
+from manikin.recordings.reconstruction.anatomy import SIDES
+from manikin.recordings.reconstruction.proportions import (
+    CENTRES,
+    far_point,
+    frames,
+    hanging_arms,
+    joint_of,
+    middle,
+    trunk_axes,
+)
+
+FEWEST = 3
+"""Markers that tell a turn."""
+
+_Guide = tuple[str, FloatArray, FloatArray]
+
+
+def placing_targets(
+    recording: MarkerRecording, found: MarkerSet, body: BodyModel, marks: Mapping[str, FloatArray],
+    centres: Mapping[str, FloatArray], pelvis: FloatArray,
+) -> tuple[PointTargets, FloatArray]:  # fmt: skip
+    """Joint centres and guides of every frame, and the pelvis' turns.
+
+    Args:
+        recording: The markers.
+        found: Which of them are known.
+        body: Our human.
+        marks: (n, 3) markers by role [m].
+        centres: (n, 3) joint centres [m].
+        pelvis: (n, 3, 3) from the axes of the pelvis' markers to the world's.
+
+    Returns:
+        Targets, NaN where one is not seen, and (n, 3, 3) from the axes of our pelvis to the world's.
+    """
+    names = [name for name in CENTRES if name in centres and _seen(centres[name])]
+    guides: list[_Guide] = [(name, np.zeros(3), centres[name]) for name in names]
+    weights = [1.0] * len(guides)
+    up = _trunk_up(marks, centres)
+    if up is not None and not _seen(up + pelvis[:, :, 0]):
+        up = None
+    pelvis = _aligned_pelvis(pelvis, up, centres)
+    guides.append(("pelvis", np.array([0.0, 0.0, ARM]), middle(centres, "thigh") + ARM * pelvis[:, :, 2]))
+    thorax = _thorax(recording, found, centres, pelvis, up)
+    if thorax is not None:
+        guides += _thorax_guides(body, marks, centres, thorax)
+        guides += _marker_guides_head(recording, found, body, centres, thorax)
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        guides += _foot(side, marks, centres)
+        guides += _turns_of_limbs(body, side, sign, marks, centres)
+    guides = [guide for guide in guides if _seen(guide[2])]
+    weights += [WEIGHT] * (len(guides) - len(weights))
+    segments = tuple(segment for segment, _, _ in guides)
+    targets = PointTargets(
+        segments, segments, np.array([point for _, point, _ in guides]),
+        np.stack([places for _, _, places in guides], axis=1), np.array(weights),
+    )  # fmt: skip
+    return targets, pelvis
+
+
+def cluster_turns(places: FloatArray) -> FloatArray | None:
+    """(n, 3, 3) turns of a rigid set of (n, k, 3) markers since the first frame in which all are seen.
+
+    NaN where fewer than three are seen; None where there is no frame of all.
+    """
+    whole = np.flatnonzero(~np.isnan(places).any(axis=(1, 2)))
+    if places.shape[1] < FEWEST or not whole.size:
+        return None
+    model, turns = places[whole[0]], np.full((len(places), 3, 3), np.nan)
+    seen = ~np.isnan(places[..., 0])
+    enough = np.flatnonzero(seen.sum(axis=1) >= FEWEST)
+    weights = seen[enough][..., None] / seen[enough].sum(axis=1)[:, None, None]
+    now = np.where(seen[enough][..., None], places[enough], 0.0)
+    first = model - np.sum(weights * model, axis=1, keepdims=True)
+    last = now - np.sum(weights * now, axis=1, keepdims=True)
+    turns[enough] = best_turns(weights * first, last)
+    return turns
+
+
+def best_turns(first: FloatArray, last: FloatArray) -> FloatArray:
+    """(n, 3, 3) rotations that bring vectors (n, k, 3) closest to others (n, k, 3).
+
+    By the singular values of their products: Kabsch, "A discussion of the solution for the best rotation to
+    relate two sets of vectors", Acta Crystallographica A34 (1978).
+    """
+    left, _, right = np.linalg.svd(last.transpose(0, 2, 1) @ first)
+    left[..., 2] *= np.linalg.det(left @ right)[:, None]
+    return left @ right
+
+
+def _seen(places: FloatArray) -> bool:
+    return not np.all(np.isnan(places[:, 0]))
+
+
+def _trunk_up(marks: Mapping[str, FloatArray], centres: Mapping[str, FloatArray]) -> FloatArray | None:
+    """(n, 3) from between the hips to between the shoulders, or else to the neck's base [m]."""
+    hips = middle(centres, "thigh")
+    if "left_upper_arm" in centres and _seen(middle(centres, "upper_arm")):
+        return middle(centres, "upper_arm") - hips
+    if "c7" in marks and "notch" in marks and _seen(marks["c7"] + marks["notch"]):
+        return 0.5 * (marks["c7"] + marks["notch"]) - hips
+    return None
+
+
+def _aligned_pelvis(
+    turns: FloatArray, up: FloatArray | None, centres: Mapping[str, FloatArray]
+) -> FloatArray:
+    """Turned about the left-right axis, by the same angle always, to the trunk or the vertical."""
+    if up is None:
+        local = np.einsum("nji,j->ni", turns, np.array([0.0, 0.0, 1.0]))
+        local = np.nanmedian(local, axis=0)
+    else:
+        straight = _straightest(up, centres, turns)
+        local = turns[straight].T @ up[straight]
+    angle = float(np.arctan2(local[0], local[2]))
+    return turns @ Rotation.from_euler("y", angle).as_matrix()
+
+
+def _straightest(up: FloatArray, centres: Mapping[str, FloatArray], turns: FloatArray) -> int:
+    """Frame with the longest trunk and hanging arms of those in which everything is known."""
+    length = np.linalg.norm(up, axis=1)
+    allowed = ~np.isnan(turns[:, 0, 0]) & ~np.isnan(length)
+    if "left_upper_arm" in centres:
+        hanging = np.zeros(len(up), dtype=bool)
+        hanging[hanging_arms(centres)] = True
+        allowed = allowed & hanging if np.any(allowed & hanging) else allowed
+    frames_allowed = np.flatnonzero(allowed)
+    return int(frames_allowed[np.argsort(length[frames_allowed])[int(0.9 * (len(frames_allowed) - 1))]])
+
+
+def _thorax(
+    recording: MarkerRecording, found: MarkerSet, centres: Mapping[str, FloatArray], pelvis: FloatArray,
+    up: FloatArray | None,
+) -> FloatArray | None:  # fmt: skip
+    """(n, 3, 3) from the axes of the thorax to the world's; None without three markers of it."""
+    turns = cluster_turns(_of_segment(recording, found, "thorax"))
+    if turns is None or up is None:
+        return None
+    both = turns[:, 0, 0] + up[:, 0] + pelvis[:, 0, 0]
+    if np.all(np.isnan(both)):
+        return None
+    if "left_upper_arm" not in centres:
+        # Who walks sways over the hips, the same to both sides: the mean of the straightest half.
+        length = np.where(np.isnan(both), np.nan, np.linalg.norm(up, axis=1))
+        tall = length >= np.nanmedian(length)
+        local = [np.einsum("nji,nj->ni", turns, axis)[tall].mean(axis=0) for axis in (up, pelvis[:, :, 1])]
+        return turns @ frames(local[0][None], local[1][None], keep_y=False)[0]
+    straight = _straightest(up + turns[:, :, 0] * 0.0, centres, pelvis)
+    aside = centres["left_upper_arm"] - centres["right_upper_arm"]
+    there = frames(up[straight][None], aside[straight][None], keep_y=True)[0]
+    return turns @ turns[straight].T @ there
+
+
+def _thorax_guides(
+    body: BodyModel, marks: Mapping[str, FloatArray], centres: Mapping[str, FloatArray], thorax: FloatArray
+) -> list[_Guide]:
+    """Where the chest points, seen from the shoulders, or from the neck's base."""
+    if "left_upper_arm" in centres:
+        base = np.array(body.segment("left_upper_arm").origin) * [1.0, 0.0, 1.0]
+        place = middle(centres, "upper_arm")
+        return [("thorax", base + ARM * np.eye(3)[0], place + ARM * thorax[:, :, 0])]
+    # As far from the hips as in our straight trunk: markers are not where our neck begins, and a trunk that
+    # is pressed together or pulled apart would bend to its limits.
+    base, hips = np.array(body.segment("neck").origin), middle(centres, "thigh")
+    up = 0.5 * (marks["c7"] + marks["notch"]) - hips
+    rise = float(np.linalg.norm(base + body.segment("thorax").origin + body.segment("lumbar").origin))
+    place = hips + rise * up / np.linalg.norm(up, axis=1, keepdims=True)
+    return [
+        ("thorax", base + ARM * axis, place + ARM * np.einsum("nij,j->ni", thorax, axis))
+        for axis in np.eye(3)
+    ]
+
+
+def _marker_guides_head(
+    recording: MarkerRecording, found: MarkerSet, body: BodyModel, centres: Mapping[str, FloatArray],
+    thorax: FloatArray,
+) -> list[_Guide]:  # fmt: skip
+    turns = cluster_turns(_of_segment(recording, found, "head"))
+    if turns is None:
+        return []
+    local = turns.transpose(0, 2, 1) @ thorax
+    known = ~np.isnan(local[:, 0, 0])
+    if not known.any():
+        return []
+    axes = turns @ Rotation.from_matrix(local[known]).mean().as_matrix()
+    origin = np.array(body.segment("neck").origin)
+    if "left_upper_arm" in centres:
+        girdle = np.array(body.segment("left_upper_arm").origin) * [1.0, 0.0, 1.0]
+        place = middle(centres, "upper_arm") + np.einsum("nij,j->ni", thorax, origin - girdle)
+    else:
+        rise = float(np.linalg.norm(origin + body.segment("thorax").origin + body.segment("lumbar").origin))
+        place = middle(centres, "thigh") + rise * thorax[:, :, 2]
+    return [("neck", ARM * axis, place + ARM * np.einsum("nij,j->ni", axes, axis)) for axis in np.eye(3)[::2]]
+
+
+def _foot(side: str, marks: Mapping[str, FloatArray], centres: Mapping[str, FloatArray]) -> list[_Guide]:
+    """Direction from heel to toes, laid at the ankle."""
+    heel, toe, ankle = (marks.get(f"{side}_heel"), marks.get(f"{side}_toe"), centres.get(f"{side}_foot"))
+    if heel is None or toe is None or ankle is None or not _seen(heel + toe + ankle):
+        return []
+    bone = toe - heel
+    rise = rise_when_flat(ankle, bone, 0.0)
+    point = ARM * np.array([np.cos(rise), 0.0, np.sin(rise)])
+    length = np.linalg.norm(bone, axis=1, keepdims=True)
+    return [(f"{side}_foot", point, ankle + ARM * bone / length)]
+
+
+def _turns_of_limbs(
+    body: BodyModel, side: str, sign: float, marks: Mapping[str, FloatArray],
+    centres: Mapping[str, FloatArray],
+) -> list[_Guide]:  # fmt: skip
+    """Outer markers of knees and elbows, and both of a wrist, seen from the joints' centres."""
+    guides: list[_Guide] = []
+    for segment, following, role in (
+        ("thigh", "leg", "knee_lateral"), ("upper_arm", "forearm", "elbow_lateral"),
+    ):  # fmt: skip
+        centre, marker = centres.get(f"{side}_{following}"), marks.get(f"{side}_{role}")
+        if centre is not None and marker is not None and _seen(marker - centre):
+            away = marker - centre
+            place = centre + ARM * away / np.linalg.norm(away, axis=1, keepdims=True)
+            origin = np.array(body.segment(f"{side}_{following}").origin)
+            guides.append((f"{side}_{segment}", origin + sign * ARM * np.eye(3)[1], place))
+    radius, ulna = marks.get(f"{side}_wrist_radius"), marks.get(f"{side}_wrist_ulna")
+    if radius is not None and ulna is not None and _seen(radius - ulna):
+        away = radius - ulna
+        place = 0.5 * (radius + ulna) + ARM * away / np.linalg.norm(away, axis=1, keepdims=True)
+        origin = np.array(body.segment(f"{side}_hand").origin)
+        guides.append((f"{side}_forearm", origin + ARM * np.eye(3)[0], place))
+    return guides
+
+
+def _of_segment(recording: MarkerRecording, found: MarkerSet, segment: str) -> FloatArray:
+    """(n, k, 3) markers of a segment."""
+    names: Sequence[str] = [name for name, place in found.segments.items() if place == segment]
+    return recording.chosen(names).positions
+
+
+WEIGHT = 0.05
+"""Of a guide, against 1 of a joint centre."""
+
+ARM = 0.2
+"""Distance of a guide from the middle of its segment's joints [m]."""
+
+LOWEST_SHARE, LOWEST = 5.0, 0.01
+"""A sole is flat up to this [m] above this percentile of the ankle's height."""
+
+OTHER_FOOT = np.deg2rad(25.0)
+"""A foot's bone differs from ours by less than this when the sole is flat [rad]."""
+
+_PARTS = {"pelvis": "thigh", "thorax": "upper_arm"}
+
+HEADS = ("head", "Head")
+NECKS = ("neck", "Neck", "lowerneck")
+
+
+def trunk_turns(recording: Recording, centres: Mapping[str, FloatArray], segment: str) -> FloatArray:
+    """(n, 3, 3) from the axes of ``"pelvis"`` or ``"thorax"`` to the world's.
+
+    The recorded joint's turns, aligned with the line from hips to shoulders where that is longest and the
+    arms hang; the
+    left-right axis is exactly that of the two joint centres.
+    """
+    geometric = trunk_axes(centres, _PARTS[segment])
+    length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
+    hanging = hanging_arms(centres)
+    straight = hanging[np.argmax(length[hanging])]
+    turns = recording.world_rotations[:, recording.joint_index(joint_of(recording, segment))]
+    turned = turns @ turns[straight].T @ geometric[straight]
+    return frames(turned[:, :, 2], geometric[:, :, 1], keep_y=True)
+
+
+def orientation_targets(
+    recording: Recording, body: BodyModel, centres: Mapping[str, FloatArray],
+    pelvis: FloatArray, thorax: FloatArray,
+) -> PointTargets:  # fmt: skip
+    """Targets of the turns of pelvis, thorax and head and of the directions of feet and hands.
+
+    Args:
+        recording: The skeleton's motion.
+        body: Our human.
+        centres: (n, 3) joint centres [m].
+        pelvis: (n, 3, 3) from the pelvis' axes to the world's.
+        thorax: (n, 3, 3) from the thorax' axes to the world's.
+    """
+    girdle = np.array(body.segment("left_upper_arm").origin) * [1.0, 0.0, 1.0]
+    found: list[tuple[str, FloatArray, FloatArray]] = [
+        ("pelvis", np.array([0.0, 0.0, ARM]), middle(centres, "thigh") + ARM * pelvis[:, :, 2]),
+        (
+            "thorax",
+            girdle + np.array([ARM, 0.0, 0.0]),
+            middle(centres, "upper_arm") + ARM * thorax[:, :, 0],
+        ),
+    ]
+    found += _head(recording, body, centres, thorax, girdle)
+    for side in ("left", "right"):
+        for segment in (f"{side}_foot", f"{side}_hand"):
+            far = far_point(recording, joint_of(recording, segment))
+            if far is not None:
+                bone = far - centres[segment]
+                length = float(np.median(np.linalg.norm(bone, axis=1)))
+                direction = np.array([0.0, 0.0, -1.0])
+                if segment.endswith("foot"):
+                    toes = body.segment(f"{side}_toes").origin
+                    rise = rise_when_flat(centres[segment], bone, float(np.arctan2(toes[2], toes[0])))
+                    direction = np.array([np.cos(rise), 0.0, np.sin(rise)])
+                found.append((segment, length * direction, far))
+    segments = tuple(segment for segment, _, _ in found)
+    return PointTargets(
+        tuple(f"{segment} guide" for segment in segments), segments, np.array([p for _, p, _ in found]),
+        np.stack([places for _, _, places in found], axis=1), np.full(len(found), WEIGHT),
+    )  # fmt: skip
+
+
+def rise_when_flat(ankle: FloatArray, bone: FloatArray, ours: float) -> float:
+    """Angle above the horizontal of a recorded foot's bone when the sole is flat [rad].
+
+    The sole is taken to be flat where the ankle is lowest. An angle that is far from our foot's says
+    that it never is (crawling, lying), and ours is taken.
+
+    Args:
+        ankle: (n, 3) [m]; frames that are NaN are left out.
+        bone: (n, 3) from back to front [m].
+        ours: Our foot's angle [rad].
+    """
+    known = ~np.isnan(ankle[:, 2] + bone[:, 2])
+    if not known.any():
+        return ours
+    height, along = ankle[known, 2], bone[known]
+    low = height <= np.percentile(height, LOWEST_SHARE) + LOWEST
+    rise = np.arctan2(along[:, 2], np.linalg.norm(along[:, :2], axis=1))
+    found = float(np.median(rise[low]))
+    return found if abs(found - ours) < OTHER_FOOT else ours
+
+
+def _head(
+    recording: Recording, body: BodyModel, centres: Mapping[str, FloatArray], thorax: FloatArray,
+    girdle: FloatArray,
+) -> list[tuple[str, FloatArray, FloatArray]]:  # fmt: skip
+    """Above and before the neck's base, by the line from the neck to the vertex; none without a head."""
+    head = next((name for name in HEADS if name in recording.joint_names), None)
+    neck = next((name for name in NECKS if name in recording.joint_names), None)
+    if head is None or neck is None:
+        return []
+    top = far_point(recording, head)
+    if top is None:
+        top = recording.positions[:, recording.joint_index(head)]
+    up = top - recording.positions[:, recording.joint_index(neck)]
+    turns = recording.world_rotations[:, recording.joint_index(head)]
+    local = Rotation.from_matrix(turns.transpose(0, 2, 1) @ thorax).mean().as_matrix()
+    axes = frames(up, (turns @ local)[:, :, 1], keep_y=False)
+    rise = np.array(body.segment("neck").origin) - girdle
+    base = middle(centres, "upper_arm") + np.einsum("nij,j->ni", thorax, rise)
+    return [
+        ("neck", np.array([0.0, 0.0, ARM]), base + ARM * axes[:, :, 2]),
+        ("neck", np.array([ARM, 0.0, 0.0]), base + ARM * axes[:, :, 0]),
+    ]

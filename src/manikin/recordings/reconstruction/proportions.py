@@ -1,0 +1,326 @@
+"""The human of a recorded person: lengths between joint centres, and the stature they tell.
+
+Also here. The joint centres that a recorded skeleton shares with our human. Postures of our human straight
+from joint centres, without search. Postures of our human that follow a recording.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from manikin.body import BodyModel, human
+from manikin.body.anthropometry import Anthropometry
+from manikin.body.joint_volume import ball_angles, ball_rotation
+from manikin.errors import InputError
+from manikin.kinematics.point_targets import PointTargets
+from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.recordings.readers.skeleton_recording import Recording
+from manikin.recordings.reconstruction.anatomy import JOINTS, SIDES
+from manikin.runtime.display import Displayed
+
+CENTRES = tuple(
+    f"{side}_{part}" for side in SIDES for part in ("thigh", "leg", "foot", "upper_arm", "forearm", "hand")
+)
+"""Segments whose origins are hips, knees, ankles, shoulders, elbows and wrists."""
+
+WRISTS = {"left_hand": ("lhand",), "right_hand": ("rhand",)}
+"""Joints that are the wrist before those of JOINTS: CMU's ASF ends the forearm twice, second at the wrist."""
+
+
+def joint_of(recording: Recording, segment: str) -> str:
+    """Name of the recorded joint at which one of our segments begins.
+
+    Raises:
+        InputError: If the skeleton has none.
+    """
+    names = (*WRISTS.get(segment, ()), *JOINTS[segment])
+    for name in names:
+        if name in recording.joint_names:
+            return name
+    raise InputError(
+        f"recording {recording.name!r} has no joint for {segment!r}; valid: one of {', '.join(names)}"
+    )
+
+
+def joint_centres(recording: Recording) -> Mapping[str, FloatArray]:
+    """Joint centres in the world, (n, 3) [m], by segment of :data:`CENTRES`.
+
+    Raises:
+        InputError: If the skeleton lacks one of the joints.
+    """
+    joints = [recording.joint_index(joint_of(recording, segment)) for segment in CENTRES]
+    return {segment: recording.positions[:, joint] for segment, joint in zip(CENTRES, joints, strict=True)}
+
+
+def far_point(recording: Recording, joint: str) -> FloatArray | None:
+    """(n, 3) end of the bone that begins at a joint: its first child, or its end [m]; None without one."""
+    index = recording.joint_index(joint)
+    children = np.flatnonzero(recording.parents == index)
+    offset = recording.offsets[children[0]] if children.size else recording.ends.get(joint)
+    if offset is None or np.linalg.norm(offset) < 1e-3:
+        return None
+    return recording.positions[:, index] + recording.world_rotations[:, index] @ offset
+
+
+STRAIGHT = 0.15
+"""Sine of the bend below which the carrier's left-right axis, too, tells a limb's turn about itself."""
+
+_LIMBS = {
+    "thigh": ("pelvis", "leg", "foot", "knee_flexion", 1.0),
+    "upper_arm": ("thorax", "forearm", "hand", "elbow_flexion", -1.0),
+}
+"""Ball joint's segment: what carries it, the joints beyond, the hinge between, and its sense about y."""
+
+
+def trunk_axes(centres: Mapping[str, FloatArray], part: str) -> FloatArray:
+    """(n, 3, 3) axes of the pelvis (``"thigh"``) or thorax (``"upper_arm"``), to the world.
+
+    y from the right joint to the left one, z from between the hips to between the shoulders.
+    """
+    y = centres[f"left_{part}"] - centres[f"right_{part}"]
+    return frames(middle(centres, "upper_arm") - middle(centres, "thigh"), y, keep_y=True)
+
+
+def analytic_ik(
+    body: BodyModel, centres: Mapping[str, FloatArray], pelvis: FloatArray, thorax: FloatArray
+) -> FloatArray:
+    """Postures within the joints' limits, close to the recorded ones.
+
+    The spine's turn is shared by lumbar and thorax, limbs point as recorded, their turn about
+    themselves is told by the bend of knee and elbow; neck, wrists and ankles are at 0.
+
+    Args:
+        body: Our human.
+        centres: (n, 3) joint centres [m].
+        pelvis: (n, 3, 3) from the pelvis' axes to the world's.
+        thorax: (n, 3, 3) from the thorax' axes to the world's.
+
+    Returns:
+        (n, nq).
+    """
+    q = np.tile(body.zero_posture(), (len(pelvis), 1))
+    q[:, :3] = middle(centres, "thigh")
+    q[:, 3:7] = Rotation.from_matrix(pelvis).as_quat()
+    spine = Rotation.from_matrix(pelvis.transpose(0, 2, 1) @ thorax)
+    half = Rotation.from_rotvec(0.5 * spine.as_rotvec()).as_matrix()
+    carriers = {"pelvis": pelvis, "thorax": pelvis}
+    for name in ("lumbar", "thorax"):
+        carriers["thorax"] = carriers["thorax"] @ _set_ball(body, q, name, half)
+    for part, (carrier, beyond, end, hinge, sign) in _LIMBS.items():
+        for side in SIDES:
+            upper = centres[f"{side}_{beyond}"] - centres[f"{side}_{part}"]
+            lower = centres[f"{side}_{end}"] - centres[f"{side}_{beyond}"]
+            upper, lower = _unit(upper), _unit(lower)
+            cross = np.cross(upper, lower)
+            bent = np.linalg.norm(cross, axis=1)
+            y = sign * cross + np.maximum(STRAIGHT - bent, 0.0)[:, None] * carriers[carrier][:, :, 1]
+            turns = frames(-upper, y, keep_y=False)
+            _set_ball(body, q, f"{side}_{part}", carriers[carrier].transpose(0, 2, 1) @ turns)
+            bend = np.arctan2(bent, np.sum(upper * lower, axis=1))
+            q[:, 7 + body.joint_index(f"{side}_{hinge}")] = bend
+    q[:, 7:] = np.clip(q[:, 7:], body.lower, body.upper)
+    return q
+
+
+def frames(z: FloatArray, y: FloatArray, *, keep_y: bool) -> FloatArray:
+    """(n, 3, 3) with columns x, y, z of (n, 3) directions; the one kept is exact."""
+    if keep_y:
+        y = _unit(y)
+        z = _unit(z - np.sum(z * y, axis=1, keepdims=True) * y)
+    else:
+        z = _unit(z)
+        y = _unit(y - np.sum(y * z, axis=1, keepdims=True) * z)
+    return np.stack([np.cross(y, z), y, z], axis=-1)
+
+
+def _set_ball(body: BodyModel, q: FloatArray, segment: str, turns: FloatArray) -> FloatArray:
+    """Write the angles of a ball joint, kept to its limits; the (n, 3, 3) turns that they make."""
+    hinges = body.segment(segment).hinges
+    axes = np.array([hinge.axis for hinge in hinges])
+    lower, upper = (np.array([getattr(hinge, end) for hinge in hinges]) for end in ("lower", "upper"))
+    angles = np.clip(ball_angles(axes, turns, 0.5 * (lower + upper)), lower, upper)
+    first = 7 + body.joint_index(hinges[0].name)
+    q[:, first : first + 3] = angles
+    return ball_rotation(axes, angles)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Reconstruction(Displayed):
+    """Postures of a body that follow recorded points.
+
+    Attributes:
+        body: The body used, with the person's lengths.
+        time: (n,) instants, 0 at the first [s].
+        q: (n, nq) postures, every hinge within its limits.
+        targets: The j points followed: joint centres of a skeleton, named after the segments that begin
+            there, or markers.
+        residual: (n, j) distance of each from where it was recorded [m]; NaN where it was not seen.
+        first_frame: Frame of the recording that is the first instant.
+        others: Markers that are not followed, for their names say nothing or they are never seen with others.
+        neutral: Segments about which the recording says nothing; their joints are as in standing.
+    """
+
+    body: BodyModel
+    time: FloatArray
+    q: FloatArray
+    targets: PointTargets
+    residual: FloatArray
+    first_frame: int = 0
+    others: tuple[str, ...] = ()
+    neutral: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.time)
+        for name, shape in (("time", (n,)), ("q", (n, self.body.nq))):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), f"reconstruction {name}", shape))
+        if len(self.targets) != n:
+            raise InputError(
+                f"reconstruction of {n} instants with {len(self.targets)} of targets; valid: as many"
+            )
+        residual = np.array(self.residual, dtype=np.float64)
+        if residual.shape != (n, len(self.joints)):
+            raise InputError(
+                f"reconstruction residual has shape {residual.shape}; valid: {(n, len(self.joints))}"
+            )
+        residual.setflags(write=False)
+        object.__setattr__(self, "residual", residual)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """(j,) names of the points followed."""
+        return self.targets.names
+
+    @cached_property
+    def median(self) -> float:
+        """Of all residuals [m]."""
+        return float(np.nanmedian(self.residual))
+
+    @cached_property
+    def worst(self) -> float:
+        """The largest residual [m]."""
+        return float(np.nanmax(self.residual))
+
+    @cached_property
+    def by_frame(self) -> FloatArray:
+        """(n,) root mean square of the residuals of each frame [m]; NaN where nothing was seen."""
+        seen = ~np.isnan(self.residual)
+        squares = np.where(seen, self.residual, 0.0) ** 2
+        counts = np.where(seen.any(axis=1), seen.sum(axis=1), np.nan)
+        return np.sqrt(squares.sum(axis=1) / counts)
+
+
+REFERENCE_STATURE = 1.75
+REFERENCE_MASS = 79.0
+"""Person of whom others are multiples [m], [kg]."""
+
+_BONES = {
+    "thigh": ("thigh", "leg"), "shank": ("leg", "foot"),
+    "upper_arm": ("upper_arm", "forearm"), "forearm": ("forearm", "hand"),
+}  # fmt: skip
+
+UPRIGHT_SHARE = 90.0
+"""Percentile of the distance of shoulders from hips that is the trunk's: a bent trunk is shorter."""
+
+
+def segment_lengths(centres: Mapping[str, FloatArray]) -> dict[str, float]:
+    """Lengths of a person [m] by the names of :data:`manikin.body.anthropometry.MEASURED_LENGTHS`.
+
+    Medians over the instants and the mean of both sides; the trunk's is taken where it is
+    extended and no arm is raised. Lengths of which a joint is missing are left out.
+
+    Args:
+        centres: (n, 3) joint centres [m], see
+            :func:`manikin.recordings.reconstruction.proportions.joint_centres`; NaN where one is not known.
+    """
+
+    def apart(first: str, second: str) -> float:
+        if first not in centres or second not in centres:
+            return np.nan
+        distance = np.linalg.norm(centres[first] - centres[second], axis=1)
+        return float(np.median(distance[~np.isnan(distance)])) if not np.all(np.isnan(distance)) else np.nan
+
+    pairs = {
+        name: [(f"{side}_{near}", f"{side}_{far}") for side in SIDES] for name, (near, far) in _BONES.items()
+    }
+    pairs |= {
+        "hips": [("left_thigh", "right_thigh")],
+        "shoulders": [("left_upper_arm", "right_upper_arm")],
+    }
+    lengths = {name: [apart(*pair) for pair in both] for name, both in pairs.items()}
+    found = {name: float(np.nanmean(both)) for name, both in lengths.items() if not np.all(np.isnan(both))}
+    if "hips" in found and "shoulders" in found:
+        length = np.linalg.norm(middle(centres, "upper_arm") - middle(centres, "thigh"), axis=1)
+        if not np.all(np.isnan(length)):
+            found["trunk"] = _trunk(centres, length)
+    return found
+
+
+def _trunk(centres: Mapping[str, FloatArray], length: FloatArray) -> float:
+    """Where it is extended and no arm is raised [m]."""
+    upright = np.percentile(length[hanging_arms(centres)], UPRIGHT_SHARE)
+    # Where arms hang in a crouch only, the trunk is never upright then.
+    return float(max(upright, np.median(length[~np.isnan(length)])))
+
+
+def hanging_arms(centres: Mapping[str, FloatArray]) -> NDArray[np.int64]:
+    """Instants at which no upper arm is raised, which would raise the shoulders too; all if there are none.
+
+    An arm hangs within 60 degrees of the line from the shoulders to the hips. Instants at which shoulders or
+    hips are not known are none; an arm whose elbow is not known counts as hanging.
+    """
+    down = middle(centres, "thigh") - middle(centres, "upper_arm")
+    cosines = []
+    known = ~np.isnan(down[:, 0])
+    for side in SIDES:
+        arm = centres.get(f"{side}_forearm", np.full_like(down, np.nan)) - centres[f"{side}_upper_arm"]
+        sizes = np.linalg.norm(arm, axis=1) * np.linalg.norm(down, axis=1)
+        cosine = np.sum(arm * down, axis=1) / np.maximum(sizes, 1e-9)
+        cosines.append(np.where(np.isnan(cosine), 1.0, cosine))
+    found = np.flatnonzero((np.min(cosines, axis=0) > 0.5) & known)
+    return found if found.size else np.flatnonzero(known)
+
+
+def middle(centres: Mapping[str, FloatArray], part: str) -> FloatArray:
+    """(n, 3) midway between the left and the right joint [m]."""
+    return 0.5 * (centres[f"left_{part}"] + centres[f"right_{part}"])
+
+
+def human_of(
+    centres: Mapping[str, FloatArray],
+    sex: str = "male",
+    mass: float | None = None,
+    stature: float | None = None,
+) -> BodyModel:
+    """Our human with the lengths of a recorded person, its masses off the lines between joints.
+
+    Args:
+        centres: (n, 3) joint centres [m]; what is missing is scaled with the stature.
+        sex: Table of the segment masses.
+        mass: Body mass [kg]; None for the body mass index of 79 kg at 1.75 m.
+        stature: Sole to vertex [m]; None for the one whose thigh, shank and trunk add up to theirs.
+
+    Raises:
+        BodyError: If a length or the stature is not that of an adult.
+    """
+    lengths = segment_lengths(centres)
+    if stature is None:
+        usual = Anthropometry(REFERENCE_STATURE, REFERENCE_MASS, sex)
+        heights = {
+            "thigh": usual.length("thigh"),
+            "shank": usual.length("shank"),
+            "trunk": usual.shoulder_height,
+        }
+        known = [name for name in heights if name in lengths]
+        share = sum(lengths[n] for n in known) / sum(heights[n] for n in known) if known else 1.0
+        stature = REFERENCE_STATURE * share
+    if mass is None:
+        mass = REFERENCE_MASS * (stature / REFERENCE_STATURE) ** 2
+    return human(stature, mass, sex, lengths=lengths, off_axis_masses=True)

@@ -1,0 +1,213 @@
+"""A recorded motion as a motion of our human, scaled to the person.
+
+Also here. A recorded skeleton's motion as a motion of our human. What a recording says nothing about, held as
+people hold it: trunk and head upright, arms hanging.
+
+Left at rest on the segment that carries it, an untold trunk would tip with every tilt of the pelvis, and the
+centre of mass with it. People keep trunk and head upright in the world, and arms hang: so each untold ball
+joint turns its segment as in upright standing, towards where the carrying segment heads.
+
+Bolt upright, the trunk would share every push forward that the pelvis gets in a step. People do not let it:
+they tilt the trunk so that the head moves evenly (Menz, Lord and Fitzpatrick, "Acceleration patterns of the
+head and pelvis when walking on level and irregular surfaces", Gait & Posture 18, 2003). Where walks here have
+markers on the trunk, its upper end has a third of the pelvis' acceleration along the walk; sideways it
+follows. So an untold trunk tilts forward and back by what leaves a third.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manikin.body import BodyModel
+from manikin.body.joint_volume import ball_angles, ball_rotation
+from manikin.errors import InputError
+from manikin.kinematics.point_targets import origin_targets
+from manikin.kinematics.tracking import follow
+from manikin.numerics.spatial import FloatArray
+from manikin.recordings.dynamics.recorded_dynamics import smooth
+from manikin.recordings.readers.markers import MarkerRecording
+from manikin.recordings.readers.skeleton_recording import Recording
+from manikin.recordings.reconstruction.marker_reconstruction import centres_of_markers, reconstruct_markers
+from manikin.recordings.reconstruction.orientation_targets import orientation_targets, trunk_turns
+from manikin.recordings.reconstruction.proportions import (
+    CENTRES,
+    Reconstruction,
+    analytic_ik,
+    human_of,
+    joint_centres,
+)
+
+
+def reconstruct_skeleton(
+    recording: Recording, body: BodyModel | None, sex: str, mass: float | None
+) -> Reconstruction:
+    """Motion of our human that follows a skeleton; see ``reconstruct``.
+
+    Hips, knees, ankles, shoulders, elbows and wrists are followed
+    (:mod:`manikin.recordings.reconstruction.proportions`); the turns of pelvis, thorax, head, feet and hands
+    count less (:mod:`manikin.recordings.reconstruction.orientation_targets`). The first frame starts from
+    the closed form (:mod:`manikin.recordings.reconstruction.proportions`), every other one from the frame
+    before. Our shoulders are fixed in the thorax: movements of a recorded shoulder girdle remain as
+    residuals.
+    """
+    centres = joint_centres(recording)
+    measured = human_of(centres, sex, mass)
+    person = measured if body is None else body
+    pelvis, thorax = (trunk_turns(recording, centres, name) for name in ("pelvis", "thorax"))
+    wanted = origin_targets(centres, CENTRES)
+    followed = wanted.and_these(orientation_targets(recording, person, centres, pelvis, thorax))
+    q, residual = follow(person, followed, analytic_ik(person, centres, pelvis, thorax), recording.rate)
+    return Reconstruction(person, recording.time, q, wanted, residual[:, : len(wanted.names)])
+
+
+UPRIGHT = ("lumbar", "thorax", "neck", "left_upper_arm", "right_upper_arm")
+"""Segments on ball joints, from the pelvis outward, that are upright or hang unless a recording tells."""
+
+_TILTED = ("lumbar", "thorax")
+
+
+CALMED_SHARE = 1.0 / 3.0
+"""Of what is fast in the pelvis' motion forward and back, what the upper end of the trunk has as well."""
+
+SLOW = 1.0
+"""Slower motion of the pelvis takes the trunk along [Hz]: below the frequency of steps."""
+
+LARGEST_TILT = np.deg2rad(10.0)
+"""Of an untold trunk [rad]."""
+
+
+def unmeasured_upright(found: Reconstruction) -> Reconstruction:
+    """The same with untold trunk, neck and upper arms as in upright standing, whatever carries them does.
+
+    An untold trunk tilts to calm its upper end. Angles are kept to the limits of their hinges. Elbows and
+    wrists stay as in standing. Nothing that is followed moves.
+    """
+    body, standing = found.body, found.body.standing_posture()
+    if not set(UPRIGHT) & set(found.neutral):
+        return found
+    q = np.array(found.q)
+    turns = {body.segments[0].name: Rotation.from_quat(q[:, 3:7]).as_matrix()}
+    tilts = _calming_tilts(found, turns[body.segments[0].name])
+    for name in UPRIGHT:
+        segment = body.segment(name)
+        axes = np.array([hinge.axis for hinge in segment.hinges])
+        places = [7 + body.joint_index(hinge.name) for hinge in segment.hinges]
+        carrier = turns[segment.parent or ""]
+        if name in found.neutral:
+            wanted = _heading(carrier) @ ball_rotation(axes, standing[places])
+            if name in _TILTED:
+                wanted = _heading(carrier) @ tilts @ ball_rotation(axes, standing[places])
+            angles = ball_angles(axes, carrier.transpose(0, 2, 1) @ wanted, standing[places])
+            limits = [(hinge.lower, hinge.upper) for hinge in segment.hinges]
+            q[:, places] = np.clip(angles, *np.transpose(limits))
+        turns[name] = carrier @ ball_rotation(axes, q[:, places])
+    return replace(found, q=q)
+
+
+def _calming_tilts(found: Reconstruction, pelvis: FloatArray) -> FloatArray:
+    """(n, 3, 3) tilts of the trunk about the axis to the left; none where it is told, or for a few frames."""
+    n, rate = len(found.q), (len(found.q) - 1) / max(float(found.time[-1] - found.time[0]), 1e-9)
+    if not set(_TILTED) <= set(found.neutral) or n * SLOW < rate or rate <= 2.0 * SLOW:
+        return np.tile(np.eye(3), (n, 1, 1))
+    place = found.q[:, :2]
+    fast = place - smooth(place, rate, np.full(n, SLOW))
+    ahead = np.einsum("ij,ij->i", fast, _heading(pelvis)[:, :2, 0])
+    length = sum(float(found.body.segment(name).origin[2]) for name in ("thorax", "neck"))
+    tilt = np.clip((CALMED_SHARE - 1.0) * ahead / length, -LARGEST_TILT, LARGEST_TILT)
+    return Rotation.from_rotvec(tilt[:, None] * [0.0, 1.0, 0.0]).as_matrix()
+
+
+def _heading(turns: FloatArray) -> FloatArray:
+    """(n, 3, 3) turns about the vertical to where the x axes of rotations point."""
+    yaw = np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
+    return Rotation.from_rotvec(yaw[:, None] * [0.0, 0.0, 1.0]).as_matrix()
+
+
+FEWEST_FRAMES = 2
+
+
+def reconstruct(
+    recording: Recording | MarkerRecording,
+    body: BodyModel | None = None,
+    *,
+    sex: str = "male",
+    mass: float | None = None,
+) -> Reconstruction:
+    """Motion of our human that follows a recording, by inverse kinematics within joint limits.
+
+    Of a skeleton the joint centres are followed (:mod:`manikin.recordings.reconstruction.reconstruct`), of
+    markers the markers themselves (:mod:`manikin.recordings.reconstruction.marker_reconstruction`). What no
+    marker tells is held as in standing, trunk and head upright and arms hanging
+    (:mod:`manikin.recordings.reconstruction.reconstruct`).
+
+    Args:
+        recording: Motion of a skeleton or of markers, at least two frames.
+        body: Our human; None for one with the lengths of the recorded person. Where other clips of the
+            person exist, take that of :func:`person_of` all of them: the trunk's length is told by extended
+            postures only.
+        sex: Table of segment masses where ``body`` is None.
+        mass: Body mass where ``body`` is None [kg]; None for the one in the file, or else a usual one.
+
+    Raises:
+        InputError: If the recording has one frame only, lacks a joint, has no markers of a pelvis, or has
+            left and right swapped.
+        BodyError: If the person's lengths are not those of an adult.
+    """
+    _check(recording)
+    if isinstance(recording, MarkerRecording):
+        return unmeasured_upright(reconstruct_markers(recording, body, sex, mass))
+    return reconstruct_skeleton(recording, body, sex, mass)
+
+
+def person_of(
+    recordings: Sequence[Recording | MarkerRecording], *, sex: str = "male", mass: float | None = None
+) -> BodyModel:
+    """Our human with the lengths of a person of whom there are several recordings, from all their frames.
+
+    Args:
+        recordings: Of the same person, at least one.
+        sex: Table of segment masses.
+        mass: Body mass [kg]; None for the one in the files, or else a usual one.
+
+    Raises:
+        InputError: As :func:`reconstruct`; if there is no recording.
+        BodyError: As :func:`reconstruct`.
+    """
+    if not recordings:
+        raise InputError("no recording to take a person's lengths from; valid: at least one")
+    for recording in recordings:
+        _check(recording)
+    each = [_centres(recording) for recording in recordings]
+    everywhere = {
+        name: np.concatenate([
+            found.get(name, np.full((len(recording), 3), np.nan))
+            for found, recording in zip(each, recordings, strict=True)
+        ])
+        for name in CENTRES
+        if any(name in found for found in each)
+    }  # fmt: skip
+    subjects = [recording.subject for recording in recordings if isinstance(recording, MarkerRecording)]
+    masses = [subject.mass for subject in subjects if subject.mass is not None]
+    statures = [subject.stature for subject in subjects if subject.stature is not None]
+    if mass is None and masses:
+        mass = float(np.median(masses))
+    return human_of(everywhere, sex, mass, float(np.median(statures)) if statures else None)
+
+
+def _centres(recording: Recording | MarkerRecording) -> Mapping[str, FloatArray]:
+    if isinstance(recording, MarkerRecording):
+        return centres_of_markers(recording)
+    return joint_centres(recording)
+
+
+def _check(recording: Recording | MarkerRecording) -> None:
+    if not isinstance(recording, Recording | MarkerRecording):
+        raise InputError(
+            f"reconstruction of a {type(recording).__name__}; valid: a Recording or a MarkerRecording"
+        )
+    if len(recording) < FEWEST_FRAMES:
+        raise InputError(
+            f"recording {recording.name!r} has {len(recording)} frame; valid: at least {FEWEST_FRAMES}"
+        )

@@ -1,0 +1,385 @@
+"""How low people go under something, and how much room they leave below it.
+
+What hangs over the way is a bar or the underside of a box. Of a bar only the height is given: wherever it
+was, it was where all of the body was below it. Each part may have passed it where it was lowest itself, so
+the room below a bar is an upper bound. Of a box the place is given as well, and the room is the least one
+while any part is below it; it is negative for who would have hit it.
+Who crouches on the spot, or is low when the recording begins or ends, passes no bar.
+
+Also here. Where people put their feet and hands, seen from what they pass or from where they begin. How far
+the centre of mass is from what supports it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.errors import InputError
+from manikin.numerics.signals import Spread, mask_runs
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.recordings.statistics.clips import RecordedClip
+from manikin.recordings.statistics.phases import mirrored
+
+AROUND = 0.25
+"""Time before and after an instant over which the direction of travel is taken [s]."""
+
+FEWEST_TRAVELLED = 0.02
+"""Way over which a direction is told [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """A place on the floor from which supports are seen, and when it was passed.
+
+    Attributes:
+        place: (2,) in the world [m].
+        heading: Direction of its x axis, counter-clockwise from the world's x [rad].
+        instant: Supports that begin later are numbered from 1, all others down from 0 [s].
+    """
+
+    place: FloatArray
+    heading: float
+    instant: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "place", frozen_array(self.place, "origin place", (2,)))
+        finite_number(self.heading, "origin heading [rad]")
+        finite_number(self.instant, "origin instant [s]")
+
+    def seen(self, places: FloatArray) -> FloatArray:
+        """(..., 2) level coordinates of (..., 2 or more) places of the world in this frame [m]."""
+        c, s = np.cos(self.heading), np.sin(self.heading)
+        return (places[..., :2] - self.place) @ np.array([[c, -s], [s, c]])
+
+
+@dataclass(frozen=True, eq=False)
+class SupportPlacement:
+    """One support of several motions ([Qiu2012]_ Fig. 3.9).
+
+    Attributes:
+        effector: Which one.
+        number: Its how-manieth support behind the origin; 0 the last before it.
+        clips: (k,) names of the motions.
+        places: (k, 2) in the frame of the origin, x ahead [m].
+    """
+
+    effector: str
+    number: int
+    clips: tuple[str, ...]
+    places: FloatArray
+
+    def __post_init__(self) -> None:
+        shape = (len(self.clips), 2)
+        object.__setattr__(self, "places", frozen_array(self.places, "placement places", shape))
+
+    @property
+    def mean(self) -> FloatArray:
+        """(2,) [m]."""
+        return self.places.mean(axis=0)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """(2, 2) of the sample, NaN for one place [m²]."""
+        if len(self.places) < 2:
+            return np.full((2, 2), np.nan)
+        return np.cov(self.places.T)
+
+    def ellipse(self, share: float = 0.5) -> tuple[FloatArray, float]:
+        """Ellipse about the mean in which a share of places lies, were they normal with this covariance.
+
+        Args:
+            share: Between 0 and 1.
+
+        Returns:
+            (2,) half axes, the longer one first [m], and the direction of the longer one [rad].
+
+        Raises:
+            InputError: If the share is not in between, or there is one place only.
+        """
+        if not 0.0 < share < 1.0 or len(self.places) < 2:
+            raise InputError(
+                f"ellipse of {share:g} of {len(self.places)} places; valid: a share in 0 to 1, two places"
+            )
+        values, axes = np.linalg.eigh(self.covariance)
+        halves = np.sqrt(np.maximum(values[::-1], 0.0) * -2.0 * np.log(1.0 - share))
+        return halves, float(np.arctan2(axes[1, 1], axes[0, 1]))
+
+
+def first_stance(clip: RecordedClip) -> Origin:
+    """Middle of the first places of the feet, x towards the farthest place reached.
+
+    Without any foot that supports it is the middle of the first places of all effectors.
+
+    Raises:
+        InputError: If nothing supports, or the centre of mass does not move on.
+    """
+    supports = clip.supports.supports
+    first = {one.effector: one.place for one in reversed(supports)}
+    feet = [place for name, place in first.items() if name.endswith("foot")] or list(first.values())
+    if not feet:
+        raise InputError(f"clip {clip.name!r} has no support to see the others from; valid: one or more")
+    way = clip.com[:, :2] - clip.com[0, :2]
+    farthest = way[int(np.argmax(np.linalg.norm(way, axis=1)))]
+    return Origin(np.mean(feet, axis=0)[:2], _heading(clip, farthest), clip.supports.start)
+
+
+def com_extreme(clip: RecordedClip, *, highest: bool = False) -> Origin:
+    """Where the centre of mass was lowest (highest), x along its way there: the place of what was passed.
+
+    Raises:
+        InputError: If the centre of mass does not move on there.
+    """
+    frame = int(np.argmax(clip.com[:, 2]) if highest else np.argmin(clip.com[:, 2]))
+    instant = float(clip.time[frame])
+    before, after = (
+        [np.interp(instant + shift, clip.time, clip.com[:, axis]) for axis in range(2)]
+        for shift in (-AROUND, AROUND)
+    )
+    return Origin(clip.com[frame, :2], _heading(clip, np.subtract(after, before)), instant)
+
+
+def support_placements(
+    clips: Sequence[RecordedClip], origins: Sequence[Origin] | None = None, *, mirror: bool = False
+) -> tuple[SupportPlacement, ...]:
+    """Supports of the same number of several motions, seen from their origins.
+
+    Args:
+        clips: The motions of one group.
+        origins: One for each; :func:`first_stance` if None.
+        mirror: Whether motions whose first step behind the origin is made by the right foot are seen in a
+            mirror, so that all begin with the left one.
+
+    Returns:
+        By effector and number, in their order.
+
+    Raises:
+        InputError: As :func:`first_stance`, or if there are not as many origins as motions.
+    """
+    if origins is None:
+        origins = [first_stance(clip) for clip in clips]
+    if len(origins) != len(clips):
+        raise InputError(f"{len(origins)} origins of {len(clips)} motions; valid: one for each")
+    found: dict[tuple[str, int], list[tuple[str, FloatArray]]] = {}
+    for clip, origin in zip(clips, origins, strict=True):
+        turned = mirror and _first_behind(clip, origin) == "right_foot"
+        for effector, places in _numbered(clip, origin).items():
+            name = mirrored(effector) if turned else effector
+            for number, place in places.items():
+                seen = origin.seen(place) * ([1.0, -1.0] if turned else [1.0, 1.0])
+                found.setdefault((name, number), []).append((clip.name, seen))
+    return tuple(
+        SupportPlacement(
+            name, number, tuple(clip for clip, _ in each), np.array([place for _, place in each])
+        )
+        for (name, number), each in sorted(found.items())
+    )
+
+
+def _numbered(clip: RecordedClip, origin: Origin) -> Mapping[str, Mapping[int, FloatArray]]:
+    numbered = {}
+    for name in {one.effector for one in clip.supports.supports}:
+        supports = clip.supports.of(name)
+        before = sum(one.start <= origin.instant for one in supports)
+        numbered[name] = {index + 1 - before: one.place for index, one in enumerate(supports)}
+    return numbered
+
+
+def _first_behind(clip: RecordedClip, origin: Origin) -> str | None:
+    later = (one for one in clip.supports.supports if one.start > origin.instant)
+    return next((one.effector for one in later if one.effector.endswith("foot")), None)
+
+
+def _heading(clip: RecordedClip, way: FloatArray) -> float:
+    if np.hypot(*way) < FEWEST_TRAVELLED:
+        raise InputError(
+            f"clip {clip.name!r} stays where it is, which tells no direction; valid: an origin with a heading"
+        )
+    return float(np.arctan2(way[1], way[0]))
+
+
+LIMIT = 1.08
+"""Distance from the centre of mass to a foot within which motions are planned ([Qiu2012]_ Table 7.5) [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class SupportDistance:
+    """Distance from the centre of mass to the place of one support while it supports.
+
+    Attributes:
+        clip: Name of the motion.
+        effector: Which one.
+        time: (k,) instants, at least one [s].
+        distance: (k,) [m].
+    """
+
+    clip: str
+    effector: str
+    time: FloatArray
+    distance: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("time", "distance"):
+            value = frozen_array(getattr(self, name), f"support distance {name}", (len(self.time),))
+            object.__setattr__(self, name, value)
+
+    @property
+    def spread(self) -> Spread:
+        """Over the instants [m]."""
+        return Spread.of(self.distance)
+
+    def share_within(self, limit: float = LIMIT) -> float:
+        """Share of the instants at which the distance is not above a limit [m]."""
+        return float(np.mean(self.distance <= limit))
+
+
+def support_distances(clip: RecordedClip) -> tuple[SupportDistance, ...]:
+    """Of each support, in their order; those too short for any instant are left out.
+
+    The place of a foot's support is the middle of its sole on the ground, as in the thesis the projection of
+    the foot's centre of mass ([Qiu2012]_ 3.2.3).
+    """
+    found = []
+    for one in clip.supports.supports:
+        within = (clip.time >= one.start - 1e-9) & (clip.time <= one.end + 1e-9)
+        if within.any():
+            distance = np.linalg.norm(clip.com[within] - one.place, axis=1)
+            found.append(SupportDistance(clip.name, one.effector, clip.time[within], distance))
+    return tuple(found)
+
+
+def largest_distances(clips: Sequence[RecordedClip]) -> dict[str, Spread]:
+    """The largest distance of each motion, by effector, over all motions ([Qiu2012]_ Table 3.5) [m]."""
+    largest: dict[str, list[float]] = {}
+    for clip in clips:
+        own: dict[str, float] = {}
+        for one in support_distances(clip):
+            own[one.effector] = max(own.get(one.effector, 0.0), float(one.distance.max()))
+        for effector, value in own.items():
+            largest.setdefault(effector, []).append(value)
+    return {effector: Spread.of(values) for effector, values in sorted(largest.items())}
+
+
+def shares_within(clips: Sequence[RecordedClip], limit: float = LIMIT) -> dict[str, float]:
+    """Share of all instants of all motions at which the distance is not above a limit, by effector."""
+    every: dict[str, list[FloatArray]] = {}
+    for clip in clips:
+        for one in support_distances(clip):
+            every.setdefault(one.effector, []).append(one.distance)
+    return {name: float(np.mean(np.concatenate(each) <= limit)) for name, each in sorted(every.items())}
+
+
+CROSSED = 0.1
+"""Level way of the centre of mass below a bar from which on it is passed [m]."""
+
+
+@dataclass(frozen=True)
+class Overhead:
+    """Something to pass under.
+
+    Attributes:
+        height: Of its underside above the lowest surface on which feet stood [m].
+        x: Where it begins and ends in the world [m]; None for a bar whose place is not known.
+        y: As ``x``.
+    """
+
+    height: float
+    x: tuple[float, float] | None = None
+    y: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        finite_number(self.height, "height to pass under [m]", above=0.0)
+        if (self.x is None) != (self.y is None):
+            raise InputError(
+                "something overhead has one of x and y only; valid: both for a box, none for a bar"
+            )
+        for axis, ends in (("x", self.x), ("y", self.y)):
+            if ends is not None and not ends[0] < ends[1]:
+                raise InputError(f"something overhead has {axis} from {ends[0]} to {ends[1]}; valid: rising")
+
+    def above(self, place: FloatArray) -> NDArray[np.bool_]:
+        """(n,) whether it is above each of the (n, 2 or more) places; a bar may be above any."""
+        inside = np.ones(len(place), dtype=bool)
+        for axis, ends in enumerate((self.x, self.y)):
+            if ends is not None:
+                inside &= (place[:, axis] >= ends[0]) & (place[:, axis] <= ends[1])
+        return inside
+
+
+@dataclass(frozen=True)
+class Passage:
+    """One time below something, or a whole recording.
+
+    Attributes:
+        start: [s].
+        end: [s].
+        com_lowest: Least height of the centre of mass above the floor [m].
+        com_lowest_at: When [s].
+        com_place: (x, y) where [m].
+        com_highest: Largest height of the centre of mass above the floor [m].
+        travelled: Level distance between where the centre of mass was at the start and at the end [m].
+        tops: Height that counts of each part of the body: the least one, the largest one below a box [m].
+        room: From the highest of these to what is passed; None for a whole recording [m].
+        below: From the lowest centre of mass to what is passed ([Qiu2012]_ Fig. 3.14) [m].
+    """
+
+    start: float
+    end: float
+    com_lowest: float
+    com_lowest_at: float
+    com_place: tuple[float, float]
+    com_highest: float
+    travelled: float
+    tops: Mapping[str, float]
+    room: float | None = None
+    below: float | None = None
+
+
+def whole_passage(clip: RecordedClip) -> Passage:
+    """Lowest centre of mass and lowest tops of a whole recording."""
+    return _passage(clip, 0, len(clip.time), None)
+
+
+def passages(clip: RecordedClip, overhead: Overhead) -> tuple[Passage, ...]:
+    """Times in which a person is below something, in order; none for who never is.
+
+    Args:
+        clip: The motion, with tops.
+        overhead: What is passed. Below a bar is who has all tops below it, below a box who has any part
+            or the centre of mass there.
+
+    Raises:
+        InputError: If the motion has no tops.
+    """
+    if not clip.tops:
+        raise InputError(f"clip {clip.name!r} has no highest points; valid: those of one part or more")
+    if overhead.x is None:
+        heights = np.max([top[:, 2] for top in clip.tops.values()], axis=0) - clip.floor
+        under = heights < overhead.height
+    else:
+        under = np.any([overhead.above(place) for place in (clip.com, *clip.tops.values())], axis=0)
+    found = [(first, stop, _passage(clip, first, stop, overhead)) for first, stop in mask_runs(under)]
+    if overhead.x is not None:
+        return tuple(one for _, _, one in found)
+    last = len(clip.time)
+    return tuple(one for a, b, one in found if a > 0 and b < last and one.travelled >= CROSSED)
+
+
+def _passage(clip: RecordedClip, first: int, stop: int, overhead: Overhead | None) -> Passage:
+    part = slice(first, stop)
+    com, floor = clip.com[part], clip.floor
+    lowest = int(np.argmin(com[:, 2]))
+    height = float(com[lowest, 2]) - floor
+    if overhead is None or overhead.x is None:
+        tops = {name: float(top[part, 2].min()) - floor for name, top in clip.tops.items()}
+    else:
+        inside = {name: top[part][overhead.above(top[part])] for name, top in clip.tops.items()}
+        tops = {name: float(top[:, 2].max()) - floor for name, top in inside.items() if len(top)}
+    room = overhead.height - max(tops.values()) if overhead is not None and tops else None
+    return Passage(
+        float(clip.time[first]), float(clip.time[stop - 1]), height, float(clip.time[part][lowest]),
+        (float(com[lowest, 0]), float(com[lowest, 1])), float(com[:, 2].max()) - floor,
+        float(np.hypot(*(com[-1] - com[0])[:2])), tops, room,
+        None if overhead is None else overhead.height - height,
+    )  # fmt: skip

@@ -1,0 +1,387 @@
+"""The phases of one motion, recorded or published, and their names.
+
+Also here. How long the phases of several motions last. How many people do it in the same order. What Qiu
+measured of one person who passed under a beam, as numbers ([Qiu2012]_ chapter 3).
+
+The file holds the numbers of Tables 3.2, 3.4 and 3.5 and those quoted in the text, nothing else. Table 3.4
+gives the phases between changes of the feet up to the last landing; the last double support is not in it.
+A motion with three steps is the left foot's first, one with four the right foot's first: Table 3.2 says so
+of 01_TR_H1C1L_1, and for 01_TR_H2C3L_1, which is not in that table, it is inferred.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from importlib import resources
+from itertools import accumulate, pairwise
+from types import MappingProxyType
+from typing import Any, Literal
+
+from manikin.errors import InputError
+from manikin.numerics.signals import Spread
+from manikin.recordings.supports.recorded_supports import RecordedSupports, SupportPhase
+from manikin.recordings.supports.supports import FEET
+
+FLIGHT = "flight"
+
+STANCES = ("", "SS", "DS")
+"""Nothing, single and double support, by the number of feet."""
+
+
+@dataclass(frozen=True)
+class PhaseSequence:
+    """Phases of one motion, each beginning where the one before it ends.
+
+    Attributes:
+        name: Of the motion.
+        group: What it is compared with: a person, a condition.
+        phases: In their order.
+        start_seen: Whether the first phase begins with a change of the supports, not with the recording.
+        end_seen: Whether the last phase ends with a change of the supports.
+    """
+
+    name: str
+    group: str
+    phases: tuple[SupportPhase, ...]
+    start_seen: bool = False
+    end_seen: bool = False
+
+    @classmethod
+    def of(cls, name: str, group: str, supports: RecordedSupports) -> "PhaseSequence":
+        """Phases of a recording, of which the first and the last are cut off by it."""
+        return cls(name, group, supports.phases)
+
+    def of_effectors(self, active: Collection[str]) -> "PhaseSequence":
+        """The same with the supports of some effectors only: phases that then are alike become one.
+
+        Hands that could be left out are passive supports, and phases are told by the feet
+        ([Qiu2012]_ 3.2.1).
+        """
+        kept = (
+            SupportPhase(one.start, one.end, tuple(name for name in one.effectors if name in active))
+            for one in self.phases
+        )
+        return replace(self, phases=_merged(kept))
+
+    def without_short(self, shortest: float) -> "PhaseSequence":
+        """The same without phases shorter than ``shortest`` [s], whose time goes to the one before."""
+        kept = list(self.phases[:1])
+        for phase in self.phases[1:]:
+            if phase.duration < shortest:
+                kept[-1] = replace(kept[-1], end=phase.end)
+            else:
+                kept.append(phase)
+        return replace(self, phases=_merged(kept))
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """Of each phase, see :func:`kind_of`."""
+        return tuple(kind_of(phase.effectors) for phase in self.phases)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Kind and number of each phase: DS-1, SS-1, DS-2 and so on ([Qiu2012]_ Fig. 3.8)."""
+        seen: Counter[str] = Counter()
+        labels = []
+        for kind in self.kinds:
+            seen[kind] += 1
+            labels.append(f"{kind}-{seen[kind]}")
+        return tuple(labels)
+
+    @property
+    def whole(self) -> tuple[bool, ...]:
+        """Whether each phase is seen from its beginning to its end."""
+        last = len(self.phases) - 1
+        return tuple(
+            (number > 0 or self.start_seen) and (number < last or self.end_seen)
+            for number in range(len(self.phases))
+        )
+
+    @property
+    def first_step(self) -> str | None:
+        """The effector that touches down first; None if none does."""
+        for before, after in pairwise(self.phases):
+            for name in after.effectors:
+                if name not in before.effectors:
+                    return name
+        return None
+
+
+def kind_of(effectors: Iterable[str]) -> str:
+    """Name of the kind of a phase: ``DS`` or ``SS`` by the feet, the others after a plus, or ``flight``."""
+    names = list(effectors)
+    feet = sum(name in FEET for name in names)
+    parts = [STANCES[feet], *(name for name in names if name not in FEET)]
+    return "+".join(part for part in parts if part) or FLIGHT
+
+
+def mirrored(effector: str) -> str:
+    """Name of the effector on the other side; the same in the middle of the body."""
+    for side, other in (("left_", "right_"), ("right_", "left_")):
+        if effector.startswith(side):
+            return other + effector.removeprefix(side)
+    return effector
+
+
+def _merged(phases: Iterable[SupportPhase]) -> tuple[SupportPhase, ...]:
+    kept: list[SupportPhase] = []
+    for phase in phases:
+        if kept and set(kept[-1].effectors) == set(phase.effectors):
+            kept[-1] = replace(kept[-1], end=phase.end)
+        else:
+            kept.append(phase)
+    return tuple(kept)
+
+
+By = Literal["number", "kind", "effectors"]
+"""``number``: DS-1, SS-1, DS-2, for motions that begin alike; ``kind``: DS, SS; ``effectors``: by name."""
+
+BYS: tuple[By, ...] = ("number", "kind", "effectors")
+
+
+def phase_durations(
+    sequences: Sequence[PhaseSequence], by: By = "number", *, cut: bool = False
+) -> dict[str, Spread]:
+    """Durations of the phases of the same name over all motions ([Qiu2012]_ Table 3.4, Fig. 3.11) [s].
+
+    Args:
+        sequences: Of at least one motion; give those of one group, or of all.
+        by: What makes a name.
+        cut: Whether phases count that begin or end with the recording.
+
+    Returns:
+        Spread of each name, in the order in which they appear.
+
+    Raises:
+        InputError: If ``by`` is unknown.
+    """
+    if by not in BYS:
+        raise InputError(f"phases by {by!r}; valid: {', '.join(BYS)}")
+    values: dict[str, list[float]] = {}
+    for one in sequences:
+        for name, phase, whole in zip(names_of(one, by), one.phases, one.whole, strict=True):
+            if whole or cut:
+                values.setdefault(name, []).append(phase.duration)
+    return {name: Spread.of(durations) for name, durations in values.items()}
+
+
+def names_of(one: PhaseSequence, by: By) -> tuple[str, ...]:
+    """Name of each phase of a motion."""
+    if by == "number":
+        return one.labels
+    if by == "kind":
+        return one.kinds
+    return tuple("+".join(phase.effectors) or "flight" for phase in one.phases)
+
+
+def by_group(sequences: Sequence[PhaseSequence]) -> dict[str, tuple[PhaseSequence, ...]]:
+    """The motions of each group, in the order in which groups appear."""
+    groups: dict[str, list[PhaseSequence]] = {}
+    for one in sequences:
+        groups.setdefault(one.group, []).append(one)
+    return {group: tuple(members) for group, members in groups.items()}
+
+
+Supporting = tuple[frozenset[str], ...]
+"""The effectors that support in each phase, one after the other."""
+
+SHORTEST = 0.03
+"""A phase shorter than this is not told from an error of touch-downs and lift-offs [s]."""
+
+
+@dataclass(frozen=True)
+class SequenceConsistency:
+    """Sequences of supports of several motions ([Qiu2012]_ Table 3.2).
+
+    Attributes:
+        counts: Motions of each sequence, the most frequent first.
+        first_steps: Motions in which each effector touched down first; those without any are left out.
+    """
+
+    counts: Mapping[Supporting, int]
+    first_steps: Mapping[str, int]
+
+    @property
+    def motions(self) -> int:
+        """How many there are."""
+        return sum(self.counts.values())
+
+    @property
+    def modal(self) -> Supporting:
+        """The most frequent sequence; empty without motions."""
+        return next(iter(self.counts), ())
+
+    @property
+    def modal_share(self) -> float:
+        """Share of the motions that have it."""
+        return self.counts[self.modal] / self.motions if self.counts else 0.0
+
+    @property
+    def mirrored_counts(self) -> Mapping[Supporting, int]:
+        """As ``counts``, with a sequence and its mirror image counted as one, the more frequent of both."""
+        merged: Counter[Supporting] = Counter()
+        for sequence, count in self.counts.items():
+            image = mirror_image(sequence)
+            merged[image if image in merged else sequence] += count
+        return dict(merged.most_common())
+
+    @property
+    def mirrored_share(self) -> float:
+        """Share of the motions with the most frequent sequence or its mirror image."""
+        return max(self.mirrored_counts.values(), default=0) / max(self.motions, 1)
+
+    @property
+    def first_step_share(self) -> float:
+        """Share of the motions with a step whose first one is made by the most frequent effector."""
+        total = sum(self.first_steps.values())
+        return max(self.first_steps.values()) / total if total else 0.0
+
+
+def sequence_consistency(
+    motions: Sequence[PhaseSequence],
+    *,
+    phases: int | None = None,
+    shortest: float = SHORTEST,
+    start: str | None = None,
+) -> SequenceConsistency:
+    """Count the sequences of supports and the first steps.
+
+    Args:
+        motions: Those of one group, or all.
+        phases: How many phases are looked at; None for all. Recordings that end anywhere differ in their
+            length and not in their order.
+        shortest: Phases shorter than this are passed over [s].
+        start: Kind of the phase from which on they are looked at, such as ``DS``, for recordings that begin
+            anywhere: the first one that is seen from its beginning. None for the first phase of all.
+    """
+    lasting = [one.without_short(shortest) for one in motions]
+    sequences = Counter(
+        tuple(frozenset(phase.effectors) for phase in _from(one, start)[:phases]) for one in lasting
+    )
+    steps = Counter(one.first_step for one in lasting if one.first_step is not None)
+    return SequenceConsistency(dict(sequences.most_common()), dict(steps.most_common()))
+
+
+def mirror_image(sequence: Supporting) -> Supporting:
+    """The sequence with left and right exchanged."""
+    return tuple(frozenset(mirrored(name) for name in effectors) for effectors in sequence)
+
+
+def initials(sequence: Supporting) -> str:
+    """A sequence in short: ``LR R LR L``, hands in small letters, others by name, ``-`` in flight."""
+    return " ".join("".join(sorted(map(_initial, one), key=_feet_first)) or "-" for one in sequence)
+
+
+def _from(one: PhaseSequence, kind: str | None) -> tuple[SupportPhase, ...]:
+    if kind is None:
+        return one.phases
+    first = 0 if one.start_seen else 1
+    begins = (number for number in range(first, len(one.phases)) if one.kinds[number] == kind)
+    return one.phases[next(begins, len(one.phases)) :]
+
+
+def _initial(effector: str) -> str:
+    side, _, part = effector.partition("_")
+    if side not in ("left", "right") or part not in ("foot", "hand"):
+        return f"({effector.replace('_', ' ')})"
+    return side[0].upper() if part == "foot" else side[0]
+
+
+def _feet_first(initial: str) -> tuple[int, str]:
+    return (0 if initial.isupper() else 1, initial)
+
+
+SHIPPED = "qiu_2012_chapter_3.json"
+MOTIONS = 30
+"""All that were made by the person, and all that Table 3.5 is about."""
+
+_BOTH = ("left_foot", "right_foot")
+_FEET = {"LR": _BOTH, "L": _BOTH[:1], "R": _BOTH[1:]}
+
+
+@dataclass(frozen=True)
+class PublishedHeights:
+    """Heights quoted in [Qiu2012]_ 3.2.3 ("about"), by beam H1, H2 and H3 [m].
+
+    Attributes:
+        standing: Of the centre of mass before the motion.
+        lowest: Of the centre of mass under each beam.
+        beams: Of the beams.
+    """
+
+    standing: float
+    lowest: Mapping[str, float]
+    beams: Mapping[str, float]
+
+
+def published_phases(first_step: str | None = None) -> tuple[PhaseSequence, ...]:
+    """The 30 motions of Table 3.4, grouped by beam and configuration such as H1C1.
+
+    Times are those of the thesis: frames begin at 1 and a hundred of them are a second.
+
+    Args:
+        first_step: ``left_foot`` or ``right_foot`` for the motions that begin with it; None for all. The
+            means quoted in the thesis are those of ``left_foot`` in C1 and C2.
+    """
+    found = (_sequence(name, frames) for name, frames, *_ in _published()["table_3_4"])
+    return tuple(one for one in found if first_step is None or one.first_step == first_step)
+
+
+def published_grasps() -> dict[str, float]:
+    """Instant at which the left hand grasped, by motion; in all others it did not [s]."""
+    data = _published()
+    return {name: rest[0] * data["frame_s"] for name, _, *rest in data["table_3_4"] if rest}
+
+
+def published_consistency() -> SequenceConsistency:
+    """Table 3.2: 24 motions of three people with free strategy in C1 and C2."""
+    counts, steps = {}, {}
+    for row in _published()["table_3_2"]:
+        sequence = tuple(frozenset(_FEET[feet]) for feet in row["phases"])
+        counts[sequence] = row["motions"]
+        (first,) = sequence[0] - sequence[1]
+        steps[first] = row["motions"]
+    return SequenceConsistency(counts, steps)
+
+
+def published_distances() -> dict[str, Spread]:
+    """Table 3.5: largest distance from the centre of mass to each foot's contact in a motion [m]."""
+    return {
+        foot: Spread(MOTIONS, row["mean"], row["deviation"], row["min"], row["max"])
+        for foot, row in _published()["table_3_5"].items()
+    }
+
+
+def published_heights() -> PublishedHeights:
+    """Heights of the centre of mass and of the beams."""
+    data = _published()
+    return PublishedHeights(
+        data["com_m"]["standing"],
+        MappingProxyType(data["com_m"]["lowest"]),
+        MappingProxyType(data["beam_heights_m"]),
+    )
+
+
+@cache
+def _published() -> dict[str, Any]:
+    file = resources.files("manikin.recordings") / "data" / SHIPPED
+    return json.loads(file.read_text(encoding="utf-8"))
+
+
+def _sequence(name: str, frames: Sequence[int]) -> PhaseSequence:
+    data = _published()
+    ends = [*accumulate(frames, initial=1)]
+    last = data["end_frames"].get(name)
+    if last is not None:
+        ends.append(last)
+    longer = max(data["table_3_2"], key=lambda row: len(row["phases"]))
+    shorter = min(data["table_3_2"], key=lambda row: len(row["phases"]))
+    feet = (shorter if len(frames) < len(shorter["phases"]) else longer)["phases"]
+    phases = tuple(
+        SupportPhase(start * data["frame_s"], end * data["frame_s"], _FEET[one])
+        for (start, end), one in zip(pairwise(ends), feet, strict=False)
+    )
+    group = name.removeprefix("01_TR_")[:4]
+    return PhaseSequence(name, group, phases, end_seen=last is None)

@@ -1,0 +1,1 @@
+"""Which contacts carried a recorded person, and when."""

@@ -1,0 +1,201 @@
+"""Contacts of a recorded person, from the supports and the postures.
+
+A foot is a rectangular sole of the body's size, flat on its surface where the foot lies flattest, for as long
+as it supports: so it stays at one place, as every stance here. A recorded foot rolls, though. While its heel
+is lifted only what lies before the hinge of the toes can carry, while its toes are only the heel;
+:func:`recorded_schedule` splits phases there if asked to. It tells by the height of both ends of a stiff
+sole above their height in flat stance. Who sits presses on a seat with a rectangle under the hips, who lies
+with one under the trunk. A hand, knee or elbow on the ground is a point; a hand anywhere else holds a grasp,
+for a recording does not tell how its surface lies.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
+from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
+from manikin.contact import (
+    Contact,
+    ContactSchedule,
+    Phase,
+    SolePart,
+    Stance,
+    StanceSequence,
+    grasp,
+    point,
+    sole,
+    sole_part,
+)
+from manikin.errors import InputError
+from manikin.numerics.signals import mask_runs
+from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, rotation_from_yaw
+from manikin.recordings.dynamics.recorded_dynamics import level_heading
+from manikin.recordings.reconstruction.proportions import Reconstruction
+from manikin.recordings.supports.body_supports import SEAT, TRUNK
+from manikin.recordings.supports.recorded_supports import RecordedSupports, Support, median_place
+from manikin.recordings.supports.support_levels import REST
+from manikin.recordings.supports.supports import sole_points
+
+FRICTION = 0.8
+"""Coefficient of friction of shoes and seats."""
+
+STRONGEST = 4.0
+"""Largest sum of normal forces, per body weight: above what walking, sitting down and running reach."""
+
+HAND_FORCE = 100.0
+"""Largest force of a hand along each axis of the world ([Qiu2012]_ 7.2) [N]."""
+
+ON_GROUND = 0.2
+"""Height above a surface up to which a hand, knee or elbow rests on it, and does not hold something [m]."""
+
+TRUNK_LENGTH = 0.29
+"""From the hips to the shoulders, per stature: what of the trunk lies on the ground."""
+
+LIFTED = 0.025
+"""Height above that in flat stance from which an end of a sole has lifted [m]."""
+
+LOWEST = 0.005
+"""Height of the middle of a sole above its lowest quarter up to which it lies flat [m]."""
+
+HEEL_SHARE = 0.25
+"""Share of a sole's length that touches while the toes are lifted: a heel is round, and gives way."""
+
+SHORTEST_PART = 0.04
+"""Shorter changes between heel, full sole and toes are not told from noise [s]."""
+
+
+class _Part(IntEnum):
+    """What of an effector touches in one frame."""
+
+    NONE = 0
+    FULL = 1
+    HEEL = 2
+    TOES = 3
+
+
+def recorded_schedule(
+    found: Reconstruction, supports: RecordedSupports, *, friction: float = FRICTION, rolling: bool = False
+) -> ContactSchedule:
+    """Stances of a recording with the durations of its phases.
+
+    Times are on the clock of the supports, their start being the first instant of the reconstruction. Every
+    phase has its recorded duration as shortest and longest. A phase without support is a flight: it has a
+    stance without contacts.
+
+    Args:
+        found: The postures, best smoothed.
+        supports: Found from them.
+        friction: Coefficient of feet and seat.
+        rolling: Whether phases are split where only the heel or the toes of a foot touch.
+
+    Raises:
+        InputError: If there is nobody's foot, or no two instants.
+    """
+    if len(found.time) < 2:
+        raise InputError("stances of a reconstruction of one instant; valid: at least two")
+    soles, rate = sole_points(found), (len(found.time) - 1) / float(found.time[-1] - found.time[0])
+    contacts: list[Contact] = []
+    table = np.zeros((len(found.time), len(supports.supports)), dtype=np.int8)
+    for column, support in enumerate(supports.supports):
+        first, stop = (round((instant - supports.start) * rate) for instant in (support.start, support.end))
+        frames = slice(first, stop if support.end_seen else len(table))
+        table[frames, column] = _Part.FULL
+        if support.effector in soles and found.body.sole_length and found.body.sole_width:
+            ends = _SoleEnds(*soles[support.effector], frames, rate)
+            size = found.body.sole_length, found.body.sole_width
+            contacts.append(ends.contact(support, *size, friction))
+            if rolling:
+                table[frames, column] = ends.parts()
+        else:
+            contacts.append(_other_contact(found, support, frames, friction, supports.surfaces))
+    firsts = np.concatenate([[0], np.flatnonzero(np.any(np.diff(table[:-1], axis=0), axis=1)) + 1])
+    instants = supports.start + np.append(found.time[firsts], found.time[-1])
+    cap = STRONGEST * found.body.mass * GRAVITY
+    hinge = (TOE_HINGE_FROM_HEEL - 0.5) * (found.body.sole_length or 0.0)
+    phases = []
+    for frame, duration in zip(firsts, np.diff(instants), strict=True):
+        held = [
+            _part(contact, _Part(part), hinge)
+            for contact, part in zip(contacts, table[frame], strict=True)
+            if part
+        ]
+        phases.append(Phase(Stance(held, cap), float(duration), float(duration)))
+    return ContactSchedule(StanceSequence(phases), instants)
+
+
+class _SoleEnds:
+    """Heel and toes of a foot during one of its supports."""
+
+    def __init__(self, heel: FloatArray, toes: FloatArray, frames: slice, rate: float) -> None:
+        speeds = [
+            np.linalg.norm(np.gradient(end, 1.0 / rate, axis=0), axis=1)[frames] for end in (heel, toes)
+        ]
+        speed = np.max(speeds, axis=0)
+        self.heel, self.toes, self.rate = heel[frames], toes[frames], rate
+        # Frames in which both rest (the slowest tenth where there is none) and their middle is lowest.
+        slow = speed <= max(REST, float(np.quantile(speed, 0.1)))
+        height = 0.5 * (self.heel + self.toes)[:, 2]
+        self.flat = slow & (height <= float(np.quantile(height[slow], 0.25)) + LOWEST)
+
+    def contact(self, support: Support, length: float, width: float, friction: float) -> Contact:
+        """The full sole where the foot lies flat."""
+        heading = np.mean((self.toes - self.heel)[self.flat], axis=0)
+        place = median_place(0.5 * (self.heel + self.toes)[self.flat])
+        place[2], yaw = support.place[2], float(np.arctan2(heading[1], heading[0]))
+        return sole(support.effector, place, yaw, length=length, width=width, friction=friction)
+
+    def parts(self) -> NDArray[np.int8]:
+        """What touches in each frame."""
+        heel, toes = (end[:, 2] - np.median(end[self.flat, 2]) for end in (self.heel, self.toes))
+        parts = np.full(len(heel), _Part.FULL, dtype=np.int8)
+        parts[(heel > LIFTED) & (heel > toes)] = _Part.TOES
+        parts[(toes > LIFTED) & (toes > heel)] = _Part.HEEL
+        for part in (_Part.HEEL, _Part.TOES, _Part.FULL):
+            for first, stop in mask_runs(parts == part):
+                if stop - first < SHORTEST_PART * self.rate:
+                    parts[first:stop] = parts[first - 1] if first else parts[min(stop, len(parts) - 1)]
+        return parts
+
+
+def _other_contact(
+    found: Reconstruction, support: Support, frames: slice, friction: float, surfaces: Sequence[float]
+) -> Contact:
+    """Of a seat, of the trunk or a limb on the ground, or else of a hand that holds something."""
+    name, place, stature = support.effector, support.place, found.body.stature
+    below = [height for height in surfaces if abs(place[2] - height) < ON_GROUND]
+    if below:
+        place = np.array([place[0], place[1], below[0]])
+    if stature is None or (name != SEAT and not below):
+        return grasp(name, place, max_force=HAND_FORCE)
+    if name not in (SEAT, TRUNK):
+        rotation = rotation_from_yaw(level_heading(found.q[frames]))
+        return point(name, place, rotation=rotation, friction=friction)
+    size = (SEAT_LENGTH, SEAT_WIDTH) if name == SEAT else (TRUNK_LENGTH, SEAT_WIDTH)
+    # Who sits looks along x of the pelvis, who lies has the shoulders along its z.
+    along = Rotation.from_quat(found.q[frames, 3:7]).apply(
+        [1.0, 0.0, 0.0] if name == SEAT else [0.0, 0.0, 1.0]
+    )
+    ahead = along.mean(axis=0)
+    if name == TRUNK:
+        level = ahead[:2] / max(float(np.linalg.norm(ahead[:2])), 1e-9)
+        place = place + 0.5 * TRUNK_LENGTH * stature * np.append(level, 0.0)
+    return sole(
+        name, place, float(np.arctan2(ahead[1], ahead[0])), length=size[0] * stature, width=size[1] * stature,
+        friction=friction,
+    )  # fmt: skip
+
+
+def _part(contact: Contact, part: _Part, hinge: float) -> Contact:
+    if part is _Part.TOES:
+        return sole_part(contact, SolePart.TOES, hinge)
+    if part is _Part.HEEL:
+        rear, half = -0.5 * contact.length, 0.5 * contact.width
+        front = rear + HEEL_SHARE * contact.length
+        points = [[front, half, 0.0], [front, -half, 0.0], [rear, -half, 0.0], [rear, half, 0.0]]
+        return replace(contact, points=frozen_array(points, "heel points"), part=SolePart.HEEL)
+    return contact

@@ -1,0 +1,326 @@
+"""Feet of a runner: when they carry is told by the force that the motion needs, which foot by the feet.
+
+Fast feet stop and start within a tenth of a second, which a low-pass of positions spreads. The centre of mass
+is heavier and slower, and knows more: in flight it falls with gravity, and while it does not, something
+carries it. So a support of a foot that ends or begins within a fall ends where it begins or begins where it
+ends; one that lasts all through a fall is left to the feet. A time between two supports in
+which nothing was found but the body is carried belongs to the feet beside it, up to where the later one is
+the slower one; who is carried between two falls stands on the lowest foot, if it is low. Where the same foot
+is on both sides, and the lowest as well, the gap stays: it stepped on the spot. In a walk the body never
+falls, so nothing changes but gaps.
+
+At both ends of a recording the low-pass knows one side only: there the force is taken for that half a period
+of the cutoff away.
+
+Also here. When nothing can support a recorded person: where the centre of mass falls freely.
+
+What is slow and near a surface need not be on it: a foot that goes up in a jump turns round where it is
+highest, be it at the height of the box that the jump began on. Newton's second law knows: the supports give
+the centre of mass all the acceleration it has beside gravity.
+"""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from manikin.numerics.signals import mask_runs
+from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.recordings.reconstruction.proportions import Reconstruction
+from manikin.recordings.supports.recorded_supports import Support, median_place
+from manikin.recordings.supports.support_levels import (
+    CUTOFF as SUPPORT_LEVELS_CUTOFF,
+)
+from manikin.recordings.supports.support_levels import (
+    Track,
+    slowest_speed,
+    track,
+)
+
+FREE = 0.8
+"""Downward acceleration over gravity from which, as a median, nothing carries: a tenth of a second of free
+fall has about as much left after the low-pass."""
+
+
+def while_carried(
+    supports: Sequence[Support], found: Reconstruction, rate: float, *,
+    start: float = 0.0, cutoff: float = SUPPORT_LEVELS_CUTOFF,
+) -> tuple[Support, ...]:  # fmt: skip
+    """Those supports during which the centre of mass does not fall freely, in order.
+
+    Args:
+        supports: Of any effectors.
+        found: At least four instants.
+        rate: Frames per second [Hz].
+        start: Instant of the first frame [s].
+        cutoff: Of the low-pass filter [Hz].
+
+    Raises:
+        InputError: If the cutoff is too high.
+    """
+    falls = -vertical_acceleration(found, rate, cutoff) / GRAVITY
+    kept = []
+    for one in supports:
+        first, last = (round((instant - start) * rate) for instant in (one.start, one.end))
+        if float(np.median(falls[first : last + 1])) < FREE:
+            kept.append(one)
+    return tuple(kept)
+
+
+def vertical_acceleration(
+    found: Reconstruction, rate: float, cutoff: float = SUPPORT_LEVELS_CUTOFF
+) -> FloatArray:
+    """(n,) upward, of the low-passed centre of mass [m/s^2].
+
+    Args:
+        found: At least four instants.
+        rate: Frames per second [Hz].
+        cutoff: Of the low-pass filter [Hz].
+
+    Raises:
+        InputError: If the cutoff is too high.
+    """
+    model = found.body.pinocchio
+    data = model.createData()
+    com = np.array([pin.centerOfMass(model, data, q).copy() for q in found.q])
+    height = track(com, rate, cutoff).positions[:, 2]
+    return np.gradient(np.gradient(height, 1.0 / rate), 1.0 / rate)
+
+
+CUTOFF = 10.0
+"""Of the low-pass of the centre of mass and of the feet [Hz]."""
+
+FALLING = 0.2
+"""Vertical force per body weight below which nothing carries. A half-sine of a force whose mean over the step
+is the weight has, low-passed at :data:`CUTOFF`, 0.09 to 0.31 of the weight left at its ends, for stances of
+0.3 to 0.17 s and flights of 0.05 to 0.13 s."""
+
+SHORTEST_FALL = 0.03
+"""Shorter falls are not told from noise [s]."""
+
+AT_END = 0.05
+"""Time from either end of the recording in which the force is not known [s]: half a period of the cutoff."""
+
+TOGETHER = 0.03
+"""Time within which both feet leave or land together [s]."""
+
+AWAY = 0.10
+"""Height above where a foot stood, or above a surface, up to which it can be what carries [m]."""
+
+NEAR = 0.02
+"""The same beside an end of the recording [m]: the fall that would bound the support is not seen."""
+
+SHORTEST = 0.08
+"""Shorter times between two falls are not told from noise [s]."""
+
+SHORTEST_KEPT = 0.04
+"""Less of a support beside a fall is none [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Foot:
+    """Ends of a sole."""
+
+    heel: Track
+    toes: Track
+
+    @property
+    def lowest(self) -> FloatArray:
+        """(n,) height of the lower end [m]."""
+        return np.minimum(self.heel.positions[:, 2], self.toes.positions[:, 2])
+
+    @property
+    def speed(self) -> FloatArray:
+        """(n,) of the slowest point of the sole [m/s]."""
+        return slowest_speed(self.heel, self.toes)
+
+    def middle(self, first: int, stop: int) -> FloatArray:
+        """(3,) of the sole, as a median."""
+        return median_place(0.5 * (self.heel.positions + self.toes.positions)[first:stop])
+
+    def contact(self, frame: int) -> FloatArray:
+        """(3,) its lower end."""
+        ends = self.heel.positions[frame], self.toes.positions[frame]
+        return ends[0] if ends[0][2] < ends[1][2] else ends[1]
+
+
+def by_the_force(
+    supports: Sequence[Support],
+    found: Reconstruction,
+    soles: Mapping[str, tuple[FloatArray, FloatArray]],
+    surfaces: Sequence[float],
+    rate: float,
+    *,
+    start: float = 0.0,
+) -> tuple[Support, ...]:
+    """Supports that begin and end where the body begins and ends to be carried; those missed are added.
+
+    Args:
+        supports: Of any effectors; those of feet change.
+        found: At least four instants.
+        soles: (n, 3) heel and (n, 3) toes of each foot, by its name [m].
+        surfaces: Heights on which feet stand [m].
+        rate: Frames per second [Hz].
+        start: Instant of the first frame [s].
+    """
+    if rate <= 2.0 * CUTOFF or not surfaces:
+        return tuple(supports)
+    n = len(found.time)
+    force = 1.0 + vertical_acceleration(found, rate, CUTOFF) / GRAVITY
+    edge = min(round(AT_END * rate), (n - 1) // 2)
+    force[:edge], force[n - edge :] = force[edge], force[n - edge - 1]
+    falls = _falls(force, rate)
+    feet = {
+        name: _Foot(track(heel, rate, CUTOFF), track(toes, rate, CUTOFF))
+        for name, (heel, toes) in soles.items()
+    }
+    table = _Table(feet, list(supports), np.array(surfaces), rate, start, n)
+    table.cut(falls)
+    table.fill(falls)
+    return tuple(table.supports)
+
+
+def _falls(force: FloatArray, rate: float) -> NDArray[np.bool_]:
+    """(n,) whether the body falls."""
+    falls = np.zeros(len(force), dtype=bool)
+    for first, stop in mask_runs(force < FALLING):
+        falls[first:stop] = stop - first >= SHORTEST_FALL * rate
+    return falls
+
+
+@dataclass(eq=False)
+class _Table:
+    """Supports, by the frames from and up to which they last."""
+
+    feet: Mapping[str, _Foot]
+    supports: list[Support]
+    surfaces: FloatArray
+    rate: float
+    start: float
+    frames: int
+
+    def span(self, one: Support) -> tuple[int, int]:
+        """First frame of a support and the one after its last."""
+        first, stop = (round((instant - self.start) * self.rate) for instant in (one.start, one.end))
+        return first, stop if one.end_seen else self.frames
+
+    def during(self, one: Support, first: int, stop: int) -> Support:
+        """A support of a foot in other frames."""
+        foot, span = self.feet[one.effector], self.span(one)
+        return replace(
+            one,
+            start=self.start + first / self.rate,
+            end=self.start + min(stop, self.frames - 1) / self.rate,
+            first_contact=one.first_contact if first == span[0] else foot.contact(first),
+            last_contact=one.last_contact if stop == span[1] else foot.contact(stop - 1),
+            start_seen=first > 0,
+            end_seen=stop < self.frames,
+        )
+
+    def cut(self, falls: NDArray[np.bool_]) -> None:
+        """Supports of feet end where a fall begins, and begin where it ends."""
+        kept = []
+        for one in self.supports:
+            first, stop = span = self.span(one)
+            for begin, end in mask_runs(falls) if one.effector in self.feet else ():
+                first = end if begin <= first < end else first
+                stop = begin if begin < stop <= end else stop
+            if (first, stop) == span:
+                kept.append(one)
+            elif stop - first >= SHORTEST_KEPT * self.rate:
+                kept.append(self.during(one, first, stop))
+        self.supports = kept
+
+    def fill(self, falls: NDArray[np.bool_]) -> None:
+        """Where the body is carried and nothing was found, the feet beside carry, or the lowest one."""
+        for first, stop, begin, end in list(self._gaps(~falls)):
+            before = self._beside(first, 1) if begin == first else []
+            after = self._beside(stop, 0) if end == stop else []
+            if self._names(before) & self._names(after):
+                self._add(begin, end, self._names(before) | self._names(after))
+                continue
+            change = self._change(before, after, begin, end) if before and after else None
+            for one in before:
+                self._until(one, end if change is None else change)
+            for one in after:
+                self._since(one, begin if change is None else change)
+            if (first < begin or first == 0) and (end < stop or stop == self.frames):
+                self._add(begin, end)
+
+    def _names(self, numbers: Sequence[int]) -> set[str]:
+        """Effectors of supports."""
+        return {self.supports[one].effector for one in numbers}
+
+    def _gaps(self, carried: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
+        """First frame and the one after the last of a time without support, and of what is carried in it."""
+        free = np.ones(self.frames, dtype=bool)
+        for one in self.supports:
+            free[slice(*self.span(one))] = False
+        for first, stop in mask_runs(free):
+            for begin, end in mask_runs(carried[first:stop]):
+                yield first, stop, first + begin, first + end
+
+    def _beside(self, frame: int, edge: int) -> list[int]:
+        """Indices of the supports of feet that end (edge 1) or begin (0) at a frame, or nearly so."""
+        return [
+            number
+            for number, one in enumerate(self.supports)
+            if one.effector in self.feet
+            and 0 <= (frame - self.span(one)[edge]) * (1 if edge else -1) <= TOGETHER * self.rate
+        ]
+
+    def _until(self, number: int, end: int) -> None:
+        """A support lasts up to a frame, or as long as its foot is low."""
+        first, stop = self.span(self.supports[number])
+        high = np.flatnonzero(self._rises(number, slice(stop, end)))
+        last = stop + int(high[0]) if len(high) else end
+        self.supports[number] = self.during(self.supports[number], first, last)
+
+    def _since(self, number: int, begin: int) -> None:
+        """A support lasts from a frame on, or from where its foot is low."""
+        first, stop = self.span(self.supports[number])
+        high = np.flatnonzero(self._rises(number, slice(begin, first)))
+        first = begin + int(high[-1]) + 1 if len(high) else begin
+        self.supports[number] = self.during(self.supports[number], first, stop)
+
+    def _change(self, before: Sequence[int], after: Sequence[int], begin: int, end: int) -> int:
+        """Frame between two supports from which the foot of the later one is the slower one."""
+        early, late = (
+            np.min([self.feet[name].speed[begin:end] for name in self._names(ones)], axis=0)
+            for ones in (before, after)
+        )
+        slower = np.flatnonzero(late < early)
+        return begin + int(slower[0]) if len(slower) else end
+
+    def _above(self, number: int) -> FloatArray:
+        """(n,) height of a foot above where it stands during a support of it [m]."""
+        one = self.supports[number]
+        lowest = self.feet[one.effector].lowest
+        return lowest - np.median(lowest[slice(*self.span(one))])
+
+    def _rises(self, number: int, frames: slice) -> NDArray[np.bool_]:
+        """Whether a foot is higher in frames beside a support than it may be and still carry."""
+        cut = frames.start == 0 or frames.stop == self.frames
+        return self._above(number)[frames] > (NEAR if cut else AWAY)
+
+    def _add(self, begin: int, end: int, others: Collection[str] = ()) -> None:
+        """A support of the lowest foot, unless it is one of the others."""
+        name = min(self.feet, key=lambda one: float(np.median(self.feet[one].lowest[begin:end])))
+        foot = self.feet[name]
+        low = foot.lowest[begin:end]
+        height = float(self.surfaces[np.argmin(np.abs(self.surfaces - low.min()))])
+        if name in others or abs(low.min() - height) > AWAY or np.median(low) - height > AWAY:
+            return
+        near = np.flatnonzero(low < low.min() + NEAR)
+        begin, end = (
+            begin + int(near[0]) if begin == 0 else begin,
+            begin + int(near[-1]) + 1 if end == self.frames else end,
+        )
+        if end - begin < SHORTEST * self.rate:
+            return
+        place = np.append(foot.middle(begin, end)[:2], height)
+        instants = self.start + begin / self.rate, self.start + min(end, self.frames - 1) / self.rate
+        ends = foot.contact(begin), foot.contact(end - 1)
+        self.supports.append(Support(name, *instants, place, *ends, begin > 0, end < self.frames))

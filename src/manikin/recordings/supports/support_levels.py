@@ -1,0 +1,321 @@
+"""Points of the feet that rest, and the heights of the surfaces on which they do.
+
+Also here. Where effectors and segments of a recorded body are.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel
+from manikin.body.limbs import with_knees_and_elbows
+from manikin.errors import InputError
+from manikin.numerics.signals import low_passed, mask_runs
+from manikin.numerics.spatial import FloatArray, frozen_array
+
+JOINTS = ("left_knee", "right_knee", "left_elbow", "right_elbow")
+"""Effectors of :func:`manikin.body.limbs.with_knees_and_elbows`."""
+
+
+def effector_places(body: BodyModel, q: FloatArray, names: Sequence[str]) -> FloatArray:
+    """(k, n, 3) effectors, or else origins of segments, in the world [m].
+
+    Args:
+        body: Who; a human has its knees and elbows as effectors, too.
+        q: (n, nq) postures.
+        names: Of effectors, or of segments.
+
+    Raises:
+        BodyError: If the body has none of a name.
+    """
+    if set(names) & set(JOINTS) - set(body.effectors):
+        body = with_knees_and_elbows(body)
+    model, data = body.pinocchio, body.pinocchio.createData()
+    frames = [
+        body.effector_frame(name) if name in body.effectors else body.segment_frame(name) for name in names
+    ]
+    # Views of Pinocchio's memory: they follow whatever is computed in these data.
+    views = [data.oMf[frame].translation for frame in frames]
+    places = np.empty((len(q), len(names), 3))
+    for number, posture in enumerate(q):
+        pin.framesForwardKinematics(model, data, posture)
+        places[number] = views
+    return np.ascontiguousarray(places.transpose(1, 0, 2))
+
+
+CUTOFF = 5.0
+"""Of the low-pass filter of positions, of second order, forward and backward ([Qiu2012]_ 3.2.1) [Hz]."""
+
+REST = 0.12
+"""Speed below which a point rests [m/s]."""
+
+TOUCH_SHARE = 0.08
+"""Share of the highest speed of its swing below which a point has touched down."""
+
+LIFT_SHARE = 0.24
+"""Share of the highest speed of its swing above which a point has lifted off."""
+
+NEVER_AT_REST = (2.0 * REST, 4.0 * REST, 8.0 * REST, 16.0 * REST)
+"""Speeds at which soles are looked at in turn where none ever rests, as in running [m/s]."""
+
+SHIFT_SPEED = 0.6
+"""Highest speed of a shift, in contrast to a swing [m/s]."""
+
+SHIFT_WAY = 0.08
+"""Longest way of a shift, in contrast to a swing [m]."""
+
+LEVELS_APART = 0.08
+"""Heights of rest within less than this belong to the same surface [m]."""
+
+GAP = 0.03
+"""Difference between neighbouring heights of rest from which they may belong to two surfaces [m]."""
+
+LEVEL = 0.04
+"""Difference between heights of heel and toes up to which a foot is as level as another time [m]."""
+
+STEEP = 0.4
+"""Rise of a sole over its length from which it stands on its ball, the toes bent: in squatting."""
+
+UPRIGHT = 0.9
+"""Rise of a sole over its length from which it stands on the tips of its toes: in crawling and lying."""
+
+RAISED = 0.15
+"""Rise of a heel over the sole's length from which a foot turns about its ball."""
+
+BALL = 0.75
+"""Share of the sole that is behind the ball of the foot."""
+
+SHORTEST_REST = 0.1
+"""Time for which a foot rests on a surface that is found from it [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One point of an effector through a recording, without noise.
+
+    Attributes:
+        positions: (n, 3) low-passed [m].
+        speed: (n,) [m/s].
+        rate: Frames per second [Hz].
+    """
+
+    positions: FloatArray
+    speed: FloatArray
+    rate: float
+
+    @property
+    def resting(self) -> NDArray[np.bool_]:
+        """(n,) whether the point is slower than :data:`REST`."""
+        return self.speed < REST
+
+    def rests(self, limit: float) -> NDArray[np.bool_]:
+        """(n,) whether the point is slower than a limit [m/s], or than it touches down after its swing."""
+        peaks = self.peak_speed()
+        return self.speed < np.maximum(limit, np.where(np.isfinite(peaks), TOUCH_SHARE * peaks, 0.0))
+
+    def peak_speed(self, rest: float = REST, shift: float = SHIFT_WAY) -> FloatArray:
+        """(n,) the highest speed of the swing between two rests [m/s]; infinite where there is none.
+
+        A point that leaves its rest slowly and rests again close to it has not swung, it has shifted: as
+        the toes do when the heel lifts, and a hand that slides along what it holds. Of a swing that the
+        recording cuts, the highest speed may be missing: it is taken for at least the median of the whole
+        ones.
+
+        Args:
+            rest: Speed below which the point rests [m/s].
+            shift: Longest way of a shift [m]; :data:`SHIFT_WAY` of one that the recording cuts.
+        """
+        peaks, last = np.full(len(self.speed), np.inf), len(self.speed)
+        moves = mask_runs(self.speed >= rest)
+        swings = [(first, stop, float(self.speed[first:stop].max())) for first, stop in moves]
+        swings = [one for one in swings if not self._shifts(*one, shift)]
+        whole = [peak for first, stop, peak in swings if first > 0 and stop < last]
+        for first, stop, peak in swings:
+            usual = float(np.median(whole)) if whole and (first == 0 or stop == last) else 0.0
+            peaks[first:stop] = max(peak, usual)
+        return peaks
+
+    def slow_and_fast(
+        self, rest: float = REST, shift: float = SHIFT_WAY
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(n,) whether the point is slow enough to have touched down, and fast enough to have lifted off.
+
+        Args:
+            rest: Speed below which the point rests between swings [m/s].
+            shift: Longest way of a shift between two rests [m].
+        """
+        peaks = self.peak_speed(rest, shift)
+        slow = self.speed < np.maximum(REST, TOUCH_SHARE * peaks)
+        return slow, self.speed > np.maximum(REST, LIFT_SHARE * peaks)
+
+    def _shifts(self, first: int, stop: int, peak: float, shift: float) -> bool:
+        last = len(self.speed)
+        whole = first > 0 and stop < last
+        way = self.positions[min(stop, last - 1)] - self.positions[max(first - 1, 0)]
+        return peak < SHIFT_SPEED and float(np.linalg.norm(way)) < (shift if whole else SHIFT_WAY)
+
+
+def track(positions: FloatArray, rate: float, cutoff: float = CUTOFF) -> Track:
+    """Low-pass the positions of a point and take their speed by central differences.
+
+    Args:
+        positions: (n, 3), at least four, in the world [m].
+        rate: Frames per second [Hz].
+        cutoff: Where each of the two passes halves the power [Hz].
+
+    Raises:
+        InputError: If there are too few positions, or the cutoff is not below half the rate.
+    """
+    if len(positions) < 4:
+        raise InputError(f"{len(positions)} positions of an effector; valid: at least 4")
+    if not 0.0 < cutoff < 0.5 * rate:
+        raise InputError(f"cutoff is {cutoff:g} Hz; valid: above 0, below half the rate, {0.5 * rate:g} Hz")
+    smooth = low_passed(positions, cutoff, rate)
+    speed = np.linalg.norm(np.gradient(smooth, 1.0 / rate, axis=0), axis=1)
+    return Track(frozen_array(smooth, "track positions"), frozen_array(speed, "track speed"), rate)
+
+
+@dataclass(frozen=True)
+class RestSurface:
+    """What feet stand on.
+
+    Attributes:
+        height: The median of those at which soles rest on it [m].
+        levels: Heights of it, lowest first; more than one where the recorded floor drifts [m].
+    """
+
+    height: float
+    levels: tuple[float, ...]
+
+
+def surfaces_under(
+    feet: Sequence[tuple[Track, Track]], lying: NDArray[np.bool_] | None = None
+) -> tuple[RestSurface, ...]:
+    """Surfaces on which feet stand, lowest first.
+
+    A foot that rests while another one moves carries the body, so what it rests on is a surface; so is the
+    lowest height at which one rests, and any at which one rests as level as on those. A foot that hangs
+    still in the air, while another one stands, is on none.
+
+    Where no sole ever rests, as in running, slow ones are taken.
+
+    Args:
+        feet: Heel and toes of each.
+        lying: (n,) whether the person lies or crawls: such feet lean on anything, and tell the lowest
+            surface only. None for never.
+    """
+    rests: list[_Rest] = []
+    for limit in (REST, *NEVER_AT_REST):
+        rests = rests or _rests(feet, limit, lying)
+    if not rests:
+        return ()
+    groups = _by_surface(sorted(rests, key=lambda rest: rest.height))
+    sure = [rest for place, group in enumerate(groups) for rest in group if place == 0 or rest.alone]
+    kept = [group for group in groups if any(rest in sure or _as_level(rest, sure) for rest in group)]
+    return tuple(_surface([rest.height for rest in group]) for group in kept)
+
+
+def ball_of(heel: Track, toes: Track) -> Track:
+    """The ball of a foot, :data:`BALL` of the way from its heel to its toes: a rising foot turns about it."""
+    positions = (1.0 - BALL) * heel.positions + BALL * toes.positions
+    speed = np.linalg.norm(np.gradient(positions, 1.0 / heel.rate, axis=0), axis=1)
+    return Track(frozen_array(positions, "track positions"), frozen_array(speed, "track speed"), heel.rate)
+
+
+def slowest_speed(heel: Track, toes: Track) -> FloatArray:
+    """(n,) of that point of a sole, from its heel to its toes, that is slowest [m/s]."""
+    begin, end = (np.gradient(point.positions, 1.0 / heel.rate, axis=0) for point in (heel, toes))
+    way = end - begin
+    share = np.clip(-np.sum(begin * way, axis=1) / np.maximum(np.sum(way**2, axis=1), 1e-12), 0.0, 1.0)
+    return np.linalg.norm(begin + share[:, None] * way, axis=1)
+
+
+def sole_height(heel: Track, toes: Track, lying: NDArray[np.bool_] | None = None) -> FloatArray:
+    """(n,) of the middle of a sole, of the ball of a steep one, or of the lower end of an upright one [m].
+
+    Args:
+        heel: Of the foot.
+        toes: Of the foot.
+        lying: (n,) whether the person lies or crawls: who squats stands on the ball however upright the
+            sole is. None for never.
+    """
+    ends = heel.positions[:, 2], toes.positions[:, 2]
+    rise = sole_rise(heel, toes)
+    upright = (rise > UPRIGHT) & (False if lying is None else lying)
+    steep = np.where(upright, np.minimum(*ends), (1.0 - BALL) * ends[0] + BALL * ends[1])
+    return np.where(rise > STEEP, steep, 0.5 * (ends[0] + ends[1]))
+
+
+def sole_rise(heel: Track, toes: Track) -> FloatArray:
+    """(n,) difference in height between the ends of a sole over its length."""
+    return np.abs(heel_rise(heel, toes))
+
+
+def heel_rise(heel: Track, toes: Track) -> FloatArray:
+    """(n,) how far the heel is above the toes over the length of the sole."""
+    way = heel.positions - toes.positions
+    return way[:, 2] / np.maximum(np.linalg.norm(way, axis=1), 1e-9)
+
+
+def _rests(
+    feet: Sequence[tuple[Track, Track]], limit: float, lying: NDArray[np.bool_] | None
+) -> list["_Rest"]:
+    """Times in which both ends of a sole are slower than a limit [m/s]."""
+    resting = [heel.rests(limit) & toes.rests(limit) for heel, toes in feet]
+    found = []
+    for number, (heel, toes) in enumerate(feet):
+        others = [~other for place, other in enumerate(resting) if place != number]
+        shortest = SHORTEST_REST * heel.rate
+        height = sole_height(heel, toes, lying)
+        tilt = toes.positions[:, 2] - heel.positions[:, 2]
+        for first, stop in mask_runs(resting[number]):
+            if stop - first >= shortest:
+                here = slice(first, stop)
+                down = lying is not None and bool(np.median(lying[here]))
+                alone = not down and any(np.sum(moving[here]) >= shortest for moving in others)
+                heights = float(np.median(height[here])), float(np.median(tilt[here]))
+                found.append(_Rest(number, *heights, alone, down))
+    return found
+
+
+def _surface(heights: Sequence[float]) -> RestSurface:
+    """Of heights of rest, lowest first, with a level for every :data:`LEVELS_APART` of them or less."""
+    levels = [[heights[0]]]
+    for height in heights[1:]:
+        if height - levels[-1][0] > LEVELS_APART:
+            levels.append([])
+        levels[-1].append(height)
+    return RestSurface(float(np.median(heights)), tuple(float(np.median(level)) for level in levels))
+
+
+def _by_surface(rests: "list[_Rest]") -> "list[list[_Rest]]":
+    """Rests in order of height by surface: those too far apart for one are split at their widest gap.
+
+    What has no gap is one surface: recorded floors drift by more than :data:`LEVELS_APART`.
+    """
+    gaps = [after.height - before.height for before, after in pairwise(rests)]
+    if rests[-1].height - rests[0].height <= LEVELS_APART or max(gaps) <= GAP:
+        return [rests]
+    widest = int(np.argmax(gaps)) + 1
+    return [*_by_surface(rests[:widest]), *_by_surface(rests[widest:])]
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """A time for which a sole rests: its height, its toes above its heel, whether alone, whether lying."""
+
+    foot: int
+    height: float
+    tilt: float
+    alone: bool
+    lying: bool
+
+
+def _as_level(rest: _Rest, sure: list[_Rest]) -> bool:
+    """Whether a foot is as level as where the same one surely stands."""
+    tilts = [one.tilt for one in sure if one.foot == rest.foot]
+    return bool(tilts) and not rest.lying and abs(rest.tilt - float(np.median(tilts))) < LEVEL

@@ -1,0 +1,353 @@
+"""Choosing a motion and a format, and writing the file.
+
+The writers themselves are imported when they are needed, so that a wrong option is
+refused at once.
+
+Also here. Motions as comma-separated values, one row per sample, units in the header. Motions at another
+sampling rate. Motions as Biovision hierarchy (BVH) files, for animation programs.
+
+BVH has y up and no unit; programs take it for centimetres.  Ours: x to the body's left, y
+up, z forward, centimetres, degrees, ``(X, Y, Z) = 100 (y, z, x)``, which is a rotation of
+our world (x forward, y left, z up) and no mirror image.  Every joint has three rotation
+channels: the segment's hinges in their order, then the axes it does not have, at zero.
+A BVH rotation is the product of its channels from left to right, like our hinges.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manikin.body import BodyModel, Segment
+from manikin.body.segments import end_of
+from manikin.errors import InputError, MotionFileError
+from manikin.motion import Motion
+from manikin.numerics.spatial import FloatArray, finite_number
+from manikin.runtime.files import write_result
+
+if TYPE_CHECKING:
+    from manikin.motion.file import MotionFile
+
+
+_AXES = ("x", "y", "z")
+
+
+def to_csv(motion: Motion) -> str:
+    """Text of a CSV file: time, pelvis, hinge angles, CoM, margin, supports, contact forces.
+
+    Numbers have 9 significant digits; the separator is a comma, the decimal sign a point.
+    """
+    columns = _columns(motion)
+    text = StringIO()
+    text.write(",".join(columns) + "\n")
+    np.savetxt(text, np.column_stack(list(columns.values())), fmt="%.9g", delimiter=",")
+    return text.getvalue()
+
+
+def _columns(motion: Motion) -> dict[str, np.ndarray]:
+    columns: dict[str, np.ndarray] = {"time [s]": motion.time}
+    for index, axis in enumerate(_AXES):
+        columns[f"pelvis_{axis} [m]"] = motion.q[:, index]
+    for index, axis in enumerate(("x", "y", "z", "w")):
+        columns[f"pelvis_quaternion_{axis} [-]"] = motion.q[:, 3 + index]
+    for index, name in enumerate(motion.joint_names):
+        columns[f"{name} [rad]"] = motion.q[:, 7 + index]
+    for index, axis in enumerate(_AXES):
+        columns[f"com_{axis} [m]"] = motion.com[:, index]
+    columns["margin [N.m]"] = motion.margin
+    for number, name in enumerate(motion.contact_names):
+        columns[f"{name}_support [-]"] = motion.support[:, number]
+        for index, axis in enumerate(_AXES):
+            columns[f"{name}_force_{axis} [N]"] = motion.contact_force[:, number, index]
+        for index, axis in enumerate(_AXES):
+            columns[f"{name}_moment_{axis} [N.m]"] = motion.contact_force[:, number, 3 + index]
+    return columns
+
+
+def resample(motion: Motion, rate: float | None) -> Motion:
+    """Return the motion at a constant rate, from its first instant on.
+
+    Positions and rates are interpolated linearly, the pelvis' quaternion along the great
+    arc, supports by the sample before.  At instants that the motion has, its own samples
+    are returned exactly.
+
+    Args:
+        motion: The motion.
+        rate: Samples per second [Hz], or None to leave it as it is.
+
+    Raises:
+        InputError: If the rate is not between 1 and 100,000 Hz.
+    """
+    if rate is None:
+        return motion
+    rate = finite_number(rate, "rate [Hz]", at_least=1.0, at_most=1e5)
+    count = int(np.floor(motion.duration * rate + 1e-9)) + 1
+    wanted = motion.time[0] + np.arange(count) / rate
+    before, share = _places(motion.time, wanted)
+    arrays: dict[str, Any] = {
+        name: _linear(array, before, share) if array.dtype != np.bool_ else array[before]
+        for name, array in motion.arrays().items()
+    }
+    arrays["time"] = wanted
+    arrays["q"][:, 3:7] = _great_arc(motion.q[:, 3:7], before, share)
+    return Motion(**arrays, contact_names=motion.contact_names, joint_names=motion.joint_names)
+
+
+def _places(time: FloatArray, wanted: FloatArray) -> tuple[np.ndarray, FloatArray]:
+    """Index of the sample before each instant and how far it is to the next (0 to 1)."""
+    if len(time) == 1:
+        return np.zeros(len(wanted), dtype=np.int64), np.zeros(len(wanted))
+    before = np.clip(np.searchsorted(time, wanted + 1e-9, side="right") - 1, 0, len(time) - 2)
+    share = np.clip((wanted - time[before]) / (time[before + 1] - time[before]), 0.0, 1.0)
+    share = np.where(share < 1e-6, 0.0, np.where(share > 1.0 - 1e-6, 1.0, share))
+    return before + (share == 1.0), np.where(share == 1.0, 0.0, share)
+
+
+def _linear(array: FloatArray, before: np.ndarray, share: FloatArray) -> FloatArray:
+    after = np.minimum(before + 1, len(array) - 1)
+    weight = share.reshape(-1, *(1,) * (array.ndim - 1))
+    return np.where(weight == 0.0, array[before], (1.0 - weight) * array[before] + weight * array[after])
+
+
+def _great_arc(quaternion: FloatArray, before: np.ndarray, share: FloatArray) -> FloatArray:
+    first, second = quaternion[before], quaternion[np.minimum(before + 1, len(quaternion) - 1)]
+    cosine = np.sum(first * second, axis=1)
+    second = np.where(cosine[:, None] < 0.0, -second, second)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
+    sine = np.sin(angle)
+    near = sine < 1e-9  # neighbours of a sampled motion are close: the chord is the arc
+    sine = np.where(near, 1.0, sine)
+    a = np.where(near, 1.0 - share, np.sin((1.0 - share) * angle) / sine)
+    b = np.where(near, share, np.sin(share * angle) / sine)
+    blended = a[:, None] * first + b[:, None] * second
+    blended /= np.linalg.norm(blended, axis=1, keepdims=True)
+    return np.where(share[:, None] == 0.0, first, blended)
+
+
+TO_BVH: FloatArray = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+"""Rotation of our world's axes to BVH's: X = y (left), Y = z (up), Z = x (forward)."""
+TO_BVH.setflags(write=False)
+
+CENTIMETRES = 100.0
+_ROOT_ORDER = "YXZ"  # yaw, pitch, roll: the singularity is a pelvis that looks straight up or down
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """Channels of one segment.
+
+    Attributes:
+        segment: The segment.
+        order: Rotation axes of its three channels, such as ``"XZY"``.
+        columns: Index among the hinges of each channel's angle, or None without one.
+        signs: +1 or -1 for a hinge about the negative axis.
+    """
+
+    segment: Segment
+    order: str
+    columns: tuple[int | None, ...] | None
+    signs: tuple[float, ...]
+
+
+def to_bvh(body: BodyModel, motion: Motion) -> str:
+    """Text of a BVH file.
+
+    Args:
+        body: Who moves.
+        motion: Evenly sampled; see :func:`manikin.reports.export.write`.
+
+    Raises:
+        MotionFileError: If the motion is not the body's, or is not evenly sampled.
+    """
+    if motion.joint_names != body.joint_names:
+        raise MotionFileError("motion has other joints than the body; valid: the body's own motion")
+    joints = _joints(body)
+    text = StringIO()
+    text.write("HIERARCHY\n")
+    _write_joint(text, body.segments[0], joints, 0)
+    text.write(f"MOTION\nFrames: {len(motion.time)}\nFrame Time: {_frame_time(motion):.9g}\n")
+    order = _depth_first(body)
+    frames = np.hstack([_root_channels(motion), *(_angles(joints[s.name], body, motion) for s in order[1:])])
+    np.savetxt(text, frames, fmt="%.7f")
+    return text.getvalue()
+
+
+def _frame_time(motion: Motion) -> float:
+    if len(motion.time) == 1:
+        return 0.01
+    steps = np.diff(motion.time)
+    if np.ptp(steps) > 1e-6:
+        raise MotionFileError(
+            f"motion is sampled every {steps.min():.6g} to {steps.max():.6g} s; valid: one rate (resample it)"
+        )
+    return float(motion.duration / len(steps))
+
+
+def _joints(body: BodyModel) -> dict[str, _Joint]:
+    joints, column = {}, 0
+    for segment in body.segments:
+        joints[segment.name] = _joint(segment, column)
+        column += len(segment.hinges)
+    return joints
+
+
+def _joint(segment: Segment, first_column: int) -> _Joint:
+    order, signs = "", []
+    for hinge in segment.hinges:
+        axis = TO_BVH @ hinge.axis
+        nearest = int(np.argmax(np.abs(axis)))
+        if not np.isclose(abs(axis[nearest]), 1.0, rtol=0.0, atol=1e-12) or "XYZ"[nearest] in order:
+            # Oblique or repeated axes cannot be channels; the whole rotation is split instead.
+            return _Joint(segment, "ZXY", None, (1.0, 1.0, 1.0))
+        order += "XYZ"[nearest]
+        signs.append(float(np.sign(axis[nearest])))
+    missing = [axis for axis in "ZXY" if axis not in order]
+    columns = tuple(range(first_column, first_column + len(signs))) + (None,) * len(missing)
+    return _Joint(segment, order + "".join(missing), columns, (*signs, *(1.0 for _ in missing)))
+
+
+def _children(body: BodyModel, name: str) -> list[Segment]:
+    return [segment for segment in body.segments if segment.parent == name]
+
+
+def _depth_first(body: BodyModel) -> list[Segment]:
+    order, waiting = [], [body.segments[0]]
+    while waiting:
+        segment = waiting.pop(0)
+        order.append(segment)
+        waiting = _children(body, segment.name) + waiting
+    return order
+
+
+def _write_joint(text: StringIO, segment: Segment, joints: dict[str, _Joint], depth: int) -> None:
+    indent, inner = "\t" * depth, "\t" * (depth + 1)
+    root = segment.parent is None
+    order = _ROOT_ORDER if root else joints[segment.name].order
+    channels = [*(f"{axis}position" for axis in "XYZ" if root), *(f"{axis}rotation" for axis in order)]
+    offset = np.zeros(3) if root else CENTIMETRES * (TO_BVH @ segment.origin)
+    text.write(f"{indent}{'ROOT' if root else 'JOINT'} {segment.name}\n{indent}{{\n")
+    text.write(f"{inner}OFFSET {_numbers(offset)}\n{inner}CHANNELS {len(channels)} {' '.join(channels)}\n")
+    children = [joint.segment for joint in joints.values() if joint.segment.parent == segment.name]
+    for child in children:
+        _write_joint(text, child, joints, depth + 1)
+    if not children:
+        end = CENTIMETRES * (TO_BVH @ end_of(segment))
+        text.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_numbers(end)}\n{inner}}}\n")
+    text.write(f"{indent}}}\n")
+
+
+def _numbers(values: Sequence[float] | FloatArray) -> str:
+    return " ".join(f"{value:.7f}" for value in values)
+
+
+def _root_channels(motion: Motion) -> FloatArray:
+    """(n, 6) position [cm] and angles [deg] of the pelvis."""
+    position = CENTIMETRES * motion.q[:, :3] @ TO_BVH.T
+    rotation = TO_BVH @ Rotation.from_quat(motion.q[:, 3:7]).as_matrix() @ TO_BVH.T
+    return np.hstack([position, _euler(rotation, _ROOT_ORDER)])
+
+
+def _angles(joint: _Joint, body: BodyModel, motion: Motion) -> FloatArray:
+    """(n, 3) channel values of a segment [deg]."""
+    hinges = motion.q[:, 7:]
+    if joint.columns is not None:
+        values = [np.zeros(len(hinges)) if c is None else hinges[:, c] for c in joint.columns]
+        return np.degrees(np.column_stack(values) * joint.signs)
+    rotation = np.broadcast_to(np.eye(3), (len(hinges), 3, 3))
+    for hinge in joint.segment.hinges:
+        angle = hinges[:, body.joint_index(hinge.name)]
+        rotation = rotation @ Rotation.from_rotvec(angle[:, None] * hinge.axis).as_matrix()
+    return _euler(TO_BVH @ rotation @ TO_BVH.T, joint.order)
+
+
+def _euler(rotation: FloatArray, order: str) -> FloatArray:
+    """(n, 3) intrinsic angles [deg] without jumps of a turn between samples."""
+    with warnings.catch_warnings():
+        # At the singularity SciPy sets the third angle to zero: one of the right answers.
+        warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)
+        angles = Rotation.from_matrix(rotation).as_euler(order)
+    return np.degrees(np.unwrap(angles, axis=0))
+
+
+FORMATS = ("bvh", "csv")
+BVH_RATE = 100.0
+"""Samples per second of a BVH file unless the caller says otherwise [Hz]."""
+
+
+def check_format(name: str) -> None:
+    """Refuse an unknown format.
+
+    Raises:
+        InputError: If there is no such format.
+    """
+    if name not in FORMATS:
+        raise InputError(f"format is {name!r}; valid: {', '.join(FORMATS)}")
+
+
+def pick_motion(content: MotionFile, which: str | None = None) -> tuple[str, Motion]:
+    """Name and value of the motion wanted; by default the executed one, else the planned one.
+
+    Raises:
+        InputError: If the file does not hold it.
+    """
+    name = which if which is not None else list(content.motions)[-1]
+    if name not in content.motions:
+        raise InputError(f"motion is {name!r}; valid here: {', '.join(content.motions)}")
+    return name, content.motions[name]
+
+
+def export_motion(
+    content: MotionFile,
+    source: str | Path,
+    format_name: str,
+    *,
+    out: str | Path | None = None,
+    which: str | None = None,
+    rate: float | None = None,
+) -> Path:
+    """Write a motion in another format, atomically.
+
+    Args:
+        content: What the motion file holds.
+        source: The run directory or motion file it came from.
+        format_name: One of :data:`FORMATS`.
+        out: File to write; ``motion.FORMAT`` beside the motion file when omitted.
+        which: ``"planned"`` or ``"executed"``; see :func:`pick_motion`.
+        rate: Samples per second [Hz]; 100 for BVH and every sample for CSV when omitted.
+
+    Returns:
+        The file written.
+
+    Raises:
+        InputError: If the format, the motion or the rate is not available.
+        MotionFileError: If the file cannot be written, or BVH is wanted without a body.
+    """
+    check_format(format_name)
+    _, motion = pick_motion(content, which)
+    folder = Path(source) if Path(source).is_dir() else Path(source).parent
+    path = Path(out) if out is not None else folder / f"motion.{format_name}"
+    text = _text(content, motion, format_name, rate, source)
+    return write_result(path, text)
+
+
+def _text(
+    content: MotionFile, motion: Motion, format_name: str, rate: float | None, source: str | Path
+) -> str:
+    pass
+
+    if format_name == "csv":
+        pass
+
+        return to_csv(resample(motion, rate))
+    pass
+
+    if content.body is None:
+        raise MotionFileError(f"{source}: holds no body; valid: a motion file with a body for bvh")
+    return to_bvh(content.body, resample(motion, BVH_RATE if rate is None else rate))

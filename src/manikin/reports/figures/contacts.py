@@ -1,0 +1,343 @@
+"""The contact strategy: one panel per phase.
+
+Also here. Which contacts were chosen: bodies in a scene side by side. Bodies and scenes as shaded solids in
+three dimensions.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+import trimesh
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+
+from manikin.body import BodyModel, Configuration
+from manikin.body.segments import segment_triangles
+from manikin.contact import Contact, ContactSchedule
+from manikin.errors import FigureError
+from manikin.numerics.spatial import FloatArray
+from manikin.pipeline.run_directory import ComTrack, RunRecord
+from manikin.reports.figures.style import dress, need, new_figure, new_grid
+from manikin.reports.figures.views import (
+    View,
+    best_view,
+    distinct_contacts,
+    draw_contact,
+    draw_obstacles,
+    panel_ticks,
+)
+from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.scene import HalfSpace, Plane, Scene
+
+MARGIN = 0.3
+"""Room around the bodies [m]."""
+NORMAL = 0.18
+"""Length of the arrow of a contact's normal [m]."""
+TASK = 0.45
+"""Length of the arrow of a task [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChoicePanel:
+    """One body of the figure.
+
+    Attributes:
+        title: Above the panel.
+        q: (nq,) configuration.
+        contacts: What was chosen, drawn as points with their normals.
+        limbs: Names of the limbs to which they belong.
+        task: (3,) direction of the task, drawn beside the head, or None.
+    """
+
+    title: str
+    q: FloatArray
+    contacts: Sequence[Contact] = ()
+    limbs: Sequence[str] = ()
+    task: FloatArray | None = field(default=None)
+
+
+def contact_choice_figure(
+    body: BodyModel,
+    scene: Scene,
+    panels: Sequence[ChoicePanel],
+    title: str = "Chosen contacts",
+    *,
+    elevation_deg: float = 14.0,
+    azimuth_deg: float = -68.0,
+    columns: int | None = None,
+) -> Figure:
+    """Draw bodies with their contacts side by side, such as before, by one heuristic and by another.
+
+    Args:
+        body: The body of all panels.
+        scene: Its surroundings, as far as they are near.
+        panels: At least one.
+        title: Of the figure.
+        elevation_deg: Height of the eye above the horizon [deg].
+        azimuth_deg: Direction of the eye about the vertical [deg].
+        columns: Panels in a row; all when omitted.
+
+    Raises:
+        FigureError: If there is no panel.
+    """
+    if not panels:
+        raise FigureError("contact choice figure has no panel; valid: at least one")
+    wide = columns or len(panels)
+    rows = -(-len(panels) // wide)
+    figure = new_figure(3.3 * wide, 3.9 * rows + 0.4, title)
+    low, high = _box(body, panels)
+    if any(panel.task is not None for panel in panels):
+        high[2] += TASK
+    for number, panel in enumerate(panels):
+        axes: Axes3D = figure.add_subplot(rows, wide, number + 1, projection="3d")
+        _draw(axes, body, scene, panel, low, high)
+        axes.view_init(elevation_deg, azimuth_deg)
+    return figure
+
+
+def _draw(
+    axes: Axes3D, body: BodyModel, scene: Scene, panel: ChoicePanel, low: FloatArray, high: FloatArray
+) -> None:
+    axes.computed_zorder = False
+    moved = [name for limb in body.limbs if limb.name in panel.limbs for name in limb.segments]
+    ends = [segment.name for segment in body.segments if segment.parent in moved]
+    draw_solids(axes, [*scene_solids(scene, low, high), *body_solids(body, panel.q, [*moved, *ends])])
+    if scene.floor_height is not None:
+        draw_floor(axes, scene.floor_height, low, high)
+    for contact in panel.contacts:
+        draw_arrow(axes, contact.position, NORMAL * contact.normal, COLOURS["planned"])
+    if panel.task is not None:
+        middle = np.array(Configuration(body, panel.q).com)
+        middle[2] = high[2] - 0.7 * TASK
+        start = middle - 0.5 * TASK * panel.task
+        draw_arrow(axes, start, TASK * panel.task, COLOURS["ink"], 3.0)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(high - low, zoom=1.25)  # type: ignore[arg-type]
+    axes.set_axis_off()
+    axes.text2D(0.5, 0.98, panel.title, transform=axes.transAxes, ha="center", va="bottom",
+                fontsize=9.5, color=COLOURS["ink"])  # fmt: skip
+
+
+def _box(body: BodyModel, panels: Sequence[ChoicePanel]) -> tuple[FloatArray, FloatArray]:
+    """Corners of a box around all bodies [m]."""
+    places = [
+        Configuration(body, panel.q).segment_placement(segment.name)[1]
+        for panel in panels
+        for segment in body.segments
+    ]
+    places += [contact.position for panel in panels for contact in panel.contacts]
+    return np.min(places, axis=0) - MARGIN, np.max(places, axis=0) + MARGIN
+
+
+LONGEST_EDGE = 0.12
+"""Triangles of obstacles are cut to edges of at most this length [m], so that they sort by depth."""
+_LIGHT = np.array([0.35, -0.55, 0.76])
+_SHADE = 0.45
+"""Brightness of what faces away from the light, as a share."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """Triangles of one colour.
+
+    Attributes:
+        triangles: (n, 3, 3) corners in the world [m].
+        colour: Of all of them.
+        alpha: Opacity in [0, 1].
+    """
+
+    triangles: FloatArray
+    colour: str
+    alpha: float = 1.0
+
+
+def body_solids(body: BodyModel, q: FloatArray, marked: Iterable[str] = ()) -> list[Solid]:
+    """Shapes of a body in one configuration.
+
+    Args:
+        body: The body.
+        q: (nq,) configuration.
+        marked: Names of segments drawn in the executed motion's colour.
+    """
+    data = body.pinocchio.createData()
+    pin.framesForwardKinematics(body.pinocchio, data, q)
+    found, wanted = [], set(marked)
+    for segment in body.segments:
+        triangles = segment_triangles(segment, rounds=10)
+        if triangles is None:
+            continue
+        vertices, faces = triangles
+        place = data.oMf[body.segment_frame(segment.name)]
+        world = vertices @ place.rotation.T + place.translation
+        colour = COLOURS["executed"] if segment.name in wanted else "#7F8FA6"
+        found.append(Solid(world[faces], colour))
+    return found
+
+
+def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]:
+    """Finite obstacles, those of them that are between two corners (3,) of a box [m]."""
+    found = []
+    for obstacle in scene:
+        if isinstance(obstacle.shape, (HalfSpace, Plane)):
+            continue
+        bounds = obstacle.bounds
+        if (bounds[1] < low).any() or (bounds[0] > high).any():
+            continue
+        mesh = obstacle.to_trimesh()
+        finer = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE)
+        triangles = np.asarray(finer[0])[np.asarray(finer[1])]
+        inside = ((triangles.max(axis=1) > low) & (triangles.min(axis=1) < high)).all(axis=1)
+        found.append(Solid(np.clip(triangles[inside], low, high), COLOURS["obstacle"], 0.55))
+    return found
+
+
+def draw_solids(axes: Axes3D, solids: Iterable[Solid]) -> None:
+    """Draw solids in one collection, so that all triangles are sorted by depth together."""
+    parts = [item for item in solids if len(item.triangles)]
+    triangles = np.concatenate([item.triangles for item in parts])
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    light = (normals / np.maximum(lengths, 1e-15)) @ (_LIGHT / np.linalg.norm(_LIGHT))
+    bright = _SHADE + (1.0 - _SHADE) * 0.5 * (1.0 + light)
+    colours = np.concatenate(
+        [np.tile([*to_rgb(item.colour), item.alpha], (len(item.triangles), 1)) for item in parts]
+    )
+    colours[:, :3] *= bright[:, None]
+    axes.add_collection3d(Poly3DCollection(triangles, facecolors=colours, edgecolors="none", linewidths=0.0))
+
+
+def draw_floor(axes: Axes3D, height: float, low: FloatArray, high: FloatArray, step: float = 0.5) -> None:
+    """Draw the floor between two corners as lines ``step`` apart [m]."""
+    xs, ys = (np.arange(np.floor(low[i] / step), np.ceil(high[i] / step) + 1) * step for i in (0, 1))
+    lines = [[(x, ys[0], height), (x, ys[-1], height)] for x in xs]
+    lines += [[(xs[0], y, height), (xs[-1], y, height)] for y in ys]
+    axes.add_collection3d(Line3DCollection(lines, colors="#D5D9DF", linewidths=0.6, zorder=0))
+
+
+def draw_arrow(axes: Axes3D, start: FloatArray, vector: FloatArray, colour: str, width: float = 2.2) -> None:
+    """Draw an arrow of a vector (3,) from a point (3,) [m], before everything else."""
+    axes.quiver(*start, *vector, color=colour, linewidth=width, arrow_length_ratio=0.3, zorder=20)
+
+
+COLUMNS = 6
+PANEL = 2.3
+"""Width of a panel [inch]; of a tall one less."""
+TALLEST = 3.6
+"""Height of a panel at the most [inch]."""
+TITLE = 1.2
+"""Room for the title above a panel [inch]."""
+WIDEST = 13.0
+"""Narrow panels stand beside each other up to this width [inch]."""
+MOST = 24
+"""More phases than this are not drawn one by one."""
+
+
+def contacts_figure(record: RunRecord) -> Figure:
+    """Draw the contacts held in each phase and the CoM's path in it ([Qiu2012]_ Fig. 5.15, 5.19).
+
+    Held contacts are filled; dashed ones have been left or are made in the next phase. The
+    view is from above, or along the walls when the contacts are on walls.
+
+    Args:
+        record: With a schedule; the CoM is drawn when there is one.
+
+    Raises:
+        FigureError: If there is no schedule, or it has more than :data:`MOST` phases.
+    """
+    schedule = need(record.schedule, "a contact schedule")
+    need(len(schedule.sequence) <= MOST, f"at most {MOST} phases")
+    view = best_view(schedule)
+    track = next(iter(record.tracks.values()), None)
+    count = len(schedule.sequence)
+    points = [c.points_in_world for c in distinct_contacts(schedule)]
+    seen = np.vstack(points + ([] if track is None else [track.position]))
+    low, high = seen.min(axis=0) - 0.1, seen.max(axis=0) + 0.1
+    width, height = view(high - low)
+    panel = min(PANEL * float(np.clip(1.3 * width / height, 0.55, 1.0)), TALLEST * width / height)
+    pitch = np.array([max(1.06 * panel, TITLE) * width / panel, height + 0.45 * width / panel])
+    scale = panel / width
+    most = max(COLUMNS if count != 7 else 4, int(WIDEST / (pitch[0] * scale)))
+    rows = -(-count // most)
+    columns = min(count, most) if most <= COLUMNS else -(-count // rows)
+    figure, grid = new_grid(
+        columns * pitch[0] * scale + 0.8, rows * pitch[1] * scale + 1.15,
+        f"Contacts of each phase, {view.words}", 1, 1, top=0.75,
+    )  # fmt: skip
+    axes = figure.add_subplot(grid[0])
+    rights = [pitch[0] * column for column in range(columns)]
+    ups = [-pitch[1] * row for row in range(rows)]
+    for number in range(count):
+        place = view.moved(rights[number % columns], ups[number // columns])
+        (left, bottom), (right, top) = place(low), place(high)
+        axes.add_patch(Rectangle((left, bottom), right - left, top - bottom, fill=False, edgecolor="#C4C9D1",
+                                 linewidth=0.7, zorder=0.4, clip_on=False))  # fmt: skip
+        axes.annotate(_title(schedule, number), (left, top), (0, 3), textcoords="offset points", fontsize=8.5)
+        if record.scene is not None:
+            draw_obstacles(axes, record.scene, place, low, high)
+        _draw_phase(axes, schedule, number, place, track)
+    (left, bottom), (right, top) = view(low), view(high)
+    horizontal, vertical = view.labels
+    dress(axes, f"{vertical}, each panel", f"{horizontal}, each panel")
+    axes.grid(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_visible(False)
+    axes.set_xticks(*panel_ticks(left, right, rights))
+    axes.set_yticks(*panel_ticks(bottom, top, ups))
+    axes.set(xlim=(left, right + rights[-1]), ylim=(bottom + ups[-1], top + 0.25 * width / panel))
+    axes.set_aspect("equal", adjustable="box", anchor="W")
+    _legend(figure, schedule)
+    return figure
+
+
+def _draw_phase(
+    axes: Axes, schedule: ContactSchedule, number: int, view: View, track: ComTrack | None
+) -> None:
+    stance = schedule.sequence[number].stance
+    colours = colours_of(schedule.sequence.effectors)
+    for near in (number - 1, number + 1):
+        if 0 <= near < len(schedule.sequence):
+            for contact in schedule.sequence[near].stance:
+                if not _held(contact, stance.contacts):
+                    draw_contact(axes, contact, view, colours[contact.effector], held=False)
+    for contact in stance:
+        draw_contact(axes, contact, view, colours[contact.effector])
+    if track is not None:
+        start, end = schedule.instants[number : number + 2]
+        times = np.linspace(float(start), float(end), 40)
+        path = view(track.at(times))
+        axes.plot(*view(track.position).T, color=COLOURS["soft"], linewidth=0.6, zorder=2.5)
+        axes.plot(*path.T, color=COLOURS["ink"], linewidth=2.0, zorder=4)
+        axes.plot(*path[-1], "o", color=COLOURS["ink"], markersize=3.5, zorder=5)
+
+
+def _held(contact: Contact, contacts: tuple[Contact, ...]) -> bool:
+    return any(contact.same_place(other) for other in contacts)
+
+
+def _title(schedule: ContactSchedule, number: int) -> str:
+    start, end = (float(instant) for instant in schedule.instants[number : number + 2])
+    return f"{number}: {start:.2f}–{end:.2f} s"
+
+
+def _legend(figure: Figure, schedule: ContactSchedule) -> None:
+    axes = figure.axes[0]
+    for name, colour in colours_of(schedule.sequence.effectors).items():
+        axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
+    handles, labels = axes.get_legend_handles_labels()
+    handles += [Line2D([], [], color=COLOURS["ink"], linewidth=2.0), Patch(fill=False, linestyle="--")]
+    labels += ["centre of mass", "dashed or pale: left, or made next"]
+    figure.legend(
+        handles,
+        labels,
+        fontsize=8,
+        frameon=False,
+        loc="upper right",
+        ncols=max(2, int((figure.get_figwidth() - 3.5) / 1.35)),
+    )

@@ -1,0 +1,247 @@
+"""Footprints, zero moment point and projected centre of mass seen from above.
+
+Also here. The zero moment point in the support polygons, and how far it stays inside.
+"""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+
+from manikin.balance.zmp import ZmpPath
+from manikin.contact import Contact, ContactKind, ContactSchedule
+from manikin.numerics.spatial import FloatArray
+from manikin.pipeline.run_directory import RunRecord
+from manikin.reports.figures.style import (
+    STYLES,
+    Labels,
+    dress,
+    label_room,
+    need,
+    new_figure,
+    support_colour,
+    support_words,
+    white_edge,
+)
+from manikin.reports.figures.timeline import timeline
+from manikin.reports.figures.views import ABOVE, distinct_contacts, draw_contact, sections
+from manikin.runtime.palette import COLOURS, colours_of, readable
+from manikin.scene import HalfSpace, Plane, Scene
+
+PLAN_HEIGHT = 5.1
+"""Of the view from above [inch]."""
+
+DISTANCE_WIDTH = 7.4
+"""Of the panel over time [inch]."""
+
+EDGE = "#AEB4BE"
+"""Colour of support polygons."""
+
+
+def zmp_figure(record: RunRecord) -> Figure:
+    """Draw the ZMP over the soles, and its distance to the support polygon ([Qiu2012]_ Fig. 5.13).
+
+    The distance is drawn firm where it decides about balance: all supports in one plane, no
+    grasp. Elsewhere it is dotted, measured in the level plane at their mean height.
+
+    Args:
+        record: With a schedule and a motion or a planned CoM.
+
+    Raises:
+        FigureError: If there is no phase in which the ZMP decides about balance.
+    """
+    schedule = need(record.schedule, "a contact schedule")
+    paths = need(record.zmp, "a motion of the centre of mass")
+    if not any(np.any(path.decisive) for path in paths.values()):
+        need(None, "a phase that stands on one plane without grasping")
+    plan = _plan_width(schedule)
+    across = label_room(record.effectors) + 0.15
+    shown = timeline(
+        record, (0.8 + plan + across + DISTANCE_WIDTH, PLAN_HEIGHT + 1.35), "Zero moment point", 1, 2,
+        strip=0.07, left=0.65, top=0.85, between=0.1, across=across, width_ratios=[plan, DISTANCE_WIDTH],
+    )  # fmt: skip
+    name, path = next(iter(paths.items()))
+    _draw_plan(shown.figure.add_subplot(shown.grid[:, 0]), schedule, name, path)
+    shown.strip(1)
+    axes = shown.panel(1, 1)
+    axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
+    for kind, one in paths.items():
+        _draw_distance(axes, kind, one)
+    shown.label(axes, "distance to the edge of the support polygon [mm]")
+    _frame_distance(axes, list(paths.values()))
+    axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
+    _legend_of_plan(shown.figure, schedule)
+    return shown.figure
+
+
+def _draw_plan(axes: Axes, schedule: ContactSchedule, name: str, path: ZmpPath) -> None:
+    contacts = distinct_contacts(schedule)
+    colours = colours_of(contact.effector for contact in contacts)
+    for contact in contacts:
+        draw_contact(axes, contact, ABOVE, colours[contact.effector])
+    for plane in path.planes:
+        if plane is not None and len(plane.polygon) > 1:
+            axes.fill(*plane.corners_in_world[:, :2].T, fill=False, edgecolor=EDGE, linewidth=0.8,
+                      linestyle=(0, (5, 3)), zorder=1)  # fmt: skip
+    counts = [len(phase.stance) for phase in schedule.sequence]
+    for part in sections(path.phase):
+        count = counts[path.phase[part.start]]
+        axes.plot(*path.point[part, :2].T, color=support_colour(count), linewidth=1.6, zorder=4)
+    low, high = _plan_box(schedule)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_aspect("equal", adjustable="box", anchor="NW")
+    labels = Labels(axes)
+    for number, instant in enumerate(schedule.instants[1:-1]):
+        sample = min(int(np.searchsorted(path.time, instant)), len(path.time) - 1)
+        x, y = path.point[sample, :2]
+        if np.isfinite(x) and np.isfinite(y):
+            axes.plot(x, y, "*", color=COLOURS["ink"], markersize=8, zorder=6)
+            labels.write(f"{number}|{number + 1}", (x, y), (5, 4), zorder=7)
+    dress(axes, "y [m]", "x [m]", f"{name.capitalize()}, from above")
+
+
+def _plan_box(schedule: ContactSchedule) -> tuple[FloatArray, FloatArray]:
+    """Corners (2,) of what is seen from above [m]."""
+    points = np.vstack([contact.points_in_world[:, :2] for contact in distinct_contacts(schedule)])
+    return points.min(axis=0) - 0.15, points.max(axis=0) + 0.15
+
+
+def _plan_width(schedule: ContactSchedule) -> float:
+    """Width that the plan takes at its height [inch]."""
+    low, high = _plan_box(schedule)
+    return float(np.clip(PLAN_HEIGHT * (high - low)[0] / (high - low)[1], 2.0, 6.5))
+
+
+def _legend_of_plan(figure: Figure, schedule: ContactSchedule) -> None:
+    """A legend in one row at the height of the figure's title."""
+    shown = sorted({min(max(len(phase.stance), 1), 3) for phase in schedule.sequence})
+    handles = [Line2D([], [], color=support_colour(c), label=f"ZMP, {support_words(c)}") for c in shown]
+    handles.append(Line2D([], [], color=COLOURS["ink"], marker="*", linestyle="", label="change of phase"))
+    handles.append(Line2D([], [], color=EDGE, linestyle=(0, (5, 3)), label="support polygon"))
+    figure.legend(handles=handles, fontsize=8.5, frameon=False, loc="upper right", ncols=len(handles))
+
+
+def _draw_distance(axes: Axes, name: str, path: ZmpPath) -> None:
+    millimetres = 1000.0 * path.distance
+    firm = np.where(path.decisive, millimetres, np.nan)
+    least = int(np.nanargmin(firm)) if np.any(path.decisive) else None
+    label = name if least is None else f"{name} (least {firm[least]:.1f} mm, {path.time[least]:.2f} s)"
+    axes.plot(path.time, firm, label=label, **STYLES[name])
+    if np.any(~path.decisive & np.isfinite(millimetres)):
+        dotted = {**STYLES[name], "linestyle": (0, (1, 2)), "linewidth": 1.0}
+        loose = np.where(path.decisive, np.nan, millimetres)
+        axes.plot(path.time, loose, label=f"{name}, no criterion: several planes or a grasp", **dotted)
+
+
+def _frame_distance(axes: Axes, paths: list[ZmpPath]) -> None:
+    values = np.concatenate([1000.0 * path.distance[np.isfinite(path.distance)] for path in paths])
+    low, high = (float(v) for v in np.percentile(values, (0.2, 100.0)))
+    decisive = [1000.0 * float(p.distance[p.decisive].min()) for p in paths if np.any(p.decisive)]
+    low = min([low, 0.0, *(max(value, -200.0) for value in decisive)])
+    room = 0.08 * (high - low)
+    axes.set_ylim(low - room, high + 3.0 * room)  # with room for the legend
+
+
+OVERHEAD = 1.0
+"""An obstacle that begins above this height [m] is something to walk under."""
+
+NARROW = 0.75
+"""A way this much narrower than long has its legend beside it."""
+
+LEVEL = 0.3
+"""Contacts whose normal has a smaller vertical part are on a wall."""
+
+
+def footprint_figure(record: RunRecord) -> Figure:
+    """Draw the soles in their order, the ZMP path and the CoM's projection ([Qiu2012]_ Fig. 5.13, 5.19).
+
+    Args:
+        record: With a planned CoM, or at least one motion, and something to stand on.
+
+    Raises:
+        FigureError: If nothing moves, or all contacts are on walls.
+    """
+    tracks = need(record.tracks, "a motion of the centre of mass")
+    contacts = [] if record.schedule is None else distinct_contacts(record.schedule)
+    if contacts and all(abs(contact.normal[2]) < LEVEL for contact in contacts):
+        need(None, "a contact that is not on a wall")
+    figure = new_figure(8.6, 8.2, "Footprints, zero moment point and centre of mass from above")
+    axes = figure.add_subplot()
+    colours = colours_of(contact.effector for contact in contacts)
+    for number, contact in enumerate(contacts):
+        _draw_contact(axes, contact, number + 1, colours[contact.effector])
+    seen = [next(iter(tracks.values())).position[:, :2], *(c.points_in_world[:, :2] for c in contacts)]
+    for name, track in tracks.items():
+        if name in record.zmp:
+            point = record.zmp[name].point
+            axes.plot(point[:, 0], point[:, 1], label=f"ZMP, {name}", **STYLES[name])
+        dotted = {**STYLES[name], "linestyle": (0, (1.2, 1.6)), "linewidth": 1.6}
+        axes.plot(*track.position[:, :2].T, label=f"centre of mass, {name}", **dotted)
+    _mark_ends(axes, next(iter(tracks.values())).position)
+    everything = np.vstack(seen)
+    low, high = everything.min(axis=0) - 0.18, everything.max(axis=0) + 0.18
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    if record.scene is not None:
+        _draw_obstacles(axes, record.scene)
+    dress(axes, "y [m]", "x [m]")
+    narrow = high[0] - low[0] < NARROW * (high[1] - low[1])
+    beside = {"bbox_to_anchor": (1.02, 1.0)} if narrow else {}
+    axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none", **beside)
+    return figure
+
+
+def _draw_contact(axes: Axes, contact: Contact, number: int, colour: str) -> None:
+    draw_contact(axes, contact, ABOVE, colour)
+    if contact.kind is ContactKind.SOLE:
+        toes = contact.points_in_world[:2, :2]  # the first two corners are the front ones
+        axes.plot(toes[:, 0], toes[:, 1], color=colour, linewidth=3.2, solid_capstyle="butt", zorder=2)
+    heel = contact.position - contact.rotation_contact_to_world[:, 0] * (contact.length / 2 + 0.03)
+    z = contact.position[2]
+    height = f"\nz = {z:.3g} m" if z else ""
+    axes.text(
+        heel[0], heel[1], f"{number}: {readable(contact.effector)}{height}", fontsize=7.5, ha="center",
+        va="center", color=colour, zorder=8, path_effects=[white_edge()],
+    )  # fmt: skip
+
+
+def _draw_obstacles(axes: Axes, scene: Scene) -> None:
+    """Outlines; what hangs above is dashed. Names stand in a column below the first corner in view."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    column: dict[tuple[int, int], list[Any]] = {}
+    for obstacle in scene:
+        low, high = obstacle.bounds
+        outside = low[0] > right or high[0] < left or low[1] > top or high[1] < bottom
+        if isinstance(obstacle.shape, (HalfSpace, Plane)) or outside:
+            continue
+        corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+        overhead = low[2] > OVERHEAD
+        if not overhead:
+            axes.add_patch(Polygon(corners, facecolor=COLOURS["obstacle"], alpha=0.22, zorder=0.5))
+        line = (0, (5, 3)) if overhead else "solid"
+        outline = Polygon(corners, fill=False, edgecolor=COLOURS["soft"], linewidth=0.9, linestyle=line)
+        outline.set_zorder(0.6)
+        axes.add_patch(outline)
+        corner = max(low[0], left), max(low[1], bottom)
+        near = round(corner[0] / 0.1), round(corner[1] / 0.1)
+        column.setdefault(near, [corner, 0])[1] += 1
+        corner, row = column[near]
+        text = f"{obstacle.name}, {'from' if overhead else 'up to'} z = {low[2] if overhead else high[2]:g} m"
+        axes.annotate(text, corner, (3, -11 * row), textcoords="offset points", fontsize=7.5, color="#666C77")
+
+
+def _mark_ends(axes: Axes, com: np.ndarray) -> None:
+    for point, text, marker in ((com[0], "start", "o"), (com[-1], "goal", "D")):
+        axes.plot(point[0], point[1], marker, color=COLOURS["ink"], markersize=5, zorder=7)
+        axes.annotate(
+            text,
+            point[:2],
+            (7, 4),
+            textcoords="offset points",
+            fontsize=8,
+            color=COLOURS["ink"],
+            zorder=8,
+            path_effects=[white_edge()],
+        )

@@ -1,0 +1,193 @@
+"""How long the phases of several motions last, each and on average.
+
+Also here. Where several people put their feet and hands, seen from above.
+"""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Ellipse, Patch
+
+from manikin.recordings.statistics.passages import SupportPlacement
+from manikin.recordings.statistics.phases import FLIGHT, By, PhaseSequence, by_group, phase_durations
+from manikin.reports.figures.style import (
+    Labels,
+    dress,
+    group_colours,
+    group_keys,
+    label_room,
+    need,
+    new_grid,
+    support_colour,
+)
+from manikin.runtime.palette import COLOURS, colours_of, readable
+
+SHARE = 0.5
+"""Of the places in an ellipse, were they normal."""
+
+FEWEST = 3
+"""Places of which an ellipse is drawn: two make a line."""
+
+
+def placements_figure(groups: Mapping[str, Sequence[SupportPlacement]]) -> Figure:
+    """Draw the places of the supports of each group, with means and ellipses ([Qiu2012]_ Fig. 3.9).
+
+    Args:
+        groups: Placements by group, one panel each; the origin of the frame is the cross.
+
+    Raises:
+        FigureError: If there is no placement.
+    """
+    shown = need({name: found for name, found in groups.items() if found}, "a placement")
+    everywhere = np.vstack([one.places for found in shown.values() for one in found])
+    low, high = everywhere.min(axis=0) - 0.25, everywhere.max(axis=0) + 0.25
+    wide = 9.6
+    panel = float(np.clip((wide - 0.9) * (high[1] - low[1]) / (high[0] - low[0]), 1.3, 5.0))
+    figure, grid = new_grid(
+        wide, 0.9 + (panel + 0.7) * len(shown), f"Supports (crosses: means; ellipses: {SHARE:.0%})",
+        len(shown), 1, between=0.7, top=0.8, bottom=0.5,
+    )  # fmt: skip
+    colours = colours_of(one.effector for found in shown.values() for one in found)
+    for row, (name, found) in enumerate(shown.items()):
+        axes = figure.add_subplot(grid[row])
+        motions = len({clip for one in found for clip in one.clips})
+        dress(axes, "y [m]", "x [m]", f"{name}, {motions} motions")
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        axes.set_aspect("equal", adjustable="box", anchor="W")
+        axes.plot(0.0, 0.0, "+", color=COLOURS["ink"], markersize=10, zorder=2)
+        _draw(axes, found, colours)
+    keys = [
+        Line2D([], [], marker="o", linestyle="", color=colour, label=readable(effector))
+        for effector, colour in colours.items()
+    ]
+    figure.legend(handles=keys, loc="upper right", ncols=len(keys), fontsize=8.5, frameon=False,
+                  borderaxespad=0.3)  # fmt: skip
+    return figure
+
+
+def _draw(axes: Axes, found: Sequence[SupportPlacement], colours: Mapping[str, str]) -> None:
+    for one in found:
+        colour = colours[one.effector]
+        axes.plot(*one.places.T, "o", color=colour, markersize=3.5, alpha=0.6, zorder=3)
+        axes.plot(*one.mean, "x", color=colour, markersize=6, zorder=5)
+        if len(one.places) >= FEWEST:
+            (long, short), turn = one.ellipse(SHARE)
+            ellipse = Ellipse(
+                (float(one.mean[0]), float(one.mean[1])), 2 * long, 2 * short, angle=float(np.degrees(turn)),
+                fill=False, edgecolor=colour, linewidth=1.2, zorder=4,
+            )  # fmt: skip
+            axes.add_patch(ellipse)
+    labels = Labels(axes)
+    for one in sorted(found, key=lambda each: -len(each.places)):
+        mean = (float(one.mean[0]), float(one.mean[1]))
+        labels.write(f"{one.number}", mean, (0.0, 6.0), ha="center", color=colours[one.effector], zorder=6)
+
+
+WIDTH = 0.8
+"""Of all bars of one phase, of the distance between two."""
+
+BEYOND = 2.5
+"""Height of the axes per largest mean, beyond which whiskers are cut off."""
+
+
+def phase_durations_figure(sequences: Sequence[PhaseSequence], by: By = "number") -> Figure:
+    """Draw the phases of each motion as a bar, and means by group ([Qiu2012]_ Fig. 3.11).
+
+    Phases cut off by the recording are pale and do not count in the means. Whiskers reach from the
+    least to the largest; the number of phases stands at the bottom.
+
+    Args:
+        sequences: Recorded or published motions.
+        by: What phases have in common that are averaged; ``number`` for motions that begin alike.
+
+    Raises:
+        FigureError: If there is no motion.
+    """
+    motions = need([one for one in sequences if one.phases], "a motion with phases")
+    groups = by_group(motions)
+    names = [one.name for members in groups.values() for one in members]
+    tall = 0.21 * len(names) + 0.12 * len(groups)
+    figure, grid = new_grid(
+        11.0, 5.2 + tall, "Durations of the phases", 2, 1, height_ratios=[tall, 3.3], top=0.75, between=0.85,
+        left=label_room(names),
+    )  # fmt: skip
+    _draw_motions(figure.add_subplot(grid[0]), groups)
+    _draw_means(figure.add_subplot(grid[1]), groups, by)
+    return figure
+
+
+def _draw_motions(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]]) -> None:
+    level, ticks, kinds = 0.0, {}, {}
+    for group, members in groups.items():
+        for one in members:
+            begin = one.phases[0].start
+            for phase, kind, whole in zip(one.phases, one.kinds, one.whole, strict=True):
+                colour = _colour(kind, len(phase.effectors))
+                kinds[kind] = colour
+                axes.barh(level, phase.duration, left=phase.start - begin, height=0.75, color=colour,
+                          alpha=0.85 if whole else 0.3, edgecolor="white", linewidth=0.6)  # fmt: skip
+            ticks[level] = one.name
+            level -= 1.0
+        axes.annotate(
+            group, (1.0, level + len(members)), xycoords=("axes fraction", "data"), xytext=(-2, 0),
+            textcoords="offset points", fontsize=8, ha="right", va="center", color=COLOURS["ink"],
+        )  # fmt: skip
+        level -= 0.6
+    dress(axes, "", "time from the beginning [s]")
+    axes.set_yticks(list(ticks), list(ticks.values()))
+    axes.tick_params(axis="y", labelsize=7)
+    axes.grid(False, axis="y")
+    axes.set_ylim(level + 1.0, 0.6)
+    keys = [Patch(color=colour, alpha=0.85, label=kind) for kind, colour in kinds.items()]
+    keys.append(Patch(color=COLOURS["soft"], alpha=0.3, label="cut off by the recording"))
+    _legend(axes, keys)
+
+
+def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By) -> None:
+    found = {group: phase_durations(members, by) for group, members in groups.items()}
+    names = _in_order([list(each) for each in found.values()])
+    width, colours = WIDTH / len(found), group_colours(found)
+    for number, (group, each) in enumerate(found.items()):
+        for place, name in enumerate(names):
+            if name not in each:
+                continue
+            spread, x = each[name], place - WIDTH / 2 + (number + 0.5) * width
+            axes.bar(x, spread.mean, width=0.94 * width, color=colours[group], alpha=0.75)
+            ends = [[spread.mean - spread.smallest], [spread.largest - spread.mean]]
+            axes.errorbar(x, spread.mean, ends, color=COLOURS["ink"], linewidth=0.8, capsize=2)
+            axes.annotate(f"{spread.count}", (x, 0.0), (0, 2), textcoords="offset points", fontsize=6.5,
+                          ha="center", color="white", fontweight="bold")  # fmt: skip
+    dress(axes, "mean, least and largest [s]")
+    axes.set_xticks(range(len(names)), [name.replace("+", "\n").replace("_", " ") for name in names])
+    axes.grid(False, axis="x")
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    spreads = [spread for each in found.values() for spread in each.values()]
+    if spreads:
+        highest = max(spread.largest for spread in spreads)
+        axes.set_ylim(0.0, min(1.06 * highest, BEYOND * max(spread.mean for spread in spreads)))
+    _legend(axes, group_keys(colours))
+
+
+def _colour(kind: str, supports: int) -> str:
+    return COLOURS["right_hand"] if kind == FLIGHT else support_colour(supports)
+
+
+def _in_order(lists: Sequence[Sequence[str]]) -> list[str]:
+    """All names once; a name stands behind those that it follows in the longest list."""
+    merged: list[str] = list(max(lists, key=len, default=[]))
+    for names in lists:
+        for before, name in pairwise(["", *names]):
+            if name not in merged:
+                merged.insert(merged.index(before) + 1 if before in merged else 0, name)
+    return merged
+
+
+def _legend(axes: Axes, keys: list[Patch]) -> None:
+    axes.legend(
+        handles=keys, fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.1, ncols=min(len(keys), 7), handlelength=1.2, columnspacing=1.2,
+    )  # fmt: skip

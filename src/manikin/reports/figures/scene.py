@@ -1,0 +1,350 @@
+"""The path of the centre of mass in the scene, with stick figures at the key instants.
+
+Also here. The postures at the key instants, side by side.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+from manikin.body import BodyModel
+from manikin.contact import ContactSchedule
+from manikin.motion import Motion
+from manikin.motion.motion import phases_of, segment_positions
+from manikin.numerics.spatial import FloatArray
+from manikin.pipeline.run_directory import ComTrack, RunRecord
+from manikin.reports.figures.style import dress, need, new_figure, new_grid, white_edge
+from manikin.reports.figures.views import (
+    ALONG_X,
+    ALONG_Y,
+    View,
+    distinct_contacts,
+    draw_body,
+    draw_contact,
+    draw_obstacles,
+    panel_ticks,
+)
+from manikin.runtime.palette import COLOURS, colours_of, side_colour
+from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
+
+MOST = 9
+"""With more key instants than this some are left out, evenly."""
+
+GAP = 0.12
+"""Between two panels [m]."""
+
+
+def postures_figure(record: RunRecord) -> Figure:
+    """Draw the body at the key instants, seen along y and along x ([Qiu2012]_ Fig. 5.14, 6.8, 7.10, 7.13).
+
+    A motion in one stance has no key instants; it is drawn where much happens. The executed motion is drawn,
+    or else the planned one; grey, the path of the CoM.
+
+    Args:
+        record: With a whole-body motion and the body.
+
+    Raises:
+        FigureError: If one is missing.
+    """
+    motions = need(record.motions, "a whole-body motion")
+    need(record.body, "a body")
+    phases = need(record.phases, "phases")
+    name, motion = list(motions.items())[-1]
+    instants = chosen_instants(phases.instants)
+    if len(instants) == 2:
+        instants = eventful_instants(motion)
+    samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
+    low, high = _frame(record, motion.com)
+    spans = high - low
+    widths = np.array([spans[0], spans[1]])
+    scale = 1.85 / widths.max()
+    figure, grid = new_grid(
+        (widths.max() + GAP) * scale * len(samples) + 0.75, 2.0 * spans[2] * scale + 1.7,
+        f"Postures at the key instants ({name})", 2, 1, top=0.65, between=0.5,
+    )  # fmt: skip
+    for row, view in enumerate((ALONG_Y, ALONG_X)):
+        axes = figure.add_subplot(grid[row, 0])
+        left, right = view(np.array([low, high]))[:, 0]
+        offsets = [(widths.max() + GAP) * column for column in range(len(samples))]
+        for offset, sample, instant in zip(offsets, samples, instants, strict=True):
+            _draw_posture(axes, record, view.moved(offset, 0.0), name, sample, (low, high))
+            if row == 0:
+                middle, top = offset + (left + right) / 2, high[2]
+                axes.annotate(f"{instant:.2f} s", (middle, top), (0, 4),
+                              textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
+        horizontal, vertical = view.labels
+        dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
+        frame_panels(axes, (left, right), (low[2], high[2]), offsets)
+    return figure
+
+
+def _draw_posture(
+    axes: Axes, record: RunRecord, view: View, name: str, sample: int, box: tuple[FloatArray, FloatArray]
+) -> None:
+    motion = record.motions[name]
+    draw_moment(axes, record, motion, sample, view, box)
+    if record.schedule is not None:
+        end = float(record.schedule.instants[-1])
+        for contact in record.schedule.stance_at(min(float(motion.time[sample]), end)):
+            draw_contact(axes, contact, view, side_colour(contact.effector))
+    axes.plot(*view(motion.com).T, color=COLOURS["soft"], linewidth=0.8, zorder=4)
+
+
+def draw_moment(
+    axes: Axes, record: RunRecord, motion: Motion, sample: int, view: View, box: tuple[FloatArray, FloatArray]
+) -> None:
+    """Draw the body among the obstacles at one sample of a motion, with its CoM.
+
+    Args:
+        axes: Where to draw.
+        record: Of the run.
+        motion: One of its motions.
+        sample: Index of the sample.
+        view: The plane that is seen, moved to the panel.
+        box: Lower and upper corner of what is shown [m].
+    """
+    if record.scene is not None:
+        draw_obstacles(axes, record.scene, view, *box)
+    if record.body is not None:
+        draw_body(axes, record.body, motion.q[sample], view)
+    axes.plot(*view(motion.com[sample]), "o", color=COLOURS["ink"], markersize=4, zorder=5)
+
+
+def frame_panels(
+    axes: Axes, across: tuple[float, float], upwards: tuple[float, float], offsets: Sequence[float]
+) -> None:
+    """Set ticks and limits of panels side by side in one pair of axes, to one scale.
+
+    Args:
+        axes: With the panels.
+        across: Both ends of the first panel [m].
+        upwards: Both ends of all [m].
+        offsets: Where the zero of each panel is drawn [m].
+    """
+    left, right = across
+    axes.grid(False, axis="x")
+    axes.set_xticks(*panel_ticks(left, right, offsets))
+    axes.set(xlim=(left, right + offsets[-1]), ylim=upwards)
+    axes.set_aspect("equal", adjustable="box", anchor="W")
+
+
+def chosen_instants(instants: FloatArray) -> FloatArray:
+    """At most :data:`MOST` of the key instants, the first and the last among them."""
+    if len(instants) <= MOST:
+        return instants
+    return instants[np.unique(np.linspace(0, len(instants) - 1, MOST).round().astype(int))]
+
+
+def eventful_instants(motion: Motion) -> FloatArray:
+    """At most :data:`MOST` instants between which the joints turn equally far, from begin to end [s]."""
+    travel = np.abs(np.diff(motion.q[:, 7:], axis=0)).sum(axis=1)
+    turned = np.concatenate(([0.0], np.cumsum(travel + 1e-9)))
+    return np.interp(np.linspace(0.0, turned[-1], min(MOST, len(turned))), turned, motion.time)
+
+
+def _frame(record: RunRecord, com: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Corners of a box around the body during the whole motion [m]."""
+    reach = np.array([0.55, 0.55, 1.05])
+    low, high = com.min(axis=0) - reach, com.max(axis=0) + reach
+    if record.schedule is not None:
+        soles = np.vstack([c.points_in_world for phase in record.schedule.sequence for c in phase.stance])
+        low = np.minimum(low, soles.min(axis=0) - 0.05)
+        low[2] = min(float(soles[:, 2].min()) - 0.05, float(com[:, 2].min()) - 0.3)
+        high = np.maximum(high, soles.max(axis=0) + 0.05)
+    return low, high
+
+
+MOST_TICKS = 9
+"""Ticks of the longest axis; the others have fewer."""
+
+
+def scene_figure(record: RunRecord, elevation_deg: float = 14.0, azimuth_deg: float = -62.0) -> Figure:
+    """Draw the CoM's path, the obstacles, the supports and the body ([Qiu2012]_ Fig. 5.21, 7.7, 7.8).
+
+    Args:
+        record: With a planned CoM, or at least one motion; body, scene and schedule are drawn
+            when they are there.
+        elevation_deg: Height of the eye above the horizon [deg].
+        azimuth_deg: Direction of the eye about the vertical [deg].
+
+    Raises:
+        FigureError: If there is nothing that moves.
+    """
+    name, track = list(need(record.tracks, "a motion of the centre of mass").items())[-1]
+    motion = record.motions.get(name)
+    figure = new_figure(9.5, 8.0, f"Motion in the scene ({name})")
+    axes: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
+    seen = [track.position]
+    corners = draw_scene(axes, record.scene) if record.scene is not None else np.zeros((0, 3))
+    if record.schedule is not None:
+        seen.append(draw_soles(axes, record.schedule))
+    figure_of = None if record.body is None or record.body.is_point_mass else record.body
+    if figure_of is not None and motion is not None:
+        seen.append(_draw_figures(axes, figure_of, motion, record.schedule))
+    elif record.schedule is not None:
+        _draw_legs(axes, track, record.schedule)
+    axes.plot(*track.position.T, color=COLOURS[name], linewidth=2.2, label="centre of mass", zorder=8)
+    if record.phases is not None:
+        places = track.at(record.phases.instants)
+        axes.scatter(
+            *places.T, s=18, color=COLOURS["ink"], zorder=9, depthshade=False, label="at the key instants"
+        )
+    frame(axes, np.vstack(seen), corners)
+    axes.view_init(elevation_deg, azimuth_deg)
+    if figure_of is not None and motion is not None:
+        _label_heads(axes, figure_of, motion, record.schedule)
+    axes.legend(loc="upper right", fontsize=8, frameon=False)
+    return figure
+
+
+def _draw_figures(
+    axes: Axes3D, body: BodyModel, motion: Motion, schedule: ContactSchedule | None
+) -> FloatArray:
+    instants = phases_of(motion, schedule).instants
+    samples = [int(np.argmin(np.abs(motion.time - instant))) for instant in instants]
+    postures = [segment_positions(body, motion.q[sample]) for sample in samples]
+    sticks = _sticks(body)
+    for number, places in enumerate(postures):
+        end = number in (0, len(postures) - 1)
+        axes.add_collection3d(
+            Line3DCollection(
+                [[places[first], places[second]] for first, second in sticks],
+                colors=[_stick_colour(first, second) for first, second in sticks],
+                linewidths=2.6 if end else 1.4,
+                alpha=0.95 if end else 0.3 + 0.3 * number / len(postures),
+                capstyle="round",
+                zorder=6,
+            )
+        )
+    return np.vstack([list(places.values()) for places in postures])
+
+
+def _draw_legs(axes: Axes3D, track: ComTrack, schedule: ContactSchedule) -> None:
+    """Join the point mass to the contacts held in the middle of each phase; thick where they are fewer."""
+    most = max(len(phase.stance) for phase in schedule.sequence)
+    colours = colours_of(schedule.sequence.effectors)
+    middles = (schedule.instants[:-1] + schedule.instants[1:]) / 2.0
+    for place, phase in zip(track.at(middles), schedule.sequence, strict=True):
+        if not len(phase.stance):
+            continue
+        legs = Line3DCollection(
+            [[place, contact.position] for contact in phase.stance],
+            colors=[colours[contact.effector] for contact in phase.stance],
+            linewidths=2.0 if len(phase.stance) < most else 0.8,
+            alpha=0.7,
+            zorder=6,
+        )
+        axes.add_collection3d(legs)
+
+
+def _label_heads(axes: Axes3D, body: BodyModel, motion: Motion, schedule: ContactSchedule | None) -> None:
+    """Write the time above each head, the ends first, leaving out what would overlap."""
+    instants = phases_of(motion, schedule).instants
+    projection = axes.get_proj()
+    taken: list[FloatArray] = []
+    for index in sorted(range(len(instants)), key=lambda i: (i not in (0, len(instants) - 1), i)):
+        sample = int(np.argmin(np.abs(motion.time - instants[index])))
+        head = segment_positions(body, motion.q[sample]).get("effector/head")
+        if head is None:
+            continue
+        seen = np.array(proj_transform(head[0], head[1], head[2], projection)[:2])
+        if any(np.all(np.abs(seen - other) < (0.008, 0.005)) for other in taken):
+            continue
+        taken.append(seen)
+        axes.text(
+            head[0], head[1], head[2] + 0.05, f"{instants[index]:.2f} s", fontsize=7.5, ha="center",
+            color=COLOURS["ink"], zorder=9, path_effects=[white_edge()],
+        )  # fmt: skip
+
+
+def _sticks(body: BodyModel) -> list[tuple[str, str]]:
+    """Pairs of joints to be joined: every segment with its parent, the hands' and the head's ends."""
+    sticks = [(segment.parent, segment.name) for segment in body.segments if segment.parent is not None]
+    free = [e for e in body.effectors.values() if "foot" not in e.name and e.segment != body.segments[0].name]
+    return sticks + [(effector.segment, f"effector/{effector.name}") for effector in free]
+
+
+def _stick_colour(start: str, end: str) -> str:
+    for side in ("left", "right"):
+        if side in start or side in end:
+            return COLOURS[f"{side}_foot"]
+    return COLOURS["ink"]
+
+
+def draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
+    """Draw every finite obstacle; return the corners of their bounds."""
+    corners = [np.zeros((0, 3))]
+    for obstacle in scene:
+        if isinstance(obstacle.shape, (HalfSpace, Plane)):
+            continue
+        faces = _box_faces(obstacle) if isinstance(obstacle.shape, Box) else _triangles(obstacle)
+        low, high = obstacle.bounds
+        axes.add_collection3d(
+            Poly3DCollection(
+                faces,
+                facecolor=COLOURS["obstacle"],
+                edgecolor="#8D94A0",
+                linewidths=0.6,
+                alpha=0.25,
+                zorder=2,
+            )
+        )
+        axes.text(high[0], low[1], high[2], f" {obstacle.name}", fontsize=8, color="#666C77", zorder=3)
+        corners.append(np.array([low, high]))
+    return np.vstack(corners)
+
+
+def _box_faces(obstacle: Obstacle) -> list[FloatArray]:
+    half = obstacle.shape.size / 2  # type: ignore[union-attr]
+    signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
+    corners = obstacle.to_world(signs * half)
+    quads = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    return [corners[list(quad)] for quad in quads]
+
+
+def _triangles(obstacle: Obstacle) -> FloatArray:
+    return np.asarray(obstacle.to_trimesh().triangles)
+
+
+def draw_soles(axes: Axes3D, schedule: ContactSchedule) -> FloatArray:
+    """Draw every contact of a schedule in three dimensions; return its points."""
+    contacts = distinct_contacts(schedule)
+    colours = colours_of(contact.effector for contact in contacts)
+    for contact in contacts:
+        colour = colours[contact.effector]
+        if len(contact.points) > 2:
+            sole = Poly3DCollection([contact.points_in_world], facecolor=colour, edgecolor=colour, alpha=0.4)
+            sole.set_zorder(4)
+            axes.add_collection3d(sole)
+        else:
+            axes.scatter(*contact.position, s=22, marker="s", color=colour, zorder=4, depthshade=False)
+    return np.vstack([contact.points_in_world for contact in contacts])
+
+
+def frame(axes: Axes3D, seen: FloatArray, corners: FloatArray) -> None:
+    """Limit the axes to the motion and to the obstacles within a metre of it."""
+    low, high = seen.min(axis=0) - 0.1, seen.max(axis=0) + 0.1
+    if len(corners):
+        low = np.minimum(low, np.maximum(corners.min(axis=0), low - 1.0))
+        high = np.maximum(high, np.minimum(corners.max(axis=0), high + 1.0))
+    low[2] = min(low[2] + 0.1, 0.0)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    longest = float(np.max(high - low) / np.linalg.norm(high - low))
+    zoom: Any = 1.16 * min(1.0, 0.85 / longest)  # the annotation says int, the function takes any number
+    axes.set_box_aspect(high - low, zoom=zoom)
+    spans = zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", (high - low) / (high - low).max(), strict=True)
+    for axis, name, share in spans:
+        axis.set_label_text(f"{name} [m]", fontsize=9)
+        axis.labelpad = 4.0 if longest < 0.85 else 12.0  # numbers along a long axis hang lower
+        axis.set_major_locator(MaxNLocator(max(round(MOST_TICKS * float(share)), 1)))
+        axis.set_tick_params(labelsize=7)
+        axis.pane.set_facecolor("#FAFBFC")
+        axis.pane.set_edgecolor("#D5D9DF")
+        axis._axinfo["grid"].update(color="#E3E6EA", linewidth=0.5)  # there is no public way

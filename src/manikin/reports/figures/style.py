@@ -1,0 +1,281 @@
+"""The common look of the figures: colours, axes, phase bands.
+
+Also here. Texts on axes that leave out what would cover an earlier one. Colours of groups of motions, and the
+entries of a legend for them.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.transforms import Bbox, Transform
+
+from manikin.errors import FigureError
+from manikin.pipeline.run_directory import RunRecord
+from manikin.runtime.palette import COLOURS, readable
+
+_WIDTH = 0.64
+"""Width of a character over the size of its font, of the widest digits."""
+
+_HEIGHT = 1.1
+"""Height of a line over the size of its font."""
+
+
+class Labels:
+    """Writes short texts on axes, each only where it covers none of those written before.
+
+    The limits of the axes have to be final, for they say how far apart two places are drawn.
+    """
+
+    def __init__(self, axes: Axes, transform: Transform | None = None) -> None:
+        """Begin without any text.
+
+        Args:
+            axes: To write on.
+            transform: From the places' coordinates to those of the display; of the data when omitted.
+        """
+        axes.apply_aspect()
+        self._axes, self._transform = axes, transform or axes.transData
+        self._point = axes.figure.dpi / 72.0
+        self._taken: list[Bbox] = []
+
+    def write(
+        self,
+        text: str,
+        place: tuple[float, float],
+        offset: tuple[float, float] = (0.0, 0.0),
+        *,
+        size: float = 7.5,
+        ha: str = "left",
+        **style: Any,
+    ) -> bool:
+        """Write a text unless it would cover another one.
+
+        Args:
+            text: One line.
+            place: What it belongs to.
+            offset: From there to the lower edge of the text [points].
+            size: Of the font [points].
+            ha: Horizontal alignment.
+            style: Passed on to Matplotlib, such as ``color``.
+
+        Returns:
+            Whether it was written.
+        """
+        corner = self._transform.transform(place) + self._point * np.asarray(offset)
+        width, height = self._point * size * np.array([_WIDTH * len(text), _HEIGHT])
+        left = corner[0] - {"left": 0.0, "center": 0.5, "right": 1.0}[ha] * width
+        box = Bbox.from_bounds(left, corner[1], width, height)
+        if any(box.overlaps(other) for other in self._taken):
+            return False
+        self._taken.append(box)
+        self._axes.annotate(
+            text, place, offset, xycoords=self._transform, textcoords="offset points", fontsize=size, ha=ha,
+            va="bottom", path_effects=[white_edge()], **style,
+        )  # fmt: skip
+        return True
+
+
+COLOURS_OF_GROUPS = (
+    "#6A51A3", "#D55E00", "#56B4E9", "#B59B00", "#8C564B", "#4D4D4D", "#E7298A", "#66A61E",
+)  # fmt: skip
+"""None is that of a foot; where there are more groups, colours come again."""
+
+FITTING = 6.0
+"""Characters of tick labels that stand side by side on an inch."""
+
+
+def group_colours(groups: Iterable[str]) -> dict[str, str]:
+    """A colour for each group, in the order in which they appear."""
+    count = len(COLOURS_OF_GROUPS)
+    return {group: COLOURS_OF_GROUPS[number % count] for number, group in enumerate(dict.fromkeys(groups))}
+
+
+def group_keys(colours: dict[str, str]) -> list[Patch]:
+    """Entries of a legend."""
+    return [Patch(color=colour, alpha=0.75, label=group) for group, colour in colours.items()]
+
+
+def legend_below_title(figure: Figure, keys: Sequence[Artist]) -> None:
+    """A legend in one row below the figure's title, which long names do not reach."""
+    figure.legend(
+        handles=list(keys), loc="upper left", ncols=len(keys), fontsize=8.5, frameon=False, borderaxespad=0.0,
+        bbox_to_anchor=(0.01, 1.0 - 0.36 / figure.get_figheight()), handlelength=1.6, columnspacing=1.2,
+    )  # fmt: skip
+
+
+def name_groups(axes: Axes, groups: Sequence[str]) -> None:
+    """Write the names of groups below their places 0, 1, ..., aslant where they are long."""
+    width = axes.get_position().width * axes.figure.get_figwidth()
+    axes.set_xticks(range(len(groups)), groups)
+    if sum(len(group) + 2 for group in groups) > FITTING * width * 2.0:
+        axes.tick_params(axis="x", labelsize=7, labelrotation=20)
+        for label in axes.get_xticklabels():
+            label.set_ha("right")
+    axes.set_xlim(-0.6, max(len(groups), 1) - 0.4)
+
+
+STYLES: dict[str, dict[str, Any]] = {
+    "recorded": {"color": COLOURS["recorded"], "linewidth": 1.6, "zorder": 2.8},
+    "planned point mass": {"color": "#8A8A8A", "linewidth": 1.2, "zorder": 2.5},
+    "planned": {"color": COLOURS["planned"], "linewidth": 2.4, "zorder": 3},
+    "executed": {"color": COLOURS["executed"], "linewidth": 0.9, "zorder": 4},
+}
+DPI = 150
+
+T = TypeVar("T")
+
+
+def new_figure(width: float, height: float, title: str) -> Figure:
+    """Figure of the given size [inch] with its own canvas, no window and no global state."""
+    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=12, fontweight="bold", color=COLOURS["ink"], x=0.01, ha="left")
+    return figure
+
+
+def new_grid(
+    width: float,
+    height: float,
+    title: str,
+    rows: int,
+    columns: int,
+    *,
+    left: float = 0.65,
+    right: float = 0.15,
+    top: float = 0.5,
+    bottom: float = 0.5,
+    across: float = 0.6,
+    between: float = 0.3,
+    **ratios: Any,
+) -> tuple[Figure, GridSpec]:
+    """Figure of the given size [inch] whose grid has known margins, which takes half the time to draw.
+
+    Args:
+        width: Of the figure [inch].
+        height: Of the figure [inch].
+        title: Of the figure.
+        rows: Of the grid.
+        columns: Of the grid.
+        left: Margin for labels [inch].
+        right: Margin [inch].
+        top: Margin for the title [inch].
+        bottom: Margin for labels [inch].
+        across: Gap between columns [inch].
+        between: Gap between rows [inch].
+        ratios: ``width_ratios``, ``height_ratios``.
+    """
+    figure = new_figure(width, height, title)
+    figure.set_layout_engine("none")
+    figure.suptitle(title, y=1.0 - 0.1 / height, va="top", x=0.01, ha="left", fontweight="bold")
+    one_width = (width - left - right - across * (columns - 1)) / columns
+    one_height = (height - top - bottom - between * (rows - 1)) / rows
+    grid = figure.add_gridspec(
+        rows, columns, left=left / width, right=1.0 - right / width, top=1.0 - top / height,
+        bottom=bottom / height, wspace=across / one_width, hspace=between / one_height, **ratios,
+    )  # fmt: skip
+    return figure, grid
+
+
+def label_room(effectors: Iterable[str]) -> float:
+    """Room that the names of effectors need beside a strip [inch]."""
+    return max([0.65, *(0.12 + 0.072 * len(name) for name in effectors)])
+
+
+def dress(axes: Axes, ylabel: str = "", xlabel: str = "", title: str = "") -> None:
+    """Give axes their labels and a quiet frame."""
+    axes.set_ylabel(ylabel, fontsize=9)
+    axes.set_xlabel(xlabel, fontsize=9)
+    if title:
+        axes.set_title(title, fontsize=10, loc="left", color=COLOURS["ink"])
+    axes.tick_params(labelsize=8, color=COLOURS["soft"])
+    axes.locator_params(axis="y", nbins=5)  # ticks are what takes most of the drawing time
+    axes.grid(True, color="#E3E3E3", linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(COLOURS["soft"])
+
+
+def support_colour(count: int) -> str:
+    """Colour of a phase with this many supports."""
+    return COLOURS[("one support", "one support", "two supports")[count] if count < 3 else "more supports"]
+
+
+def support_words(count: int) -> str:
+    """Words for a phase with this many supports."""
+    return ("flight", "one support", "two supports", "three or more")[min(count, 3)]
+
+
+def support_keys(counts: Iterable[int]) -> list[Patch]:
+    """Entries of a legend for the colours of phases with these numbers of supports."""
+    return [
+        Patch(color=support_colour(count), alpha=0.8, label=support_words(count))
+        for count in sorted({min(count, 3) for count in counts})
+    ]
+
+
+def named_below(effectors: Iterable[str]) -> str:
+    """The supports of a phase below each other, for the label of a bar."""
+    return "\n".join(readable(name) for name in effectors) or "flight"
+
+
+def need(value: T | None, what: str) -> T:
+    """The value, or a refusal to draw.
+
+    Raises:
+        FigureError: If there is none.
+    """
+    if not value:
+        raise FigureError(f"this figure needs {what}, which the run does not have; valid: a run with it")
+    return value
+
+
+def end_of(record: RunRecord) -> float:
+    """Last instant that a motion or a phase reaches [s]."""
+    ends = [float(track.time[-1]) for track in record.tracks.values()]
+    return max([*ends, *([] if record.phases is None else [float(record.phases.instants[-1])])])
+
+
+def span_at_least(axes: Axes, least: float) -> None:
+    """Widen the vertical limits to ``least`` about their middle, so that noise is not magnified."""
+    low, high = axes.get_ylim()
+    if high - low < least:
+        axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+
+
+def white_edge() -> withStroke:
+    """Path effect that keeps a text readable on top of lines."""
+    return withStroke(linewidth=2.5, foreground="white")
+
+
+def legend_above(axes: Axes) -> None:
+    """A legend in one row above the right end of the axes, where it hides nothing."""
+    axes.legend(
+        fontsize=8,
+        frameon=False,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.1,
+        ncols=len(axes.get_legend_handles_labels()[0]),
+        handlelength=1.6,
+        columnspacing=1.4,
+    )
+
+
+def legend_in_title(figure: Figure, *axes: Axes) -> None:
+    """A legend of ``axes`` in one row at the height of the figure's title."""
+    entries = [entry for one in axes for entry in zip(*one.get_legend_handles_labels(), strict=True)]
+    handles, labels = [handle for handle, _ in entries], [label for _, label in entries]
+    figure.legend(
+        handles, labels, fontsize=8.5, frameon=False, loc="upper right", ncols=len(labels), borderaxespad=0.3,
+        handlelength=1.6, columnspacing=1.2,
+    )  # fmt: skip

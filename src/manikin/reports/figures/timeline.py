@@ -1,0 +1,371 @@
+"""Panels over time below a strip that shows which contacts are held.
+
+Also here. How long each phase lasts, and when the supports are really loaded. The stability margin in time.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from manikin.contact import ContactSchedule
+from manikin.motion import Motion
+from manikin.motion.motion import PhaseTable
+from manikin.pipeline.run_directory import ComTrack, RunRecord
+from manikin.reports.figures.style import (
+    STYLES,
+    Labels,
+    dress,
+    end_of,
+    label_room,
+    legend_in_title,
+    named_below,
+    need,
+    new_grid,
+    support_colour,
+    support_keys,
+)
+from manikin.runtime.palette import COLOURS, colours_of, readable
+
+AT_LIMIT = 1e-3
+"""A duration this close to its bound is at it [s]."""
+
+_NAME_SIZE = 6.5
+"""Font of the names below the bars [points]."""
+
+
+def timing_figure(record: RunRecord) -> Figure:
+    """Draw the durations of the phases with their bounds, and the supports in time ([Qiu2012]_ Fig. 5.16).
+
+    Args:
+        record: With a schedule; loaded contacts are drawn when there is an execution.
+
+    Raises:
+        FigureError: If there is no schedule.
+    """
+    schedule = need(record.schedule, "a contact schedule")
+    phases = need(record.phases, "phases")
+    executed = record.motions.get("executed")
+    rows = 0.4 * len(record.effectors)
+    most = max(len(phase.stance) for phase in schedule.sequence)
+    figure, grid = new_grid(
+        _width(schedule), 4.0 + 0.13 * most + rows, "Timing of the phases", 2, 1,
+        left=label_room(record.effectors), top=0.7, between=0.6 + 0.13 * most, height_ratios=[2.2, rows],
+    )  # fmt: skip
+    _draw_durations(figure.add_subplot(grid[0]), schedule)
+    axes = figure.add_subplot(grid[1])
+    end = end_of(record)
+    draw_phases(axes, phases, end)
+    colours = colours_of(record.effectors)
+    for row, name in enumerate(record.effectors):
+        bars = _bars(schedule, name, end)
+        axes.broken_barh(bars, (row + 0.12, 0.40), facecolors=colours[name], alpha=0.9)
+        if executed is not None and name in executed.contact_names:
+            axes.broken_barh(
+                _loaded(executed, name), (row + 0.56, 0.26), facecolors=COLOURS["ink"], alpha=0.75
+            )
+    axes.set_yticks(np.arange(len(record.effectors)) + 0.5, [readable(n) for n in record.effectors])
+    axes.set_ylim(len(record.effectors), 0.0)
+    note = "planned supports (wide bars) and loaded contacts of the execution (narrow bars)"
+    dress(axes, "", "time [s]", note if executed is not None else "planned supports")
+    axes.grid(False)
+    return figure
+
+
+def _draw_durations(axes: Axes, schedule: ContactSchedule) -> None:
+    durations = schedule.durations
+    for number, (phase, duration) in enumerate(zip(schedule.sequence, durations, strict=True)):
+        least, most = phase.min_duration, phase.max_duration
+        at_limit = duration <= least + AT_LIMIT
+        axes.bar(number, duration, width=0.62, color=support_colour(len(phase.stance)), alpha=0.8,
+                 hatch="///" if at_limit else None, edgecolor="white", linewidth=0.0)  # fmt: skip
+        for bound, style in ((least, "solid"), (most, "dotted")):
+            if bound is not None and bound < 3.0 * float(durations.max()):
+                axes.hlines(bound, number - 0.38, number + 0.38, color=COLOURS["ink"], linewidth=1.2,
+                            linestyle=style, zorder=4)  # fmt: skip
+        axes.annotate(f"{duration:.2f}", (number, max(duration, least)), (0, 3), textcoords="offset points",
+                      ha="center", fontsize=8)  # fmt: skip
+    named = [f"{n}\n{named_below(phase.stance.effectors)}" for n, phase in enumerate(schedule.sequence)]
+    axes.set_xticks(range(len(durations)), named)
+    dress(axes, "duration [s]", "", f"total {float(durations.sum()):.2f} s")
+    axes.tick_params(axis="x", labelsize=_NAME_SIZE)
+    axes.set_xlim(-0.6, len(durations) - 0.4)
+    axes.set_ylim(0.0, 1.14 * max(float(durations.max()), max(p.min_duration for p in schedule.sequence)))
+    axes.grid(False, axis="x")
+    axes.legend(handles=_keys(schedule), fontsize=8, frameon=False, loc="lower right",
+                bbox_to_anchor=(1.0, 1.0), ncols=6, borderaxespad=0.1)  # fmt: skip
+
+
+def _keys(schedule: ContactSchedule) -> list[Patch | Line2D]:
+    keys = support_keys(len(phase.stance) for phase in schedule.sequence)
+    shortest = Patch(facecolor=COLOURS["soft"], hatch="///", edgecolor="white", label="as short as allowed")
+    ink = COLOURS["ink"]
+    bounds = [Line2D([], [], color=ink, linewidth=1.2, label="shortest allowed")]
+    if any(phase.max_duration is not None for phase in schedule.sequence):
+        bounds.append(Line2D([], [], color=ink, linewidth=1.2, linestyle="dotted", label="longest allowed"))
+    return [*keys, shortest, *bounds]
+
+
+def _width(schedule: ContactSchedule) -> float:
+    """Width of the figure [inch] at which the names below neighbouring bars keep apart."""
+    effectors = schedule.sequence.effectors
+    one = _NAME_SIZE / 72.0 * (0.5 * max((len(name) for name in effectors), default=0) + 1.0)
+    return max(11.0, label_room(effectors) + len(schedule.sequence) * one)
+
+
+def _bars(schedule: ContactSchedule, name: str, end: float) -> list[tuple[float, float]]:
+    stops = np.append(schedule.instants[1:-1], end)
+    return [
+        (float(start), float(stop - start))
+        for start, stop, phase in zip(schedule.instants[:-1], stops, schedule.sequence, strict=True)
+        if name in phase.stance
+    ]
+
+
+def _loaded(motion: Motion, name: str) -> list[tuple[float, float]]:
+    """Start and length of each interval in which the contact presses."""
+    on = np.concatenate([[False], motion.support[:, motion.contact_names.index(name)], [False]])
+    starts, stops = np.flatnonzero(on[1:] & ~on[:-1]), np.flatnonzero(on[:-1] & ~on[1:])
+    last = len(motion.time) - 1
+    return [
+        (float(motion.time[a]), float(motion.time[min(b, last)] - motion.time[a]))
+        for a, b in zip(starts, stops, strict=True)
+    ]
+
+
+POINT_MASS = "planned point mass"
+ZOOM_FROM = 5.0
+"""A second panel shows the lower part when some phase peaks this many times higher than another."""
+
+ZOOM = 2.5
+"""Height of that panel over the smallest peak of a phase."""
+
+
+def margin_figure(record: RunRecord) -> Figure:
+    """Draw the margins with the minimum of each phase ([Qiu2012]_ Fig. 5.13, 5.16, 5.23, 7.9).
+
+    Args:
+        record: With a planned CoM, or at least one motion.
+
+    Raises:
+        FigureError: If it has neither.
+    """
+    curves = need(margin_curves(record), "a motion of the centre of mass")
+    phases = need(record.phases, "phases")
+    units = list(dict.fromkeys(curve.margin_unit for curve in curves.values()))
+    panels: list[tuple[str, float | None]] = [(unit, None) for unit in units]
+    ceiling = _zoom_ceiling(curves, phases)
+    if len(units) == 1 and ceiling is not None:
+        panels.append((units[0], ceiling))
+    size = 13.5, 4.8 + 2.6 * (len(panels) - 1)
+    drawing = timeline(record, size, "Stability margin", len(panels), strip=0.075, between=0.15)
+    drawing.strip()
+    for row, (unit, top) in enumerate(panels):
+        axes = drawing.panel(row + 1)
+        shown = {name: curve for name, curve in curves.items() if curve.margin_unit == unit}
+        _draw_curves(axes, shown, phases, top)
+        zoomed = "" if top is None else ", lower part"
+        drawing.label(axes, f"margin{zoomed} [{unit}]")
+    legend_in_title(drawing.figure, *drawing.figure.axes[1 : 1 + len(units)])
+    return drawing.figure
+
+
+def margin_curves(record: RunRecord) -> dict[str, ComTrack]:
+    """Margins by name: of the planned point mass, then of each whole-body motion."""
+    if not record.motions:
+        return dict(record.tracks)
+    curves = {} if record.plan is None else {POINT_MASS: record.plan}
+    return {**curves, **record.tracks}
+
+
+def phase_minima(curve: ComTrack, phases: PhaseTable) -> list[int | None]:
+    """Sample with the smallest margin of each phase, None where the curve has no sample."""
+    inside = phases.phase_at(curve.time)
+    found: list[int | None] = []
+    for phase in range(len(phases)):
+        samples = np.flatnonzero(inside == phase)
+        found.append(int(samples[np.argmin(curve.margin[samples])]) if len(samples) else None)
+    return found
+
+
+def _zoom_ceiling(curves: dict[str, ComTrack], phases: PhaseTable) -> float | None:
+    """Upper end of the zoomed panel, or None when one panel shows everything well."""
+    peaks = [
+        float(curve.margin[phases.phase_at(curve.time) == phase].max(initial=-np.inf))
+        for curve in curves.values()
+        for phase in range(len(phases))
+    ]
+    lowest = min((peak for peak in peaks if peak > 0.0), default=0.0)
+    return ZOOM * lowest if lowest > 0.0 and max(peaks) > ZOOM_FROM * lowest else None
+
+
+def _draw_curves(axes: Axes, curves: dict[str, ComTrack], phases: PhaseTable, top: float | None) -> None:
+    axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
+    for name, curve in curves.items():
+        label = f"{name} ({_lowest(curve, phases)})"
+        axes.plot(curve.time, curve.margin, label=label, **STYLES[name])
+    low = min(0.0, *(float(curve.margin.min()) for curve in curves.values()))
+    high = max(float(curve.margin.max()) for curve in curves.values()) if top is None else top
+    low = low if top is None else max(low, -top)
+    axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
+    labels = Labels(axes)
+    for name, curve in curves.items():
+        if name != POINT_MASS:
+            _mark_minima(axes, labels, curve, phases, name, top)
+
+
+def _lowest(curve: ComTrack, phases: PhaseTable) -> str:
+    index = int(np.argmin(curve.margin))
+    phase = int(phases.phase_at(curve.time[index : index + 1])[0])
+    where = f"in phase {phase}" if curve.time[index] <= phases.instants[-1] else "at rest"
+    return f"lowest {curve.margin[index]:.1f} {curve.margin_unit} {where}, {curve.time[index]:.2f} s"
+
+
+def _mark_minima(
+    axes: Axes, labels: Labels, curve: ComTrack, phases: PhaseTable, name: str, top: float | None
+) -> None:
+    """Mark the least margin of each phase, numbered where there is room, and ring the least of all."""
+    found = [index for index in phase_minima(curve, phases) if index is not None]
+    offset = (0.0, -11.0 if name == "executed" else 4.0)
+    for index in sorted(found, key=lambda index: curve.margin[index]):
+        time, margin = float(curve.time[index]), float(curve.margin[index])
+        if top is not None and margin > top:
+            continue
+        axes.plot(time, margin, "o", markersize=3.5, color=COLOURS[name], zorder=5)
+        labels.write(
+            f"{margin:.0f}", (time, margin), offset, size=7, ha=_alignment(time, phases), color=COLOURS[name],
+            zorder=6,
+        )  # fmt: skip
+    index = int(np.argmin(curve.margin))
+    axes.plot(
+        curve.time[index], curve.margin[index], "o", markersize=9, markerfacecolor="none",
+        markeredgecolor=COLOURS[name], markeredgewidth=1.4, zorder=6,
+    )  # fmt: skip
+
+
+def _alignment(time: float, phases: PhaseTable) -> str:
+    """Alignment of a label that keeps it inside the axes."""
+    first, last = float(phases.instants[0]), float(phases.instants[-1])
+    edge = 0.01 * (last - first)
+    return "left" if time < first + edge else "right" if time > last - edge else "center"
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """A figure whose first row shows the contacts and whose other rows are panels over time.
+
+    Attributes:
+        figure: The figure.
+        grid: Its grid; the strips stand in row 0.
+        phases: The phases, shaded in every panel.
+        end: Last instant that is shown [s].
+    """
+
+    figure: Figure
+    grid: GridSpec
+    phases: PhaseTable
+    end: float
+
+    def strip(self, column: int = 0, title: str = "", *, named: bool = True) -> None:
+        """Draw the contacts over the panels of a column, with the names of the effectors beside them."""
+        axes = self.figure.add_subplot(self.grid[0, column])
+        draw_contact_strip(axes, self.phases, self.end)
+        if title:
+            axes.set_title(title, fontsize=10, loc="left", pad=15)
+        if not named:
+            axes.set_yticklabels([])
+
+    def panel(self, row: int, column: int = 0) -> Axes:
+        """Axes over time with the phases shaded; ``row`` counts from 1, below the strip."""
+        axes = self.figure.add_subplot(self.grid[row, column])
+        draw_phases(axes, self.phases, self.end)
+        return axes
+
+    def label(self, axes: Axes, ylabel: str) -> None:
+        """Dress a panel; only the lowest one of its column has times below it."""
+        place = axes.get_subplotspec()
+        lowest = place is not None and place.is_last_row()
+        dress(axes, ylabel, "time [s]" if lowest else "")
+        axes.tick_params(labelbottom=lowest)
+
+
+def timeline(
+    record: RunRecord,
+    size: tuple[float, float],
+    title: str,
+    panels: int,
+    columns: int = 1,
+    *,
+    strip: float = 0.1,
+    **margins: Any,
+) -> Timeline:
+    """Make the figure and its grid; the strips and panels are drawn when asked for.
+
+    Args:
+        record: With phases.
+        size: Width and height of the figure [inch].
+        title: Of the figure.
+        panels: Rows of panels below the strip.
+        columns: Of strips and panels.
+        strip: Height of the strip for each effector, relative to that of a panel.
+        margins: Of :func:`manikin.reports.figures.style.new_grid`.
+
+    Raises:
+        FigureError: If the record has no phases.
+    """
+    phases = need(record.phases, "phases")
+    heights = [strip * max(len(record.effectors), 2)] + [1.0] * panels
+    margins = {"left": label_room(record.effectors), **margins}
+    figure, grid = new_grid(*size, title, 1 + panels, columns, height_ratios=heights, **margins)
+    return Timeline(figure, grid, phases, end_of(record))
+
+
+def draw_phases(axes: Axes, phases: PhaseTable, end: float) -> None:
+    """Shade single supports and draw a line at every key instant; time runs to ``end`` [s]."""
+    for start, stop, supports in _spans(phases, end):
+        if len(supports) <= 1:
+            axes.axvspan(start, stop, color=COLOURS["shade"], zorder=0, linewidth=0)
+    for instant in phases.instants:
+        axes.axvline(float(instant), color="#B9BEC6", linewidth=0.7, linestyle=(0, (4, 3)), zorder=1)
+    axes.set_xlim(float(phases.instants[0]), end)
+
+
+def draw_contact_strip(axes: Axes, phases: PhaseTable, end: float) -> None:
+    """One bar per effector while it is in contact, and the numbers of the phases, from 0, above."""
+    effectors = list(dict.fromkeys(name for supports in phases.supports for name in supports))
+    colours = colours_of(effectors)
+    for row, effector in enumerate(effectors):
+        bars = [(start, stop - start) for start, stop, on in _spans(phases, end) if effector in on]
+        axes.broken_barh(bars, (row + 0.15, 0.7), facecolors=colours[effector], alpha=0.85)
+    axes.set_yticks(np.arange(len(effectors)) + 0.5, [readable(name) for name in effectors], fontsize=8)
+    axes.set_ylim(len(effectors) + 0.05, 0.0)
+    axes.set_xlim(float(phases.instants[0]), end)
+    axes.tick_params(length=0, labelbottom=False)
+    axes.set_xticks([])
+    for side in ("top", "right", "left", "bottom"):
+        axes.spines[side].set_visible(False)
+    _number_phases(axes, phases, end)
+
+
+def _number_phases(axes: Axes, phases: PhaseTable, end: float) -> None:
+    """Number the phases above a strip where there is room, the long ones first."""
+    labels = Labels(axes)
+    order = np.argsort(-np.diff(phases.instants), kind="stable")
+    for number in order:
+        middle = float(phases.instants[number : number + 2].mean())
+        labels.write(f"{number}", (middle, 0.0), (0.0, 2.0), size=8, ha="center", color=COLOURS["ink"])
+    if end > phases.instants[-1] + 0.2:
+        middle = (float(phases.instants[-1]) + end) / 2
+        labels.write("rest", (middle, 0.0), (0.0, 2.0), size=8, ha="center", color=COLOURS["soft"])
+
+
+def _spans(phases: PhaseTable, end: float) -> list[tuple[float, float, tuple[str, ...]]]:
+    """Start, end and supports of each phase; the last one lasts until ``end``."""
+    stops = [*(float(t) for t in phases.instants[1:-1]), max(end, float(phases.instants[-1]))]
+    starts = [float(t) for t in phases.instants[:-1]]
+    return list(zip(starts, stops, phases.supports, strict=True))

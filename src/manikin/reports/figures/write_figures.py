@@ -1,0 +1,142 @@
+"""Writing every figure that a run has the data for."""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from io import BytesIO
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from manikin.errors import FigureError
+from manikin.pipeline.run_directory import RunRecord
+from manikin.reports.comparison import RunComparison
+from manikin.reports.figures.com import com_figure, planes_figure
+from manikin.reports.figures.compare_runs import (
+    compare_margin_figure,
+    compare_planes_figure,
+    compare_postures_figure,
+    compare_scene_figure,
+    compare_timing_figure,
+)
+from manikin.reports.figures.contacts import contacts_figure
+from manikin.reports.figures.effectors import effectors_figure, flights_figure, tracking_figure
+from manikin.reports.figures.ground import footprint_figure, zmp_figure
+from manikin.reports.figures.scene import postures_figure, scene_figure
+from manikin.reports.figures.timeline import margin_figure, timing_figure
+from manikin.reports.figures.walks import walk_paths_figure
+from manikin.runtime.files import atomic_path, writing
+
+FIGURES: dict[str, Callable[[RunRecord], Figure]] = {
+    "com": com_figure,
+    "margin": margin_figure,
+    "footprints": footprint_figure,
+    "walk_paths": walk_paths_figure,
+    "zmp": zmp_figure,
+    "planes": planes_figure,
+    "contacts": contacts_figure,
+    "timing": timing_figure,
+    "scene": scene_figure,
+    "postures": postures_figure,
+    "flights": flights_figure,
+    "effectors": effectors_figure,
+    "tracking": tracking_figure,
+}
+"""Every figure of a run by the name of its file."""
+
+
+COMPARISONS: dict[str, Callable[[RunComparison], Figure]] = {
+    "compare_timing": compare_timing_figure,
+    "compare_planes": compare_planes_figure,
+    "compare_scene": compare_scene_figure,
+    "compare_margin": compare_margin_figure,
+    "compare_postures": compare_postures_figure,
+}
+"""Every figure of two runs by the name of its file."""
+
+T = TypeVar("T")
+
+
+def write_figures(
+    record: RunRecord, folder: str | Path, on_done: Callable[[float], None] | None = None
+) -> list[Path]:
+    """Draw the figures that apply and write them as PNG files, each atomically.
+
+    A figure that the run has no data for (no execution, no hand, a wall) is left out.
+
+    Args:
+        record: A run.
+        folder: Existing folder.
+        on_done: Told the share of figures done after each.
+
+    Returns:
+        The files written.
+
+    Raises:
+        MotionFileError: If the folder cannot be written to.
+    """
+    return _write(FIGURES, record, Path(folder), on_done)
+
+
+def write_comparison(
+    comparison: RunComparison, folder: str | Path, on_done: Callable[[float], None] | None = None
+) -> list[Path]:
+    """Draw the figures of two runs that apply, as :func:`write_figures` does for one.
+
+    Raises:
+        MotionFileError: If the folder cannot be written to.
+    """
+    return _write(COMPARISONS, comparison, Path(folder), on_done)
+
+
+def comparison_pictures(comparison: RunComparison) -> dict[str, bytes]:
+    """PNG files of the figures of two runs that apply, by what they show."""
+    found = {}
+    for name, draw in COMPARISONS.items():
+        with suppress(FigureError):
+            found[name.replace("_", " ")] = png_of(draw(comparison))
+    return found
+
+
+def _write(
+    figures: Mapping[str, Callable[[T], Figure]],
+    data: T,
+    folder: Path,
+    on_done: Callable[[float], None] | None,
+) -> list[Path]:
+    written = []
+    for number, (name, draw) in enumerate(figures.items()):
+        try:
+            figure = draw(data)
+        except FigureError:
+            figure = None
+        if figure is not None:
+            path = folder / f"{name}.png"
+            save_figure(figure, path)
+            written.append(path)
+        if on_done is not None:
+            on_done((number + 1) / len(figures))
+    return written
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure as a PNG file, atomically.
+
+    Raises:
+        MotionFileError: If it cannot be written.
+    """
+    with writing(path), atomic_path(path) as temporary:
+        temporary.write_bytes(png_of(figure))
+
+
+def png_of(figure: Figure) -> bytes:
+    """Content of a PNG file."""
+    # One drawing instead of the two of savefig; and the same data gives the same bytes.
+    canvas, content = FigureCanvasAgg(figure), BytesIO()
+    canvas.draw()
+    image = Image.fromarray(np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[..., :3]))
+    image.save(content, format="png", compress_level=4, dpi=(figure.dpi, figure.dpi))
+    return content.getvalue()

@@ -1,0 +1,180 @@
+"""Writing files so that nobody ever sees half of one.
+
+Content goes to a hidden temporary file in the same folder, is flushed to the disk and
+then renamed over the target, which the operating system does in one step.  An
+interruption, even a kill, leaves the old file or none; after a kill a ``.NAME.*.tmp``
+file may remain.
+
+Also here. Directories of results: taken over or refused, and written so that an interruption leaves whole
+files.
+"""
+
+import json
+import math
+import os
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from manikin.errors import MotionFileError
+
+FIGURES = "figures"
+
+
+class ResultDirectory:
+    """Directory of one kind of result, told from others by a file that each of them has.
+
+    Attributes:
+        path: The directory.
+        kind: What the result is called in messages, such as ``"run"``.
+        marks: Files of which every such directory has one; the first is named in messages.
+    """
+
+    kind: ClassVar[str]
+    marks: ClassVar[tuple[str, ...]]
+
+    def __init__(self, path: str | Path) -> None:
+        """Create the directory, or take over that of an earlier result of the same kind.
+
+        Raises:
+            MotionFileError: If it cannot be created, or holds something else.
+        """
+        self.path = Path(path)
+        if self.path.exists() and not self.path.is_dir():
+            raise MotionFileError(f"{self.path}: is a file; valid: a directory for the {self.kind}")
+        make_directory(self.path)
+        content = sorted(item.name for item in self.path.iterdir() if not item.name.startswith("."))
+        if content and not set(self.marks) & set(content):
+            raise MotionFileError(
+                f"{self.path}: holds {content[0]!r} but no {self.marks[0]}, so it is not an earlier "
+                f"{self.kind}; valid: a new or empty directory, or one of an earlier {self.kind}"
+            )
+        # What a killed process was about to write stays behind as a hidden .NAME.*.tmp file.
+        self.remove(".*.tmp", "*/.*.tmp")
+
+    @property
+    def figures(self) -> Path:
+        """Folder of the figures, created when asked for."""
+        return self.folder(FIGURES)
+
+    def folder(self, name: str) -> Path:
+        """Folder inside the directory, created when asked for."""
+        folder = self.path / name
+        make_directory(folder)
+        return folder
+
+    def write(self, name: str, content: str | Mapping[str, Any]) -> Path:
+        """Write a file atomically.
+
+        Args:
+            name: Of the file, relative to the directory.
+            content: Text, or plain values and arrays that become JSON.
+
+        Raises:
+            MotionFileError: If it cannot be written.
+        """
+        return write_result(self.path / name, content)
+
+    def remove(self, *patterns: str) -> None:
+        """Remove files by their patterns.
+
+        Raises:
+            MotionFileError: If the directory cannot be written to.
+        """
+        with writing(self.path):
+            for pattern in patterns:
+                for file in self.path.glob(pattern):
+                    file.unlink()
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Context in which an error of the system becomes the message that ``path`` cannot be written.
+
+    Raises:
+        MotionFileError: If the system reports an error.
+    """
+    try:
+        yield
+    except OSError as error:
+        problem = f"{path}: cannot be written ({error.strerror or error})"
+        raise MotionFileError(f"{problem}; valid: in a writable directory") from None
+
+
+def write_result(path: str | Path, content: str | Mapping[str, Any]) -> Path:
+    """Write a text, or plain values as JSON, atomically.
+
+    Raises:
+        MotionFileError: If it cannot be written.
+    """
+    with writing(Path(path)):
+        write_text(path, content if isinstance(content, str) else to_json(content) + "\n")
+    return Path(path)
+
+
+def make_directory(path: Path) -> None:
+    """Create a directory, and those above it, unless it is there.
+
+    Raises:
+        MotionFileError: If it cannot be created.
+    """
+    with writing(path):
+        path.mkdir(parents=True, exist_ok=True)
+
+
+def to_json(value: Any, indent: int | None = 2) -> str:
+    """JSON text of plain values and numpy arrays; NaN and infinity, which JSON lacks, become null."""
+    return json.dumps(_plain(value), indent=indent, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+@contextmanager
+def atomic_path(path: str | Path) -> Iterator[Path]:
+    """Context that yields a temporary path; what is written there replaces ``path`` on success.
+
+    Args:
+        path: The file to be written; its folder must exist. A symbolic link is followed.
+
+    Raises:
+        OSError: If the folder cannot be written to.
+    """
+    target = Path(path).resolve()
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        yield temporary
+        _flush(temporary)
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write ``text`` in UTF-8 with Unix line ends, atomically.
+
+    Raises:
+        OSError: If the folder cannot be written to.
+    """
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _flush(path: Path) -> None:
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())

@@ -1,0 +1,243 @@
+"""Section of a scenario file: the sequence of supports.
+
+Also here. Section of a scenario file: the contacts of one phase. Sections of a scenario or stance file: one
+contact.
+"""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+
+from manikin.scenarios.validation import (
+    Duration,
+    FrameMoves,
+    NonNegative,
+    Number,
+    Positive,
+    Section,
+    Vector3,
+    refuse,
+    rule_error,
+)
+
+_KIND_KEYS: dict[str, tuple[str, ...]] = {
+    "sole": ("normal", "sole", "friction", "normal_force_cap_N", "torsion_limit_Nm", "settle_s"),
+    "point": ("normal", "friction", "normal_force_cap_N"),
+    "grasp": ("max_force_N", "planning_max_force_N", "max_moment_Nm", "rpy_deg"),
+}
+"""Keys of a contact that only some kinds have."""
+
+
+class SoleSection(Section):
+    """A rectangular sole."""
+
+    length_m: Positive = Field(description="along the toes' direction [m]")
+    width_m: Positive = Field(description="across it [m]")
+
+
+class ContactSection(Section):
+    """One contact; what it leaves out comes from the section around it."""
+
+    kind: Literal["sole", "point", "grasp"] | None = Field(
+        default=None, description="default: sole for a foot, grasp for a hand"
+    )
+    position: Annotated[Vector3, FrameMoves.POINT] = Field(
+        description="of the contact (centre of a sole) in the world [m]"
+    )
+    yaw_deg: Annotated[Number, FrameMoves.HEADING] = Field(
+        default=0.0,
+        description="heading of the toes, or of the axes of a point's friction, counter-clockwise from "
+        "world x [deg]",
+    )
+    normal: Annotated[Vector3 | None, FrameMoves.DIRECTION] = Field(
+        default=None, description="surface normal, into the body (default up)"
+    )
+    rpy_deg: Annotated[Vector3 | None, FrameMoves.ORIENTATION] = Field(
+        default=None, description="orientation of a grasping hand [deg]"
+    )
+    sole: SoleSection | None = Field(default=None, description="size of this sole")
+    friction: Positive | None = Field(default=None, description="Coulomb coefficient")
+    normal_force_cap_N: Positive | None = Field(
+        default=None, description="largest normal force of this contact [N]"
+    )
+    torsion_limit_Nm: Positive | None = Field(
+        default=None, description="largest moment about the normal [N.m]"
+    )
+    settle_s: NonNegative | None = Field(
+        default=None, description="time after the touch-down in which it may still slide to its place [s]"
+    )
+    max_force_N: Positive | None = Field(
+        default=None,
+        description="grasp: largest force along each axis of the world, in a scenario of the task frame [N]",
+    )
+    planning_max_force_N: Positive | None = Field(
+        default=None, description="grasp: smaller limit that planning balances with (default: max_force_N)"
+    )
+    max_moment_Nm: NonNegative | None = Field(
+        default=None, description="grasp: largest moment per axis [N.m]"
+    )
+
+    @field_validator("normal")
+    @classmethod
+    def _nonzero(cls, normal: Any) -> Any:
+        if normal is not None and not any(normal):
+            raise rule_error("a direction that is not zero")
+        return normal
+
+    def kind_for(self, effector: str) -> str:
+        """Kind of the contact when ``effector`` makes it."""
+        return self.kind or ("grasp" if "hand" in effector else "sole")
+
+    def check_for(self, effector: str, path: str = "") -> None:
+        """Refuse keys that the contact's kind does not have.
+
+        Raises:
+            PydanticCustomError: Naming the key under ``path``.
+        """
+        kind = self.kind_for(effector)
+        for key in sorted({key for keys in _KIND_KEYS.values() for key in keys} - {*_KIND_KEYS[kind]}):
+            if getattr(self, key) is not None:
+                valid = ", ".join(("kind", "position", "yaw_deg", *_KIND_KEYS[kind]))
+                raise refuse(f"{path}{key}", f"does not belong to a {kind}; valid: {valid}")
+        if kind == "grasp" and self.max_force_N is None:
+            raise refuse(f"{path}max_force_N", "is missing; valid: a number > 0 [N] for a grasp")
+
+
+EFFECTORS = ("left_foot", "right_foot", "left_hand", "right_hand", "buttocks")
+"""Effectors of a human that a phase may put in contact, in the order of the contact tables."""
+
+MASSLESS_FEET = ("left_front_foot", "right_front_foot", "left_hind_foot", "right_hind_foot")
+"""Feet that only a point mass has, besides those of a human."""
+
+
+def _contact_tag(value: Any) -> str:
+    return "same" if isinstance(value, str) else "contact"
+
+
+ContactEntry = Annotated[
+    Annotated[Literal["same"], Tag("same")] | Annotated[ContactSection, Tag("contact")],
+    Discriminator(_contact_tag),
+]
+"""A contact, or the word ``same`` for the one of the phase before."""
+
+
+class PhaseSection(Section):
+    """The contacts of one phase and how long it may last; an effector left out is in the air."""
+
+    left_foot: ContactEntry | None = Field(default=None, description="contact of the left foot, or 'same'")
+    right_foot: ContactEntry | None = Field(default=None, description="contact of the right foot, or 'same'")
+    left_hand: ContactEntry | None = Field(default=None, description="contact of the left hand, or 'same'")
+    right_hand: ContactEntry | None = Field(default=None, description="contact of the right hand, or 'same'")
+    left_front_foot: ContactEntry | None = Field(
+        default=None, description="contact of that foot of a point mass, or 'same'"
+    )
+    right_front_foot: ContactEntry | None = Field(
+        default=None, description="contact of that foot of a point mass, or 'same'"
+    )
+    left_hind_foot: ContactEntry | None = Field(
+        default=None, description="contact of that foot of a point mass, or 'same'"
+    )
+    right_hind_foot: ContactEntry | None = Field(
+        default=None, description="contact of that foot of a point mass, or 'same'"
+    )
+    buttocks: ContactEntry | None = Field(default=None, description="contact with a seat, or 'same'")
+    min_duration_s: Duration = Field(default=0.1, description="shortest duration [s]")
+    max_duration_s: Duration | None = Field(default=None, description="longest duration [s]")
+    com_near: Annotated[Vector3 | None, FrameMoves.POINT] = Field(
+        default=None, description="where the centre of mass should be when the phase begins [m]"
+    )
+    com_within_m: Vector3 = Field(
+        default=(0.05, 0.05, 0.05),
+        description="how far it may be from there along x, y and z of the task frame, x being the heading "
+        "at the start [m]",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.max_duration_s is not None and self.max_duration_s < self.min_duration_s:
+            raise refuse(
+                "max_duration_s", f"is {self.max_duration_s:g}; valid: at least min_duration_s = "
+                f"{self.min_duration_s:g}"
+            )  # fmt: skip
+        if min(self.com_within_m) <= 0.0:
+            raise refuse("com_within_m", f"is {list(self.com_within_m)}; valid: three numbers > 0 [m]")
+        if not self.entries():
+            raise refuse("", f"has no contact; valid: at least one of {', '.join(EFFECTORS)}")
+        for effector, entry in self.entries().items():
+            if not isinstance(entry, str):
+                entry.check_for(effector, f"{effector}.")
+        return self
+
+    def entries(self) -> dict[str, "ContactSection | Literal['same']"]:
+        """Contacts by effector, those in the air left out."""
+        found = {name: getattr(self, name) for name in (*EFFECTORS, *MASSLESS_FEET)}
+        return {name: entry for name, entry in found.items() if entry is not None}
+
+
+class SupportsSection(Section):
+    """An explicit sequence of supports, with the defaults of its contacts."""
+
+    friction: Positive = Field(default=0.7, description="Coulomb coefficient of soles and points")
+    sole: SoleSection = Field(
+        default=SoleSection(length_m=0.28, width_m=0.12), description="size of the real soles"
+    )
+    planning_sole: SoleSection | None = Field(
+        default=None,
+        description="smaller soles that planning balances on, for robustness (default: the real ones)",
+    )
+    foot: Literal["flat", "rolling"] = Field(
+        default="flat",
+        description="whether a foot lands and leaves with its whole sole, or lands on its heel and leaves "
+        "from its toes while another foot stands",
+    )
+    planning_friction: Positive | None = Field(
+        default=None, description="smaller friction that planning balances with (default: the real one)"
+    )
+    normal_force_cap_N: Positive | None = Field(
+        default=None, description="largest sum of the normal forces of a stance [N] (default: 3 body weights)"
+    )
+    contact_normal_force_cap_N: Positive | None = Field(
+        default=None, description="largest normal force of each sole or point that gives none itself [N]"
+    )
+    planning_normal_force_cap_N: Positive | None = Field(
+        default=None, description="smaller cap that planning balances with (default: the real one)"
+    )
+    phases: Annotated[list[PhaseSection], Field(min_length=1)] = Field(description="phases in order")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.planning_sole is not None:
+            for key in ("length_m", "width_m"):
+                ours, real = getattr(self.planning_sole, key), getattr(self.sole, key)
+                if ours > real:
+                    raise refuse(f"planning_sole.{key}", f"is {ours:g}; valid: at most sole.{key} = {real:g}")
+        for key, real in (
+            ("planning_friction", "friction"),
+            ("planning_normal_force_cap_N", "normal_force_cap_N"),
+        ):
+            ours, limit = getattr(self, key), getattr(self, real)
+            if ours is not None and limit is not None and ours > limit:
+                raise refuse(key, f"is {ours:g}; valid: at most {real} = {limit:g}")
+        if self.phases[0].com_near is not None:
+            raise refuse("phases[0].com_near", "is given; valid: task.start.com says where the motion begins")
+        if self.foot == "rolling" and any(phase.com_near is not None for phase in self.phases):
+            raise refuse("foot", "is rolling beside a phase with com_near; valid: flat, or no com_near")
+        for number, phase in enumerate(self.phases):
+            before = self.phases[number - 1].entries() if number else {}
+            for effector, entry in phase.entries().items():
+                if entry == "same" and effector not in before:
+                    raise refuse(
+                        f"phases[{number}].{effector}", "is 'same' but the phase before has no such contact; "
+                        "valid: a contact with a position"
+                    )  # fmt: skip
+        return self
+
+    def resolved_phases(self) -> list[dict[str, ContactSection]]:
+        """Contacts of each phase with every ``same`` replaced by what it stands for."""
+        phases: list[dict[str, ContactSection]] = []
+        for phase in self.phases:
+            contacts: dict[str, ContactSection] = {}
+            for effector, entry in phase.entries().items():
+                contacts[effector] = phases[-1][effector] if isinstance(entry, str) else entry
+            phases.append(contacts)
+        return phases

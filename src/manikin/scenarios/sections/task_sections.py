@@ -1,0 +1,368 @@
+"""Sections of a scenario file: from where to where.
+
+Also here. Section of a scenario file: a disturbance. Sections of a scenario file: the things in the scene.
+Sections of a scenario file: a walk over the floor, and who else walks there. Section of a scenario file: how
+a run of it should end. Section of a scenario file: a frame other than the world's.
+"""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from manikin.numerics.spatial import PlanarTransform
+from manikin.scenarios.validation import (
+    Duration,
+    FrameMoves,
+    Name,
+    NonNegative,
+    Number,
+    Positive,
+    Section,
+    Size3,
+    Text,
+    Vector2,
+    Vector3,
+    refuse,
+    rule_error,
+)
+
+LARGEST_FORCE = 5000.0
+"""Some seven body weights, far beyond what can be held [N]; ``manikin.simulation.recover`` has the same."""
+
+LARGEST_FREQUENCY = 100.0
+"""Of a sine: ten of the physics' steps are left for each period [Hz]."""
+
+Force = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST_FORCE)]
+
+
+class PushSection(Section):
+    """A push on the trunk: of the thorax during an execution, near the centre of mass in a recovery."""
+
+    force_N: Force = Field(description="size [N]; of a sine its amplitude")
+    direction_deg: Number = Field(
+        description="of the force, counter-clockwise from the body's forward axis [deg]"
+    )
+    duration_s: Duration = Field(description="how long [s]")
+    at_s: NonNegative = Field(description="when it begins [s]")
+    frequency_hz: Positive | None = Field(
+        default=None,
+        le=LARGEST_FREQUENCY,
+        description="of a sine that begins with the push [Hz] (default: a constant force)",
+    )
+
+
+class RecoverySection(Section):
+    """A body that stands, is pushed, and keeps its balance without a motion given beforehand."""
+
+    feet: Literal["held", "free"] = Field(
+        default="held",
+        description="held: welded to the ground, as in Kudoh (2002); free: in contact with friction",
+    )
+    support: Literal["both", "left", "right"] = Field(
+        default="both", description="feet that the body stands on; beside a single one the other is raised"
+    )
+    feet_apart_m: Positive | None = Field(
+        default=None,
+        description="distance between the middles of both soles, sideways [m] (default: as the body stands)",
+    )
+    delay_s: NonNegative = Field(
+        default=0.2, description="from the beginning of the push until the body reacts [s]"
+    )
+    steps: Annotated[int, Field(ge=0, le=2)] = Field(
+        default=0, description="how many steps it may take, 0 to 2; free feet only"
+    )
+    ankle_stiffness: NonNegative = Field(
+        default=0.64,
+        description="stiffness of both ankles together before the body reacts, in m g h per radian "
+        "(default: calf muscles at rest)",
+    )
+    sole_inset_m: NonNegative = Field(
+        default=0.005, description="how far inside the edge of the soles the ZMP is kept [m]"
+    )
+    duration_s: Duration = Field(default=3.5, description="of the run [s]")
+    friction: Positive = Field(default=0.7, description="of the soles")
+    locked: list[Literal["arms", "hips"]] = Field(
+        default_factory=list, description="joints that hold the posture: arms; hips, with the trunk"
+    )
+    posture_control_only: bool = Field(
+        default=False, description="whether the quadratic program is left out, for comparison"
+    )
+    strength: Positive = Field(
+        default=1.0, description="torque and speed limits relative to those of the body"
+    )
+
+
+OBSTACLE_SHAPES = ("box", "cylinder", "capsule", "sphere", "plane", "half_space", "mesh")
+
+
+class RoundSection(Section):
+    """A cylinder or capsule along its z axis."""
+
+    radius_m: Positive = Field(description="radius [m]")
+    length_m: Positive = Field(description="length [m]; of a capsule, without its round ends")
+
+
+class SphereSection(Section):
+    """A sphere."""
+
+    radius_m: Positive = Field(description="radius [m]")
+
+
+class ObstacleSection(Section):
+    """One thing in the scene: a name, one shape and a pose."""
+
+    name: Text = Field(description="unique name")
+    box: Size3 | None = Field(default=None, description="sizes along x, y, z [m]")
+    cylinder: RoundSection | None = Field(default=None, description="cylinder along z")
+    capsule: RoundSection | None = Field(default=None, description="capsule along z")
+    sphere: SphereSection | None = Field(default=None, description="sphere")
+    plane: Vector3 | None = Field(
+        default=None, description="normal of an infinite two-sided plane through position, turned by rpy_deg"
+    )
+    half_space: Vector3 | None = Field(
+        default=None, description="outward normal of a solid half-space at position, turned by rpy_deg"
+    )
+    mesh: Text | None = Field(
+        default=None, description="STL, OBJ, PLY or DAE file, relative to this file's folder"
+    )
+    scale: Positive | None = Field(default=None, description="factor on the mesh's coordinates (default 1)")
+    unit: Literal["m", "cm", "mm", "in"] | None = Field(
+        default=None, description="unit of the mesh (default: a DAE file's own, else m)"
+    )
+    convex: Literal["no", "hull", "parts"] | None = Field(
+        default=None, description="replace the mesh, or each connected part, by its convex hull"
+    )
+    padded: Annotated[bool, Field(strict=True)] = Field(
+        default=False, description="whether any part of the body may lean on it, as on a seat"
+    )
+    position: Annotated[Vector3, FrameMoves.POINT] = Field(
+        default=(0.0, 0.0, 0.0), description="origin in the world [m]"
+    )
+    rpy_deg: Annotated[Vector3, FrameMoves.ORIENTATION] = Field(
+        default=(0.0, 0.0, 0.0), description="fixed-axis roll, pitch, yaw [deg]"
+    )
+
+    @property
+    def shape(self) -> str:
+        """Key of the shape that is given."""
+        return next(name for name in OBSTACLE_SHAPES if getattr(self, name) is not None)
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        given = [name for name in OBSTACLE_SHAPES if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = f"has {' and '.join(given)}" if given else "has no shape"
+            raise refuse("", f"{found}; valid: exactly one of {', '.join(OBSTACLE_SHAPES)}")
+        for key in ("scale", "unit", "convex"):
+            if getattr(self, key) is not None and given[0] != "mesh":
+                raise refuse(key, f"is given for a {given[0]}; valid: only with mesh")
+        for key in ("plane", "half_space"):
+            normal = getattr(self, key)
+            if normal is not None and not any(normal):
+                raise refuse(key, f"is {list(normal)}; valid: a normal that is not zero")
+        return self
+
+
+LARGEST_WALKERS = 8
+"""How many others may walk in a scenario."""
+
+Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=4.0)]
+
+
+class StandSection(Section):
+    """Where a walker stands at the beginning."""
+
+    at: Annotated[Vector2, FrameMoves.POINT] = Field(description="x and y [m]")
+    heading_deg: Annotated[Number, FrameMoves.HEADING] = Field(default=0.0, description="where to face [deg]")
+
+
+class WaypointSection(StandSection):
+    """Where a walker comes past, or stops."""
+
+    speed_m_s: NonNegative = Field(
+        default=0.0, description="with which it is passed, towards the place after it; 0 for a stop [m/s]"
+    )
+    wait_s: NonNegative = Field(default=0.0, description="how long the walker stands there [s]")
+
+
+class WalkerSection(Section):
+    """Somebody else who walks there, on a way that does not depend on whom the scenario is about."""
+
+    name: Name = Field(description="what messages and files call this walker")
+    start: StandSection = Field(description="where the walker stands at the beginning")
+    via: list[WaypointSection] = Field(
+        min_length=1, description="where the walker goes, in order; the last one is a stop"
+    )
+    wait_s: NonNegative = Field(default=0.0, description="how long the walker stands at the start [s]")
+    max_speed_m_s: Speed = Field(default=1.6, description="limit of the speed over the floor [m/s]")
+
+
+class WalkingSection(Section):
+    """A walk from start to goal of the task: path by optimal control, whole body from recorded walks."""
+
+    whole_body: Literal["recorded", "planned"] = Field(
+        default="recorded",
+        description="recorded: as recorded people walk, along the path; planned: on footprints along the "
+        "path, balanced and executed in the physics engine",
+    )
+    footprints: Literal["stepper", "library"] = Field(
+        default="stepper",
+        description="of a planned walk from start to goal: stepper, by rules along the path; library, where "
+        "recorded people's feet stand on the same path, and no faster than they go",
+    )
+    start: StandSection | None = Field(
+        default=None,
+        description="with supports: where the body walks from, to the feet of their first phase; the plan "
+        "goes on from there",
+    )
+    via: list[WaypointSection] = Field(
+        default_factory=list, description="where the way to the goal leads past, in order"
+    )
+    wait_s: NonNegative = Field(default=0.0, description="how long the body stands at the start [s]")
+    max_speed_m_s: Speed = Field(default=1.6, description="limit of the speed over the floor [m/s]")
+    room_m: NonNegative = Field(default=0.05, description="distance to keep from obstacles and others [m]")
+    weights: Literal["prose", "literal", "recorded", "recorded-turns"] = Field(
+        default="prose",
+        description="weights of the criterion: as the text of Truong (2010) 5.5.1 has them, as its "
+        "equations (5.5) and (5.8) read literally, or as identified from recorded walks, all or turns only",
+    )
+    others: list[WalkerSection] = Field(
+        default_factory=list, max_length=LARGEST_WALKERS,
+        description="others who walk there; each keeps away from those before it in the list, and the "
+        "scenario's body from all of them",
+    )  # fmt: skip
+
+    def is_planned(self, supports: object) -> bool:
+        """Whether footprints are planned and executed, as they always are before supports."""
+        return self.whole_body == "planned" or supports is not None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        names = [other.name for other in self.others]
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                raise refuse(f"others[{index}].name", f"is {name!r} again; valid: a unique name")
+            if self.others[index].via[-1].speed_m_s > 0.0:
+                raise refuse(
+                    f"others[{index}].via[{len(self.others[index].via) - 1}].speed_m_s",
+                    "is not 0; valid: the last one is a stop, 0",
+                )
+        return self
+
+
+class ExpectSection(Section):
+    """Success, or a failure with the stage in which it is expected and its reason."""
+
+    outcome: Literal["success", "failure"] = Field(description="how a run should end")
+    stage: Literal["walk", "contacts", "centroidal", "wholebody", "execution", "push"] | None = Field(
+        default=None, description="stage that should fail; a failure of another one is not as expected"
+    )
+    because: Text | None = Field(default=None, description="why it is expected to fail")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in ("stage", "because"):
+            if self.outcome == "success" and getattr(self, key) is not None:
+                raise refuse(key, "is given beside outcome: success; valid: beside outcome: failure")
+        return self
+
+
+def _mapping(value: Any) -> Any:
+    return {"outcome": value} if isinstance(value, str) else value
+
+
+Expectation = Annotated[
+    ExpectSection,
+    BeforeValidator(_mapping, json_schema_input_type=Literal["success", "failure"] | ExpectSection),
+]
+"""``success``, ``failure``, or a mapping with the outcome, the stage and the reason."""
+
+
+class FrameSection(Section):
+    """A frame in the world, as high as that."""
+
+    at: Annotated[Vector2, FrameMoves.POINT] = Field(
+        default=(0.0, 0.0), description="where its origin is, x and y [m]"
+    )
+    yaw_deg: Annotated[Number, FrameMoves.HEADING] = Field(
+        default=0.0, description="where its x axis points, counter-clockwise from world x [deg]"
+    )
+
+    def transform_to_world(self) -> PlanarTransform:
+        """Transform from this frame to the world."""
+        return PlanarTransform(*self.at, self.yaw_deg)
+
+
+class StateSection(Section):
+    """Where the body starts or ends."""
+
+    com: Annotated[Vector3 | None, FrameMoves.POINT] = Field(default=None, description="centre of mass [m]")
+    velocity_m_s: Annotated[Vector3 | None, FrameMoves.DIRECTION] = Field(
+        default=None, description="of the centre of mass when the body sits down at the goal (default: free)"
+    )
+    at: Annotated[Vector2 | None, FrameMoves.POINT] = Field(
+        default=None, description="where to stand, x and y [m]"
+    )
+    heading_deg: Annotated[Number | None, FrameMoves.HEADING] = Field(
+        default=None, description="where to face [deg]"
+    )
+    height_m: Number | None = Field(
+        default=None,
+        description="height of the surface to stand or sit on there [m] (default: the lowest one on "
+        "which the posture exists)",
+    )
+    posture: Literal["standing", "seated", "crouched", "climbing"] | None = Field(
+        default=None,
+        description="how the body is at rest there (default: standing); climbing: on what its limbs "
+        "hold, as high as if it stood on that height",
+    )
+
+    @model_validator(mode="after")
+    def _placed(self) -> Self:
+        if self.com is None and self.at is None:
+            raise refuse("com", "is missing; valid: three numbers [x, y, z] in metres, or at: [x, y]")
+        return self
+
+    def implied(self) -> dict[str, Any]:
+        """The heading of a body that stands at a place."""
+        return {} if self.at is None or self.heading_deg is not None else {"heading_deg": 0.0}
+
+
+class ActSection(Section):
+    """What the hands do to an object where the way ends."""
+
+    kind: Literal["push", "pull"] = Field(description="press with the palms, or hold on and draw")
+    on: Text = Field(description="name of an obstacle; it does not move")
+    direction: Annotated[Vector3, FrameMoves.DIRECTION] = Field(
+        description="where the force on the object points; level"
+    )
+    force_N: Positive = Field(description="force on the object [N]")
+    ramp_s: Positive = Field(default=1.0, description="time in which the force rises from none [s]")
+    hold_s: NonNegative = Field(default=2.0, description="time for which it is held then [s]")
+
+    @field_validator("direction")
+    @classmethod
+    def _level(cls, direction: Any) -> Any:
+        if not any(direction) or direction[2] != 0.0:
+            raise rule_error("a direction that is level (its z 0) and not zero")
+        return direction
+
+
+class TaskSection(Section):
+    """From where to where, and what is done there."""
+
+    start: StateSection = Field(description="state at the beginning, at rest")
+    goal: StateSection = Field(
+        description="state at the end, at rest; found, and may be left out, with an act and no supports"
+    )
+    act: ActSection | None = Field(
+        default=None, description="what the hands do to an object at the end; where to stand for it is found"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _goal_of_act(cls, data: Any) -> Any:
+        """Leave the goal of an act to the planner."""
+        if isinstance(data, dict) and data.get("act") is not None and "goal" not in data and "start" in data:
+            return {**data, "goal": data["start"]}
+        return data

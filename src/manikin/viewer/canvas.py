@@ -1,0 +1,236 @@
+"""What every viewer shows: the server, the obstacles and the body's shapes.
+
+Also here. A page in the browser: its server, and the loop that serves it.
+"""
+
+import socket
+import threading
+import time as clock
+from abc import ABC, abstractmethod
+from contextlib import redirect_stdout
+from io import StringIO
+
+import numpy as np
+import pinocchio as pin
+import viser
+
+from manikin.body import BodyModel
+from manikin.body.segments import segment_triangles
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray
+from manikin.scene import HalfSpace, Plane, Scene
+
+
+class Page(ABC):
+    """Serves one page until it is closed.
+
+    Attributes:
+        server: The viser server.
+    """
+
+    def __init__(self, port: int, frame_rate: float) -> None:
+        """Start the server.
+
+        Args:
+            port: Port to listen on; 0 picks a free one.
+            frame_rate: Largest number of pictures per second.
+
+        Raises:
+            InputError: If the port is taken.
+        """
+        self._lock = threading.RLock()
+        self._closed = threading.Event()
+        self._frame_rate = frame_rate
+        self.server = start_server(port)
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return f"http://{HOST}:{self.server.get_port()}"
+
+    @abstractmethod
+    def advance(self, seconds: float) -> None:
+        """Show what has come of ``seconds`` of real time [s]."""
+
+    def run(self) -> None:
+        """Serve until :meth:`close` is called or Ctrl-C is pressed."""
+        before = clock.monotonic()
+        try:
+            while not self._closed.wait(max(0.0, before + 1.0 / self._frame_rate - clock.monotonic())):
+                now = clock.monotonic()
+                self.advance(now - before)
+                before = now
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Stop the server; a second call does nothing."""
+        if not self._closed.is_set():
+            self._closed.set()
+            stop_server(self.server)
+
+
+HOST = "127.0.0.1"
+"""The viewer listens to this computer only."""
+
+COLOURS = {
+    "recorded": (106, 81, 163),
+    "planned": (0, 114, 178),
+    "executed": (213, 94, 0),
+    "left": (0, 158, 115),
+    "right": (204, 121, 167),
+    "trunk": (150, 156, 166),
+    "obstacle": (186, 192, 202),
+    "floor": (236, 238, 241),
+    "force": (230, 159, 0),
+}
+
+
+VIEW = np.array([-1.7, -1.9, 0.5])
+"""Where new visitors look from, seen from what they look at [m]."""
+
+WHOLE = 2.0
+"""Size of what is seen whole from there, a body aside [m]."""
+
+
+ABOVE = 0.35
+"""From the origin of the head to a name above it [m]."""
+
+
+def start_server(port: int) -> viser.ViserServer:
+    """Start a server on this computer.
+
+    Args:
+        port: Port to listen on; 0 picks a free one.
+
+    Raises:
+        InputError: If the port is taken.
+    """
+    with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
+        server = viser.ViserServer(host=HOST, port=_checked_port(port), verbose=False)
+    server.scene.set_up_direction("+z")
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    return server
+
+
+def stop_server(server: viser.ViserServer) -> None:
+    """Stop a server without a word."""
+    with redirect_stdout(StringIO()):
+        server.stop()
+
+
+def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: bool = False) -> None:
+    """Draw the finite obstacles and the floor."""
+    for obstacle in scene or ():
+        if isinstance(obstacle.shape, (HalfSpace, Plane)):
+            continue
+        mesh = obstacle.to_trimesh()
+        server.scene.add_mesh_simple(
+            f"/scene/{obstacle.name}",
+            np.asarray(mesh.vertices),
+            np.asarray(mesh.faces),
+            color=COLOURS["obstacle"],
+            opacity=0.55,
+            flat_shading=True,
+            side="double",
+        )
+    if scene is not None and scene.floor_height is not None:
+        height = scene.floor_height - 1e-3
+        server.scene.add_grid(
+            "/floor",
+            width=8.0,
+            height=8.0,
+            cell_size=0.5,
+            plane="xy",
+            position=(0, 0, height),
+            infinite_grid=endless_floor,
+        )
+
+
+def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) -> None:
+    """Let new visitors look at a point from behind its right, from a person's height or above.
+
+    Args:
+        server: Of the page.
+        middle: (3,) the point [m].
+        size: Of what is to be seen, a body aside: from farther away the larger it is [m].
+    """
+    server.initial_camera.look_at = middle
+    server.initial_camera.position = middle + max(1.0, size / WHOLE) * VIEW
+    server.initial_camera.up = (0.0, 0.0, 1.0)
+
+
+class BodyShapes:
+    """The shapes of a body on the page.
+
+    Attributes:
+        frames: One frame for each segment with shapes.
+        data: Pinocchio's data of the configuration shown.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, body: BodyModel, opacity: float = 0.7, root: str = "/body"
+    ) -> None:
+        """Draw the body; what is inside it stays visible.
+
+        Args:
+            server: Of the page.
+            body: Whose shapes.
+            opacity: In [0, 1].
+            root: Name of the body on the page.
+        """
+        self._body = body
+        self.data = body.pinocchio.createData()
+        self.frames: dict[str, viser.FrameHandle] = {}
+        self._meshes: list[viser.MeshHandle] = []
+        for segment in body.segments:
+            triangles = segment_triangles(segment)
+            if triangles is None:
+                continue
+            self.frames[segment.name] = server.scene.add_frame(f"{root}/{segment.name}", show_axes=False)
+            mesh = server.scene.add_mesh_simple(
+                f"{root}/{segment.name}/shape", *triangles, color=side_colour(segment.name), opacity=opacity
+            )
+            self._meshes.append(mesh)
+
+    def paint(self, colour: tuple[int, int, int]) -> None:
+        """Give all shapes one colour, other than those of the sides of a body."""
+        for mesh in self._meshes:
+            mesh.color = colour
+
+    def place(self, q: FloatArray) -> None:
+        """Show the configuration (nq,)."""
+        pin.framesForwardKinematics(self._body.pinocchio, self.data, q)
+        for name, frame in self.frames.items():
+            placement = self.data.oMf[self._body.segment_frame(name)]
+            x, y, z, w = pin.Quaternion(placement.rotation).coeffs()
+            frame.wxyz, frame.position = (w, x, y, z), placement.translation
+
+    def top(self) -> FloatArray:
+        """(3,) above the highest origin of a segment as the body is placed [m]."""
+        places = [self.data.oMf[self._body.segment_frame(name)].translation for name in self.frames]
+        return max(places, key=lambda place: place[2]) + np.array([0.0, 0.0, ABOVE])
+
+    def show(self, visible: bool) -> None:
+        """Draw the body, or hide it."""
+        for frame in self.frames.values():
+            frame.visible = visible
+
+
+def side_colour(name: str) -> tuple[int, int, int]:
+    """Colour of what belongs to a side of the body, by its name."""
+    return next((COLOURS[side] for side in ("left", "right") if name.startswith(side)), COLOURS["trunk"])
+
+
+def _checked_port(port: int) -> int:
+    """Return a port that is free, or refuse: viser would silently take another one."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, port))
+        except (OSError, OverflowError) as error:
+            problem = getattr(error, "strerror", None) or str(error)
+            raise InputError(f"port {port} cannot be used ({problem}); valid: a free port, or 0") from None
+        return int(probe.getsockname()[1])

@@ -1,0 +1,101 @@
+"""How people walk: paths, footprints, segments, words, whole-body walks ([Truong2010]_ chapters 3 to 6)."""
+
+from manikin.walking.footsteps.footprints import Footprint, Footprints
+from manikin.walking.footsteps.stepper import StepRule, place_footprints, walked_footprints
+from manikin.walking.gait.follow_path import Walk, WalkController, WalkFrame, walk_along
+from manikin.walking.gait.motion_library import MotionLibrary, load_library, save_library
+from manikin.walking.path.path_plan import walking_path, walking_paths
+from manikin.walking.path.route import WalkRoute, Waypoint, walking_route
+from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, floor_plan
+from manikin.walking.path.walking_model import (
+    LITERAL_ORDER,
+    PROSE_ORDER,
+    RECORDED_TURNS,
+    RECORDED_WALKS,
+    START,
+    TEST_TARGETS,
+    WalkObjective,
+    experiment_targets,
+)
+from manikin.walking.path.walking_path import WalkingPath, WalkingResiduals, WalkingTask, walked
+from manikin.walking.segments.goal_categories import (
+    CategorySpread,
+    CategoryStatistics,
+    HolonomicEnds,
+    HolonomicZone,
+    PathDeviation,
+    category_goals,
+    category_of,
+    category_statistics,
+    holonomic_ends,
+    holonomic_zone,
+    path_deviation,
+)
+from manikin.walking.segments.segmentation import (
+    HOLONOMIC,
+    KINDS,
+    NONHOLONOMIC,
+    STANDING,
+    OnlineSegmentation,
+    PathSegment,
+    PathSegments,
+    SegmentationRule,
+    ShoulderPaths,
+    segment_path,
+)
+
+__all__ = [
+    "HOLONOMIC",
+    "KINDS",
+    "LITERAL_ORDER",
+    "NONHOLONOMIC",
+    "PROSE_ORDER",
+    "RECORDED_TURNS",
+    "RECORDED_WALKS",
+    "STANDING",
+    "START",
+    "TEST_TARGETS",
+    "CategorySpread",
+    "CategoryStatistics",
+    "Footprint",
+    "Footprints",
+    "HolonomicEnds",
+    "HolonomicZone",
+    "MotionLibrary",
+    "OnlineSegmentation",
+    "PathDeviation",
+    "PathSegment",
+    "PathSegments",
+    "SegmentationRule",
+    "ShoulderPaths",
+    "StepRule",
+    "Walk",
+    "WalkController",
+    "WalkFrame",
+    "WalkObjective",
+    "WalkObstacle",
+    "WalkRoute",
+    "Walker",
+    "WalkingPath",
+    "WalkingResiduals",
+    "WalkingTask",
+    "Waypoint",
+    "category_goals",
+    "category_of",
+    "category_statistics",
+    "experiment_targets",
+    "floor_plan",
+    "holonomic_ends",
+    "holonomic_zone",
+    "load_library",
+    "path_deviation",
+    "place_footprints",
+    "save_library",
+    "segment_path",
+    "walk_along",
+    "walked",
+    "walked_footprints",
+    "walking_path",
+    "walking_paths",
+    "walking_route",
+]

@@ -1,0 +1,340 @@
+"""Placing the feet of a walk along the path of the body.
+
+Also here. Footprints of a whole-body walk: where its feet stand, and when.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+from scipy.integrate import cumulative_trapezoid
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, finite_number
+from manikin.walking.footsteps.footprints import FEET, Footprint, Footprints
+from manikin.walking.gait.follow_path import Walk
+from manikin.walking.path.walking_path import WalkingPath
+
+SIDE = {"left_foot": 1.0, "right_foot": -1.0}
+"""On which side of the body a foot is, along its y axis."""
+
+_REACHED = 1e-6
+_ROUNDING = 0.1
+
+
+@dataclass(frozen=True)
+class StepRule:
+    """Where and when feet are set down, of a person of 1.75 m.
+
+    Step length and frequency grow together: their quotient, the walk ratio, is the same at all speeds, about
+    0.0065 m per step and minute ([Murakami2017]_, who find it larger below 1 m/s).
+    The other numbers are our choice, within hips that turn about 40 degrees out and less in.
+
+    Attributes:
+        walk_ratio: Step length over step frequency [m s].
+        longest_step: Steps are shorter than this at any speed [m]; no plan was found for steps of 0.6 m.
+        side_step: Way of the body in a close-and-open pair of steps to the side [m].
+        turn_step: Turn of the body in a step [rad].
+        width: Between the soles' middles in walking, across the heading [m].
+        standing_width: The same at the start and the end [m].
+        narrowest: Least distance of a landing foot from a parallel one, across their mean heading [m]; feet
+            do not cross. Turned feet keep what their soles need beyond that.
+        sole_length: Of the soles [m].
+        widest: Largest [m].
+        longest: Largest distance along their mean heading [m].
+        toes_in: A landing foot is turned inwards from the other one by at most this [rad].
+        toes_out: The same, outwards [rad].
+        single: Least time on one foot [s].
+        double: Least time on both feet between steps [s].
+        double_share: Share of a step that is spent on both feet.
+        standing: Least time on both feet at the start and the end [s].
+    """
+
+    walk_ratio: float = 0.0065 * 60.0
+    longest_step: float = 0.5
+    side_step: float = 0.25
+    turn_step: float = np.radians(25.0)
+    width: float = 0.15
+    standing_width: float = 0.2
+    narrowest: float = 0.15
+    sole_length: float = 0.28
+    widest: float = 0.5
+    longest: float = 0.7
+    toes_in: float = np.radians(12.0)
+    toes_out: float = np.radians(40.0)
+    single: float = 0.4
+    double: float = 0.1
+    double_share: float = 0.25
+    standing: float = 0.3
+
+    def __post_init__(self) -> None:
+        for name in ("walk_ratio", "longest_step", "side_step", "turn_step", "narrowest", "sole_length",
+                     "longest", "single", "double", "standing"):  # fmt: skip
+            finite_number(getattr(self, name), f"step rule {name}", above=0.0)
+        for name in ("width", "standing_width", "widest"):
+            finite_number(getattr(self, name), f"step rule {name} [m]", at_least=self.narrowest)
+        for name in ("toes_in", "toes_out"):
+            finite_number(getattr(self, name), f"step rule {name} [rad]", at_least=0.0, at_most=np.pi / 2)
+        finite_number(self.double_share, "step rule double_share", above=0.0, at_most=0.9)
+
+    def scaled(self, stature: float) -> "StepRule":
+        """The rule of a body of another stature: lengths grow with it, times with its square root.
+
+        Args:
+            stature: [m].
+        """
+        length = finite_number(stature, "stature [m]", above=0.0) / 1.75
+        time = np.sqrt(length)
+        lengths = (
+            "longest_step",
+            "side_step",
+            "width",
+            "standing_width",
+            "narrowest",
+            "sole_length",
+            "widest",
+            "longest",
+        )
+        times = ("single", "double", "standing")
+        return replace(
+            self,
+            walk_ratio=self.walk_ratio * length * time,
+            **{name: getattr(self, name) * length for name in lengths},
+            **{name: getattr(self, name) * time for name in times},
+        )
+
+    def frequency(self, velocity: FloatArray) -> FloatArray:
+        """(...) steps per second at (..., 3) forward, left [m/s] and angular velocities [rad/s]."""
+        speed = np.abs(velocity[..., 0])
+        ahead = np.maximum(speed / self.walk_ratio, (speed / self.longest_step) ** 2)
+        aside, turning = 2.0 * velocity[..., 1] / self.side_step, velocity[..., 2] / self.turn_step
+        return np.sqrt(ahead + aside**2 + turning**2)
+
+
+def place_footprints(
+    path: WalkingPath, rule: StepRule | None = None, *, first: str | None = None, height: float = 0.0
+) -> Footprints:
+    """Alternate footprints along a path, from both feet side by side to both feet side by side.
+
+    The body's path is cut into steps by its step frequency. A foot is set down where the body is at the next
+    cut, as the body passes it there; in moves to the side it comes no nearer to the other foot than side by
+    side, so that legs do not cross: feet close and open. Further steps follow until both feet stand at the
+    goal. They land half a step before the body passes.
+
+    Args:
+        path: Of the middle between the feet.
+        rule: Where and when feet are set down.
+        first: Foot of the first step; that on the side to which the body moves or turns, if omitted.
+        height: Of the floor [m].
+
+    Raises:
+        InputError: If the path is no solution, the foot has no such name, or the rule's limits keep the feet
+            from the goal.
+    """
+    rule = StepRule() if rule is None else rule
+    if not path.succeeded:
+        raise InputError(f"walking path {path.failure}; valid: a path that succeeded")
+    if first is not None and first not in FEET:
+        raise InputError(f"first is {first!r}; valid: {', '.join(FEET)}")
+    cuts = _Cuts(path, rule)
+    chosen = _leading(cuts) if first is None else first
+    stands = [_beside(foot, cuts.place(0.0), rule.standing_width) for foot in FEET]
+    steps = list(_steps(cuts, rule, chosen))
+    return _timed(dict(zip(FEET, stands, strict=True)), steps, cuts, rule, height)
+
+
+class _Cuts:
+    """The path over the number of steps done."""
+
+    def __init__(self, path: WalkingPath, rule: StepRule) -> None:
+        self.path = path
+        done = cumulative_trapezoid(rule.frequency(path.velocity), path.time, initial=0.0)
+        self.count = max(1, int(np.ceil(done[-1] - _ROUNDING)))
+        # Where the body rests nothing is done; a little keeps the inverse unique.
+        done += 1e-9 * path.time
+        self._done = done * (self.count / done[-1])
+
+    def time(self, done: float) -> float:
+        """When so many steps are done [s]."""
+        return float(np.interp(done, self._done, self.path.time))
+
+    def place(self, done: float) -> FloatArray:
+        """(3,) x, y [m] and heading [rad] of the body when so many steps are done."""
+        return self.path.place_at(self.time(min(done, float(self.count))))
+
+
+def _leading(cuts: _Cuts) -> str:
+    """The foot on the side to which the first step goes, or the left one."""
+    here, there = cuts.place(0.0), cuts.place(1.0)
+    x, y = there[:2] - here[:2]
+    aside = -np.sin(here[2]) * x + np.cos(here[2]) * y
+    return "right_foot" if aside + 0.1 * (there[2] - here[2]) < -0.02 else "left_foot"
+
+
+def _beside(foot: str, place: FloatArray, width: float) -> FloatArray:
+    x, y, heading = place
+    half = SIDE[foot] * width / 2
+    return np.array([x - np.sin(heading) * half, y + np.cos(heading) * half, heading])
+
+
+def _steps(cuts: _Cuts, rule: StepRule, first: str) -> Iterator[tuple[str, FloatArray]]:
+    """Foot and place of each step, until both stand at the goal."""
+    goal = cuts.place(cuts.count)
+    ends = {foot: _beside(foot, goal, rule.standing_width) for foot in FEET}
+    feet = {foot: _beside(foot, cuts.place(0.0), rule.standing_width) for foot in FEET}
+    order = itertools.cycle((first, *(foot for foot in FEET if foot != first)))
+    for number, foot in enumerate(order, start=1):
+        if all(np.abs(feet[each] - ends[each]).max() < _REACHED for each in FEET):
+            return
+        if number > 4 * cuts.count + 20:
+            raise InputError("step rule keeps the feet from the goal; valid: wider limits or shorter steps")
+        width = rule.width if number < cuts.count else rule.standing_width
+        other = next(feet[each] for each in FEET if each != foot)
+        wanted = _beside(foot, cuts.place(number), width)
+        placed = within_reach(wanted, other, SIDE[foot], rule)
+        if np.abs(placed - feet[foot]).max() > _REACHED:
+            feet[foot] = placed
+            yield foot, placed
+
+
+def within_reach(wanted: FloatArray, other: FloatArray, side: float, rule: StepRule) -> FloatArray:
+    """The nearest place that the hips allow a foot beside the other one.
+
+    Args:
+        wanted: (3,) x, y [m] and yaw [rad] of the foot.
+        other: (3,) the same of the one that stands.
+        side: Of the foot, from :data:`SIDE`.
+        rule: Its limits.
+
+    Returns:
+        (3,) x, y [m] and yaw [rad].
+    """
+    outwards = np.clip(side * (wanted[2] - other[2]), -rule.toes_in, rule.toes_out)
+    yaw = other[2] + side * outwards
+    mean = (yaw + other[2]) / 2
+    ahead, left = np.array([np.cos(mean), np.sin(mean)]), np.array([-np.sin(mean), np.cos(mean)])
+    offset = wanted[:2] - other[:2]
+    along = float(np.clip(offset @ ahead, -rule.longest, rule.longest))
+    least = rule.narrowest + rule.sole_length * np.sin(abs(outwards) / 2)
+    across = float(np.clip(side * (offset @ left), least, max(least, rule.widest)))
+    return np.array([*(other[:2] + along * ahead + side * across * left), yaw])
+
+
+def _timed(
+    stands: dict[str, FloatArray],
+    steps: list[tuple[str, FloatArray]],
+    cuts: _Cuts,
+    rule: StepRule,
+    height: float,
+) -> Footprints:
+    """Times of lift-off and touch-down: half a step before the body passes, none shorter than the rule's."""
+    passed = [cuts.time(number + 0.5) for number in range(cuts.count)]
+    end = cuts.path.duration
+    usual = float(np.median(np.diff(passed))) if len(passed) > 1 else rule.single + rule.double
+    while len(passed) < len(steps):
+        passed.append(max(end, passed[-1] + usual) if len(passed) == cuts.count else passed[-1] + usual)
+    half = rule.double_share * usual / 2
+    lifts, lands = [], []
+    for number, middle in enumerate(passed[: len(steps)]):
+        if number == 0:
+            lift = max(rule.standing, middle - half - (1.0 - rule.double_share) * usual)
+        else:
+            lift = max(lands[-1] + rule.double, passed[number - 1] + half)
+        lifts.append(lift)
+        lands.append(max(lift + rule.single, middle - half))
+    finish = max(end, (lands[-1] if lands else 0.0) + rule.standing)
+    return Footprints(list(_supports(stands, steps, lifts, lands, finish, height)))
+
+
+def _supports(
+    stands: dict[str, FloatArray],
+    steps: list[tuple[str, FloatArray]],
+    lifts: list[float],
+    lands: list[float],
+    finish: float,
+    height: float,
+) -> Iterator[Footprint]:
+    for foot in FEET:
+        places = [stands[foot], *(place for each, place in steps if each == foot)]
+        own = [number for number, (each, _) in enumerate(steps) if each == foot]
+        begins = [0.0, *(lands[number] for number in own)]
+        ends = [*(lifts[number] for number in own), finish]
+        for (x, y, yaw), begin, leave in zip(places, begins, ends, strict=True):
+            yield Footprint(foot, [x, y, height], yaw, begin, leave)
+
+
+def walked_footprints(walk: Walk, rule: StepRule | None = None, *, height: float = 0.0) -> Footprints:
+    """Footprints of a walk from the library of recorded ones, to be planned and executed on.
+
+    Each is where the foot is in the middle of its support, relative to how far behind the path both feet
+    stand at the start: the path is that of the middle between the feet, as for :func:`place_footprints`.
+    Recorded feet turn in and come close to each other in a way that soles and legs of other sizes cannot:
+    every footprint is moved to the nearest place that the rule allows beside the other foot. Where one foot
+    lands in the frame in which the other one leaves, both stand for one frame.
+
+    Args:
+        walk: From standing to standing.
+        rule: Of it, where a foot may be set down beside the other one.
+        height: Of the floor [m].
+
+    Raises:
+        InputError: If the walk has a moment without a foot on the floor, or does not begin and end on both.
+    """
+    rule = StepRule() if rule is None else rule
+    flying = np.flatnonzero(~walk.support.any(axis=1))
+    if flying.size:
+        raise InputError(
+            f"walk has no foot on the floor at {walk.time[flying[0]]:.2f} s; valid here: a slower one"
+        )
+    held = sorted(
+        (one for foot in range(len(walk.feet)) for one in _walked_footprints_supports(walk, foot)),
+        key=lambda one: (one.lands, one.effector),
+    )
+    return Footprints(list(_reachable(_overlapping(held, walk), rule, height)))
+
+
+def _walked_footprints_supports(walk: Walk, foot: int) -> Iterator[Footprint]:
+    """Of one foot, as the walk has them, shifted so that the walk begins with its feet about its path."""
+    behind = np.mean([_sole(walk, each, 0)[:2] for each in range(len(walk.feet))], axis=0) - walk.place[0, :2]
+    standing = np.flatnonzero(walk.support[:, foot])
+    for rows in np.split(standing, 1 + np.flatnonzero(np.diff(standing) > 1)):
+        middle = int(rows[len(rows) // 2])
+        x, y, yaw = _sole(walk, foot, middle)
+        turn = np.exp(1j * (walk.place[middle, 2] - walk.place[0, 2])) * complex(*behind)
+        lands, leaves = walk.time[[rows[0], min(rows[-1] + 1, len(walk.time) - 1)]].tolist()
+        yield Footprint(walk.feet[foot], [x - turn.real, y - turn.imag, 0.0], yaw, lands, leaves)
+
+
+def _sole(walk: Walk, foot: int, row: int) -> tuple[float, float, float]:
+    """Middle of a sole, x, y [m], and its yaw [rad] in a frame of the walk."""
+    body, name = walk.body, walk.feet[foot]
+    data, frame = body.pinocchio.createData(), body.effector_frame(name)
+    pin.forwardKinematics(body.pinocchio, data, walk.q[row])
+    there = pin.updateFramePlacement(body.pinocchio, data, frame)
+    x, y = there.translation[:2].tolist()
+    return x, y, math.atan2(there.rotation[1, 0], there.rotation[0, 0])
+
+
+def _overlapping(held: Sequence[Footprint], walk: Walk) -> Iterator[Footprint]:
+    """The same, each foot leaving at least one frame after the next landing of the other one."""
+    frame = float(walk.time[1] - walk.time[0])
+    for step in held:
+        landings = [one.lands for one in held if one.effector != step.effector and one.lands > step.lands]
+        leaves = step.leaves
+        if landings and abs(landings[0] - leaves) < frame / 2:
+            leaves += frame
+        yield Footprint(step.effector, step.position, step.yaw, step.lands, leaves)
+
+
+def _reachable(held: Iterator[Footprint], rule: StepRule, height: float) -> Iterator[Footprint]:
+    """The same where the rule allows a foot beside the other one, on the floor."""
+    places: dict[str, FloatArray] = {}
+    for step in held:
+        place = np.append(step.position[:2], step.yaw)
+        for other in (places[foot] for foot in SIDE if foot != step.effector and foot in places):
+            place = within_reach(place, other, SIDE[step.effector], rule)
+        places[step.effector] = place
+        yield Footprint(step.effector, [*place[:2], height], float(place[2]), step.lands, step.leaves)

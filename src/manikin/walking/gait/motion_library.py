@@ -1,0 +1,289 @@
+"""The motion library: walking cycles of one body, by forward, left and angular velocity.
+
+Also here. The motion library as a file: coefficients in NumPy's ``.npz``, without pickled objects.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cache, cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.body import BodyModel, human
+from manikin.body.limbs import mirrored_hinges
+from manikin.errors import InputError
+from manikin.numerics.signals import shifted
+from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.runtime.files import atomic_path
+
+MIRRORED = " mirrored"
+
+
+ROOT = ("ahead", "left", "height", "roll", "pitch", "yaw")
+"""Signals of the root: its error around the line or circle, and its height [m]; its turns, yaw being the
+error of the heading [rad]. The hinges' angles follow."""
+
+_ROOT_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+
+REFERENCE_STATURE = 1.75
+"""Of the body that all cycles are kept for [m]."""
+
+STAND = "stand"
+
+
+@cache
+def reference_body() -> BodyModel:
+    """The human that all cycles are kept for."""
+    return human(REFERENCE_STATURE)
+
+
+def leg_length(body: BodyModel) -> float:
+    """Hip to ankle of a stretched leg [m], by which places and velocities scale from body to body."""
+    return -float(body.segment("left_leg").origin[2] + body.segment("left_foot").origin[2])
+
+
+@dataclass(frozen=True, eq=False)
+class MotionLibrary:
+    """c cycles that begin when the left toes push off ([Truong2010]_ 6.4).
+
+    Joint angles are those of the reference body's revolute hinges. Their ranges leave one triple of angles
+    only for every turn of a ball joint (the middle one stays within 90 degrees, the others within 180), so
+    that blends of postures within the ranges are within the ranges, without leaps.
+
+    Attributes:
+        names: Of the cycles, ``FILE first-last``, with ``mirrored`` for the mirror images.
+        kinds: Class of each, such as ``"walk straight"``.
+        velocities: (c, 3) forward, left [m/s], angular [rad/s].
+        periods: (c,) durations [s].
+        events: (c, 3) phases at which the left foot lands, the right one leaves the floor, and the right one
+            landed before: below 0 where it did so before the cycle's begin.
+        coefficients: (c, 2 k + 1, s) Fourier coefficients of the signals: :data:`ROOT`, then the hinges.
+        joint_names: Of the hinges.
+        leg: Leg length of the body they are for [m].
+        acknowledgements: Of those who recorded the motions.
+    """
+
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    velocities: FloatArray
+    periods: FloatArray
+    events: FloatArray
+    coefficients: FloatArray
+    joint_names: tuple[str, ...]
+    leg: float
+    acknowledgements: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        c, signals = len(self.names), len(ROOT) + len(self.joint_names)
+        wanted = {"velocities": (c, 3), "periods": (c,), "events": (c, 3), "coefficients": (c, None, signals)}
+        for name, shape in wanted.items():
+            array = frozen_array(getattr(self, name), f"motion library {name}", shape)
+            object.__setattr__(self, name, array)
+        if len(self.kinds) != c:
+            raise InputError(f"motion library has {len(self.kinds)} kinds; valid: {c}, one a cycle")
+        if self.coefficients.shape[1] % 2 == 0 or self.coefficients.shape[1] < 3:
+            raise InputError(
+                f"motion library has {self.coefficients.shape[1]} coefficients a signal; valid: 3, 5, 7, ..."
+            )
+        if c == 0 or self.periods.min() <= 0.0 or not self.leg > 0.0:
+            raise InputError("motion library has no cycle, or no duration or leg length; valid: all > 0")
+        landing, off, other = self.events.T
+        if not np.all(
+            (landing > 0.0)
+            & (landing < 1.0)
+            & (off > 0.0)
+            & (off < 1.0)
+            & (other < off)
+            & (other > off - 1.0)
+        ):
+            raise InputError(
+                "motion library has events out of order; valid: 0 < landing, off < 1, other before off"
+            )
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def harmonics(self) -> int:
+        """Of every signal."""
+        return (self.coefficients.shape[1] - 1) // 2
+
+    @cached_property
+    def hinges(self) -> slice:
+        """Where the hinges' angles are among the signals."""
+        return slice(len(ROOT), None)
+
+    def index(self, name: str) -> int:
+        """Place of a cycle.
+
+        Raises:
+            InputError: If there is none of that name.
+        """
+        if name not in self.names:
+            raise InputError(f"motion library has no cycle {name!r}; valid: {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def chosen(self, indices: Sequence[int] | NDArray[np.integer]) -> Self:
+        """The library of some of its cycles."""
+        of_cycles = ("velocities", "periods", "events", "coefficients")
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        given |= {name: given[name][list(indices)] for name in of_cycles}
+        given |= {name: tuple(given[name][i] for i in indices) for name in ("names", "kinds")}
+        return type(self)(**given)
+
+    def mirrored(self, body: BodyModel) -> Self:
+        """The library of the mirror images, which begin at the left toe-off again.
+
+        Args:
+            body: Whose hinges they are.
+        """
+        indices, factors = mirrored_hinges(body)
+        hinges = self.hinges
+        coefficients = np.array(self.coefficients)
+        coefficients[:, :, : len(ROOT)] *= _ROOT_MIRROR
+        coefficients[:, :, hinges] = factors * self.coefficients[:, :, hinges][:, :, indices]
+        strike, off, other = self.events.T
+        coefficients = np.array([shifted(c, p) for c, p in zip(coefficients, off, strict=True)])
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        given |= {
+            "names": tuple(f"{name} mirrored" for name in self.names),
+            "velocities": self.velocities * [1.0, -1.0, -1.0],
+            "events": np.column_stack([other + 1.0 - off, 1.0 - off, strike - off]),
+            "coefficients": coefficients,
+        }
+        return type(self)(**given)
+
+    def with_cycles(self, other: "MotionLibrary") -> Self:
+        """Both libraries in one."""
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        for name in ("velocities", "periods", "events", "coefficients"):
+            given[name] = np.concatenate([getattr(self, name), getattr(other, name)])
+        for name in ("names", "kinds"):
+            given[name] = getattr(self, name) + getattr(other, name)
+        return type(self)(**given)
+
+
+FORMAT = "manikin motion library 1"
+
+SHIPPED = "walking_library.npz"
+
+LARGEST = 50_000_000
+"""Of a file that is read [bytes]."""
+
+_ARRAYS = {"velocities": 2, "periods": 1, "events": 2, "coefficients": 3, "leg": 0}
+_WORDS = {"format": 0, "names": 1, "kinds": 1, "joint_names": 1, "acknowledgements": 1}
+
+
+def save_library(library: MotionLibrary, path: str | Path) -> None:
+    """Write a library; mirror images are left out and made again when it is read.
+
+    The coefficients are rounded to single precision, some 1e-7 rad.
+
+    Args:
+        library: Cycles.
+        path: File to write, ``.npz``.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    kept = [i for i, name in enumerate(library.names) if not name.endswith(MIRRORED)]
+    sided = np.array([library.names[i] + MIRRORED in library.names for i in kept])
+    arrays: dict[str, Any] = {
+        "format": np.array(FORMAT),
+        "names": np.array([library.names[i] for i in kept]),
+        "kinds": np.array([library.kinds[i] for i in kept]),
+        "sided": sided,
+        "velocities": library.velocities[kept],
+        "periods": library.periods[kept],
+        "events": library.events[kept],
+        "coefficients": library.coefficients[kept].astype(np.float32),
+        "joint_names": np.array(library.joint_names),
+        "leg": np.array(library.leg),
+        "acknowledgements": np.array(library.acknowledgements),
+    }
+    try:
+        with atomic_path(path) as temporary, temporary.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}") from None
+
+
+def load_library(path: str | Path | None = None) -> MotionLibrary:
+    """Read a library, with its mirror images.
+
+    Args:
+        path: A file written by :func:`save_library`; the library that comes with this package if omitted.
+
+    Raises:
+        InputError: If it is no such file, or what it holds does not fit together.
+    """
+    if path is None:
+        return _shipped()
+    return _read(Path(path))
+
+
+@cache
+def _shipped() -> MotionLibrary:
+    with resources.as_file(resources.files("manikin.walking") / "data" / SHIPPED) as file:
+        return _read(file)
+
+
+def _read(file: Path) -> MotionLibrary:
+    try:
+        if file.stat().st_size > LARGEST:
+            raise InputError(f"{file} is larger than {LARGEST // 1_000_000} MB; valid: a motion library")
+        archive = np.load(file, allow_pickle=False)
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise InputError(f"{file} holds one array; valid: a motion library (.npz)")
+        with archive:
+            given = {name: archive[name] for name in archive.files}
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(
+            f"{file} cannot be read: {error.strerror or error}; valid: a motion library"
+        ) from None
+    except Exception:  # numpy, zipfile and zlib raise a dozen kinds for damaged bytes
+        raise InputError(f"{file} is damaged or no motion library; valid: a file of this package") from None
+    return _library(file, given)
+
+
+def _library(file: Path, given: dict[str, Any]) -> MotionLibrary:
+    for name, dimensions in (*_ARRAYS.items(), *_WORDS.items(), ("sided", 1)):
+        if name not in given:
+            raise InputError(f"{file} has no {name!r}; valid: a motion library")
+        kind = "U" if name in _WORDS else "b" if name == "sided" else "f"
+        if given[name].dtype.kind != kind or given[name].ndim != dimensions:
+            raise InputError(
+                f"{file} {name} is {given[name].dtype} of {given[name].ndim} dimensions; "
+                f"valid: kind {kind!r}, {dimensions} dimensions"
+            )
+    if str(given["format"]) != FORMAT:
+        raise InputError(f"{file} has the format {str(given['format'])!r}; valid: {FORMAT!r}")
+    sided, names = given["sided"], tuple(given["names"].tolist())
+    if len(sided) != len(names) or len(set(names)) != len(names):
+        raise InputError(f"{file} names are not unique, or their number is not that of 'sided'")
+    body = _body(file, tuple(given["joint_names"].tolist()))
+    try:
+        library = MotionLibrary(
+            names, tuple(given["kinds"].tolist()), given["velocities"], given["periods"], given["events"],
+            given["coefficients"], body.joint_names, float(given["leg"]),
+            tuple(given["acknowledgements"].tolist()),
+        )  # fmt: skip
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+    chosen = np.flatnonzero(sided)
+    return library.with_cycles(library.chosen(chosen).mirrored(body)) if len(chosen) else library
+
+
+def _body(file: Path, joint_names: tuple[str, ...]) -> BodyModel:
+    body = reference_body()
+    if joint_names != body.joint_names:
+        raise InputError(
+            f"{file} is for other hinges than those of our human; valid: a library of this version"
+        )
+    return body

@@ -1,0 +1,1 @@
+"""Walking paths by optimal control ([Truong2010]_ chapter 3)."""

@@ -1,0 +1,429 @@
+"""Finding walking paths: the criterion minimised from several guesses, around obstacles as well.
+
+Also here. Initial guesses of a walking path: straight, turned, and around what is in the way. Ways between
+resting obstacles, searched on a grid to guess paths from, or to tell that there is none.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, PlanarTransform, finite_number, frozen_array
+from manikin.numerics.spline import BSpline
+from manikin.runtime.parallel import side_by_side
+from manikin.walking.path.path_program import DEGREE, PathStructure
+from manikin.walking.path.path_solver import Guess, bent, cheapest, lacking, programme_of, sharpened, solve
+from manikin.walking.path.walk_obstacles import Walker, WalkObstacle, clearance
+from manikin.walking.path.walking_model import PROSE_ORDER, WalkObjective
+from manikin.walking.path.walking_path import WalkingPath, WalkingTask
+
+GUESSES = ("straight", "turning", "other first turn", "other last turn")
+"""Guesses without obstacles: the heading turns evenly; or first to the goal, then along, then to its end; or
+so with one of the turns the other way round, where that turn is nearly half a turn."""
+
+_HALF_TURN = np.radians(150.0)
+"""Turns from which the other way round is tried as well [rad]."""
+
+_ASIDE = 0.1
+"""Room that a detour leaves beside an obstacle [m]."""
+
+_MANY = 2
+"""Of more obstacles in the way than this, all are passed on one side or all on the other."""
+
+
+def wrap(angle: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def kinds_of_guesses(start: FloatArray, goal: FloatArray) -> list[str]:
+    """Those of :data:`GUESSES` that make sense between two places (3,) x, y [m], heading [rad]."""
+    turns = zip(GUESSES[2:], _turns(start, goal), strict=True)
+    return [*GUESSES[:2], *(kind for kind, turn in turns if abs(turn) >= _HALF_TURN)]
+
+
+def guess_path(
+    structure: PathStructure, kind: str, start: FloatArray, goal: FloatArray, via: Sequence[FloatArray] = ()
+) -> FloatArray:
+    """Control points of a guess; the last one's heading may differ from the goal's by whole turns.
+
+    Args:
+        structure: Of the programme.
+        kind: One of :data:`GUESSES`.
+        start: (3,) x, y [m], heading [rad].
+        goal: (3,) x, y [m], heading [rad].
+        via: (2,) places to pass, in order [m].
+
+    Returns:
+        (n, 3).
+    """
+    knots = structure.knots
+    shares = np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(structure.pieces + DEGREE)])
+    corners = np.vstack([start[:2], *via, goal[:2]])
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    at = lengths[-1] * _smooth(shares)
+    xy = np.column_stack([np.interp(at, lengths, corners[:, i]) for i in range(2)])
+    if kind == "straight":
+        heading = start[2] + _smooth(shares) * wrap(goal[2] - start[2])
+    else:
+        first, last = _turns(start, goal)
+        first = _other_way(first) if kind == GUESSES[2] else first
+        last = _other_way(last) if kind == GUESSES[3] else last
+        heading = start[2] + first * _smooth(shares / 0.4) + last * _smooth((shares - 0.6) / 0.4)
+    return np.column_stack([xy, heading])
+
+
+def guess_duration(objective: WalkObjective, start: FloatArray, goal: FloatArray) -> float:
+    """A duration somewhat above that of a straight walk [s]."""
+    return 1.3 * objective.straight_duration(max(float(np.hypot(*(goal[:2] - start[:2]))), 0.3))
+
+
+def detours(
+    obstacles: Sequence[WalkObstacle],
+    times: Sequence[float],
+    walker: Walker,
+    start: FloatArray,
+    goal: FloatArray,
+) -> Iterator[list[FloatArray]]:
+    """Ways around obstacles, each a list of places to pass in order [m].
+
+    Args:
+        obstacles: Those in the way.
+        times: When the walker is nearest to each [s].
+        walker: Who must fit beside them.
+        start: (3,) x, y [m], heading [rad].
+        goal: (3,) x, y [m], heading [rad].
+    """
+    along = (goal[:2] - start[:2]) / np.hypot(*(goal[:2] - start[:2]))
+    left = np.array([-along[1], along[0]])
+    centres = [
+        one.corners.mean(axis=0) + one.displacement(t) for one, t in zip(obstacles, times, strict=True)
+    ]
+    order = np.argsort([centre @ along for centre in centres])
+    count = len(obstacles)
+    sides = (
+        itertools.product((1.0, -1.0), repeat=count)
+        if count <= _MANY
+        else ((s,) * count for s in (1.0, -1.0))
+    )
+    for choice in sides:
+        via = [
+            centres[i] + choice[i] * (obstacles[i].reach + walker.width / 2 + _ASIDE) * left for i in order
+        ]
+        if not _blocked(via, obstacles, walker):
+            yield via
+
+
+def turned_between(points: FloatArray, turn: float) -> FloatArray:
+    """(n, 3) control points whose headings differ by ``turn`` [rad] on the way, to pass between obstacles."""
+    share = np.linspace(0.0, 1.0, len(points))
+    turned = points.copy()
+    turned[:, 2] += turn * _smooth(share / 0.3) * _smooth((1.0 - share) / 0.3)
+    return turned
+
+
+def _turns(start: FloatArray, goal: FloatArray) -> tuple[float, float]:
+    """Turns from the start's heading to the goal's direction, and from there to the goal's heading [rad]."""
+    ahead = np.arctan2(*(goal[:2] - start[:2])[::-1])
+    return wrap(ahead - start[2]), wrap(goal[2] - ahead)
+
+
+def _other_way(turn: float) -> float:
+    return turn - 2.0 * np.pi if turn > 0.0 else turn + 2.0 * np.pi
+
+
+def _blocked(via: Sequence[FloatArray], obstacles: Sequence[WalkObstacle], walker: Walker) -> bool:
+    """Whether a place to pass is in an obstacle that rests."""
+    resting = [one for one in obstacles if not one.moves]
+    points = np.array(via)[:, None, :]
+    return any(bool(np.any(one.distance(points, np.zeros(len(via))) < walker.depth / 2)) for one in resting)
+
+
+def _smooth(share: FloatArray) -> FloatArray:
+    """``3 s^2 - 2 s^3``, from 0 to 1 and at rest at both ends."""
+    s = np.clip(share, 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+_CELL = 0.05
+"""Side of a cell [m], where that makes no more than :data:`_CELLS` along the longer side."""
+
+_CELLS = 160
+
+_BESIDE = 1.0
+"""Room around everything in which ways are searched [m]."""
+
+_STEPS = ((1, 0), (0, 1), (1, 1), (1, -1))
+
+
+class Grid:
+    """The floor around start, goal and resting obstacles in square cells.
+
+    Args:
+        obstacles: Those that do not move are taken.
+        start: (3,) x, y [m], heading [rad].
+        goal: (3,) x, y [m], heading [rad].
+    """
+
+    def __init__(self, obstacles: Sequence[WalkObstacle], start: FloatArray, goal: FloatArray) -> None:
+        resting = [one for one in obstacles if not one.moves]
+        ends = np.vstack([start[:2], goal[:2]])
+        corners = [
+            one.corners + one.displacements[0] + sign * one.radius for one in resting for sign in (-1, 1)
+        ]
+        points = np.vstack([ends, *corners])
+        self._low, high = points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE
+        self._cell = max(_CELL, float((high - self._low).max()) / _CELLS)
+        self._shape = tuple(np.ceil((high - self._low) / self._cell).astype(int) + 1)
+        rows, columns = np.indices(self._shape)
+        self._centres = self._low + self._cell * np.column_stack([rows.ravel(), columns.ravel()])
+        rooms = [one.distance(self._centres[:, None], np.zeros(1))[:, 0] for one in resting]
+        self._room = np.min(rooms, axis=0) if rooms else np.full(len(self._centres), np.inf)
+        self._ends = [int(np.argmin(np.linalg.norm(self._centres - end, axis=1))) for end in ends]
+
+    @property
+    def tolerance(self) -> float:
+        """A way with this much less room than a cell's centre shows may still exist beside it [m]."""
+        return self._cell * np.sqrt(0.5)
+
+    def way(self, room: float) -> FloatArray | None:
+        """The shortest way whose cells keep their centres this far from all obstacles.
+
+        Args:
+            room: [m]; start and goal themselves may have less.
+
+        Returns:
+            (k, 2) centres of its cells between start and goal [m], or None if there is no way.
+        """
+        free = self._room >= room
+        free[self._ends] = True
+        index = np.arange(free.size).reshape(self._shape)
+        firsts, seconds, lengths = [], [], []
+        for dx, dy in _STEPS:
+            a = index[: self._shape[0] - dx, max(0, -dy) : self._shape[1] - max(0, dy)].ravel()
+            b = a + dx * self._shape[1] + dy
+            both = free[a] & free[b]
+            firsts.append(a[both])
+            seconds.append(b[both])
+            lengths.append(np.full(int(both.sum()), np.hypot(dx, dy)))
+        edges = (np.concatenate(lengths), (np.concatenate(firsts), np.concatenate(seconds)))
+        graph = coo_matrix(edges, shape=(free.size, free.size)).tocsr()
+        _, before = dijkstra(graph, directed=False, indices=self._ends[0], return_predecessors=True)
+        cells = [self._ends[1]]
+        while cells[-1] != self._ends[0]:
+            if before[cells[-1]] < 0:
+                return None
+            cells.append(int(before[cells[-1]]))
+        return self._centres[cells[-2:0:-1]]
+
+
+GRID, GOAL_GRID = 6, 9
+"""Decimals of the obstacles that ways are sought around [m], as exact as floor plans; and of their goal."""
+
+NEAREST, FARTHEST = 0.01, 100.0
+"""Distances from start to goal that can be asked [m]; at none, the direction of the goal has no value."""
+
+
+def walking_path(
+    start: ArrayLike,
+    goal: ArrayLike,
+    objective: WalkObjective = PROSE_ORDER,
+    *,
+    obstacles: Sequence[WalkObstacle] = (),
+    walker: Walker | None = None,
+    room: float = 0.05,
+    max_speed: float | None = None,
+    start_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    goal_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    like: WalkingPath | None = None,
+) -> WalkingPath:
+    """The way a person walks from one place and heading to another ([Truong2010]_ 5.5-5.8).
+
+    Every initial guess is optimised and the cheapest path is returned, whose heading may end whole turns from
+    the goal's. Obstacles, which the thesis leaves open (5.6), are constraints under the same cost: if the
+    path without them is in their way, ways between them from a grid and detours on both sides are optimised
+    and the cheapest is returned. All are local optima; a cheaper one elsewhere cannot be excluded.
+
+    Args:
+        start: (3,) x, y [m], heading [rad], counter-clockwise from x.
+        goal: (3,) x, y [m], heading [rad], 0.01 to 100 m from the start.
+        objective: The cost; :data:`LITERAL_ORDER` is the other reading of (5.8).
+        obstacles: To be kept away from, at rest or moving.
+        walker: The body's extent, used with obstacles only.
+        room: Distance to keep from obstacles [m].
+        max_speed: Limit of the speed over the floor [m/s]. Without one, far goals are run to: the cost of
+            the thesis grows with accelerations, not with speeds.
+        start_velocity: (3,) forward, left [m/s], angular velocity [rad/s]; at rest, as in the thesis' data.
+        goal_velocity: (3,) the same at the goal.
+        like: A path to start from instead of the guesses, such as that of a neighbouring goal.
+
+    Returns:
+        The path. If there is none it says so in ``failure`` and holds the nearest attempt.
+
+    Raises:
+        InputError: If an argument is not usable, or start or goal are in an obstacle.
+    """
+    task = WalkingTask(
+        start=frozen_array(start, "walking start [m, m, rad]", (3,)),
+        goal=frozen_array(goal, "walking goal [m, m, rad]", (3,)),
+        objective=objective,
+        obstacles=tuple(obstacles),
+        walker=Walker() if walker is None else walker,
+        room=finite_number(room, "walking room [m]", at_least=0.0),
+        max_speed=None if max_speed is None else finite_number(max_speed, "max_speed [m/s]", at_least=0.1),
+        start_velocity=frozen_array(start_velocity, "walking start_velocity [m/s, m/s, rad/s]", (3,)),
+        goal_velocity=frozen_array(goal_velocity, "walking goal_velocity [m/s, m/s, rad/s]", (3,)),
+    )
+    _check(task)
+    guesses = _guesses(task) if like is None else [Guess("like another", *bent(like, task))]
+    free = cheapest([solve(replace(task, obstacles=()), guess) for guess in guesses])
+    return sharpened(_around(task, free) if task.obstacles else free)
+
+
+def walking_paths(
+    start: ArrayLike,
+    goals: Sequence[ArrayLike],
+    objective: WalkObjective = PROSE_ORDER,
+    *,
+    workers: int = 1,
+    **options: Any,
+) -> list[WalkingPath]:
+    """Paths from one start to many goals, as :func:`walking_path` finds each.
+
+    Args:
+        start: (3,) x, y [m], heading [rad].
+        goals: (k, 3) of the same.
+        objective: The cost.
+        workers: Processes. They are started afresh, which takes longer than a hundred goals without obstacles
+            do; and a script must ask for more than one under ``if __name__ == "__main__"``.
+        options: Of :func:`walking_path`.
+
+    Raises:
+        InputError: As :func:`walking_path`, before anything is computed where that is possible.
+    """
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise InputError(f"workers is {workers!r}; valid: an integer >= 1")
+    wanted = [frozen_array(goal, f"walking goal {i} [m, m, rad]", (3,)) for i, goal in enumerate(goals)]
+    one = partial(_one, start, objective, options)
+    found = dict(side_by_side(one, wanted, workers, "walking paths"))
+    return [found[number] for number in range(len(wanted))]
+
+
+def _check(task: WalkingTask) -> None:
+    distance = float(np.hypot(*(task.goal - task.start)[:2]))
+    if not NEAREST <= distance <= FARTHEST:
+        raise InputError(
+            f"walking goal is {distance:g} m from the start; valid: {NEAREST:g} to {FARTHEST:g} m"
+        )
+    resting = [one for one in task.obstacles if not one.moves]
+    for name, place, there in (("start", task.start, task.obstacles), ("goal", task.goal, resting)):
+        for one, left in zip(there, clearance(there, task.walker, place[None], np.zeros(1))[0], strict=True):
+            if left < task.room:
+                raise InputError(
+                    f"walking {name} leaves {left:.3g} m to obstacle {one.name!r}; "
+                    f"valid: at least {task.room:g} m"
+                )
+
+
+def _guesses(task: WalkingTask) -> Iterator[Guess]:
+    structure = programme_of(replace(task, obstacles=())).structure
+    duration = guess_duration(task.objective, task.start, task.goal)
+    for kind in kinds_of_guesses(task.start, task.goal):
+        yield Guess(kind, guess_path(structure, kind, task.start, task.goal), duration)
+
+
+def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
+    """The free path if it has room, else the best of the detours around what is in its way."""
+    kept = replace(free, task=task)
+    short = lacking(kept)
+    if free.succeeded and np.all(short <= 0.0):
+        return kept
+    # Ways over a grid depend on its axes: with those of the start, a scene elsewhere has the same ones.
+    x, y, heading = task.start.tolist()
+    transform_start_to_world = PlanarTransform(x, y, math.degrees(heading))
+    transform_world_to_start = transform_start_to_world.inverse
+    from_start = _from_start(task, transform_world_to_start)
+    blocking = [one for one, lack in zip(from_start.obstacles, short, strict=False) if lack > 0.0]
+    found = _on_ways(from_start, _in_frame(kept, from_start, transform_world_to_start, GRID), blocking)
+    return _in_frame(found, task, transform_start_to_world)
+
+
+def _on_ways(task: WalkingTask, free: WalkingPath, blocking: Sequence[WalkObstacle]) -> WalkingPath:
+    """The best of the ways between all obstacles and of the detours around those that are in the way."""
+    grid = Grid(task.obstacles, task.start, task.goal)
+    narrow = grid.way(task.walker.depth / 2 + task.room - grid.tolerance)
+    if narrow is None:
+        return replace(free, failure="the obstacles leave no way to the goal", others={})
+    wide = grid.way(task.walker.width / 2 + task.room)
+    ways = {"narrow way": narrow} | ({} if wide is None else {"wide way": wide})
+    guesses = (*_way_guesses(task, free, ways), *_detour_guesses(task, free, blocking))
+    return cheapest([solve(task, guess) for guess in guesses])
+
+
+def _from_start(task: WalkingTask, transform_world_to_start: PlanarTransform) -> WalkingTask:
+    """The task in the frame of its start, its places on a grid that leaves no trace of where that is."""
+    goal = transform_world_to_start.points(task.goal[:2])
+    return replace(
+        task,
+        start=np.zeros(3),
+        goal=np.append(goal, task.goal[2] - task.start[2]).round(GOAL_GRID),
+        obstacles=tuple(one.moved(transform_world_to_start, GRID) for one in task.obstacles),
+    )
+
+
+def _in_frame(
+    path: WalkingPath, task: WalkingTask, transform: PlanarTransform, decimals: int | None = None
+) -> WalkingPath:
+    """A path in the frame of another task, whose places are those of its own after a transform."""
+    points = path.spline.control_points
+    moved = np.column_stack([transform.points(points[:, :2]), points[:, 2] + transform.yaw])
+    duration = path.duration
+    if decimals is not None:
+        moved, duration = moved.round(decimals), round(duration, decimals)
+    spline = BSpline(path.spline.degree, path.spline.knots, moved)
+    return replace(path, task=task, spline=spline, duration=duration)
+
+
+def _way_guesses(task: WalkingTask, free: WalkingPath, ways: Mapping[str, FloatArray]) -> Iterator[Guess]:
+    """Along ways over the grid; along the narrow one, where the shoulders may not fit, turned aside too."""
+    structure = programme_of(task).structure
+    for name, way in ways.items():
+        points = guess_path(structure, "turning", task.start, task.goal, list(way))
+        yield Guess(name, points, 1.2 * free.duration)
+        if name == "narrow way":
+            for side, turn in (("left", -np.pi / 2), ("right", np.pi / 2)):
+                turned = turned_between(points, turn)
+                yield Guess(f"{name}, {side} shoulder first", turned, 1.2 * free.duration)
+
+
+def _detour_guesses(
+    task: WalkingTask, free: WalkingPath, blocking: Sequence[WalkObstacle]
+) -> Iterator[Guess]:
+    """Past what is in the way on either side; straight on, sooner or later where something moves."""
+    if not blocking:
+        return
+    structure = programme_of(task).structure
+    times = np.linspace(0.0, free.duration, 201)
+    room = clearance(blocking, task.walker, free.place_at(times), times)
+    nearest = [float(times[i]) for i in room.argmin(axis=0)]
+    for number, via in enumerate(detours(blocking, nearest, task.walker, task.start, task.goal)):
+        way = guess_path(structure, "turning", task.start, task.goal, via)
+        yield Guess(f"detour {number}", way, 1.2 * free.duration)
+    if any(one.moves for one in blocking):
+        for name, factor in (("straight on", 1.0), ("sooner", 0.7), ("later", 1.6)):
+            yield Guess(name, free.spline.control_points, factor * free.duration)
+
+
+def _one(
+    start: ArrayLike, objective: WalkObjective, options: dict[str, Any], goal: FloatArray
+) -> WalkingPath:
+    return walking_path(start, goal, objective, **options)

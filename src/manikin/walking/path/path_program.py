@@ -1,0 +1,255 @@
+"""The nonlinear programme of a walking path, written once per structure; numbers are its parameters.
+
+x, y and heading are flat outputs of the unified model
+(:func:`manikin.walking.path.walking_model.body_motion`), so the programme has no dynamics: its unknowns are
+the inner control points of one spline through place and heading, over normalised time, and the logarithm of
+the end time. The ends of the spline hold start and goal exactly, the integrals of (5.6) are Gauss sums
+within each piece, and derivatives are exact. Without obstacles nothing is constrained. This transcription is
+our own; the thesis used another, unpublished one.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spline import BSpline, basis_matrix, clamped_knots
+from manikin.walking.path.walk_obstacles import WalkObstacle
+
+DEGREE = 4
+"""Of the spline: continuous rates of the accelerations."""
+
+GAUSS_POINTS = 3
+"""Points of each piece at which the integrands are taken."""
+
+SAMPLES = 3
+"""Instants of each piece at which obstacles and speed are looked at."""
+
+
+@dataclass(frozen=True)
+class PathStructure:
+    """What the programme's expressions depend on; numbers are its parameters.
+
+    Attributes:
+        pieces: Of the spline.
+        obstacles: Number of corners and of instants of each obstacle.
+        discs: Number of discs of the walker.
+        limited_speed: Whether the speed is limited.
+    """
+
+    pieces: int
+    obstacles: tuple[tuple[int, int], ...] = ()
+    discs: int = 1
+    limited_speed: bool = False
+
+    @property
+    def knots(self) -> FloatArray:
+        """Of the spline, over [0, 1]."""
+        return clamped_knots(DEGREE, np.linspace(0.0, 1.0, self.pieces + 1))
+
+    @property
+    def inner_points(self) -> int:
+        """Number of control points that are unknown: two at either end follow from place and velocity."""
+        return self.pieces + DEGREE - 4
+
+    @property
+    def sample_shares(self) -> FloatArray:
+        """Shares of the duration at which obstacles and speed are looked at, without the start."""
+        return np.linspace(0.0, 1.0, SAMPLES * self.pieces + 1)[1:]
+
+
+@dataclass(frozen=True, eq=False)
+class PathProgram:
+    """The compiled programme.
+
+    Attributes:
+        structure: What it was built for.
+        symbols: CasADi's ``x``, ``p``, ``f`` and ``g`` with ``terms``, (5, 1) integrals of the terms.
+        parameters: Names and shapes of the parameters, in order.
+        rows: Number of rows of each group of constraints, in order: one group per obstacle, then the speed.
+    """
+
+    structure: PathStructure
+    symbols: dict[str, Any]
+    parameters: tuple[tuple[str, tuple[int, int]], ...]
+    rows: tuple[int, ...]
+
+    @cached_property
+    def solver(self) -> ca.Function:
+        """IPOPT on the programme."""
+        options = {
+            "print_time": False,
+            "error_on_fail": False,
+            "calc_lam_p": False,
+            "show_eval_warnings": False,
+            "ipopt": {
+                "print_level": 0,
+                "sb": "yes",
+                "tol": 1e-6,
+                "max_iter": 100,
+                "bound_relax_factor": 0.0,
+                "mu_strategy": "adaptive",
+                "linear_solver": "mumps",
+            },
+        }
+        problem = {name: self.symbols[name] for name in ("x", "p", "f", "g")}
+        return ca.nlpsol("walking_path", "ipopt", problem, options)
+
+    @cached_property
+    def sensitivities(self) -> ca.Function:
+        """Of unknowns and parameters: Hessian of the objective and (unknowns, 5) slopes of the terms."""
+        x, terms = self.symbols["x"], self.symbols["terms"]
+        hessian, _ = ca.hessian(self.symbols["f"], x)
+        slopes = ca.jacobian(terms, x).T
+        return ca.Function("sensitivities", [x, self.symbols["p"]], [ca.densify(hessian), ca.densify(slopes)])
+
+    def pack_parameters(self, values: dict[str, Any]) -> FloatArray:
+        """Parameter vector from arrays by name."""
+        return np.concatenate([
+            np.asarray(values[name], dtype=np.float64).reshape(shape).ravel(order="F")
+            for name, shape in self.parameters
+        ])  # fmt: skip
+
+    def pack(self, points: FloatArray, duration: float) -> FloatArray:
+        """Unknowns of all (n, 3) control points, of which the inner ones are used, and the duration [s]."""
+        return np.append(points[2:-2].ravel(order="F"), np.log(duration))
+
+    def unpack(self, unknowns: FloatArray, values: dict[str, Any]) -> tuple[BSpline, float]:
+        """Spline over [0, 1] through place and heading, and duration [s]."""
+        duration = float(np.exp(unknowns[-1]))
+        inner = unknowns[:-1].reshape(3, -1).T
+        start, goal = np.asarray(values["start"]), np.asarray(values["goal"])
+        step = duration / (DEGREE * self.structure.pieces)
+        second = start + step * np.asarray(values["start_rate"])
+        last_but_one = goal - step * np.asarray(values["goal_rate"])
+        points = np.vstack([start, second, inner, last_but_one, goal])
+        return BSpline(DEGREE, self.structure.knots, points), duration
+
+
+def obstacle_parameters(index: int, obstacle: WalkObstacle) -> dict[str, FloatArray]:
+    """Parameters of one obstacle: its track is a place, first a velocity of zero, and changes of velocity."""
+    velocity = np.diff(obstacle.displacements, axis=0) / np.diff(obstacle.times)[:, None]
+    zero = np.zeros((1, 2))
+    changes = np.diff(np.vstack([zero, velocity, zero]), axis=0)
+    return {
+        f"corners{index}": obstacle.corners + obstacle.displacements[0],
+        f"radius{index}": np.array([obstacle.radius]),
+        f"times{index}": obstacle.times,
+        f"changes{index}": changes,
+    }
+
+
+class _Builder:
+    """Collects parameters while the programme is written."""
+
+    def __init__(self) -> None:
+        self.parameters: dict[str, ca.SX] = {}
+
+    def __call__(self, name: str, rows: int, columns: int = 1) -> ca.SX:
+        self.parameters[name] = ca.SX.sym(name, rows, columns)
+        return self.parameters[name]
+
+
+@lru_cache(maxsize=32)
+def transcribe(structure: PathStructure) -> PathProgram:
+    """Write the programme of a structure; cached."""
+    parameter = _Builder()
+    inner = ca.SX.sym("C", structure.inner_points, 3)
+    log_duration = ca.SX.sym("log_T")
+    duration = ca.exp(log_duration)
+    start, goal = parameter("start", 1, 3), parameter("goal", 1, 3)
+    start_rate, goal_rate = parameter("start_rate", 1, 3), parameter("goal_rate", 1, 3)
+    step = duration / (DEGREE * structure.pieces)
+    points = ca.vertcat(start, start + step * start_rate, inner, goal - step * goal_rate, goal)
+    terms = _terms(structure, points, duration, goal, parameter("fade", 1))
+    objective = ca.dot(parameter("weights", 5), terms)
+    rows = _obstacle_rows(structure, points, duration, parameter)
+    if structure.limited_speed:
+        rows.append(_speed_rows(structure, points, duration, parameter("max_speed", 1)))
+    symbols = {
+        "x": ca.vertcat(ca.vec(inner), log_duration),
+        "p": ca.vertcat(*[ca.vec(p) for p in parameter.parameters.values()]),
+        "f": objective,
+        "g": ca.vertcat(*rows),
+        "terms": terms,
+    }
+    shapes = tuple((name, p.shape) for name, p in parameter.parameters.items())
+    return PathProgram(structure, symbols, shapes, tuple(row.numel() for row in rows))
+
+
+def _basis(structure: PathStructure, shares: FloatArray, derivative: int = 0) -> ca.DM:
+    matrix = basis_matrix(DEGREE, structure.knots, shares, derivative)
+    matrix[np.abs(matrix) < 1e-13] = 0.0
+    return ca.sparsify(ca.DM(matrix))
+
+
+def _terms(structure: PathStructure, points: ca.SX, duration: ca.SX, goal: ca.SX, fade: ca.SX) -> ca.SX:
+    """(5, 1) integrals of (5.6) without their weights, in the order of ``objective.TERMS``."""
+    roots, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    shares = ((np.arange(structure.pieces)[:, None] + (roots + 1.0) / 2.0) / structure.pieces).ravel()
+    part = duration * ca.DM(np.tile(weights / 2.0 / structure.pieces, structure.pieces))
+    place = _basis(structure, shares) @ points
+    rate = _basis(structure, shares, 1) @ points / duration
+    second = _basis(structure, shares, 2) @ points / duration**2
+    cos, sin = ca.cos(place[:, 2]), ca.sin(place[:, 2])
+    forward, left = cos * rate[:, 0] + sin * rate[:, 1], cos * rate[:, 1] - sin * rate[:, 0]
+    along = cos * second[:, 0] + sin * second[:, 1] + rate[:, 2] * left
+    across = cos * second[:, 1] - sin * second[:, 0] - rate[:, 2] * forward
+    dx, dy = goal[0] - place[:, 0], goal[1] - place[:, 1]
+    psi = ca.atan2(cos * dy - sin * dx, cos * dx + sin * dy)
+    square = dx**2 + dy**2
+    faded = square / (square + fade**2) * psi**2
+    integrals = [ca.dot(part, value) for value in (along**2, across**2, second[:, 2] ** 2, faded)]
+    return ca.vertcat(duration, *integrals)
+
+
+def _obstacle_rows(
+    structure: PathStructure, points: ca.SX, duration: ca.SX, parameter: _Builder
+) -> list[ca.SX]:
+    """Distances of the walker's discs to each obstacle, less what they must be [m]."""
+    if not structure.obstacles:
+        return []
+    shares = structure.sample_shares
+    place = _basis(structure, shares) @ points
+    time = duration * ca.DM(shares)
+    offsets, room = parameter("offsets", structure.discs), parameter("room", len(structure.obstacles))
+    rows = []
+    for index, (corners, instants) in enumerate(structure.obstacles):
+        corner = parameter(f"corners{index}", corners, 2)
+        radius = parameter(f"radius{index}", 1)
+        times = parameter(f"times{index}", instants)
+        changes = parameter(f"changes{index}", instants, 2)
+        moved = [
+            sum(changes[k, i] * ca.fmax(time - times[k], 0.0) for k in range(instants)) for i in range(2)
+        ]
+        for disc in range(structure.discs):
+            x = place[:, 0] - offsets[disc] * ca.sin(place[:, 2]) - moved[0]
+            y = place[:, 1] + offsets[disc] * ca.cos(place[:, 2]) - moved[1]
+            rows.append(_distance(x, y, corner) - radius - room[index])
+    return rows
+
+
+def _distance(x: ca.SX, y: ca.SX, corners: ca.SX) -> ca.SX:
+    """Signed distance of points to a convex polygon with counter-clockwise corners."""
+    count, squares, depth = corners.shape[0], [], []
+    for i in range(count):
+        dx, dy = x - corners[i, 0], y - corners[i, 1]
+        if count == 1:
+            return ca.sqrt(dx**2 + dy**2 + 1e-12)
+        ex, ey = (corners[(i + 1) % count, axis] - corners[i, axis] for axis in range(2))
+        along = ca.fmin(ca.fmax((dx * ex + dy * ey) / (ex**2 + ey**2), 0.0), 1.0)
+        squares.append((dx - along * ex) ** 2 + (dy - along * ey) ** 2)
+        depth.append((dx * ey - dy * ex) / ca.sqrt(ex**2 + ey**2))
+    outside, inside = squares[0], depth[0]
+    for square, plane in zip(squares[1:], depth[1:], strict=True):
+        outside, inside = ca.fmin(outside, square), ca.fmax(inside, plane)
+    return ca.if_else(inside < 0.0, inside, ca.sqrt(outside + 1e-12))
+
+
+def _speed_rows(structure: PathStructure, points: ca.SX, duration: ca.SX, limit: ca.SX) -> ca.SX:
+    """Room below the speed limit, as a difference of squares over the limit [m/s]."""
+    rate = _basis(structure, structure.sample_shares, 1) @ points[:, :2] / duration
+    return limit - ca.sum2(rate**2) / limit

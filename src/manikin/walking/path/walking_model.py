@@ -1,0 +1,224 @@
+"""The unified walking model: a body on the floor that goes forward, sideways and turns ([Truong2010]_ 5.3).
+
+The thesis counts the lateral velocity to the right (5.5) and orders its state ``(x, y, theta, v_f, omega,
+v_l)``. Everywhere in this project left is positive, and lateral comes before angular:
+:func:`state_from_thesis` and :func:`state_to_thesis` are the only door between the two.
+
+Also here. What a walk costs: time, accelerations and looking away from the goal ([Truong2010]_ 5.4-5.5). The
+targets of the thesis' experiment and of its tests ([Truong2010]_ 4.3.3, 5.5.2).
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, finite_number
+
+TERMS = ("time", "forward", "lateral", "angular", "goal")
+"""Names of the five terms, in the order of every vector of them."""
+
+HOLONOMIC_ZONE = 0.5
+"""Nearer goals are reached by stepping, without a look along the way [m] ([Truong2010]_ 4.6, Fig. 4.23)."""
+
+
+@dataclass(frozen=True)
+class WalkObjective:
+    """``T + a1 int u_forward^2 + a2 int u_lateral^2 + a3 int u_angular^2 + a4 int w(r) psi^2`` (5.6).
+
+    ``psi`` is the direction of the goal from the body's heading, in (-pi, pi] (5.7). At the goal it has no
+    value, and the thesis does not say what it does there. Here it fades with the distance ``r`` of the goal
+    as ``w = r^2 / (r^2 + goal_fade^2)``. The default lets the direction go within the radius in which the
+    thesis' subjects stepped sideways without turning (4.6); a fade of a few centimetres gives the criterion
+    as it is printed, under which a goal half a metre aside is approached in an arc.
+
+    The defaults are the numbers of (5.8) in the order of the text of 5.5.1: lateral accelerations cost about
+    1.5 times what forward ones do, angular ones less. Read literally, (5.5) and (5.8) swap the two:
+    :data:`LITERAL_ORDER`.
+
+    Attributes:
+        time: a0 [1/s].
+        forward: a1 [s^3/m^2].
+        lateral: a2 [s^3/m^2].
+        angular: a3 [s^3/rad^2].
+        goal: a4 [1/(s rad^2)].
+        goal_fade: Distance at which the goal term has faded to one half [m].
+    """
+
+    time: float = 1.0
+    forward: float = 1.2
+    lateral: float = 1.7
+    angular: float = 0.7
+    goal: float = 5.2
+    goal_fade: float = HOLONOMIC_ZONE
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            name = field.name.replace("_", " ")
+            value = getattr(self, field.name)
+            if field.name == "goal":
+                number = finite_number(value, f"walking weight {name}", at_least=0.0)
+            else:
+                number = finite_number(value, f"walking weight {name}", above=0.0)
+            object.__setattr__(self, field.name, number)
+
+    @property
+    def weights(self) -> FloatArray:
+        """(5,) weights in the order of :data:`TERMS`."""
+        return np.array([self.time, self.forward, self.lateral, self.angular, self.goal])
+
+    def straight_duration(self, distance: float) -> float:
+        """Duration of the best walk straight ahead, ``(36 a1 d^2 / a0)^(1/4)`` [s]; its cost is 4/3 a0 T."""
+        return float((36.0 * self.forward * distance**2 / self.time) ** 0.25)
+
+
+PROSE_ORDER = WalkObjective()
+"""The weights of (5.8) as the text of 5.5.1 explains them."""
+
+LITERAL_ORDER = WalkObjective(lateral=0.7, angular=1.7)
+"""The weights of (5.8) with u_1, u_2, u_3 as (5.5) names them."""
+
+RECORDED_WALKS = WalkObjective(forward=4.4, lateral=2.7, angular=0.82, goal=1.2)
+"""Identified from 42 recorded walks of all kinds at once, to two digits (``docs/inverse.md``); ours."""
+
+RECORDED_TURNS = WalkObjective(forward=2.8, lateral=0.58, angular=0.63, goal=1.1)
+"""Identified from the 15 of them in which somebody turns a corner, so that heading and way part; ours.
+
+With these weights most walks to goals 1 to 3 m away begin and end holonomically, as those of the thesis'
+subjects do (4.5); with the printed ones few do (``docs/patterns.md``)."""
+
+
+def goal_direction(place: FloatArray, goal: FloatArray) -> FloatArray:
+    """(n,) psi of (n, 3) places: direction of the goal from the heading, in (-pi, pi] [rad] (5.7)."""
+    offset = goal[:2] - place[:, :2]
+    cos, sin = np.cos(place[:, 2]), np.sin(place[:, 2])
+    return np.arctan2(cos * offset[:, 1] - sin * offset[:, 0], cos * offset[:, 0] + sin * offset[:, 1])
+
+
+def cost_rates(
+    place: FloatArray, acceleration: FloatArray, goal: FloatArray, objective: WalkObjective
+) -> FloatArray:
+    """(n, 5) integrands of the terms, without their weights.
+
+    Args:
+        place: (n, 3) x, y [m], heading [rad].
+        acceleration: (n, 3) forward, left [m/s^2], angular [rad/s^2].
+        goal: (3,) x, y [m], heading [rad].
+        objective: For its fade.
+    """
+    square = np.sum((goal[:2] - place[:, :2]) ** 2, axis=1)
+    faded = square / (square + objective.goal_fade**2) * goal_direction(place, goal) ** 2
+    return np.column_stack([np.ones(len(place)), acceleration**2, faded])
+
+
+START = (0.0, 0.0, float(np.pi / 2))
+"""Where every subject stood: x, y [m], heading [rad] ([Truong2010]_ Fig. 4.14)."""
+
+TEST_TARGETS = ((1.0, 0.0, 0.0), (-1.0, 1.0, float(np.pi / 4)))
+"""Targets on which the thesis tests its cost ([Truong2010]_ 5.5.2)."""
+
+_ACROSS = (0.5, 1.0, 2.0, 3.0)
+_ALONG = (-1.0, 0.0, 0.5, 1.0)
+
+
+def experiment_targets() -> FloatArray:
+    """106 targets like those of the experiment ([Truong2010]_ 4.3.3).
+
+    The thesis states 106 targets at 32 places of [-3, 3] x [-1, 1] m, 16 on either side, with headings out
+    of eight from 0 to 7 pi/4; which ones is in a drawing only. Here the places are 0.5, 1, 2 and 3 m to
+    either side and -1, 0, 0.5 and 1 m ahead, mirrored, with three or four of the headings at each, so that
+    every heading and its mirror image occur.
+
+    Returns:
+        (106, 3) x, y [m], heading [rad], in [0, 2 pi).
+    """
+    targets = []
+    for number, (x, y) in enumerate((x, y) for x in _ACROSS for y in _ALONG):
+        headings = [(3 * number + step) % 8 for step in ((0, 2, 4, 6) if number % 3 == 0 else (0, 3, 5))]
+        for heading in headings[: 4 if number < 15 else 3]:
+            angle = heading * np.pi / 4
+            targets += [(x, y, angle), (-x, y, (np.pi - angle) % (2.0 * np.pi))]
+    return np.array(targets)
+
+
+STATE = ("x", "y", "heading", "forward", "left", "angular")
+"""Order of a state: place [m] and heading [rad] in the world, velocities in the body frame [m/s, rad/s]."""
+
+CONTROL = ("forward", "left", "angular")
+"""Order of velocities and accelerations: along the body's x [m/s^2], its y [m/s^2], about z [rad/s^2]."""
+
+
+def state_derivative(state: ArrayLike, control: ArrayLike) -> FloatArray:
+    """Rate of a state under accelerations ([Truong2010]_ 5.5, with left positive).
+
+    Args:
+        state: (..., 6) in the order of :data:`STATE`.
+        control: (..., 3) accelerations in the order of :data:`CONTROL`: rates of the body's own velocities.
+
+    Returns:
+        (..., 6).
+    """
+    z, u = _last(state, 6, "walking state"), _last(control, 3, "walking control")
+    rate = np.empty((*np.broadcast_shapes(z.shape[:-1], u.shape[:-1]), 6))
+    rate[..., :3] = to_world(z[..., 2], z[..., 3:])
+    rate[..., 3:] = u
+    return rate
+
+
+def to_world(heading: ArrayLike, velocity: ArrayLike) -> FloatArray:
+    """(..., 3) rates of x, y and heading of (..., 3) forward, left and angular velocity."""
+    v = _last(velocity, 3, "body velocity")
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.stack(
+        [cos * v[..., 0] - sin * v[..., 1], sin * v[..., 0] + cos * v[..., 1], v[..., 2]], axis=-1
+    )
+
+
+def to_body(heading: ArrayLike, rate: ArrayLike) -> FloatArray:
+    """(..., 3) forward, left and angular velocity of (..., 3) rates of x, y and heading."""
+    v = _last(rate, 3, "rate of the place")
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.stack(
+        [cos * v[..., 0] + sin * v[..., 1], cos * v[..., 1] - sin * v[..., 0], v[..., 2]], axis=-1
+    )
+
+
+def body_motion(place: ArrayLike, rate: ArrayLike, second: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Velocities and accelerations that move the body along a given path.
+
+    x, y and heading as functions of time are flat outputs of the model: its other states and its controls
+    follow from them and their derivatives, for any twice differentiable path.
+
+    Args:
+        place: (..., 3) x, y [m] and heading [rad].
+        rate: (..., 3) first derivatives.
+        second: (..., 3) second derivatives.
+
+    Returns:
+        (..., 3) velocities and (..., 3) accelerations in the order of :data:`CONTROL`.
+    """
+    heading = _last(place, 3, "place")[..., 2]
+    velocity, acceleration = to_body(heading, rate), to_body(heading, second)
+    acceleration[..., 0] += velocity[..., 2] * velocity[..., 1]
+    acceleration[..., 1] -= velocity[..., 2] * velocity[..., 0]
+    return velocity, acceleration
+
+
+def state_from_thesis(state: ArrayLike) -> FloatArray:
+    """(..., 6) state of a (..., 6) state ``(x, y, theta, v_f, omega, v_l)`` of [Truong2010]_ 5.5."""
+    z = _last(state, 6, "state of the thesis")
+    return np.concatenate([z[..., :4], -z[..., 5:6], z[..., 4:5]], axis=-1)
+
+
+def state_to_thesis(state: ArrayLike) -> FloatArray:
+    """(..., 6) state ``(x, y, theta, v_f, omega, v_l)`` of [Truong2010]_ 5.5 of a (..., 6) state."""
+    z = _last(state, 6, "walking state")
+    return np.concatenate([z[..., :4], z[..., 5:6], -z[..., 4:5]], axis=-1)
+
+
+def _last(value: ArrayLike, size: int, name: str) -> FloatArray:
+    array = np.asarray(value, dtype=np.float64)
+    if array.ndim == 0 or array.shape[-1] != size:
+        raise InputError(f"{name} has shape {array.shape}; valid: (..., {size})")
+    return array

@@ -1,0 +1,378 @@
+"""Nine categories of goals, and how walks to them begin, end and differ ([Truong2010]_ 4.4, 4.5.1).
+
+Also here. How alike several walks to one goal are, and how long their holonomic ends are ([Truong2010]_ 4.4,
+4.5). The zone of goals near the start that are walked to without a nonholonomic part ([Truong2010]_ 4.6).
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.walking.path.walking_model import START
+from manikin.walking.segments.segmentation import (
+    HOLONOMIC,
+    NONHOLONOMIC,
+    THESIS_RULE,
+    PathSegments,
+    SegmentationRule,
+    ShoulderPaths,
+    segment_path,
+)
+
+
+@dataclass(frozen=True)
+class HolonomicEnds:
+    """Lengths of the way before and after what is nonholonomic ([Truong2010]_ 4.9).
+
+    Attributes:
+        from_origin: PLO, from the origin to the end of the first holonomic part [m].
+        to_goal: PLG, from the beginning of the last holonomic part to the goal [m].
+        length: Of the whole way [m].
+    """
+
+    from_origin: float
+    to_goal: float
+    length: float
+
+
+def holonomic_ends(found: PathSegments) -> HolonomicEnds:
+    """Integrate the speed of the shoulders' middle up to the first nonholonomic frame, and from the last one.
+
+    The print's sum (4.10) counts its points otherwise than its step; this is the trapezoidal rule between all
+    instants. Standing before and after the walk belongs to its ends. Without any nonholonomic frame, both
+    lengths are that of the whole way.
+
+    Args:
+        found: A segmented walk, better off-line: a single nonholonomic frame ends the first part.
+    """
+    paths = found.paths
+    rates = np.asarray(np.gradient(paths.middle, 1.0 / paths.rate, axis=0))
+    speed = np.hypot(rates[:, 0], rates[:, 1])
+    ahead = np.flatnonzero(found.labels == NONHOLONOMIC)
+    if ahead.size:
+        first, after = int(ahead[0]), min(int(ahead[-1]) + 1, len(speed) - 1)
+    else:
+        first, after = len(speed) - 1, 0
+    whole, begin, end = (
+        float(np.trapezoid(part, dx=1.0 / paths.rate)) for part in (speed, speed[: first + 1], speed[after:])
+    )
+    return HolonomicEnds(begin, end, whole)
+
+
+@dataclass(frozen=True, eq=False)
+class PathDeviation:
+    """Several walks about their mean, at equal shares of their durations.
+
+    Attributes:
+        time: (n,) instants of the shortest walk [s].
+        mean: (n, 2) mean path of the shoulders' middle [m] ([Truong2010]_ 4.7).
+        deviation: (n,) TD, root mean square of the distances to the mean [m] ([Truong2010]_ 4.8).
+    """
+
+    time: FloatArray
+    mean: FloatArray
+    deviation: FloatArray
+
+    @property
+    def average(self) -> float:
+        """ATD, mean of TD over time [m]."""
+        return float(np.mean(self.deviation))
+
+    @property
+    def largest(self) -> float:
+        """MTD, maximum of TD over time [m]."""
+        return float(np.max(self.deviation))
+
+
+def path_deviation(walks: Sequence[ShoulderPaths]) -> PathDeviation:
+    """Mean path of several walks and how far they are from it ([Truong2010]_ 4.4).
+
+    All are rescaled in time to the shortest one and interpolated linearly at as many instants as it has.
+    The thesis calls TD a sum of distances; its formula, used here, is their root mean square.
+
+    Args:
+        walks: At least two, from the same start to the same goal.
+
+    Raises:
+        InputError: If there are fewer than two walks.
+    """
+    if len(walks) < 2:
+        raise InputError(f"deviation of {len(walks)} walks; valid: at least 2")
+    shortest = min(walks, key=lambda walk: walk.time[-1])
+    share = shortest.time / shortest.time[-1]
+    resampled = np.array(
+        [[np.interp(share, w.time / w.time[-1], line) for line in w.middle.T] for w in walks]
+    ).transpose(0, 2, 1)
+    mean = np.mean(resampled, axis=0)
+    deviation = np.sqrt(np.mean(np.sum((resampled - mean) ** 2, axis=2), axis=0))
+    return PathDeviation(
+        shortest.time, frozen_array(mean, "mean path [m]"), frozen_array(deviation, "deviation [m]")
+    )
+
+
+THESIS_RADIUS = THESIS_RULE.diagonal_step
+"""Of the zone that the thesis proposes from its recordings [m] ([Truong2010]_ Fig. 4.23)."""
+
+STRAIGHT = float(np.radians(22.5))
+"""Goals less far from straight ahead are left out [rad]: people walk to them straight."""
+
+LARGEST_TURN = float(np.radians(22.5))
+"""Goals with a larger turn are left out [rad]: to them one of the other seven headings is nearer."""
+
+
+@dataclass(frozen=True, eq=False)
+class HolonomicZone:
+    """Goals and how holonomic the walks to them are.
+
+    Attributes:
+        goals: (k, 3) ahead, left [m], turn in (-pi, pi] [rad], in the frame of the start.
+        shares: (k,) holonomic share of the moving frames of each walk [-].
+        considered: (k,) whether a goal counts: neither behind, nor straight ahead, nor with a large turn.
+    """
+
+    goals: FloatArray
+    shares: FloatArray
+    considered: NDArray[np.bool_]
+
+    @property
+    def distances(self) -> FloatArray:
+        """(k,) from the start [m]."""
+        return np.hypot(self.goals[:, 0], self.goals[:, 1])
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """(k,) whether a walk is holonomic from its beginning to its end."""
+        return self.shares >= 1.0
+
+    @property
+    def radius(self) -> float:
+        """Distance up to which all goals that count are reached holonomically throughout [m], or 0."""
+        return self._radius(self.considered)
+
+    @property
+    def farthest(self) -> float:
+        """Distance of the farthest goal that counts and is reached holonomically throughout [m], or 0."""
+        return float(np.max(self.distances[self.considered & self.whole], initial=0.0))
+
+    def radius_towards(self, low: float, high: float) -> float:
+        """Radius for the goals of a sector.
+
+        Args:
+            low: Smallest angle of the sector to either side of straight ahead [rad].
+            high: Largest angle [rad].
+        """
+        aside = np.abs(np.arctan2(self.goals[:, 1], self.goals[:, 0]))
+        return self._radius(self.considered & (aside >= low) & (aside <= high))
+
+    def _radius(self, chosen: NDArray[np.bool_]) -> float:
+        beyond = np.min(self.distances[chosen & ~self.whole], initial=np.inf)
+        inside = chosen & self.whole & (self.distances < beyond - 1e-9)
+        return float(np.max(self.distances[inside], initial=0.0))
+
+
+def holonomic_zone(
+    goals: ArrayLike,
+    walks: Sequence[PathSegments],
+    start: ArrayLike = START,
+    *,
+    largest_turn: float = LARGEST_TURN,
+) -> HolonomicZone:
+    """The zone around a start in which goals are reached holonomically, from segmented walks.
+
+    As in the thesis, goals behind the start are not considered, nor those straight ahead, to which people
+    just walk. The thesis says that large turns prevent a single step, but not from which on.
+
+    Args:
+        goals: (k, 3) x, y [m], heading [rad] of every walk's goal.
+        walks: (k) segmented walks, better off-line.
+        start: (3,) of all walks.
+        largest_turn: Goals with a larger turn are left out [rad].
+
+    Raises:
+        InputError: If there are not as many goals as walks.
+    """
+    begin = frozen_array(start, "start [m, m, rad]", (3,))
+    seen = seen_from(goals, begin)
+    if len(seen) != len(walks):
+        raise InputError(f"{len(seen)} goals of {len(walks)} walks; valid: one goal of each walk")
+    shares = []
+    for walk in walks:
+        aside, ahead = walk.share(HOLONOMIC), walk.share(NONHOLONOMIC)
+        shares.append(1.0 if ahead == 0.0 and aside > 0.0 else aside / max(1e-9, aside + ahead))
+    angle = np.abs(np.arctan2(seen[:, 1], seen[:, 0]))
+    considered = (
+        (angle >= STRAIGHT - 1e-9) & (angle <= np.pi / 2 + 1e-9) & (np.abs(seen[:, 2]) <= largest_turn)
+    )
+    return HolonomicZone(
+        frozen_array(seen, "goals of the zone"), frozen_array(shares, "shares of the zone"), considered
+    )
+
+
+HEADINGS_DEG = {
+    "LCF": 45, "MCF": 90, "HCF": 135, "LCS": 0, "MCS": 90, "HCS": 270, "LCB": 315, "MCB": 270, "HCB": 225,
+}  # fmt: skip
+"""Final heading by category where the start looks along y and the goal is to the right [deg]."""
+
+_BEARINGS_DEG = {"F": (30.0, 45.0, 60.0), "S": (90.0,), "B": (120.0, 135.0, 150.0)}
+
+BESIDE = 0.25
+"""Goals less far ahead or behind are at the side [m]: half of the distance to the next row of goals."""
+
+NEAR_HEADING = float(np.radians(22.5))
+"""Final headings less far from that of a category belong to it [rad]: half of the angle between two."""
+
+
+def seen_from(goals: ArrayLike, start: ArrayLike = START) -> FloatArray:
+    """Goals in the frame of a start: x ahead, y to the left.
+
+    Args:
+        goals: (k, 3) x, y [m], heading [rad] in the world.
+        start: (3,) the same.
+
+    Returns:
+        (k, 3) ahead, left [m], turn in (-pi, pi] [rad].
+    """
+    begin = frozen_array(start, "start [m, m, rad]", (3,))
+    ends = frozen_array(goals, "goals [m, m, rad]", (None, 3))
+    way, (sine, cosine) = ends[:, :2] - begin[:2], (np.sin(begin[2]), np.cos(begin[2]))
+    turn = np.pi - np.mod(np.pi - (ends[:, 2] - begin[2]), 2.0 * np.pi)
+    return np.column_stack([way @ [cosine, sine], way @ [-sine, cosine], turn])
+
+
+def category_of(goal: ArrayLike, start: ArrayLike = START) -> str | None:
+    """Category of a goal, or None if its heading is that of no category of its zone.
+
+    F is in front, S at the side, B behind. LC, MC, HC are low, medium and high curvature of the way: it is
+    bent least by a final heading in its own direction. The thesis gives the headings once, which makes sense
+    for goals to the right; for goals to the left they are mirrored here. Goals straight ahead or behind count
+    as being to the right.
+
+    Args:
+        goal: (3,) x, y [m], heading [rad].
+        start: (3,) the same.
+    """
+    ahead, left, turn = seen_from([frozen_array(goal, "goal [m, m, rad]", (3,))], start)[0].tolist()
+    zone = "F" if ahead >= BESIDE else "B" if ahead <= -BESIDE else "S"
+    heading = np.pi / 2 + (-turn if left > 1e-9 else turn)
+    for name, degrees in HEADINGS_DEG.items():
+        if name[2] == zone and abs(np.angle(np.exp(1j * (heading - np.radians(degrees))))) < NEAR_HEADING:
+            return name
+    return None
+
+
+def category_goals(distance: float) -> list[tuple[str, FloatArray]]:
+    """Goals of the nine categories at one distance to the right of :data:`START`; mirrored ones are alike.
+
+    The thesis shows the places of its goals in a drawing only (Fig. 4.14). Here they are 30, 45 and 60
+    degrees from straight ahead, aside, and 30, 45 and 60 degrees from straight behind.
+
+    Args:
+        distance: From the start [m], at least 0.5.
+
+    Returns:
+        21 names of categories with goals, (3,) x, y [m], heading [rad].
+    """
+    radius = finite_number(distance, "distance of the goals [m]", at_least=2.0 * BESIDE)
+    goals = []
+    for name, degrees in HEADINGS_DEG.items():
+        for bearing in np.radians(_BEARINGS_DEG[name[2]]):
+            place = (START[0] + radius * np.sin(bearing), START[1] + radius * np.cos(bearing))
+            goals.append((name, np.array([*place, np.radians(degrees)])))
+    return goals
+
+
+@dataclass(frozen=True)
+class CategorySpread:
+    """Of lengths of several walks.
+
+    Attributes:
+        mean: [m].
+        average_deviation: AD, mean distance from the mean [m].
+        largest_deviation: MD, largest distance from the mean [m].
+    """
+
+    mean: float
+    average_deviation: float
+    largest_deviation: float
+
+    @classmethod
+    def of(cls, values: Sequence[float]) -> "CategorySpread":
+        """Of at least one value."""
+        away = np.abs(np.asarray(values) - np.mean(values))
+        return cls(float(np.mean(values)), float(np.mean(away)), float(np.max(away)))
+
+
+@dataclass(frozen=True)
+class CategoryStatistics:
+    """Walks to the goals of one category.
+
+    Attributes:
+        goals: Number of goals.
+        walks: Number of walks.
+        from_origin: PLO.
+        to_goal: PLG.
+        patterned: Share of the walks that are holonomic, then nonholonomic, then holonomic [-].
+        holonomic: Mean share of the moving frames that are holonomic [-].
+        average_deviation: ATD, the mean of the goals with several walks [m]; None if there is none.
+        largest_deviation: MTD, the largest of these goals [m]; None if there is none.
+    """
+
+    goals: int
+    walks: int
+    from_origin: CategorySpread
+    to_goal: CategorySpread
+    patterned: float
+    holonomic: float
+    average_deviation: float | None
+    largest_deviation: float | None
+
+
+def category_statistics(
+    walks: Iterable[tuple[ArrayLike, Sequence[ShoulderPaths]]],
+    start: ArrayLike = START,
+    rule: SegmentationRule = THESIS_RULE,
+) -> dict[str, CategoryStatistics]:
+    """Statistics by category of walks from one start; goals of no category are left out.
+
+    Args:
+        walks: Every goal, (3,) x, y [m], heading [rad], with the walks to it.
+        start: (3,) of all walks.
+        rule: By which the walks are cut into segments, off-line.
+
+    Returns:
+        Statistics by the names of :data:`HEADINGS_DEG`, in their order, of the categories that occur.
+
+    Raises:
+        InputError: If a goal has no walk.
+    """
+    groups: dict[str, list[Sequence[ShoulderPaths]]] = {name: [] for name in HEADINGS_DEG}
+    for goal, found in walks:
+        if not found:
+            raise InputError(f"goal {np.asarray(goal).tolist()} has no walk; valid: at least one")
+        name = category_of(goal, start)
+        if name is not None:
+            groups[name].append(found)
+    return {name: _statistics(group, rule) for name, group in groups.items() if group}
+
+
+def _statistics(group: Sequence[Sequence[ShoulderPaths]], rule: SegmentationRule) -> CategoryStatistics:
+    segmented = [segment_path(walk, rule) for walks in group for walk in walks]
+    ends = [holonomic_ends(one) for one in segmented]
+    shares = [
+        one.share(HOLONOMIC) / max(1e-9, one.share(HOLONOMIC) + one.share(NONHOLONOMIC)) for one in segmented
+    ]
+    spreads = [path_deviation(walks) for walks in group if len(walks) > 1]
+    return CategoryStatistics(
+        goals=len(group),
+        walks=len(segmented),
+        from_origin=CategorySpread.of([one.from_origin for one in ends]),
+        to_goal=CategorySpread.of([one.to_goal for one in ends]),
+        patterned=float(np.mean([one.pattern == "H-N-H" for one in segmented])),
+        holonomic=float(np.mean(shares)),
+        average_deviation=float(np.mean([one.average for one in spreads])) if spreads else None,
+        largest_deviation=max(one.largest for one in spreads) if spreads else None,
+    )

@@ -1,0 +1,452 @@
+"""Where a walk is holonomic and where it is not ([Truong2010]_ 4.2).
+
+People mostly walk where they look: then the motion is *nonholonomic*. Steps to the side or obliquely are
+*holonomic*. Function 1 of the thesis tells them apart by both shoulders: a frame is nonholonomic if one of
+them moves within 15 degrees of the body's heading. So the inner shoulder of a turn may stand or go back.
+
+On-line that is all, known one half step of the tangent later. Off-line, three things are added: the paths are
+low-passed, short holonomic intervals between nonholonomic ones are examined as noise, and single steps that
+are straight to the eye are told apart from flat diagonal steps.
+
+Also here. Where the two shoulders of a walker go over the floor: the body's heading and each shoulder's
+direction.
+"""
+
+import itertools
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from manikin.errors import InputError
+from manikin.numerics.signals import SHARES, low_passed
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.recordings.readers.skeleton_recording import Recording
+from manikin.recordings.reconstruction.anatomy import SIDES, segment_joint
+from manikin.walking.path.walking_path import WalkingPath
+
+BREADTH = 0.36
+"""Between the shoulder joints of a walker who has a path only [m]."""
+
+STILL = 1e-9
+"""Speed below which nothing is said about a direction [m/s]."""
+
+LEAST_DISTANCE = 1e-3
+"""Between the shoulders, seen from above; below it the body has no heading [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShoulderPaths:
+    """Both shoulders on the ground plane, at an even rate; in the world, y is to the left of x.
+
+    Attributes:
+        left: (n, 2) left shoulder [m].
+        right: (n, 2) right shoulder [m].
+        rate: Frames per second [Hz].
+
+    Raises:
+        InputError: If there are fewer than three frames, the paths differ in length, or the shoulders meet.
+    """
+
+    left: FloatArray
+    right: FloatArray
+    rate: float
+
+    def __post_init__(self) -> None:
+        finite_number(self.rate, "shoulder paths rate [Hz]", above=0.0)
+        left = frozen_array(self.left, "left shoulder [m]", (None, 2))
+        right = frozen_array(self.right, "right shoulder [m]", (len(left), 2))
+        if len(left) < 3:
+            raise InputError(f"shoulder paths have {len(left)} frames; valid: at least 3")
+        close = np.flatnonzero(np.hypot(*(left - right).T) < LEAST_DISTANCE)
+        if close.size:
+            raise InputError(
+                f"shoulders meet at frame {close[0]}; "
+                f"valid: at least {LEAST_DISTANCE} m apart, seen from above"
+            )
+        object.__setattr__(self, "left", left)
+        object.__setattr__(self, "right", right)
+
+    @classmethod
+    def of_recording(cls, recording: Recording) -> Self:
+        """Joints of the upper arms of a recorded person.
+
+        Raises:
+            InputError: If the recording has no such joints, or fewer than three frames.
+        """
+        left, right = (
+            recording.positions[:, segment_joint(recording, f"{side}_upper_arm"), :2] for side in SIDES
+        )
+        return cls(left, right, recording.rate)
+
+    @classmethod
+    def of_walk(cls, path: WalkingPath, breadth: float = BREADTH) -> Self:
+        """Shoulders on the left and on the right of a path.
+
+        Args:
+            path: A walk.
+            breadth: Between the shoulders [m].
+
+        Raises:
+            InputError: If the breadth is not positive.
+        """
+        return cls.of_places(path.place, (len(path.time) - 1) / path.duration, breadth)
+
+    @classmethod
+    def of_places(cls, place: ArrayLike, rate: float, breadth: float = BREADTH) -> Self:
+        """Shoulders on the left and on the right of places.
+
+        Args:
+            place: (n, 3) x, y [m], heading [rad].
+            rate: Places per second [Hz].
+            breadth: Between the shoulders [m].
+
+        Raises:
+            InputError: If the breadth is not positive, or there are fewer than three places.
+        """
+        half = finite_number(breadth, "breadth of the shoulders [m]", at_least=LEAST_DISTANCE) / 2
+        places = frozen_array(place, "places [m, m, rad]", (None, 3))
+        left = half * np.column_stack([-np.sin(places[:, 2]), np.cos(places[:, 2])])
+        return cls(places[:, :2] + left, places[:, :2] - left, rate)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self.left)
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """(n,) instants, 0 at the first frame [s]."""
+        return frozen_array(np.arange(len(self)) / self.rate, "time")
+
+    @cached_property
+    def middle(self) -> FloatArray:
+        """(n, 2) midpoint of the shoulders [m] ([Truong2010]_ 4.4 and 4.5)."""
+        return frozen_array((self.left + self.right) / 2, "middle of the shoulders")
+
+    @cached_property
+    def heading(self) -> FloatArray:
+        """(n,) direction in which the body looks, continuous [rad] ([Truong2010]_ 4.2 and 4.3)."""
+        return frozen_array(np.unwrap(heading_of(self.points)), "heading")
+
+    @property
+    def points(self) -> FloatArray:
+        """(n, 2, 2) left and right shoulder [m]."""
+        return np.stack([self.left, self.right], axis=1)
+
+    def velocities(self, frames: int = 1) -> FloatArray:
+        """(n, 2, 2) of the left and the right shoulder, by central differences [m/s] ([Truong2010]_ 4.6).
+
+        Args:
+            frames: From a frame to either neighbour. Near the ends the missing neighbour is the end itself.
+        """
+        index = np.arange(len(self))
+        before, after = np.maximum(index - frames, 0), np.minimum(index + frames, len(self) - 1)
+        return (self.points[after] - self.points[before]) * (self.rate / (after - before))[:, None, None]
+
+    def low_passed(self, cutoff: float) -> "ShoulderPaths":
+        """The same without fast changes: Butterworth of second order, forward and backward.
+
+        [Truong2010]_ 4.3.4 filters with a "normalized cutoff frequency 0.5 Hz"; read as a share of the
+        Nyquist frequency, 25 Hz at its 100 Hz. The order is not given there.
+
+        Args:
+            cutoff: As a share of half the rate, between 0 and 1 [-].
+        """
+        padding = max(9, int(np.ceil(2.0 / cutoff)))
+        left, right = (low_passed(path, cutoff, SHARES, padding) for path in (self.left, self.right))
+        return ShoulderPaths(left, right, self.rate)
+
+
+def heading_of(points: FloatArray) -> FloatArray:
+    """(...) direction square to the line of the (..., 2, 2) shoulders, forward, in (-pi/2, 3 pi/2] [rad].
+
+    [Truong2010]_ 4.2 and 4.3, with the arctangent of two arguments that the print leaves out.
+    """
+    across = points[..., 1, :] - points[..., 0, :]
+    return np.arctan2(across[..., 1], across[..., 0]) + np.pi / 2
+
+
+def deviations(points: FloatArray, velocities: FloatArray) -> FloatArray:
+    """(..., 2) body heading less direction of each shoulder's motion, within pi of zero [rad]; NaN at rest.
+
+    Args:
+        points: (..., 2, 2) left and right shoulder [m].
+        velocities: (..., 2, 2) of both [m/s].
+    """
+    tangent = np.arctan2(velocities[..., 1], velocities[..., 0])
+    difference = heading_of(points)[..., None] - tangent
+    wrapped = np.arctan2(np.sin(difference), np.cos(difference))
+    return np.where(np.hypot(velocities[..., 0], velocities[..., 1]) > STILL, wrapped, np.nan)
+
+
+HOLONOMIC = "holonomic"
+NONHOLONOMIC = "nonholonomic"
+STANDING = "standing"
+KINDS = (HOLONOMIC, NONHOLONOMIC, STANDING)
+"""Kinds of frames and of segments."""
+
+Labels = NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class SegmentationRule:
+    """Thresholds. Those that the thesis gives are the defaults; it is silent about the others.
+
+    Attributes:
+        tolerance: Angle between heading and a shoulder's motion below which a frame is nonholonomic [rad];
+            15 degrees ([Truong2010]_ 4.2.1).
+        half_step: From an instant to those that its tangent joins [s], at least one frame; one frame at the
+            100 Hz of the thesis. On-line, labels come this much later.
+        standing_speed: Both shoulders slower than this stand [m/s]. Not in the thesis, whose walks begin at
+            the first motion.
+        cutoff: Of the low-pass of the paths, as a share of the Nyquist frequency [-]; 0.5 ([Truong2010]_
+            4.3.4), None without it. Off-line only.
+        noise: Holonomic intervals up to this duration may be noise [s], 0 for none; they are judged by
+            deviations low-passed at ``1 / (2 noise)``. The thesis ([Truong2010]_ 4.2.2.1) names the filter,
+            not its cutoff or how long noise lasts. Off-line only.
+        boundary: Angle below which two headings are the same [rad]; 1 degree ([Truong2010]_ 4.2.2.2), None
+            without this step. Off-line only.
+        diagonal_step: Longest way from rest to rest that can be one flat diagonal step [m]: 0.5 m, the radius
+            around the start in which the thesis found single steps ([Truong2010]_ 4.5.2, Fig. 4.23). Longer
+            walks have the labels of Function 1, also where they drift aside and end with their first heading.
+            Off-line only.
+        either_way: Whether a shoulder that goes straight back counts as one that goes ahead. The thesis says
+            so of turns on the spot only ([Truong2010]_ Fig. 4.3 d); its constraint (1.1) and its quotient
+            (4.1), which has no quadrants, say so of any motion, so that to walk backward is nonholonomic.
+    """
+
+    tolerance: float = float(np.radians(15.0))
+    half_step: float = 0.01
+    standing_speed: float = 0.1
+    cutoff: float | None = 0.5
+    noise: float = 0.2
+    boundary: float | None = float(np.radians(1.0))
+    diagonal_step: float = 0.5
+    either_way: bool = False
+
+    def __post_init__(self) -> None:
+        where = "segmentation rule"
+        finite_number(self.tolerance, f"{where} tolerance [rad]", above=0.0, at_most=np.pi)
+        finite_number(self.half_step, f"{where} half_step [s]", at_least=0.0)
+        finite_number(self.standing_speed, f"{where} standing_speed [m/s]", at_least=0.0)
+        finite_number(self.noise, f"{where} noise [s]", at_least=0.0)
+        finite_number(self.diagonal_step, f"{where} diagonal_step [m]", at_least=0.0)
+        if self.cutoff is not None:
+            finite_number(self.cutoff, f"{where} cutoff [-]", above=0.0, at_most=0.99)
+        if self.boundary is not None:
+            finite_number(self.boundary, f"{where} boundary [rad]", above=0.0, at_most=np.pi)
+
+    def frames(self, rate: float) -> int:
+        """Half step of the tangent in frames, at least one."""
+        return max(1, round(self.half_step * rate))
+
+    def ahead(self, angles: FloatArray) -> NDArray[np.bool_]:
+        """(...) whether one of the shoulders goes ahead by its deviation, (..., 2) [rad]."""
+        away = np.abs(angles)
+        return np.any((np.minimum(away, np.pi - away) if self.either_way else away) < self.tolerance, axis=-1)
+
+
+THESIS_RULE = SegmentationRule()
+
+
+@dataclass(frozen=True)
+class PathSegment:
+    """A stretch of one kind.
+
+    Attributes:
+        kind: One of :data:`KINDS`.
+        start: Instant of its first frame [s].
+        end: Instant of the next segment's first frame, or of the last frame of all [s].
+    """
+
+    kind: str
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class PathSegments:
+    """A walk cut into holonomic, nonholonomic and standing stretches.
+
+    Attributes:
+        paths: The shoulders that were looked at, low-passed where the rule says so.
+        labels: (n,) one of :data:`KINDS` per frame.
+        deviations: (n, 2) heading less direction of the left and the right shoulder [rad]; NaN at rest.
+        segments: Stretches in order, without gaps.
+    """
+
+    paths: ShoulderPaths
+    labels: Labels
+    deviations: FloatArray
+    segments: tuple[PathSegment, ...]
+
+    @property
+    def pattern(self) -> str:
+        """Kinds of the moving stretches in order: ``H-N-H`` is holonomic, nonholonomic, holonomic."""
+        moving = (one.kind for one in self.segments if one.kind != STANDING)
+        return "-".join(kind[0].upper() for kind, _ in itertools.groupby(moving))
+
+    def share(self, kind: str) -> float:
+        """Share of the frames that are of a kind [-].
+
+        Raises:
+            InputError: If there is no such kind.
+        """
+        if kind not in KINDS:
+            raise InputError(f"kind of a segment is {kind!r}; valid: {', '.join(KINDS)}")
+        return float(np.mean(self.labels == kind))
+
+
+def segment_path(
+    paths: ShoulderPaths, rule: SegmentationRule = THESIS_RULE, *, online: bool = False
+) -> PathSegments:
+    """Cut a walk into segments ([Truong2010]_ Function 1 and 4.2.2).
+
+    "At the boundary of forward walking and sideward step" the thesis ([Truong2010]_ 4.2.2.2) splits motions
+    that are "smaller than the tolerance" throughout by their initial and final orientation, and draws two
+    single motions. Here a motion from standing to standing is a diagonal step if it is no longer than
+    :attr:`SegmentationRule.diagonal_step`, both headings are the same and the way between both places is not
+    along them; otherwise it is nonholonomic, as any walk of several steps that keeps within the tolerance.
+    Walks that are not recorded from rest to rest are left as they are.
+
+    Args:
+        paths: Both shoulders.
+        rule: Thresholds.
+        online: Function 1 alone, as :class:`OnlineSegmentation` gives it frame by frame.
+    """
+    if not online and rule.cutoff is not None:
+        paths = paths.low_passed(rule.cutoff)
+    velocities = paths.velocities(rule.frames(paths.rate))
+    angles = deviations(paths.points, velocities)
+    labels = _function_1(angles, velocities, rule)
+    if not online:
+        labels = _without_noise(labels, angles, paths.rate, rule)
+        labels = _with_diagonal_steps(labels, paths, rule)
+    labels.setflags(write=False)
+    angles.setflags(write=False)
+    return PathSegments(paths, labels, angles, _segments(labels, paths.time))
+
+
+class OnlineSegmentation:
+    """Function 1 frame by frame: each label comes :attr:`delay` frames after its frame.
+
+    The labels are those of ``segment_path(..., online=True)``.
+
+    Args:
+        rate: Frames per second [Hz].
+        rule: Thresholds; ``cutoff``, ``noise`` and ``boundary`` need the future and are not used.
+    """
+
+    def __init__(self, rate: float, rule: SegmentationRule = THESIS_RULE) -> None:
+        self._rate = finite_number(rate, "on-line segmentation rate [Hz]", above=0.0)
+        self._rule = rule
+        self._frames: deque[FloatArray] = deque(maxlen=2 * self.delay + 1)
+
+    @property
+    def delay(self) -> int:
+        """Frames from a frame to its label."""
+        return self._rule.frames(self._rate)
+
+    def step(self, left: ArrayLike, right: ArrayLike) -> str | None:
+        """Take the next frame and label the one :attr:`delay` frames before it; None while there is none.
+
+        Args:
+            left: (2,) left shoulder [m].
+            right: (2,) right shoulder [m].
+
+        Raises:
+            InputError: If a shoulder is not two finite numbers, or the shoulders meet.
+        """
+        points = np.stack(
+            [frozen_array(p, f"{s} shoulder [m]", (2,)) for p, s in ((left, "left"), (right, "right"))]
+        )
+        if np.hypot(*(points[0] - points[1])) < LEAST_DISTANCE:
+            raise InputError(f"shoulders meet; valid: at least {LEAST_DISTANCE} m apart, seen from above")
+        self._frames.append(points)
+        now = len(self._frames) - 1 - self.delay
+        return self._label(now, len(self._frames) - 1) if now >= 0 else None
+
+    def finish(self) -> Iterator[str]:
+        """Labels of the last frames, whose tangents end at the last frame.
+
+        Raises:
+            InputError: If there were fewer than two frames.
+        """
+        last = len(self._frames) - 1
+        if last < 1:
+            raise InputError("on-line segmentation has fewer than 2 frames; valid: at least 2")
+        for now in range(max(0, last + 1 - self.delay), last + 1):
+            yield self._label(now, last)
+
+    def _label(self, now: int, after: int) -> str:
+        before = max(0, now - self.delay)
+        frames = self._frames
+        velocities = (frames[after] - frames[before]) * (self._rate / (after - before))
+        return str(_function_1(deviations(frames[now], velocities), velocities, self._rule))
+
+
+def _function_1(angles: FloatArray, velocities: FloatArray, rule: SegmentationRule) -> Labels:
+    """(...) labels of (..., 2) deviations and (..., 2, 2) velocities."""
+    standing = np.all(np.hypot(velocities[..., 0], velocities[..., 1]) < rule.standing_speed, axis=-1)
+    return np.where(standing, STANDING, np.where(rule.ahead(angles), NONHOLONOMIC, HOLONOMIC))
+
+
+def _without_noise(labels: Labels, angles: FloatArray, rate: float, rule: SegmentationRule) -> Labels:
+    """Labels with short holonomic intervals made nonholonomic where the low-passed deviation is small."""
+    runs = list(_runs(labels))
+    noisy = np.zeros(len(labels), dtype=bool)
+    for (before, *_), (kind, first, stop), (after, *_) in zip(runs, runs[1:], runs[2:], strict=False):
+        around = before == after == NONHOLONOMIC and kind == HOLONOMIC
+        noisy[first:stop] = around and (stop - first) / rate <= rule.noise
+    cleaned = labels.copy()
+    for joined, first, stop in _runs((labels == NONHOLONOMIC) | noisy):
+        if joined and np.any(noisy[first:stop]):
+            smooth = _smoothed(angles[first:stop], min(0.99, 1.0 / (rule.noise * rate)))
+            cleaned[first:stop][noisy[first:stop] & rule.ahead(smooth)] = NONHOLONOMIC
+    return cleaned
+
+
+def _smoothed(angles: FloatArray, cutoff: float) -> FloatArray:
+    """(n, 2) angles, low-passed as directions so that whole turns do not matter; NaN counts for nothing."""
+    known = np.isfinite(angles)
+    pointers = np.where(known, np.exp(1j * np.where(known, angles, 0.0)), 0.0)
+    real, imaginary = (low_passed(part, cutoff, SHARES, padding=9) for part in (pointers.real, pointers.imag))
+    return np.where(np.any(known, axis=0), np.arctan2(imaginary, real), np.nan)
+
+
+def _with_diagonal_steps(labels: Labels, paths: ShoulderPaths, rule: SegmentationRule) -> Labels:
+    """Labels with single steps made holonomic that keep the heading and go obliquely to it."""
+    found = labels.copy()
+    runs = list(_runs(labels))
+    if rule.boundary is None:
+        return found
+    for (before, *_), (kind, first, stop), (after, *_) in zip(runs, runs[1:], runs[2:], strict=False):
+        if not (before == after == STANDING and kind == NONHOLONOMIC):
+            continue
+        start, end = first - 1, stop
+        turned = paths.heading[end] - paths.heading[start]
+        way = paths.middle[end] - paths.middle[start]
+        if np.hypot(way[0], way[1]) > rule.diagonal_step:
+            continue
+        aside = np.arctan2(way[1], way[0]) - paths.heading[start]
+        if abs(turned) < rule.boundary <= abs(np.arctan2(np.sin(aside), np.cos(aside))):
+            found[first:stop] = HOLONOMIC
+    return found
+
+
+def _runs(values: NDArray[np.generic]) -> Iterator[tuple[object, int, int]]:
+    """Value, first index and the one after the last, of stretches of equal values."""
+    borders = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1).tolist(), len(values)]
+    for first, stop in itertools.pairwise(borders):
+        yield values[first].item(), first, stop
+
+
+def _segments(labels: Labels, time: FloatArray) -> tuple[PathSegment, ...]:
+    return tuple(
+        PathSegment(str(kind), float(time[first]), float(time[min(stop, len(time) - 1)]))
+        for kind, first, stop in _runs(labels)
+    )

@@ -1,0 +1,38 @@
+"""Words of walking: smoothest paths and the partition of their goals by word ([Truong2010]_ 3.3)."""
+
+from manikin.walking.words.partition import (
+    HEADINGS,
+    THESIS_GRID,
+    EqualPaths,
+    WordGrid,
+    WordSlice,
+    bent_to,
+    count_words,
+    equal_paths,
+    shares,
+    solve_slice,
+    solve_slices,
+)
+from manikin.walking.words.word_path import STRAIGHT, THESIS_WORDS, WordPath
+from manikin.walking.words.word_solver import WordResiduals, residuals, word_path, word_paths
+
+__all__ = [
+    "HEADINGS",
+    "STRAIGHT",
+    "THESIS_GRID",
+    "THESIS_WORDS",
+    "EqualPaths",
+    "WordGrid",
+    "WordPath",
+    "WordResiduals",
+    "WordSlice",
+    "bent_to",
+    "count_words",
+    "equal_paths",
+    "residuals",
+    "shares",
+    "solve_slice",
+    "solve_slices",
+    "word_path",
+    "word_paths",
+]

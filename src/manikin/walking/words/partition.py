@@ -1,0 +1,351 @@
+"""The space of goals cut into slices of one final heading, and each slice into cells of one word.
+
+Also here. Goals for which the best paths are found: places on a grid, and final headings. Slices of the
+partition, several at once, each in a process beside this one. Goals on the border of cells, where two
+different paths cost the same ([Truong2010]_ Fig. 3.7).
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.runtime.parallel import side_by_side
+from manikin.walking.path.walking_model import START
+from manikin.walking.words.word_path import THESIS_WORDS, WordPath, words_of
+from manikin.walking.words.word_program import Goals, Minima, minimise, quadrature, squares
+from manikin.walking.words.word_solver import FARTHEST, NEAREST, WordResiduals, cheapest, guesses, residuals
+
+HEADING_STEP = 10
+"""Between slices [deg] ([Truong2010]_ 3.3)."""
+
+HEADINGS = tuple(range(0, 360, HEADING_STEP))
+"""Of the 36 slices [deg]."""
+
+
+@dataclass(frozen=True)
+class WordGrid:
+    """Places of the goals of every slice; the thesis' by default ([Truong2010]_ 3.3).
+
+    Attributes:
+        x: Smallest and largest x, to the right of the start [m].
+        y: Smallest and largest y, ahead of the start [m].
+        step: Between neighbours [m].
+    """
+
+    x: tuple[float, float] = (-2.0, 2.0)
+    y: tuple[float, float] = (3.0, 9.0)
+    step: float = 0.2
+
+    def __post_init__(self) -> None:
+        finite_number(self.step, "step of the grid of words [m]", at_least=0.05, at_most=10.0)
+        for name in ("x", "y"):
+            low, high = (
+                finite_number(end, f"{name} of the grid of words [m]") for end in getattr(self, name)
+            )
+            if not -20.0 <= low <= high <= 20.0:
+                raise InputError(
+                    f"{name} of the grid of words is {low:g} to {high:g} m; valid: -20 to 20, ascending"
+                )
+        distances = np.hypot(self.columns[None], self.rows[:, None])
+        nearest, farthest = float(distances.min()), float(distances.max())
+        if nearest < NEAREST or farthest > FARTHEST:
+            raise InputError(
+                f"goals of the grid of words are {nearest:g} to {farthest:g} m from the start; "
+                f"valid: {NEAREST:g} to {FARTHEST:g} m"
+            )
+
+    @property
+    def columns(self) -> FloatArray:
+        """(nx,) x of the nodes [m]."""
+        return self._nodes(*self.x)
+
+    @property
+    def rows(self) -> FloatArray:
+        """(ny,) y of the nodes [m]."""
+        return self._nodes(*self.y)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of rows and columns."""
+        return len(self.rows), len(self.columns)
+
+    def goals(self, heading_deg: float) -> FloatArray:
+        """(ny nx, 3) x, y [m], heading [rad] of a slice, row by row."""
+        x, y = np.meshgrid(self.columns, self.rows)
+        return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, np.radians(heading_deg))])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {"x_m": list(self.x), "y_m": list(self.y), "step_m": self.step}
+
+    def _nodes(self, low: float, high: float) -> FloatArray:
+        count = int(np.floor((high - low) / self.step + 1e-9)) + 1
+        return np.round(low + self.step * np.arange(float(count)), 9)
+
+
+THESIS_GRID = WordGrid()
+
+
+SAME_COST = 1e-9
+"""Share of the cost up to which two paths cost the same."""
+
+_TWO_BRANCHES = 1e-6
+"""Share of the cost by which a branch must be the costlier one at the other's goal."""
+
+_STEPS = 8
+_BISECTIONS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class EqualPaths:
+    """Two paths to one goal that cost the same.
+
+    Attributes:
+        first: One of them.
+        second: The other.
+        apart: Largest distance between them at equal shares of their lengths [m].
+    """
+
+    first: WordPath
+    second: WordPath
+    apart: float
+
+    @property
+    def gap(self) -> float:
+        """Difference of their costs, as a share [-]."""
+        return abs(self.first.cost - self.second.cost) / self.first.cost
+
+
+def bent_to(path: WordPath, goal: FloatArray) -> WordPath | None:
+    """The local minimum that a path becomes when its goal moves straight to another one, or None if it ends.
+
+    Args:
+        path: A local minimum.
+        goal: (3,) x, y [m], heading with whole turns [rad].
+    """
+    shape, cost, length = path.shape[None], path.cost, path.length
+    for share in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
+        end = path.goal + share * (goal - path.goal)
+        found = minimise(Goals.of(path.start, end[None]), shape)
+        if not found.found[0]:
+            return None
+        shape, cost, length = found.shapes, float(found.cost[0]), float(found.length[0])
+    return WordPath(path.start, np.array(goal), shape[0], length, cost)
+
+
+def equal_paths(one: WordPath, other: WordPath) -> EqualPaths:
+    """Find the goal between two goals that both ways to go reach at the same cost, by bisection.
+
+    Args:
+        one: Best path to a goal.
+        other: Best path to another goal nearby, of another branch, from the same start.
+
+    Raises:
+        InputError: If both bend into each other, or one ends before the other's goal.
+    """
+    whole = 2.0 * np.pi * np.round((other.goal[2] - one.goal[2]) / (2.0 * np.pi))
+    lift = np.array([0.0, 0.0, whole])
+    for bending, best, raised in ((one, other, -lift), (other, one, lift)):
+        there = bent_to(bending, best.goal + raised)
+        if there is None or there.cost < best.cost * (1.0 + _TWO_BRANCHES):
+            raise InputError(
+                "two paths of words are of one branch, or one ends between their goals; "
+                "valid: best paths to neighbours that are of two branches"
+            )
+    low, high = one.goal, other.goal - lift
+    first, second, a, b = one, other, one, other
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2.0
+        first, second = bent_to(a, middle), bent_to(b, middle + lift)
+        if first is None or second is None:
+            raise InputError("a path of words ends between the goals; valid: goals closer to each other")
+        if first.cost < second.cost:
+            low, a = middle, first
+        else:
+            high, b = middle, second
+        if abs(first.cost - second.cost) < SAME_COST * first.cost:
+            break
+    apart = float(np.max(np.hypot(*(first.states() - second.states())[:, :2].T)))
+    return EqualPaths(first, second, apart)
+
+
+JUMP = 1e-6
+"""Share of the cost by which two branches at one goal must differ to be two."""
+
+_START = np.array(START)
+
+
+@dataclass(frozen=True, eq=False)
+class WordSlice:
+    """Best paths to all places of a grid with one final heading; row by row, n places.
+
+    Attributes:
+        grid: Of the places.
+        heading_deg: Final heading modulo whole turns [deg].
+        turns: (n,) final less initial heading of the path [rad].
+        shapes: (n, degree) of the paths.
+        lengths: (n,) of the paths [m].
+        costs: (n,) of the paths [m]; infinite where none was found.
+    """
+
+    grid: WordGrid
+    heading_deg: float
+    turns: FloatArray
+    shapes: FloatArray
+    lengths: FloatArray
+    costs: FloatArray
+
+    def __post_init__(self) -> None:
+        n = self.grid.shape[0] * self.grid.shape[1]
+        for name, shape in (("turns", (n,)), ("shapes", (n, None)), ("lengths", (n,)), ("costs", (n,))):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), f"{name} of a slice", shape))
+
+    @cached_property
+    def goals(self) -> FloatArray:
+        """(n, 3) x, y [m] and heading with whole turns [rad]."""
+        goals = self.grid.goals(self.heading_deg)
+        goals[:, 2] = START[2] + self.turns
+        return goals
+
+    @cached_property
+    def words(self) -> NDArray[np.str_]:
+        """(ny, nx) word of each place."""
+        return np.array(words_of(self.shapes, self.lengths)).reshape(self.grid.shape)
+
+    def path(self, row: int, column: int) -> WordPath:
+        """Path to one place."""
+        i = row * self.grid.shape[1] + column
+        return WordPath(_START, self.goals[i], self.shapes[i], float(self.lengths[i]), float(self.costs[i]))
+
+    def residuals(self) -> WordResiduals:
+        """Of all its paths, measured afresh."""
+        return residuals(_START, self.goals, self.shapes, self.lengths)
+
+    def missed(self) -> float:
+        """How far paths end from their goals, or their costs are from those given; largest [m] or [rad]."""
+        b, lengths = self.shapes, self.lengths[:, None]
+        turned, weights = quadrature(b.shape[1])
+        heading = START[2] + b @ turned.T
+        ends = lengths * np.column_stack([np.cos(heading) @ weights, np.sin(heading) @ weights])
+        cost = self.lengths + (b**2) @ squares(b.shape[1]) / self.lengths**3
+        turn = -b[:, 0] / 6.0 - (self.goals[:, 2] - START[2])
+        whole = np.angle(np.exp(1j * (self.goals[:, 2] - np.radians(self.heading_deg))))
+        parts = (ends - self.goals[:, :2], cost - self.costs, turn, whole)
+        return float(max(np.max(np.abs(part)) for part in parts))
+
+    def jumps(self) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+        """Pairs of neighbours (row, column) whose paths are of two branches: none bends into the other.
+
+        The path of either is bent to the other's goal; if it costs more there than the path that was found
+        for it, there is a goal between them with two best paths.
+        """
+        rows, columns = self.grid.shape
+        index = np.arange(rows * columns).reshape(rows, columns)
+        pairs = np.vstack(
+            [
+                np.column_stack([index[:, :-1].ravel(), index[:, 1:].ravel()]),
+                np.column_stack([index[:-1].ravel(), index[1:].ravel()]),
+            ]
+        )
+        apart = self._costlier(pairs[:, 0], pairs[:, 1]) & self._costlier(pairs[:, 1], pairs[:, 0])
+        return [(divmod(int(a), columns), divmod(int(b), columns)) for a, b in pairs[apart]]
+
+    def _costlier(self, by: NDArray[np.intp], at: NDArray[np.intp]) -> NDArray[np.bool_]:
+        goals = self.goals[at].copy()
+        goals[:, 2] = self.goals[by, 2]
+        bent = minimise(Goals.of(_START, goals), self.shapes[by])
+        return bent.cost > self.costs[at] * (1.0 + JUMP)
+
+
+def solve_slice(heading_deg: float, grid: WordGrid = THESIS_GRID) -> WordSlice:
+    """Best paths to all places of a grid with one final heading.
+
+    After all guesses, the paths of neighbours are bent to each place until nothing gets cheaper.
+
+    Args:
+        heading_deg: Final heading, 90 is that of the start [deg].
+        grid: Of the places.
+
+    Raises:
+        InputError: If a place was not reached by any guess.
+    """
+    goals = grid.goals(finite_number(heading_deg, "heading of a slice [deg]"))
+    turned, best = cheapest(_START, goals, guesses())
+    turned, best = _from_neighbours(grid, turned, best)
+    if not np.all(best.found):
+        place = goals[np.flatnonzero(~best.found)[0]]
+        raise InputError(
+            f"no path was found to ({place[0]:g}, {place[1]:g}) m at {heading_deg:g} deg; valid: another grid"
+        )
+    return WordSlice(grid, float(heading_deg), turned[:, 2] - START[2], best.shapes, best.length, best.cost)
+
+
+def _from_neighbours(grid: WordGrid, turned: FloatArray, best: Minima) -> tuple[FloatArray, Minima]:
+    """Minima improved by those of neighbours."""
+    turned, shapes = turned.copy(), best.shapes.copy()
+    cost, length = best.cost.copy(), best.length.copy()
+    rows, columns = grid.shape
+    index = np.arange(rows * columns).reshape(rows, columns)
+    for _ in range(rows + columns):
+        improved = False
+        for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
+            here, there = index, np.roll(index, shift, axis)
+            keep = (slice(None), slice(1, None) if shift > 0 else slice(None, -1))
+            inside = keep if axis == 1 else keep[::-1]
+            to, by = here[inside].ravel(), there[inside].ravel()
+            ends = turned[to].copy()
+            ends[:, 2] = turned[by, 2]
+            bent = minimise(Goals.of(_START, ends), shapes[by])
+            better = bent.cost < cost[to] * (1.0 - 1e-8)
+            changed = to[better]
+            turned[changed], shapes[changed] = ends[better], bent.shapes[better]
+            cost[changed], length[changed] = bent.cost[better], bent.length[better]
+            improved = improved or bool(changed.size)
+        if not improved:
+            break
+    return turned, Minima(shapes, cost, length)
+
+
+def count_words(slices: Iterable[WordSlice]) -> dict[str, int]:
+    """Number of places of each word: those of the thesis in its order, then others by their number."""
+    counted = Counter(str(word) for one in slices for word in one.words.ravel())
+    others = sorted(
+        (word for word in counted if word not in THESIS_WORDS), key=lambda word: (-counted[word], word)
+    )
+    return {word: counted[word] for word in (*THESIS_WORDS, *others)}
+
+
+def shares(counts: Mapping[str, int]) -> dict[str, float]:
+    """Share of each word."""
+    total = max(1, sum(counts.values()))
+    return {word: number / total for word, number in counts.items()}
+
+
+def solve_slices(
+    headings_deg: Sequence[float], grid: WordGrid = THESIS_GRID, *, jobs: int = 1
+) -> Iterator[WordSlice]:
+    """Solve slices side by side; each depends on nothing but itself, so any number of jobs finds the same.
+
+    Args:
+        headings_deg: Final heading of each [deg].
+        grid: Of the places.
+        jobs: Processes, see :func:`manikin.runtime.parallel.side_by_side`.
+
+    Yields:
+        The slices in the order in which they are done.
+
+    Raises:
+        InputError: If ``jobs`` is less than 1, or a slice cannot be solved.
+        ManikinError: If a process ends before its slice.
+    """
+    if jobs < 1:
+        raise InputError(f"jobs is {jobs}; valid: at least 1")
+    for _, found in side_by_side(partial(solve_slice, grid=grid), headings_deg, jobs, "words"):
+        yield found

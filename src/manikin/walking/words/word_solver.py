@@ -1,0 +1,230 @@
+r"""Paths that minimise the derivative of the curvature, from a start to goals.
+
+What is minimised is the squared norm of the control of the clothoid system with :math:`u_1 = 1` and free
+length,
+
+.. math:: J = \int_0^L (u_1^2 + u_2^2) \, ds = \int_0^L (1 + \dot\kappa^2) \, ds .
+
+The thesis ([Truong2010]_ 3.3) speaks of "the minimization of the curvature derivative" and of clothoid arcs
+with :math:`u_2 = \pm c`. Without a price of the length there is no optimum: loops as large as one likes lead
+to any goal, and scaling a loop by :math:`\lambda` divides :math:`\int \dot\kappa^2` by :math:`\lambda^3` and
+:math:`\max |\dot\kappa|` by :math:`\lambda^2`. The least :math:`c` therefore is none, and where a path exists
+that no small change improves, it spells IDI or DID only (:mod:`manikin.walking.words.word_path`). The norm
+of the control is the criterion of the work that the thesis summarises there [Arechavaleta 2008b]; with it an
+optimum exists and spells the six words. Its arcs are no exact clothoids: as in the thesis, words are read off
+the local extrema of the curvature. Both controls weigh the same in metres, which is a choice of a length
+scale.
+
+Headings are the same modulo :math:`2 \pi`. Considered are all turns of at most one whole turn to either side.
+
+Also here. Whether paths meet their goals and the necessary conditions of optimality, measured without the
+solver.
+
+For :math:`\int (1 + u_2^2)` Pontryagin's principle says :math:`u_2 = p_\kappa / 2`, :math:`\dot p_\kappa =
+-p_\varphi`, :math:`\dot p_\varphi = p_x \sin\varphi - p_y \cos\varphi` with constant :math:`p_x, p_y`, and a
+Hamiltonian that is zero since the length is free. So :math:`-2 \ddot u_2` must be a combination of
+:math:`\sin\varphi` and :math:`\cos\varphi`.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from manikin.errors import InputError
+from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.walking.path.walking_model import START
+from manikin.walking.words.word_path import WordPath
+from manikin.walking.words.word_program import DEGREE, Goals, Minima, basis, minimise, quadrature
+
+_STEPS = 3000
+
+
+@dataclass(frozen=True, eq=False)
+class WordResiduals:
+    """Largest violations of each of k paths.
+
+    Attributes:
+        position: (k,) distance from the goal of the system (3.2) integrated densely under u2 [m].
+        heading: (k,) the same of the heading [rad].
+        curvature: (k,) the same of the curvature, 0 at the goal [1/m].
+        adjoint: (k,) largest difference of u2 and the adjoint's p_kappa / 2, as a share of the largest u2 (at
+            least 0.01 / m^2) [-].
+        hamiltonian: (k,) largest Hamiltonian; the cost's rate is at least 1 [-].
+    """
+
+    position: FloatArray
+    heading: FloatArray
+    curvature: FloatArray
+    adjoint: FloatArray
+    hamiltonian: FloatArray
+
+
+def residuals(start: FloatArray, goals: FloatArray, shapes: FloatArray, lengths: FloatArray) -> WordResiduals:
+    """Integrate (3.2) by Runge and Kutta's rule and fit the adjoint to every path.
+
+    Args:
+        start: (3,) x, y [m], heading [rad].
+        goals: (k, 3) the same, with whole turns.
+        shapes: (k, degree) of the paths.
+        lengths: (k,) of the paths [m].
+    """
+    share = np.linspace(0.0, 1.0, 2 * _STEPS + 1)
+    rates = shapes @ basis(share, 0, shapes.shape[1]).T / lengths[:, None] ** 2
+    states = _integrated(start, rates, lengths)
+    missed = np.abs(states[-1, :, :3] - goals)
+    adjoint, hamiltonian = _adjoint(states, rates[:, ::2], lengths)
+    return WordResiduals(
+        np.hypot(missed[:, 0], missed[:, 1]), missed[:, 2], np.abs(states[-1, :, 3]), adjoint, hamiltonian
+    )
+
+
+def _integrated(start: FloatArray, rates: FloatArray, lengths: FloatArray) -> FloatArray:
+    """(n, k, 4) states of the system under u2 given at every half step."""
+
+    def derivative(state: FloatArray, control: FloatArray) -> FloatArray:
+        return np.stack([np.cos(state[:, 2]), np.sin(state[:, 2]), state[:, 3], control], axis=1)
+
+    state = np.tile(np.append(start, 0.0), (len(lengths), 1))
+    step, states = (lengths / _STEPS)[:, None], [state]
+    for i in range(0, 2 * _STEPS, 2):
+        first = derivative(state, rates[:, i])
+        second = derivative(state + step / 2 * first, rates[:, i + 1])
+        third = derivative(state + step / 2 * second, rates[:, i + 1])
+        fourth = derivative(state + step * third, rates[:, i + 2])
+        state = state + step / 6 * (first + 2 * second + 2 * third + fourth)
+        states.append(state)
+    return np.array(states)
+
+
+def _adjoint(states: FloatArray, rates: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Largest misfit of u2, and largest Hamiltonian, for the adjoint that fits both best.
+
+    With p_x and p_y constant, p_phi = p_phi(0) + p_x (y - y_0) - p_y (x - x_0); it is integrated once more.
+    """
+    misfit, largest = np.empty(len(lengths)), np.empty(len(lengths))
+    for k, length in enumerate(lengths):
+        x, y, heading, curvature = states[:, k].T
+        x, y, way, rate = x - x[0], y - y[0], np.linspace(0.0, length, len(x)), rates[k]
+        none, ones = np.zeros_like(way), np.ones_like(way)
+        # Columns: p_kappa(0), p_phi(0), p_x, p_y.
+        p_curvature = np.column_stack([ones, -way, -_primitive(y, way), _primitive(x, way)])
+        moving = np.column_stack(
+            [none, curvature, np.cos(heading) + y * curvature, np.sin(heading) - x * curvature]
+        )
+        hamiltonian = moving + rate[:, None] * p_curvature
+        price = 1.0 + rate**2
+        rows, wanted = np.vstack([p_curvature / 2.0, hamiltonian]), np.concatenate([rate, price])
+        missing = rows @ np.linalg.lstsq(rows, wanted, rcond=None)[0] - wanted
+        misfit[k] = np.max(np.abs(missing[: len(way)])) / max(0.01, np.abs(rate).max())
+        largest[k] = np.max(np.abs(missing[len(way) :]))
+    return misfit, largest
+
+
+def _primitive(values: FloatArray, way: FloatArray) -> FloatArray:
+    """Integral from the start at every instant, by a rule of fourth order."""
+    return CubicSpline(way, values).antiderivative()(way)
+
+
+NEAREST, FARTHEST = 0.5, 15.0
+"""Distances of goals that can be asked [m]; farther away the polynomials do not resolve the ends of paths."""
+
+SECOND = (-2.0, -1.0, 0.0, 1.0, 2.0)
+"""Turns aside and back of the guesses [rad]: the largest heading of the second polynomial."""
+
+THIRD = (-1.2, 0.0, 1.2)
+"""The same of the third polynomial [rad]."""
+
+_CHEAPER = 1e-9
+"""Share of the cost by which another path must be cheaper to be taken instead."""
+
+
+def word_paths(goals: ArrayLike, start: ArrayLike = START) -> list[WordPath]:
+    """Best paths to goals, each the cheapest local minimum that any guess led to.
+
+    Args:
+        goals: (k, 3) x, y [m], heading [rad] modulo whole turns; 0.5 to 15 m from the start.
+        start: (3,) the same; that of the thesis looks along y.
+
+    Raises:
+        InputError: If an argument is not usable, or no guess led to a path.
+    """
+    begin = frozen_array(start, "start of a word [m, m, rad]", (3,))
+    ends = frozen_array(goals, "goals of words [m, m, rad]", (None, 3))
+    distance = np.hypot(*(ends - begin)[:, :2].T)
+    for number in np.flatnonzero((distance < NEAREST) | (distance > FARTHEST)):
+        raise InputError(
+            f"goal {number} of words is {distance[number]:g} m from the start; "
+            f"valid: {NEAREST:g} to {FARTHEST:g} m"
+        )
+    turned, best = cheapest(begin, ends, guesses())
+    for number in np.flatnonzero(~best.found):
+        raise InputError(
+            f"goal {number} of words, {ends[number].tolist()}: no path was found; valid: another goal"
+        )
+    return [
+        WordPath(begin, *row)
+        for row in zip(turned, best.shapes, best.length.tolist(), best.cost.tolist(), strict=True)
+    ]
+
+
+def word_path(goal: ArrayLike, start: ArrayLike = START) -> WordPath:
+    """Best path to one goal, see :func:`word_paths`.
+
+    Raises:
+        InputError: If an argument is not usable, or no guess led to a path.
+    """
+    return word_paths([frozen_array(goal, "goal of a word [m, m, rad]", (3,))], start)[0]
+
+
+def guesses() -> list[tuple[float, ...]]:
+    """Largest headings of the free polynomials of every guess [rad]."""
+    return [(second, third) for second in SECOND for third in THIRD]
+
+
+def cheapest(
+    start: FloatArray, goals: FloatArray, amplitudes: Sequence[Sequence[float]]
+) -> tuple[FloatArray, Minima]:
+    """For every goal the cheapest minimum from any guess with any turn.
+
+    Args:
+        start: (3,) x, y [m], heading [rad].
+        goals: (k, 3) the same, modulo whole turns.
+        amplitudes: Of each guess, largest headings of the free polynomials in order [rad].
+
+    Returns:
+        (k, 3) goals with the turns of their paths, and the paths.
+    """
+    size = len(goals)
+    turned, shapes = goals.copy(), np.zeros((size, DEGREE))
+    cost, length = np.full(size, np.inf), np.full(size, np.nan)
+    for some, ends in _turns(start, goals):
+        asked = Goals.of(start, ends)
+        for guess in amplitudes:
+            found = minimise(asked, np.tile(guessed_shape(guess), (len(ends), 1)))
+            better = found.cost < cost[some] - _CHEAPER * found.length
+            chosen = some[better]
+            turned[chosen], shapes[chosen] = ends[better], found.shapes[better]
+            cost[chosen], length[chosen] = found.cost[better], found.length[better]
+    return turned, Minima(shapes, cost, length)
+
+
+def guessed_shape(amplitudes: Sequence[float]) -> FloatArray:
+    """(degree,) coefficients of a heading whose polynomials have these largest values [rad]."""
+    shape = np.zeros(DEGREE)
+    free = slice(1, 1 + len(amplitudes))
+    shape[free] = np.asarray(amplitudes) / np.abs(quadrature()[0]).max(axis=0)[free]
+    return shape
+
+
+def _turns(start: FloatArray, goals: FloatArray) -> Iterator[tuple[NDArray[np.intp], FloatArray]]:
+    """Indices of goals, and the goals with a heading at most a whole turn from the start's."""
+    turn = np.mod(goals[:, 2] - start[2], 2.0 * np.pi)
+    for whole in (0, -1, 1):
+        some = np.flatnonzero(np.abs(turn + 2.0 * np.pi * whole) <= 2.0 * np.pi + 1e-9)
+        if some.size:
+            ends = goals[some].copy()
+            ends[:, 2] = start[2] + turn[some] + 2.0 * np.pi * whole
+            yield some, ends

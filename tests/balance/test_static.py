@@ -1,0 +1,60 @@
+"""Balance at rest by contact forces: against the polygon of point feet and hand calculation."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from manikin.balance import StaticRegion, static_room, static_torque_share
+from manikin.body import Configuration, insect
+from manikin.contact import FRICTION_MODELS, ContactModel, Stance, grasp, point, sole
+from manikin.numerics.polygon import signed_distance
+
+CORNERS = [(0.2, 0.2, 0.0), (-0.2, 0.2, 0.0), (-0.2, -0.2, 0.0), (0.2, -0.2, 0.0)]
+
+
+def test_on_level_points_the_room_is_the_distance_to_their_polygon():
+    """A square of 0.4 m: 0.2 m from its middle to each side, 0.15 m from 5 cm beside it."""
+    feet = Stance([point(f"p{k}", place, friction=0.7) for k, place in enumerate(CORNERS)])
+    assert static_room(feet, 75.0, np.array([0.0, 0.0, 1.0])) == pytest.approx(0.2)
+    assert static_room(feet, 75.0, np.array([0.05, 0.0, 1.0])) == pytest.approx(0.15)
+    assert static_room(feet, 75.0, np.array([0.25, 0.0, 1.0])) == -np.inf
+    assert static_room(Stance([]), 75.0, np.zeros(3)) == -np.inf
+
+
+@given(
+    x=st.floats(-0.3, 0.3), y=st.floats(-0.5, 0.5), tilt=st.floats(-0.6, 0.6),
+    model=st.sampled_from(FRICTION_MODELS),
+)  # fmt: skip
+def test_the_room_agrees_with_the_region_of_the_wrench_polytope(x, y, tilt, model):
+    """Two independent ways: balanced in one when balanced in the other, the room not below the distance."""
+    contacts = [
+        sole("left_foot", (0.0, 0.15, 0.0), length=0.1, width=0.08, friction=0.7),
+        point("right_foot", (0.1, -0.2, 0.3), friction=0.7, normal=(np.sin(tilt), 0.0, np.cos(tilt))),
+        grasp("left_hand", (0.3, 0.3, 1.5), max_force=150.0),
+    ]
+    stance = Stance(contacts, model=ContactModel.of_body(75.0, model))
+    region = StaticRegion.of(stance, 75.0)
+    inside = signed_distance(np.array([x, y]), region.polygon)
+    room = static_room(stance, 75.0, np.array([x, y, 1.0]))
+    if abs(inside) > 1e-6:
+        assert (room >= 0.0) == (inside > 0.0)
+    if inside > 0.0:
+        assert room >= inside - 1e-6
+
+
+def test_the_torque_share_of_an_insect_scales_with_its_strength():
+    """Torques at rest are proportional to the weight; a massless one would need none.
+
+    The limits are in units of weight times length, so that an insect twice as large has the same share.
+    """
+    shares = []
+    for length in (0.4, 0.8):
+        body = insect(length)
+        q = body.standing_posture()
+        state = Configuration(body, q)
+        feet = [point(name, state.effector_placement(name)[1], friction=0.7) for name in body.effectors]
+        shares.append(static_torque_share(body, q, Stance(feet)))
+        assert static_torque_share(body, q, Stance(feet[:2])) == np.inf
+    assert 0.0 < shares[0] < 1.0
+    assert shares[0] == pytest.approx(shares[1], rel=1e-6)

@@ -1,0 +1,111 @@
+"""The configuration spline's derivatives are exact in Pinocchio's convention."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from manikin.errors import SplineError
+from manikin.motion.configuration_spline import (
+    ConfigurationSpline,
+    align_quaternions,
+    states_from_raw,
+    tangent_map,
+    turn_derivatives,
+)
+from manikin.numerics.spatial import rotation_from_quaternion
+
+
+@pytest.fixture
+def model() -> pin.Model:
+    model = pin.Model()
+    root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    model.addJoint(root, pin.JointModelRX(), pin.SE3.Identity(), "hinge")
+    return model
+
+
+@pytest.fixture
+def spline() -> ConfigurationSpline:
+    rng = np.random.default_rng(3)
+    degree, points = 5, 9
+    control = rng.normal(size=(points, 8))
+    control[:, 3:7] = np.array([0.1, -0.2, 0.3, 1.0]) + 0.3 * rng.normal(size=(points, 4))
+    knots = np.concatenate([np.zeros(degree + 1), [0.3, 0.7, 1.1], np.full(degree + 1, 1.6)])
+    return ConfigurationSpline(knots, control, degree)
+
+
+def test_velocity_is_the_derivative_of_the_configuration(spline, model):
+    """Central difference on the manifold; its error is O(h^2) ~ 1e-8 times the third derivative."""
+    t, h = np.linspace(0.05, 1.55, 31), 1e-5
+    before, now, after = (spline.evaluate(t + d) for d in (-h, 0.0, h))
+    for k in range(len(t)):
+        numeric = (
+            pin.difference(model, now.q[k], after.q[k]) - pin.difference(model, now.q[k], before.q[k])
+        ) / (2 * h)
+        np.testing.assert_allclose(now.v[k], numeric, atol=2e-6)
+
+
+def test_acceleration_is_the_derivative_of_the_velocity(spline):
+    t, h = np.linspace(0.05, 1.55, 31), 1e-5
+    before, now, after = (spline.evaluate(t + d) for d in (-h, 0.0, h))
+    np.testing.assert_allclose(now.a, (after.v - before.v) / (2 * h), atol=5e-5)
+
+
+def test_tangent_map_is_the_derivative_of_the_configuration(model):
+    rng = np.random.default_rng(5)
+    raw = rng.normal(size=(4, 8))
+    h = 1e-6
+
+    def configuration(row):
+        return np.concatenate([row[:3], row[3:7] / np.linalg.norm(row[3:7]), row[7:]])
+
+    for row, block in zip(raw, tangent_map(raw), strict=True):
+        for column in range(7):
+            step = np.zeros(8)
+            step[column] = h
+            numeric = (
+                pin.difference(model, configuration(row), configuration(row + step))
+                - pin.difference(model, configuration(row), configuration(row - step))
+            ) / (2 * h)
+            np.testing.assert_allclose(block[:6, column], numeric[:6], atol=1e-8)
+
+
+def test_rotation_from_quaternion_agrees_with_pinocchio():
+    u = np.random.default_rng(1).normal(size=(5, 4))
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    for row, rotation in zip(u, rotation_from_quaternion(u), strict=True):
+        np.testing.assert_allclose(rotation, pin.Quaternion(*row[[3, 0, 1, 2]]).matrix(), atol=1e-14)
+
+
+def test_aligned_quaternions_never_jump_to_the_opposite_half_space():
+    q = np.random.default_rng(2).normal(size=(20, 9))
+    aligned = align_quaternions(q)
+    assert np.all(np.sum(aligned[1:, 3:7] * aligned[:-1, 3:7], axis=1) >= 0)
+    np.testing.assert_array_equal(np.abs(aligned), np.abs(q))
+
+
+def test_knots_and_control_points_must_fit():
+    with pytest.raises(SplineError, match="knots = control points"):
+        ConfigurationSpline(np.zeros(5), np.zeros((3, 8)), 5)
+
+
+def test_turn_derivatives_agree_with_finite_differences():
+    """Central differences of smooth functions of size one: error ~ 1e-9."""
+    rng = np.random.default_rng(4)
+    raw, rate, second = (rng.normal(size=(5, 7)) for _ in range(3))
+    exact = turn_derivatives(raw[:, 3:], rate[:, 3:], second[:, 3:])
+    h = 1e-6
+    for column in range(4):
+        for which in range(3):
+            step = np.zeros(7)
+            step[3 + column] = h
+            plus, minus = (
+                states_from_raw(*[x + sign * step * (which == k) for k, x in enumerate((raw, rate, second))])
+                for sign in (1.0, -1.0)
+            )
+            omega, alpha = (
+                (a[:, 3:6] - b[:, 3:6]) / (2 * h) for a, b in ((plus.v, minus.v), (plus.a, minus.a))
+            )
+            by_value_rate = (exact.omega_by_value, exact.omega_by_rate, np.zeros((5, 3, 4)))[which]
+            by_all = (exact.alpha_by_value, exact.alpha_by_rate, exact.alpha_by_second)[which]
+            np.testing.assert_allclose(omega, by_value_rate[:, :, column], atol=1e-7)
+            np.testing.assert_allclose(alpha, by_all[:, :, column], atol=1e-6)

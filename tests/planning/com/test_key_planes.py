@@ -1,0 +1,77 @@
+"""Planes at single key instants: met exactly there, measured, and felt nowhere else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from manikin.errors import InputError
+from manikin.planning.com import KeyPlane, plan_com
+from manikin.planning.com.com_certificate import measure
+
+coordinate = st.floats(-2.0, 2.0)
+place = st.tuples(coordinate, coordinate, coordinate).map(np.array)
+
+
+@pytest.mark.parametrize("key", [2, 4])
+def test_the_plan_passes_exactly_behind_a_plane_at_its_key_instant(planned, key):
+    """Pushed 2 cm off the free plan's place along a level direction, the CoM touches the plane to 1e-6 m."""
+    there = planned.trajectory.position(planned.key_instants[key])
+    plane = KeyPlane.towards(key, there, there - np.array([0.02, 0.0, 0.0]))
+    result = plan_com(replace(planned.problem, key_planes=(plane,)))
+    assert result.succeeded, result.failure
+    beyond = plane.violation(result.trajectory.position(result.key_instants[key]))
+    assert abs(beyond) <= 1e-6
+    assert result.certificate[f"key plane 0 at T_{key}"].value == pytest.approx(beyond, abs=1e-12)
+
+
+def test_the_certificate_measures_a_plane_that_is_broken(planned):
+    """The free plan lies 3 cm beyond a plane put 3 cm behind its place at T_3."""
+    there = planned.trajectory.position(planned.key_instants[3])
+    problem = replace(planned.problem, key_planes=(KeyPlane.towards(3, there, there - [0.0, 0.0, 0.03]),))
+    residual = measure(problem, planned.trajectory, planned.polytopes)["key plane 0 at T_3"]
+    assert residual.value == pytest.approx(0.03, abs=1e-12)
+    assert residual.phase == 2
+    assert residual.time == planned.key_instants[3]
+
+
+def test_a_plane_that_cannot_be_kept_is_the_failure(planned):
+    """Half a metre lower than the band of 2 cm allows."""
+    there = planned.trajectory.position(planned.key_instants[3])
+    plane = KeyPlane.towards(3, there, there - [0.0, 0.0, 0.5])
+    result = plan_com(replace(planned.problem, key_planes=(plane,)))
+    assert not result.succeeded
+    assert "violated" in result.failure.reason
+
+
+def test_a_problem_without_planes_is_measured_as_before(planned):
+    assert planned.problem.key_planes == ()
+    assert not any("key plane" in item.requirement for item in planned.certificate.items)
+
+
+@given(start=place, goal=place, beyond=st.floats(0.0, 0.5))
+def test_towards_cuts_off_the_start_and_keeps_the_goal(start, goal, beyond):
+    """The start is as far beyond as the goal is away; the goal lies on the plane moved by ``beyond``."""
+    away = float(np.linalg.norm(start - goal))
+    if away < 1e-6:
+        return
+    plane = KeyPlane.towards(1, start, goal, beyond)
+    assert float(plane.violation(start)) == pytest.approx(away + beyond, abs=1e-9)
+    assert float(plane.violation(goal)) == pytest.approx(beyond, abs=1e-9)
+    assert np.linalg.norm(plane.normal) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("key", [7, 12])
+def test_planes_at_the_goal_or_after_it_are_refused(platform, key):
+    with pytest.raises(InputError, match=f"key instant {key}; valid: 1 to 6"):
+        replace(platform(), key_planes=(KeyPlane(key, (0, 0, 1), 1.0),))
+
+
+@pytest.mark.parametrize(
+    ("key", "normal", "message"), [(0, (0, 0, 1), "an integer >= 1"), (1, (0, 0, 0), "not zero")]
+)
+def test_broken_planes_are_refused(key, normal, message):
+    with pytest.raises(InputError, match=message):
+        KeyPlane(key, normal, 1.0)

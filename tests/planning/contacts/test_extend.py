@@ -1,0 +1,192 @@
+"""Contacts along a guide: balanced, free, on surfaces, one change at a time; or an explained failure."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from manikin.balance import StaticRegion
+from manikin.body import Configuration, human
+from manikin.contact import Stance, sole, soles_overlap
+from manikin.numerics.spatial import rotation_from_yaw
+from manikin.planning.contacts import Endpoints, ExtendSettings, Footholds, GuideLine, Habit, follow_guide
+from manikin.scene import Box, Obstacle, Scene
+
+BODY = human(1.75, 75.0, "male")
+STEPS = Scene(
+    [
+        Obstacle("low", Box((0.36, 1.0, 0.15)), translation=(0.68, 0.0, 0.075)),
+        Obstacle("high", Box((1.0, 1.0, 0.30)), translation=(1.36, 0.0, 0.15)),
+    ]
+)
+
+
+def straight(start, goal, count=60):
+    share = np.linspace(0.0, 1.0, count)[:, None]
+    poses = (1.0 - share) * start.q[:7] + share * goal.q[:7]
+    poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+    return GuideLine.through(poses)
+
+
+def planned(scene, at, heading=0.0, **options):
+    ends = Endpoints(BODY, scene, 0.7)
+    start = ends.find(np.zeros(2), 0.0, Habit.STANDING).stage
+    goal = ends.find(np.asarray(at), heading, Habit.STANDING).stage
+    assert start is not None
+    assert goal is not None
+    settings = ExtendSettings(**options)
+    return follow_guide(BODY, scene, straight(start, goal), start, goal, settings), start, goal
+
+
+@pytest.fixture(scope="module")
+def climbed():
+    found, _, _ = planned(STEPS, (1.5, 0.0))
+    assert found.failure is None
+    return found.plan
+
+
+def test_every_change_breaks_or_makes_one_contact(climbed):
+    for before, after in zip(climbed.stages, climbed.stages[1:], strict=False):
+        changed = {name for name in before.contacts if before.contacts[name] is not after.contacts.get(name)}
+        changed |= set(after.contacts) - set(before.contacts)
+        assert len(changed) == 1
+    climbed.sequence()  # refuses contacts that slide
+
+
+def test_postures_hold_the_contacts_on_both_sides_of_their_change(climbed):
+    """To the tolerance of the search, 0.2 mm."""
+    for before, after in zip(climbed.stages, climbed.stages[1:], strict=False):
+        state = Configuration(BODY, after.q)
+        for name, contact in {**before.contacts, **after.contacts}.items():
+            turn, place = state.effector_placement(name)
+            assert np.linalg.norm(place - contact.position) < 3e-4
+            np.testing.assert_allclose(turn, contact.rotation_contact_to_world, atol=5e-4)
+
+
+def test_the_contacts_that_stay_carry_the_body_at_rest(climbed):
+    """Measured with the support polygon, which the search does not use: the CoM is above a sole's ground."""
+    for before, after in zip(climbed.stages, climbed.stages[1:], strict=False):
+        staying = {name: c for name, c in before.contacts.items() if after.contacts.get(name) is c}
+        assert len(staying) == 1
+        (contact,) = staying.values()
+        own = contact.rotation_contact_to_world.T @ (after.com - contact.position)
+        assert abs(own[0]) < 0.5 * contact.length
+        assert abs(own[1]) < 0.5 * contact.width
+
+
+def test_soles_lie_on_surfaces_and_not_on_each_other(climbed):
+    for stage in climbed.stages:
+        feet = list(stage.contacts.values())
+        for contact in feet:
+            STEPS.supporting_surface(contact, 1e-6)
+        assert len(feet) < 2 or not soles_overlap(*feet)
+
+
+def test_the_body_ends_where_it_was_asked_to(climbed):
+    assert np.linalg.norm(climbed.goal_com[:2] - [1.5, 0.0]) < 0.06
+    assert climbed.stages[-1].contacts["left_foot"].position[2] == pytest.approx(0.30)
+
+
+def test_durations_allow_for_the_change_of_posture(climbed):
+    ends = [*(stage.q for stage in climbed.stages[1:]), climbed.goal]
+    for stage, q in zip(climbed.stages, ends, strict=True):
+        assert np.abs(q[7:] - stage.q[7:]).max() <= 1.3 * stage.min_duration + 1e-9
+
+
+def test_the_same_task_has_the_same_plan(climbed):
+    again, _, _ = planned(STEPS, (1.5, 0.0))
+    np.testing.assert_array_equal(again.plan.postures, climbed.postures)
+
+
+@settings(max_examples=4)
+@given(x=st.floats(0.2, 1.2), y=st.floats(-0.5, 0.5), heading=st.floats(-1.2, 1.2))
+def test_goals_on_the_flat_are_reached(x, y, heading):
+    """Near places and headings on an empty floor, the same ones at every run."""
+    found, _, goal = planned(Scene(), (x, y), heading)
+    assert found.failure is None
+    for foot, contact in found.plan.stages[-1].contacts.items():
+        assert np.linalg.norm(contact.position - goal.contacts[foot].position) <= 0.06
+
+
+def test_a_step_that_no_leg_can_make_is_explained():
+    wall = Scene([Obstacle("block", Box((1.0, 2.0, 1.2)), translation=(1.0, 0.0, 0.6))])
+    found, _, _ = planned(wall, (1.0, 0.0), searches=60)
+    assert found.plan is None
+    assert "no contacts" in found.failure
+    assert "most often" in found.failure
+    assert found.searches <= 62
+
+
+# --- the parts -------------------------------------------------------------------------------
+
+
+@given(x=st.floats(-0.2, 1.8), y=st.floats(-0.3, 0.3), yaw=st.floats(-3.1, 3.1), height=st.floats(0.0, 0.3))
+def test_footholds_carry_the_whole_sole_and_leave_the_foot_free(x, y, yaw, height):
+    holds = Footholds(BODY, STEPS)
+    found = holds.near(np.array([x, y, height]), yaw)
+    assert [hold.cost for hold in found] == sorted(hold.cost for hold in found)
+    for hold in found:
+        contact = hold.contact("left_foot", holds.length, holds.width, 0.7)
+        assert STEPS.supporting_surface(contact, 1e-9).obstacle == hold.obstacle
+        corners = contact.points_in_world + np.array([0.0, 0.0, 0.05])
+        assert all(STEPS.nearest(corner)[1] > 0.01 for corner in corners)
+
+
+def test_the_region_of_a_sole_is_the_sole():
+    """Flat ground, friction that does not matter: the whole sole ([Qiu2012] 4.2.8)."""
+    contact = sole("left_foot", (0.3, 0.1, 0.0), 0.4, length=0.28, width=0.12, friction=0.7)
+    region = StaticRegion.of(Stance([contact]), 75.0)
+    turn = rotation_from_yaw(0.4)[:2, :2]
+    own = (region.polygon - [0.3, 0.1]) @ turn
+    np.testing.assert_allclose(np.abs(own).max(axis=0), [0.14, 0.06], atol=1e-6)
+    assert len(region.polygon) == 4
+    np.testing.assert_allclose(region.nearest(np.array([0.31, 0.1]), 0.03), [0.31, 0.1])
+    far = (region.nearest(np.array([2.0, 0.8]), 0.03) - [0.3, 0.1]) @ turn
+    assert np.all(np.abs(far) <= np.array([0.11, 0.03]) + 1e-9)
+    assert (
+        StaticRegion.of(Stance([contact]), 75.0).nearest(np.zeros(2), 0.2) is not None
+    )  # as much as is possible
+
+
+def test_a_steep_sole_carries_nobody():
+    high = np.sqrt(0.75)
+    slope = np.array([[0.5, 0.0, high], [0.0, 1.0, 0.0], [-high, 0.0, 0.5]])
+    contact = sole("left_foot", (0.0, 0.0, 0.0), length=0.28, width=0.12, friction=0.3, rotation=slope)
+    region = StaticRegion.of(Stance([contact]), 75.0)
+    assert region.is_empty
+    assert region.nearest(np.zeros(2), 0.03) is None
+
+
+def test_a_guide_counts_turns_on_the_spot():
+    turns = np.linspace(0.0, 1.0, 11)
+    poses = np.array([[0, 0, 0.9, 0, 0, np.sin(t / 2), np.cos(t / 2)] for t in turns])
+    line = GuideLine.through(poses)
+    assert line.length == pytest.approx(0.35, abs=1e-9)
+    np.testing.assert_allclose(line.at(0.175), [0, 0, 0.9, 0, 0, np.sin(0.25), np.cos(0.25)], atol=1e-9)
+    np.testing.assert_allclose(line.at(9.0), poses[-1], atol=1e-12)
+
+
+@pytest.mark.parametrize("seat", [0.36, 0.42, 0.48])
+def test_a_seated_start_touches_seat_and_floor(seat):
+    scene = Scene([Obstacle("seat", Box((0.4, 0.5, seat)), translation=(-0.08, 0.0, seat / 2))])
+    ends = Endpoints(BODY, scene, 0.7)
+    stage = ends.find(np.zeros(2), 0.0, Habit.SEATED).stage
+    assert set(stage.contacts) == {"buttocks", "left_foot", "right_foot"}
+    assert stage.contacts["buttocks"].position[2] == pytest.approx(seat)
+    state = Configuration(BODY, stage.q)
+    for name, contact in stage.contacts.items():
+        assert np.linalg.norm(state.effector_placement(name)[1] - contact.position) < 3e-4
+    risen = ends.risen(stage).stage
+    assert set(risen.contacts) == {"left_foot", "right_foot"}
+    assert risen.com[2] > stage.com[2] + 0.15
+
+
+def test_ends_that_do_not_exist_say_why():
+    ends = Endpoints(BODY, Scene(floor_height=None), 0.7)
+    assert "no surface with room" in ends.find(np.zeros(2), 0.0, Habit.STANDING).failure
+    low = Scene([Obstacle("lid", Box((3.0, 3.0, 0.2)), translation=(0.0, 0.0, 0.5))])
+    on_top = Endpoints(BODY, low, 0.7).find(np.zeros(2), 0.0, Habit.STANDING).stage
+    assert on_top.contacts["left_foot"].position[2] == pytest.approx(0.6)
+    below = Endpoints(BODY, low, 0.7).find(np.zeros(2), 0.0, Habit.STANDING, 0.0)
+    assert below.stage is None
+    assert "no posture standing at" in below.failure

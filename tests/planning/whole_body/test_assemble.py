@@ -1,0 +1,258 @@
+"""A planned whole-body motion keeps what it promises, measured apart from its certificate."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from manikin.planning.whole_body import (
+    KeyPostures,
+    WholeBodyRequirements,
+    WholeBodySettings,
+    find_key_postures,
+    plan_whole_body,
+    swing_planner,
+)
+from manikin.planning.whole_body import (
+    plan_whole_body as assemble,
+)
+from manikin.planning.whole_body.fit import with_updated_penalties
+from manikin.planning.whole_body.fit_scales import FitScales
+from manikin.planning.whole_body.fit_targets import CLOSEST_KNOTS, phase_knots, refined, sample_times
+from manikin.planning.whole_body.posture_style import CLOSE
+from manikin.planning.whole_body.whole_body_certificate import WholeBodyFailure
+
+
+def test_knots_hold_every_key_instant_and_are_dense_enough():
+    instants = np.array([0.0, 0.33, 0.75, 1.2])
+    knots = phase_knots(instants, 0.1, 5)
+    assert set(instants) <= set(knots)
+    assert np.diff(np.unique(knots)).max() <= 0.1 + 1e-12
+    assert np.all(knots[:6] == 0.0)
+    assert np.all(knots[-6:] == 1.2)
+    times = sample_times(knots, 3)
+    assert len(times) == 3 * (len(np.unique(knots)) - 1) + 1
+
+
+def test_the_step_succeeds_and_its_feet_stay_where_they_stand(step_motion, person, step_com):
+    assert step_motion.succeeded, step_motion.failure
+    motion, schedule = step_motion.motion, step_com.schedule
+    data = person.pinocchio.createData()
+    for k in range(0, len(motion.time), 7):
+        pin.framesForwardKinematics(person.pinocchio, data, motion.q[k])
+        for contact in schedule.stance_at(float(motion.time[k])):
+            placement = data.oMf[person.effector_frame(contact.effector)]
+            # 1 mm is the requirement; the certificate must not be more generous than this.
+            assert np.linalg.norm(placement.translation - contact.position) <= 1.0e-3
+    worst = np.linalg.norm(motion.com - step_com.position(motion.time), axis=1).max()
+    assert worst <= 2.0e-3
+    assert worst <= step_motion.certificate.max_com_error_m + 1e-12
+
+
+def test_velocities_and_accelerations_are_those_of_the_configurations(step_motion, person):
+    """Trapezoidal integration over 1 ms: the error is of order 1e-9 rad for jerks of 1e3 rad/s^3."""
+    motion = step_motion.motion
+    h = np.diff(motion.time)
+    for k in range(0, len(h), 13):
+        moved = pin.difference(person.pinocchio, motion.q[k], motion.q[k + 1])
+        np.testing.assert_allclose(moved, 0.5 * h[k] * (motion.v[k] + motion.v[k + 1]), atol=2e-6)
+        np.testing.assert_allclose(
+            motion.v[k + 1] - motion.v[k], 0.5 * h[k] * (motion.a[k] + motion.a[k + 1]), atol=2e-4
+        )
+
+
+def test_planned_forces_obey_newton_and_euler(step_motion, person, step_com):
+    """Contact forces and torques together satisfy the equation of motion of the whole body."""
+    motion = step_motion.motion
+    model, data = person.pinocchio, person.pinocchio.createData()
+    schedule = step_com.schedule
+    for k in range(0, len(motion.time), 29):
+        pin.computeCentroidalMomentumTimeVariation(model, data, motion.q[k], motion.v[k], motion.a[k])
+        force = motion.contact_force[k, :, :3].sum(axis=0)
+        # 0.01 N in 775 N: the least-squares sharing of the forces weighs the wrench 1e6 times.
+        weight = np.array([0.0, 0.0, 9.81 * person.mass])
+        np.testing.assert_allclose(force, data.dhg.linear + weight, atol=0.05)
+        moment = np.zeros(3)
+        for c, name in enumerate(motion.contact_names):
+            if motion.support[k, c]:
+                contact = schedule.stance_at(float(motion.time[k]))[name]
+                moment += motion.contact_force[k, c, 3:]
+                moment += np.cross(contact.position - data.com[0], motion.contact_force[k, c, :3])
+            else:
+                assert not motion.contact_force[k, c].any()
+        np.testing.assert_allclose(moment, data.dhg.angular, atol=0.05)
+    assert np.abs(motion.tau[:, :6]).max() < 0.05
+
+
+def test_no_contact_pulls_or_slips_in_the_plan(step_motion):
+    force = step_motion.motion.contact_force[:, :, :3]
+    assert force[..., 2].min() >= -1e-9
+    # Friction pyramid of the flat soles, mu = 0.7.
+    assert np.all(np.abs(force[..., :2]).max(axis=2) <= 0.7 * force[..., 2] + 1e-9)
+
+
+def test_swinging_limbs_keep_the_whole_body_in_balance(step_motion):
+    """The margin of the whole-body wrench (with angular momentum) stays positive."""
+    assert step_motion.motion.margin.min() > 0.0
+
+
+def test_the_motion_begins_and_ends_at_rest(step_motion):
+    assert np.abs(step_motion.motion.v[[0, -1]]).max() < 5e-3
+
+
+def test_the_same_seed_gives_the_same_bits(step_motion, person, flat_ground, step_com):
+    again = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
+    for name, array in step_motion.motion.arrays().items():
+        assert np.array_equal(array, getattr(again.motion, name)), name
+
+
+def test_a_motion_that_breaks_its_requirement_is_a_failure_that_says_so(person, flat_ground, step_com):
+    # Coarse, because what cannot be is tried in several ways.
+    coarse = WholeBodySettings(guide_spacing=0.3, knot_spacing=0.1, manner=CLOSE)
+    strict = replace(coarse, requirements=WholeBodyRequirements(com_error=1e-9))
+    result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0), settings=strict)
+    assert not result.succeeded
+    assert "centre-of-mass error" in result.failure.reason
+    assert result.failure.where.startswith("phase ")
+
+
+@pytest.mark.parametrize("led_is_caught", [False, True])
+def test_a_caught_fit_is_led_by_the_key_postures_unless_that_is_caught_too(
+    led_is_caught, step_motion, person, flat_ground, step_com, monkeypatch
+):
+    postures = find_key_postures(person, flat_ground, step_com)
+    # Arms unlike the manner's: they show which guide was followed.
+    arm = 7 + person.joint_index("left_elbow_flexion")
+    bent = [replace(p, q=np.where(np.arange(person.nq) == arm, 1.4, p.q)) for p in postures.postures]
+    answers = iter([True, led_is_caught])
+    monkeypatch.setattr(assemble, "_is_caught", lambda _: next(answers, False))
+    result = plan_whole_body(
+        person, flat_ground, step_com, rng=np.random.default_rng(0), waypoints=KeyPostures(tuple(bent))
+    )
+    assert result.succeeded, result.failure
+    if led_is_caught:
+        np.testing.assert_array_equal(result.motion.q, step_motion.motion.q)
+    else:
+        middle = slice(len(result.motion.q) // 3, -len(result.motion.q) // 3)
+        assert np.abs(result.motion.q[middle, arm] - 1.4).max() < 0.1
+        assert np.abs(step_motion.motion.q[middle, arm] - 1.4).min() > 0.2
+
+
+def blocked(result, name, value):
+    """The motion as if it broke one requirement."""
+    certificate = replace(result.certificate, **{name: value})
+    return replace(result, certificate=certificate, failure=WholeBodyFailure(name, 0.6, "phase 1"))
+
+
+def test_where_straight_toes_are_in_the_way_they_may_bend(
+    step_motion, person, flat_ground, step_com, monkeypatch
+):
+    """What is too near something with straight toes, the arms close or not, is fitted without them.
+
+    The other requirements are kept with and without; the fit that counts differs in the toes.
+    """
+    attempt, straight = assemble._Planner._attempt, []
+
+    def nothing_with_straight_toes(planner, swings, began):
+        straight.append(planner.straight_toes)
+        if planner.straight_toes:
+            return blocked(step_motion, "min_clearance_m", -0.004)
+        return attempt(planner, swings, began)
+
+    monkeypatch.setattr(assemble._Planner, "_attempt", nothing_with_straight_toes)
+    result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
+    assert straight == [True, True, False]
+    assert result.succeeded, result.failure
+    toes = [7 + k for k, name in enumerate(person.joint_names) if name.endswith("toe_extension")]
+    held, loose = (np.abs(motion.q[:, toes]).max() for motion in (step_motion.motion, result.motion))
+    assert loose > 2.0 * held
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "tried"),
+    [("max_support_error_m", 0.01, [True, True]), ("min_clearance_m", -0.004, [True, True, False])],
+)
+def test_toes_stay_straight_where_something_else_breaks(
+    name, value, tried, step_motion, person, flat_ground, step_com, monkeypatch
+):
+    """A contact that is missed has nothing to do with toes; they are loosened for clearance alone."""
+    straight = []
+
+    def misses(planner, *_):
+        straight.append(planner.straight_toes)
+        return blocked(step_motion, name, value)
+
+    monkeypatch.setattr(assemble._Planner, "_attempt", misses)
+    monkeypatch.setattr(assemble._Planner, "_search_again", lambda *_: None)
+    result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
+    assert straight == tried
+    assert not result.succeeded
+
+
+@pytest.mark.slow
+def test_a_step_found_by_the_bi_rrt_is_followed_like_any_other(person, flat_ground, step_com, monkeypatch):
+    """With smooth curves made to fail, the whole motion still keeps every requirement."""
+    real = swing_planner.plan_swing
+
+    def fails(*args, **kwargs):
+        plan = real(*args, **kwargs)
+        return replace(plan, check=replace(plan.check, failure="made to fail"))
+
+    monkeypatch.setattr(swing_planner, "plan_swing", fails)
+    result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
+    assert [item.method for item in result.swings] == ["bi-rrt"]
+    assert result.succeeded, result.failure
+
+
+@pytest.mark.parametrize(
+    ("name", "what"), [("torque_share", "share of a torque limit"), ("missing_wrench", "missing wrench")]
+)
+def test_the_certificate_refuses_forces_beyond_the_body_or_its_contacts(step_motion, name, what):
+    residuals = step_motion.certificate
+    assert residuals.table(WholeBodyRequirements()).held
+    excess = replace(residuals, **{f"max_{name}": 1.01})
+    found = excess.table(WholeBodyRequirements()).first_broken
+    assert found is not None
+    assert found.name.startswith(what)
+    assert found.time_s == residuals.worst_times_s[f"max_{name}"]
+
+
+@given(
+    st.lists(st.floats(0.02, 1.0), min_size=1, max_size=6),
+    st.floats(0.02, 0.2),
+)
+def test_refined_knots_keep_the_old_ones_and_halve_the_spans_at_key_instants(durations, spacing):
+    """The spline space grows: whatever was fitted before can still be fitted."""
+    instants = np.concatenate([[0.0], np.cumsum(durations)])
+    knots = phase_knots(instants, spacing, 5)
+    fine = refined(knots, instants, 5, within=0.05)
+    assert set(np.unique(knots)) <= set(fine)
+    assert np.all(fine[:6] == instants[0])
+    assert np.all(fine[-6:] == instants[-1])
+    middle = 0.5 * (fine[1:] + fine[:-1])[np.diff(fine) > 0]
+    near = np.abs(middle[:, None] - instants).min(axis=1) < 0.02
+    widest = np.diff(np.unique(knots)).max()
+    assert np.all(np.diff(np.unique(fine))[near] <= max(0.5 * widest, 2.0 * CLOSEST_KNOTS) + 1e-9)
+
+
+def test_what_is_broken_weighs_more():
+    """Scales of the broken requirements become finer, the others stay."""
+    scales = FitScales()
+    changed = with_updated_penalties(
+        scales, frozenset({"min_clearance_m", "max_support_error_m"}), narrow=True
+    )
+    assert changed.clearance < scales.clearance
+    assert WholeBodyRequirements().clearance < changed.safe_distance < scales.safe_distance
+    assert (
+        with_updated_penalties(scales, frozenset({"min_clearance_m"})).safe_distance == scales.safe_distance
+    )
+    assert changed.multiplier_rounds > 0
+    for name in ("joint_limit", "joint_velocity", "force", "moment_share", "position", "com"):
+        assert getattr(changed, name) == getattr(scales, name)
+    again = with_updated_penalties(changed, frozenset({"max_missing_wrench"}))
+    assert again.force < scales.force
+    assert again.moment_share < scales.moment_share
+    assert again.clearance == changed.clearance

@@ -1,0 +1,139 @@
+"""What a motion has to do at each time, and what it may touch meanwhile."""
+
+import numpy as np
+import pytest
+
+from manikin.body import human
+from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
+from manikin.planning.whole_body.fit_targets import (
+    FLIGHT_POSITION_WEIGHT,
+    FLIGHT_ROTATION_WEIGHT,
+    LEAVING_RAMP,
+    POSITION_RAMP,
+    ROTATION_RAMP,
+    STRAIGHT,
+    STRAIGHTENING,
+    effector_targets,
+    flat_share,
+    ignored_pairs,
+)
+from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN
+from manikin.planning.whole_body.swing_curve import SwingCurve
+from manikin.planning.whole_body.swing_path import Pose
+from manikin.planning.whole_body.swing_planner import PlannedSwing
+from manikin.scene import Box, Obstacle, Scene
+
+BODY = human()
+SIZE = {"length": 0.26, "width": 0.1, "friction": 0.7}
+LEFT = sole("left_foot", (0.0, 0.1, 0.0), **SIZE)
+RIGHT = sole("right_foot", (0.0, -0.1, 0.0), **SIZE)
+ON_STEP = sole("right_foot", (0.5, -0.1, 0.2), **SIZE)
+SEAT = sole("buttocks", (0.2, 0.4, 0.5), length=0.14, width=0.24, friction=0.4, settle=0.5)
+SCENE = Scene(
+    [
+        Obstacle("step", Box((0.4, 0.4, 0.2)), translation=(0.5, -0.1, 0.1)),
+        Obstacle("seat", Box((0.5, 0.4, 0.1)), translation=(0.2, 0.4, 0.45)),
+        Obstacle("post", Box((0.1, 0.1, 2.0)), translation=(1.5, 0.0, 1.0)),
+    ]
+)
+LIFT, LAND, SIT, END = 0.5, 2.0, 3.0, 4.0
+SCHEDULE = ContactSchedule(
+    StanceSequence(
+        [
+            Phase(Stance(held, 2000.0))
+            for held in ([LEFT, RIGHT], [LEFT], [LEFT, ON_STEP], [LEFT, ON_STEP, SEAT])
+        ]
+    ),
+    [0.0, LIFT, LAND, SIT, END],
+)
+
+
+def touchable(time):
+    """Obstacle by segment that may touch it at one time."""
+    (pairs,) = ignored_pairs(BODY, SCENE, SCHEDULE, np.array([time]))
+    found = {}
+    for segment, obstacle in pairs:
+        found.setdefault(obstacle, set()).add(segment)
+    return found
+
+
+def flight_weights(duration, elapsed):
+    """Importance of position and orientation at times after the lift-off of a flight."""
+    start, end = LIFT, LIFT + duration
+    schedule = ContactSchedule(StanceSequence(SCHEDULE.sequence.phases[:3]), [0.0, start, end, end + 1.0])
+    (swing,) = [s for s in schedule.sequence.swings() if s.effector == "right_foot"]
+    poses = [Pose(c.position, c.rotation_contact_to_world) for c in (RIGHT, ON_STEP)]
+    curve = SwingCurve.lift(*poses, start, end)
+    planned = PlannedSwing(swing, curve, "smooth")
+    target = effector_targets(schedule, [planned], start + np.asarray(elapsed))["right_foot"]
+    return target.weight, target.rotation_weight
+
+
+@pytest.mark.parametrize("time", [LIFT, LIFT + 0.02, 1.2, LAND - 0.02])
+def test_a_foot_may_touch_what_it_leaves_and_what_it_steps_on_during_its_whole_flight(time):
+    """However long the flight is: a foot rolls off, drags or scuffs where its contacts are."""
+    found = touchable(time)
+    assert {"right_foot", "right_toes"} <= found["floor"]
+    assert found["step"] == {"right_foot", "right_toes"}
+
+
+def test_before_and_after_its_flight_a_foot_may_touch_its_support_alone():
+    assert "step" not in touchable(LIFT - 1e-6)
+    after = touchable(LAND)
+    assert after["step"] == {"right_foot", "right_toes"}
+    assert after["floor"] == {"left_foot", "left_toes"}
+
+
+@pytest.mark.parametrize(
+    ("time", "near"),
+    [
+        (0.0, False),
+        (SIT - SITTING_DOWN - 1e-6, False),
+        (SIT - SITTING_DOWN, True),
+        (SIT - 1e-6, True),
+        (END, True),
+    ],
+)
+def test_the_trunk_may_come_close_to_the_seat_only_just_before_it_sits_down(time, near):
+    """It is above the seat for most of its long flight and must not sink into it."""
+    assert ("seat" in touchable(time)) is near
+
+
+def test_nobody_may_touch_what_is_no_support():
+    pairs = ignored_pairs(BODY, SCENE, SCHEDULE, np.linspace(0.0, END, 200))
+    assert not any(obstacle == "post" for found in pairs for _, obstacle in found)
+    limbs = {segment for found in pairs for segment, _ in found}
+    assert not any("hand" in name or "leg" in name for name in limbs)
+
+
+@pytest.mark.parametrize("duration", [1.5, 4.0])
+def test_a_long_flight_is_bound_to_its_contacts_only_near_them(duration):
+    """A fifth of a second, and for the orientation after the lift-off less: the foot may roll off at once."""
+    elapsed = np.linspace(POSITION_RAMP, duration - POSITION_RAMP, 20)
+    assert flight_weights(duration, elapsed)[0] == pytest.approx(np.full(20, FLIGHT_POSITION_WEIGHT))
+    elapsed = np.linspace(LEAVING_RAMP, duration - ROTATION_RAMP, 20)
+    assert flight_weights(duration, elapsed)[1] == pytest.approx(np.full(20, FLIGHT_ROTATION_WEIGHT))
+    near = [0.25 * LEAVING_RAMP, duration - 0.25 * ROTATION_RAMP]
+    assert all(np.all(weight > 0.8) for weight in flight_weights(duration, near))
+
+
+def test_a_short_flight_is_bound_to_its_contacts_for_a_quarter_at_each_end():
+    duration = 0.6
+    position, rotation = flight_weights(
+        duration, [0.1 * duration, 0.25 * duration, 0.75 * duration, 0.9 * duration]
+    )
+    assert position[1:3] == pytest.approx([FLIGHT_POSITION_WEIGHT] * 2)
+    assert rotation[1:3] == pytest.approx([FLIGHT_ROTATION_WEIGHT] * 2)
+    assert position[0] == pytest.approx(position[3])
+    assert rotation[0] == pytest.approx(rotation[3])
+    assert 0.5 < position[0] < 1.0
+
+
+def test_toes_are_straight_while_their_sole_is_held_and_free_in_the_middle_of_a_flight():
+    toe = BODY.joint_index("right_toe_extension")
+    straight = LAND - STRAIGHT
+    becoming = straight - 0.5 * STRAIGHTENING
+    time = np.array([0.0, LIFT, LIFT + 0.5 * STRAIGHT, 0.5 * (LIFT + LAND), becoming, straight, LAND, END])
+    share = flat_share(BODY, SCHEDULE, time)
+    np.testing.assert_allclose(share[toe], [1.0, 1.0, 0.5, 0.0, 0.5, 1.0, 1.0, 1.0], atol=1e-12)
+    np.testing.assert_array_equal(share[BODY.joint_index("left_toe_extension")], 1.0)

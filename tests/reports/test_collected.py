@@ -1,0 +1,107 @@
+"""Tables of several reports: beams beside people, other statures, seeds."""
+
+import copy
+
+import pytest
+
+from manikin.pipeline.batch import counts
+from manikin.reports.summary_table import beam_table, filed, seed_record, seed_table, stature_table
+
+PUBLISHED = {"lowest_com_m": {"H1": 0.85, "H2": 0.80}, "beam_height_m": {"H1": 1.45, "H2": 1.30}}
+
+
+def a_run(scenario, variant=None, **changes):
+    run = {
+        "scenario": scenario if variant is None else f"{scenario}@{variant}", "variant": variant,
+        "expected": "success", "as_expected": True, "verdict": "proved", "planned": True, "proved": True,
+        "succeeded": True, "failure": None, "wall_s": 9.0,
+        "stature_m": 1.75, "mass_kg": 79.0, "seed": 0,
+        "centroidal": {
+            "duration_s": 5.0, "min_margin": 30.123456, "margin_unit": "N.m", "feasibility_radius": 70.0,
+            "wall_s": 1.0,
+        },
+        "wholebody": {
+            "min_clearance_m": 0.02, "min_margin": 20.5, "lowest_com_m": 0.7434, "head_clearance_m": 0.0312,
+            "seed_matters": False, "wall_s": 5.0,
+        },
+        "execution": {
+            "min_margin": 17.123456, "com_rms_error_m": 7e-5, "lowest_com_m": 0.742,
+            "head_clearance_m": 0.031, "fell": False, "wall_s": 3.0,
+        },
+    }  # fmt: skip
+    return {**run, **changes}
+
+
+def a_report(*runs, **asked):
+    return {
+        "stature_m": None, "seed": None, **asked, "runs": list(runs), **counts(runs), "wall_s": 10.0,
+    }  # fmt: skip
+
+
+def cells(table):
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]]
+
+
+MISSED = {"stage": "wholebody", "reason": "no posture", "time_s": 1.0, "where": ""}
+STOPPED = a_run("beam-H1C1", as_expected=False, succeeded=False, failure=MISSED, execution=None)
+POINT_MASS = a_run("walls", stature_m=None, wholebody=None, execution=None)
+
+
+def test_beams_stand_beside_people_and_infeasible_variants_are_left_out():
+    low = a_run("beam-H1C1", "knee-high", expected="failure")
+    table = cells(beam_table(a_report(a_run("beam-H2C1", "S2"), low, a_run("platform")), PUBLISHED))
+    assert table == [["beam-H2C1", "S2", "1.30", "0.80", "0.74", "0.74", "31.2", "31.0"]]
+
+
+def test_what_was_not_measured_is_left_blank():
+    assert cells(beam_table(a_report(STOPPED), PUBLISHED))[0][-3:] == ["-", "31.2", "-"]
+    old = a_run("beam-H1C1", execution={"min_margin": 1.0})
+    assert cells(beam_table(a_report(old), PUBLISHED))[0][-1] == "-"
+
+
+def test_statures_are_side_by_side_and_a_point_mass_has_none():
+    reports = [a_report(a_run("platform"), STOPPED, POINT_MASS, stature_m=s) for s in (1.85, 1.65)]
+    table = cells(stature_table(reports))
+    assert [(row[0], row[2]) for row in table] == [
+        ("beam-H1C1", "1.65"), ("beam-H1C1", "1.85"), ("platform", "1.65"), ("platform", "1.85"),
+    ]  # fmt: skip
+    assert table[0][3:] == ["79", "FAILED (wholebody): no posture", "-"]
+    assert table[3][3:] == ["79", "proved", "17.1"]
+
+
+def test_seeds_with_the_same_bits_are_one_result():
+    other = copy.deepcopy(a_run("platform"))
+    other["execution"]["min_margin"] += 1e-12
+    other["wholebody"]["seed_matters"] = True
+    records = {"0": seed_record(a_report(a_run("platform"), a_run("walk", "slippery")))}
+    same = {**records, "1": records["0"]}
+    assert [row[2:] for row in cells(seed_table(same))] == [["2 of 2 seeds", "no", "1", "17.1"]] * 2
+    records["1"] = seed_record(
+        a_report(other, {**STOPPED, "scenario": "walk@slippery", "variant": "slippery"})
+    )
+    first, second = cells(seed_table(records))
+    assert first == ["platform", "-", "2 of 2 seeds", "yes", "2", "17.1"]
+    assert second == ["walk", "slippery", "1 of 2 seeds", "no", "2", "17.1"]
+
+
+def test_a_spread_of_margins_is_shown():
+    worse = a_run("platform", execution={"min_margin": 8.5})
+    records = {seed: seed_record(a_report(run)) for seed, run in {"0": a_run("platform"), "1": worse}.items()}
+    assert cells(seed_table(records))[0][5] == "8.5 to 17.1"
+
+
+def test_each_report_is_filed_in_its_place_and_replaces_the_old_one_there():
+    kept = {}
+    for asked in ({}, {"stature_m": 1.65}, {"seed": 10}, {"seed": 9}, {"stature_m": 1.65}):
+        kept = filed(kept, a_report(a_run("platform"), **asked))
+    assert [*kept] == ["main", "statures", "seeds"]
+    assert [*kept["statures"]] == ["1.65"]
+    assert [*kept["seeds"]] == ["0", "9", "10"]
+    assert kept["main"]["runs"][0]["centroidal"]["min_margin"] == pytest.approx(30.12, abs=1e-12)
+    assert kept["seeds"]["9"]["platform"][1] == 30.123456
+
+
+def test_a_main_report_of_several_seeds_is_none_of_the_ten():
+    assert filed({}, a_report(a_run("platform"), a_run("walk", seed=4)))["seeds"] == {}
+    unknown = a_report(a_run("platform", seed=None))
+    assert filed({}, unknown)["seeds"] == {}
