@@ -158,7 +158,7 @@ def share(
         rest = rest[~done]
         if len(rest) == 0:
             break
-    for k in rest:
+    for k in rest.tolist():
         magnitude[k], multiplier[k] = problem.solve_one(k)
     return SharedForces(magnitude, multiplier, system)
 
@@ -182,7 +182,9 @@ class _Program:
         system = (self.A * weight[:, None, :]) @ self.A.T + self.softness * np.eye(6)
         known = np.where(full, self.upper, 0.0) if full.any() else np.zeros(full.shape)
         known = np.where(free, self.prior[rows], known)
-        return system, np.linalg.solve(system, (self.b[rows] - known @ self.A.T)[:, :, None])[:, :, 0]
+        missing = (self.b[rows] - known @ self.A.T)[:, :, None]
+        aim: FloatArray = np.linalg.solve(system, missing)[:, :, 0].astype(np.float64, copy=False)
+        return system, aim
 
     def step(
         self, rows: NDArray[np.int64], start: FloatArray, aim: FloatArray, error: FloatArray
@@ -208,11 +210,11 @@ class _Program:
 
     def solve_one(self, row: int) -> tuple[FloatArray, FloatArray]:
         """Magnitudes (g,) and multiplier (6,) by a general solver."""
-        weight, stiff = self.gain[row] ** -0.5, self.softness**-0.5
+        weight, stiff = np.asarray(self.gain[row] ** -0.5), self.softness**-0.5
         stacked = np.vstack([stiff * self.A, np.diag(weight)])
         target = np.concatenate([stiff * self.b[row], weight * self.prior[row]])
         found = lsq_linear(stacked, target, bounds=(0.0, self.upper), method="bvls", tol=1e-12).x
-        magnitude = np.clip(found, 0.0, self.upper)
+        magnitude: FloatArray = np.clip(found, 0.0, self.upper).astype(np.float64)
         return magnitude, (self.b[row] - self.A @ magnitude) / self.softness
 
 

@@ -122,7 +122,7 @@ class Controller:
         body, self._root = with_root(body)
         self.body = body
         self.schedule = schedule
-        self._friction_model = _inside_the_cone(schedule.sequence[0].stance.friction_model)
+        self._friction_model: FrictionModel = _inside_the_cone(schedule.sequence[0].stance.friction_model)
         self.settings = settings or ControlSettings()
         joints = body.nv - 6
         damping = np.zeros(joints) if joint_damping is None else joint_damping
