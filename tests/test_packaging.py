@@ -44,9 +44,7 @@ def declared(*extras):
     return {re.match(r"[\w-]+", line)[0].lower() for line in lines}
 
 
-@pytest.mark.parametrize(
-    ("folder", "extras"), [("src", ("viewer", "mocap")), ("tests", ("test", "viewer", "mocap"))]
-)
+@pytest.mark.parametrize(("folder", "extras"), [("src", ("mocap",)), ("tests", ("test", "mocap"))])
 def test_every_import_is_declared(folder, extras):
     known = {*declared(*extras), "manikin", "tests"}
     assert {name: str(path) for name, path in imported(folder).items() if name not in known} == {}

@@ -6,7 +6,7 @@ import pytest
 from manikin.scenarios import load_scenario
 from manikin.scene import Proximity, Scene
 
-RECORDED = {"beam-H1C1@S2": 0.85}
+RECORDED = {"beam-H1C1": 0.85}
 """Lowest CoM heights of people [m] ([Qiu2012]_ 3.2.3, "about")."""
 
 

@@ -56,13 +56,13 @@ def test_a_point_mass_run_has_schedule_scene_and_margin(tmp_path):
 
 def test_margin_of_the_plan_is_that_of_the_planner(tmp_path):
     """At rest over both feet at the start the point mass has the margin of that stance."""
-    from manikin.balance import pseudo_wrench, wrench_polytope
+    from manikin.balance import evaluate_balance
 
     record = read_run(write_run(tmp_path / "com"))
     stance = load_scenario("platform").build_sequence(planning=True)[0].stance
     plan = record.plan
-    wrench = pseudo_wrench(79.0, plan.position[0], plan.acceleration[0])
-    assert plan.margin[0] == pytest.approx(wrench_polytope(stance).margin(wrench))
+    at_rest = evaluate_balance(stance, 79.0, plan.position[0], plan.acceleration[0])
+    assert plan.margin[0] == pytest.approx(at_rest.margin)
 
 
 def test_a_full_run_has_motions_and_plan(tmp_path, finished_run):

@@ -50,7 +50,7 @@ def test_other_bodies_walk_with_their_own_heights(ahead, stature):
     heights = [walking_supports(ahead, scenario).start_com[2] for scenario in (referred, own)]
     assert np.allclose(heights, 0.96 * stature / 1.75)
     margins = [walking_supports(ahead, scenario).required_margin for scenario in (referred, own)]
-    assert np.allclose(margins, 15.0 * stature / 1.75)
+    assert np.allclose(margins, 10.9 * stature / 1.75)
     steps = place_footprints(walking_path((0, 0, 0), (2, 0, 0), max_speed=0.6), StepRule().scaled(stature))
     assert walking_supports(steps, own).build_centroidal_problem().support_distance == pytest.approx(
         0.985 * stature / 1.75

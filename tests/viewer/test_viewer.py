@@ -1,9 +1,7 @@
 """The viewer: served on this computer only, scrubbed, switched and closed."""
 
-import builtins
 import http.client
 import socket
-import sys
 import threading
 import urllib.request
 from dataclasses import replace
@@ -128,20 +126,6 @@ def test_taken_and_impossible_ports_are_refused_in_one_line(session, finished_ru
 def test_file_without_body_is_refused(finished_run):
     with pytest.raises(InputError, match="no body"):
         serve(replace(finished_run, body=None), port=0)
-
-
-def test_missing_extra_says_how_to_install(finished_run, monkeypatch):
-    real = builtins.__import__
-
-    def without_viser(name, *arguments, **keywords):
-        if name == "viser" or name.startswith("viser."):
-            raise ModuleNotFoundError("No module named 'viser'", name="viser")
-        return real(name, *arguments, **keywords)
-
-    monkeypatch.delitem(sys.modules, "manikin.viewer.session", raising=False)
-    monkeypatch.setattr(builtins, "__import__", without_viser)
-    with pytest.raises(InputError, match=r"pip install 'manikin\[viewer\]'"):
-        serve(finished_run)
 
 
 def test_others_move_on_the_same_clock(finished_run):

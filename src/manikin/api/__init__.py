@@ -3,6 +3,7 @@
 from manikin.api.bodies import Balance, balance, creature, grasp, point, scene, sole, stance
 from manikin.api.recorded import RecordedMotion, analyze, read
 from manikin.api.runs import Comparison, Run, compare, plan, push, simulate, walk
+from manikin.body import human
 
 __all__ = [
     "Balance",
@@ -14,6 +15,7 @@ __all__ = [
     "compare",
     "creature",
     "grasp",
+    "human",
     "plan",
     "point",
     "push",

@@ -1,5 +1,6 @@
 """A planned whole-body motion keeps what it promises, measured apart from its certificate."""
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -16,14 +17,14 @@ from manikin.planning.whole_body import (
     plan_whole_body,
     swing_planner,
 )
-from manikin.planning.whole_body import (
-    plan_whole_body as assemble,
-)
 from manikin.planning.whole_body.fit import with_updated_penalties
 from manikin.planning.whole_body.fit_scales import FitScales
 from manikin.planning.whole_body.fit_targets import CLOSEST_KNOTS, phase_knots, refined, sample_times
 from manikin.planning.whole_body.posture_style import CLOSE
 from manikin.planning.whole_body.whole_body_certificate import WholeBodyFailure
+
+MODULE = importlib.import_module("manikin.planning.whole_body.plan_whole_body")
+"""The module; the room hands on the function of the same name."""
 
 
 def test_knots_hold_every_key_instant_and_are_dense_enough():
@@ -128,7 +129,7 @@ def test_a_caught_fit_is_led_by_the_key_postures_unless_that_is_caught_too(
     arm = 7 + person.joint_index("left_elbow_flexion")
     bent = [replace(p, q=np.where(np.arange(person.nq) == arm, 1.4, p.q)) for p in postures.postures]
     answers = iter([True, led_is_caught])
-    monkeypatch.setattr(assemble, "_is_caught", lambda _: next(answers, False))
+    monkeypatch.setattr(MODULE, "_is_caught", lambda _: next(answers, False))
     result = plan_whole_body(
         person, flat_ground, step_com, rng=np.random.default_rng(0), waypoints=KeyPostures(tuple(bent))
     )
@@ -144,7 +145,8 @@ def test_a_caught_fit_is_led_by_the_key_postures_unless_that_is_caught_too(
 def blocked(result, name, value):
     """The motion as if it broke one requirement."""
     certificate = replace(result.certificate, **{name: value})
-    return replace(result, certificate=certificate, failure=WholeBodyFailure(name, 0.6, "phase 1"))
+    table, failure = certificate.table(WholeBodyRequirements()), WholeBodyFailure(name, 0.6, "phase 1")
+    return replace(result, certificate=certificate, requirements=table, failure=failure)
 
 
 def test_where_straight_toes_are_in_the_way_they_may_bend(
@@ -154,7 +156,7 @@ def test_where_straight_toes_are_in_the_way_they_may_bend(
 
     The other requirements are kept with and without; the fit that counts differs in the toes.
     """
-    attempt, straight = assemble._Planner._attempt, []
+    attempt, straight = MODULE._Planner._attempt, []
 
     def nothing_with_straight_toes(planner, swings, began):
         straight.append(planner.straight_toes)
@@ -162,7 +164,7 @@ def test_where_straight_toes_are_in_the_way_they_may_bend(
             return blocked(step_motion, "min_clearance_m", -0.004)
         return attempt(planner, swings, began)
 
-    monkeypatch.setattr(assemble._Planner, "_attempt", nothing_with_straight_toes)
+    monkeypatch.setattr(MODULE._Planner, "_attempt", nothing_with_straight_toes)
     result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
     assert straight == [True, True, False]
     assert result.succeeded, result.failure
@@ -185,8 +187,8 @@ def test_toes_stay_straight_where_something_else_breaks(
         straight.append(planner.straight_toes)
         return blocked(step_motion, name, value)
 
-    monkeypatch.setattr(assemble._Planner, "_attempt", misses)
-    monkeypatch.setattr(assemble._Planner, "_search_again", lambda *_: None)
+    monkeypatch.setattr(MODULE._Planner, "_attempt", misses)
+    monkeypatch.setattr(MODULE._Planner, "_search_again", lambda *_: None)
     result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
     assert straight == tried
     assert not result.succeeded

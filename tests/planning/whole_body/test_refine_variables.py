@@ -129,7 +129,8 @@ def standing_samples(schedule, com_x, shift):
     place = {name: np.tile(contacts[name].position, (5, 1)) for name in names}
     for name in names:
         place[name][:, 2] += shift if "hand" in name else 0.0
-    return VariableSamples(time, wrench, time, place, dict.fromkeys(names, np.zeros(5)))
+    com = np.tile([com_x, 0.0, 0.9], (5, 1))
+    return VariableSamples(time, wrench, com, time, place, dict.fromkeys(names, np.zeros(5)))
 
 
 def stand(*hands):

@@ -105,7 +105,7 @@ def test_pelvis_looking_straight_down_is_no_special_case():
 
 def test_oblique_and_repeated_hinges_are_written_as_euler_angles():
     oblique = [np.array([1.0, 2.0, 0.5]), np.array([0.0, 0.0, -1.0]), np.array([0.3, -1.0, 0.2])]
-    hinges = tuple(Hinge(f"h{i}", axis, -1.0, 1.0, 5.0, 50.0) for i, axis in enumerate(oblique))
+    hinges = tuple(Hinge(f"h{i}", axis, -1.0, 1.0, 5.0, -50.0, 50.0) for i, axis in enumerate(oblique))
     inertia = np.eye(3) * 0.1
     root = Segment("root", None, np.zeros(3), (), 5.0, np.zeros(3), inertia)
     arm = Segment("arm", "root", np.array([0.1, 0.2, 0.3]), hinges, 1.0, np.array([0.0, 0.0, 0.2]), inertia)
