@@ -44,7 +44,7 @@ BODIES = [
 @pytest.mark.parametrize("name", EVERY)
 def test_every_scenario_ends_as_its_file_says(name):
     """A success stands on its feet in the physics engine; a failure names its stage and its reason."""
-    result = manikin.pipeline.runner.run(name)
+    result = manikin.run(name)
     if load_scenario(name).file.expect == "failure":
         assert not result.succeeded
         assert result.summary["failure"]["stage"]
@@ -59,7 +59,7 @@ def test_every_scenario_ends_as_its_file_says(name):
 @pytest.mark.parametrize("name", [name for name in EVERY if name in LOWEST_COM or name.endswith("@S2")])
 def test_the_head_passes_under_the_beam(name):
     """2 cm clear of it; the CoM comes as low as people's within 7 cm, or lower with a hand on a post."""
-    result = manikin.pipeline.runner.run(name)
+    result = manikin.run(name)
     assert result.succeeded, result.summary["failure"]
     scenario = load_scenario(name)
     body = scenario.build_body()
@@ -73,11 +73,11 @@ def test_the_head_passes_under_the_beam(name):
 
 def test_a_passage_runs_again_through_its_key_frames(tmp_path):
     """The example of [Qiu2012]_ 5.3.3, 9 key frames with a left-hand grasp, on our own recording."""
-    recorded = manikin.pipeline.runner.run("beam-H1C1@S2", out=tmp_path / "recorded")
+    recorded = manikin.run("beam-H1C1@S2", out=tmp_path / "recorded")
     file = tmp_path / "again.yaml"
     recording = f"planning: {{method: keyframes, recording: {recorded.directory}}}"
     file.write_text(f"extends: beam-H1C1@S2\nname: again\n{recording}\n")
-    result = manikin.pipeline.runner.run(file)
+    result = manikin.run(file)
     assert result.succeeded, result.summary["failure"]
     assert len(result.centroidal.key_instants) == 9
     assert result.summary["execution"]["min_margin"] > 0.0
@@ -85,7 +85,7 @@ def test_a_passage_runs_again_through_its_key_frames(tmp_path):
 
 def test_the_passage_between_two_beams_ends_on_the_seat():
     """At the end the seat carries most of the weight, and the person rests."""
-    executed = manikin.pipeline.runner.run("beam-H2C3").executed
+    executed = manikin.run("beam-H2C3").executed
     buttocks = executed.contact_names.index("buttocks")
     assert executed.contact_force[-1, buttocks, 2] > 0.5 * 79.0 * 9.81
     assert np.abs(executed.v[-1]).max() < 0.1
@@ -93,7 +93,7 @@ def test_the_passage_between_two_beams_ends_on_the_seat():
 
 def test_a_knee_high_beam_ends_in_its_true_cause():
     """0.4 m is less than the body folds to; the failure says so."""
-    failure = manikin.pipeline.runner.run("beam-H1C1@knee-high").summary["failure"]
+    failure = manikin.run("beam-H1C1@knee-high").summary["failure"]
     assert "'beam' leaves 0.40 m above the supports; this body folds to no less than" in failure["reason"]
 
 
@@ -101,7 +101,7 @@ def test_a_knee_high_beam_ends_in_its_true_cause():
 def test_other_bodies_do_the_same(name, stature, mass, sex):
     """The scene does not grow with the body; margins of the scenario are kept by each ([Qiu2012]_ 5.4.4)."""
     scenario = load_scenario(name).with_body(stature, mass, sex)
-    result = manikin.pipeline.runner.run(scenario)
+    result = manikin.run(scenario)
     assert result.succeeded, result.summary["failure"]
     assert result.execution.min_margin > 0.0
     assert result.summary["centroidal"]["min_margin"] >= scenario.required_margin - 1e-6

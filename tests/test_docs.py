@@ -122,7 +122,7 @@ def test_scenario_examples_succeed(tmp_path):
     assert examples
     for text in examples:
         (tmp_path / "example.yaml").write_text(text)
-        result = manikin.pipeline.runner.run(tmp_path / "example.yaml")
+        result = manikin.run(tmp_path / "example.yaml")
         assert result.succeeded, result.summary["failure"]
 
 

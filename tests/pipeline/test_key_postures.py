@@ -48,7 +48,7 @@ planning:
 
 def stride(tmp_path, **changes):
     given = {
-        "length": 0.65, "lamp_m": 0.1, "lamp_height": 3.0, "goal_height": 0.97, "constraints": "[]",
+        "length": 0.74, "lamp_m": 0.1, "lamp_height": 3.0, "goal_height": 0.97, "constraints": "[]",
     }  # fmt: skip
     file = tmp_path / "stride.yaml"
     file.write_text(STRIDE.format(**(given | changes)))
@@ -57,7 +57,7 @@ def stride(tmp_path, **changes):
 
 @pytest.mark.slow
 def test_a_plan_too_high_for_the_legs_is_planned_again_lower_and_executed(tmp_path):
-    """Feet 0.65 m apart: legs of 0.9 m cannot carry the CoM at 0.95 m, as the first plan wants it."""
+    """Feet 0.74 m apart: legs of 0.9 m cannot carry the CoM at 0.95 m, as the first plan wants it."""
     result = run(stride(tmp_path), out=tmp_path / "run")
     summary = result.summary
     assert summary["succeeded"], summary["failure"]

@@ -15,7 +15,7 @@ BEAMS = ("H1C1", "H2C1", "H3C1", "H2C2", "H2C3")
 @pytest.mark.slow
 def test_another_body_runs_the_same_scenario():
     """The first fit leaves a shank 7 mm from the threshold; the second one makes room."""
-    result = manikin.pipeline.runner.run(load_scenario("platform").with_body(1.60, 55.0, "female"), seed=3)
+    result = manikin.run(load_scenario("platform").with_body(1.60, 55.0, "female"), seed=3)
     assert result.succeeded, result.summary["failure"]
     assert result.summary["wholebody"]["min_clearance_m"] >= 0.01
     assert result.summary["execution"]["min_margin"] > 0.0
@@ -44,7 +44,7 @@ def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_pat
 def test_walks_succeed_for_every_stature(name, stature, mass):
     """[Qiu2012]_ 5.4.4: the ZMP stays inside the support polygon, of the point mass and the body."""
     scenario = load_scenario(name).with_body(stature_m=stature, mass_kg=mass)
-    result = manikin.pipeline.runner.run(scenario)
+    result = manikin.run(scenario)
     assert result.succeeded, result.summary["failure"]
     assert result.execution.min_margin > 0.0
     com, body = result.summary["centroidal"], result.summary["wholebody"]
@@ -57,7 +57,7 @@ def test_walks_succeed_for_every_stature(name, stature, mass):
 def test_a_cluttered_task_succeeds_for_a_tall_person():
     """What stands in the scene does not grow with the body: a roof 1.5 m high."""
     tall = load_scenario("platform").with_body(stature_m=1.90, mass_kg=95.0)
-    result = manikin.pipeline.runner.run(tall)
+    result = manikin.run(tall)
     assert result.succeeded, result.summary["failure"]
     assert not result.execution.fell
     assert result.execution.min_margin > 0.0
@@ -84,6 +84,6 @@ def test_the_walk_asks_for_the_published_margin_and_duration():
 )
 def test_impossible_walks_and_passages_name_the_cause(name, cause):
     """The explanation names what would have to change, not where a solver stopped."""
-    result = manikin.pipeline.runner.run(name)
+    result = manikin.run(name)
     assert not result.succeeded
     assert cause in result.summary["failure"]["reason"]
