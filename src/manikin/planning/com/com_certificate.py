@@ -159,7 +159,6 @@ def measure(
     """Measure every requirement of ``problem`` on a trajectory.
 
     Args:
-        problem: The requirements.
         trajectory: Any trajectory through the same number of phases.
         polytopes: W_i of the phases about ``problem.reference``.
     """

@@ -1,12 +1,9 @@
-"""Smooth geometric constraints on the CoM, written once for numbers and for CasADi symbols.
+"""Geometric constraints on the CoM: smooth ones for numbers and CasADi symbols, and planes at key instants.
 
-Also here. An upper bound of the CoM's height below an overhead obstacle, smooth in x and y. Planes beyond
-which the CoM must not be at one key instant.
-
-Where the body, with the CoM at (x, y), would reach below the obstacle, the CoM must not be
-higher than the body can fold to; away from it the bound rises smoothly to a height that no
-posture reaches.  [Qiu2012]_ 5.29 drew such a surface by hand and left its construction open
-(8.2.2); this is our own.
+Below an overhead obstacle the height of the CoM is bounded: where the body, with the CoM at (x, y), would
+reach below the obstacle, the CoM must not be higher than the body can fold to; away from it the bound rises
+smoothly to a height that no posture reaches.  [Qiu2012]_ 5.29 drew such a surface by hand and left its
+construction open (8.2.2); this is our own.
 """
 
 from collections.abc import Callable, Sequence
@@ -254,14 +251,6 @@ class CeilingHeight:
 
 
 @dataclass(frozen=True)
-class _OverheadBelow:
-    surface: CeilingHeight
-
-    def __call__(self, x: Any, y: Any, z: Any) -> Any:
-        return z - self.surface(x, y)
-
-
-@dataclass(frozen=True)
 class _Outside:
     zone: Zone
 
@@ -270,21 +259,16 @@ class _Outside:
 
 
 def height_below(name: str, surface: CeilingHeight) -> GeometricConstraint:
-    """The CoM below the surface of one overhead obstacle.
-
-    Args:
-        name: Of the obstacle.
-        surface: Greatest height of the CoM.
-    """
-    return GeometricConstraint(f"height below '{name}'", _OverheadBelow(surface))
+    """The CoM below the greatest height that one overhead obstacle, of a name, allows."""
+    return GeometricConstraint(f"height below '{name}'", _Below(surface))
 
 
 def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
-    """The CoM outside a zone through which nothing passes, at any height.
+    """The CoM outside a zone through which nothing passes, at any height; half its onset counts as inside.
 
     Args:
-        name: Of the obstacle.
-        zone: Where the body would be below it; half the onset counts as inside.
+        name: Name of the obstacle.
+        zone: Where the body would be below it.
         reason: Why nothing passes, for the explanation of a failure.
     """
     return GeometricConstraint(f"way around '{name}'", _Outside(zone), reason)
@@ -292,8 +276,7 @@ def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
 
 def _edge_normals(points: FloatArray) -> FloatArray:
     """(k, 2) outward normals of the edges of the convex hull of (n, 2) points."""
-    hull = ConvexHull(points)
-    return np.asarray(hull.equations[:, :2], dtype=np.float64)
+    return np.asarray(ConvexHull(points).equations[:, :2], dtype=np.float64)
 
 
 def _distinct(normals: FloatArray) -> FloatArray:

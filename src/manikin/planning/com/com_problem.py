@@ -1,7 +1,4 @@
-"""What the timing-free method is asked: bodies, stances, bounds and weights ([Qiu2012]_ 5.4).
-
-Also here. The CoM trajectory: a clamped B-spline over normalised time with its contact schedule.
-"""
+"""The CoM trajectory, and the problem that asks for one: stances, bounds and weights ([Qiu2012]_ 5.4)."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -154,15 +151,18 @@ class CentroidalTrajectory(Displayed):
             "knots": self.spline.knots.tolist(),
             "control_points_m": self.spline.control_points.tolist(),
             "key_instants_s": self.schedule.instants.tolist(),
-            **({} if turning is None else {"turning": _spline_dict(turning)}),
-        }
+            **({} if turning is None else {"turning": {
+                "degree": int(turning.degree),
+                "knots": turning.knots.tolist(),
+                "control_points_Nm": turning.control_points.tolist(),
+            }}),
+        }  # fmt: skip
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], sequence: StanceSequence) -> Self:
         """Rebuild a trajectory written by :meth:`to_dict`.
 
         Args:
-            data: The dictionary.
             sequence: The stances, which the dictionary does not hold.
 
         Raises:
@@ -175,8 +175,8 @@ class CentroidalTrajectory(Displayed):
             raise InputError(f"centroidal trajectory lacks {missing[0]!r}; valid keys: {', '.join(wanted)}")
         spline = BSpline(data["degree"], data["knots"], data["control_points_m"])
         schedule = ContactSchedule(sequence, data["key_instants_s"])
-        told = data.get("turning")
-        turning = None if told is None else BSpline(told["degree"], told["knots"], told["control_points_Nm"])
+        rate = data.get("turning")
+        turning = None if rate is None else BSpline(rate["degree"], rate["knots"], rate["control_points_Nm"])
         return cls(float(data["mass_kg"]), spline, schedule, turning=turning)
 
     def _derivative(self, time: ArrayLike, order: int) -> FloatArray:
@@ -185,14 +185,6 @@ class CentroidalTrajectory(Displayed):
         if order > 0:
             values = np.where(((t >= 0.0) & (t <= self.duration))[..., None], values, 0.0)
         return values
-
-
-def _spline_dict(spline: BSpline) -> dict[str, Any]:
-    return {
-        "degree": int(spline.degree),
-        "knots": spline.knots.tolist(),
-        "control_points_Nm": spline.control_points.tolist(),
-    }
 
 
 MarginSpace = Literal["wrench", "force", "wrench_about_origin"]
@@ -309,10 +301,6 @@ class CentroidalProblem:
             "sequence": sequence,
             "start_com": frozen_array(start_com, "centroidal start_com [m]", (3,)),
             "goal_com": frozen_array(goal_com, "centroidal goal_com [m]", (3,)),
-            "start_velocity": _optional_vector(start_velocity, "start_velocity [m/s]"),
-            "goal_velocity": _optional_vector(goal_velocity, "goal_velocity [m/s]"),
-            "start_acceleration": _optional_vector(start_acceleration, "start_acceleration [m/s^2]"),
-            "goal_acceleration": _optional_vector(goal_acceleration, "goal_acceleration [m/s^2]"),
             "degree": _integer(degree, "degree", 3),
             "margin_space": margin_space,
             "required_margin": finite_number(required_margin, "centroidal required_margin", at_least=0.0),
@@ -323,6 +311,14 @@ class CentroidalProblem:
             "weights": Weights() if weights is None else weights,
             "samples": _integer(samples, "samples", 2),
         }
+        derivatives = {
+            "start_velocity": (start_velocity, "[m/s]"), "goal_velocity": (goal_velocity, "[m/s]"),
+            "start_acceleration": (start_acceleration, "[m/s^2]"),
+            "goal_acceleration": (goal_acceleration, "[m/s^2]"),
+        }  # fmt: skip
+        for name, (vector, unit) in derivatives.items():
+            known = None if vector is None else frozen_array(vector, f"centroidal {name} {unit}", (3,))
+            object.__setattr__(self, name, known)
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -349,10 +345,6 @@ class CentroidalProblem:
     def max_durations(self) -> FloatArray:
         """(phases,) upper bounds of the durations [s], infinite where there is none."""
         return np.array([np.inf if p.max_duration is None else p.max_duration for p in self.sequence])
-
-
-def _optional_vector(value: ArrayLike | None, name: str) -> FloatArray | None:
-    return None if value is None else frozen_array(value, f"centroidal {name}", (3,))
 
 
 def _inner_planes(planes: Sequence[KeyPlane], phases: int) -> tuple[KeyPlane, ...]:

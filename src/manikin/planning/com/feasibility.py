@@ -1,6 +1,6 @@
 """What can be said before solving: Propositions 1 and 2 and the ends of the motion ([Qiu2012]_ 5.4.3).
 
-Also here. Why a stance cannot work at all: friction too low for a slope, feet too far apart for the legs.
+A failure also says why a stance cannot work at all: friction too low for a slope, feet too far apart.
 """
 
 import itertools
@@ -244,7 +244,6 @@ def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]
     (Proposition 2), then whether any acceleration balances the CoM at the start and at the goal.
 
     Args:
-        problem: What to find.
         polytopes: W_i of the phases about ``problem.reference``.
     """
     radii = _bounds(problem, polytopes)
@@ -294,23 +293,43 @@ def _duration_failure(problem: CentroidalProblem) -> Failure | None:
 
 def _end_failure(problem: CentroidalProblem) -> Failure | None:
     last = len(problem.sequence) - 1
-    for name, phase, com in (("start", 0, problem.start_com), ("goal", last, problem.goal_com)):
-        limit = problem.support_distance
-        for contact in problem.sequence[phase].stance if limit is not None else ():
+    return misplaced(problem, problem.start_com, (0,), "start CoM") or misplaced(
+        problem, problem.goal_com, (last,), "goal CoM"
+    )
+
+
+def misplaced(
+    problem: CentroidalProblem,
+    com: FloatArray,
+    phases: Sequence[int],
+    what: str,
+    tolerance: float = ROUNDING,
+) -> Failure | None:
+    """Failure of a CoM position that is too far from a contact or breaks a constraint, or None.
+
+    Args:
+        problem: Says what the position has to keep.
+        com: (3,) position [m].
+        phases: Phases in which it occurs.
+        what: The position in words.
+        tolerance: Largest violation that counts as none [m].
+    """
+    limit = problem.support_distance
+    for phase in phases if limit is not None else ():
+        for contact in problem.sequence[phase].stance:
             distance = float(np.linalg.norm(com - contact.position))
-            if limit is not None and distance > limit + ROUNDING:
+            if limit is not None and distance > limit + tolerance:
                 return Failure(
                     "support distance",
-                    f"{name} CoM is {distance:.3f} m from {contact.effector}, out of reach: "
+                    f"{what} is {distance:.3f} m from {contact.effector}, out of reach: "
                     f"the limit is {limit:.3f} m",
                     phase, where=contact.effector,
                 )  # fmt: skip
-        for constraint in problem.geometric:
-            violation = float(constraint.violation(com))
-            if violation > ROUNDING:
-                return Failure(
-                    constraint.name, f"{name} CoM violates '{constraint.name}' by {violation:.4f} m", phase
-                )
+    for constraint in problem.geometric:
+        violation = float(constraint.violation(com))
+        if violation > tolerance:
+            reason = f"{what} violates '{constraint.name}' by {violation:.4f} m"
+            return Failure(constraint.name, reason, phases[-1])
     return None
 
 

@@ -1,10 +1,7 @@
-"""What the keyframe-based method is asked: a recording and what the motion has to keep ([Qiu2012]_ 5.3.1).
+"""The keyframe-based problem: a CoM recorded on stances, and what a motion has to keep ([Qiu2012]_ 5.3.1)."""
 
-Also here. A recorded CoM with the stances it was recorded on ([Qiu2012]_ 3.2.2, 5.3.1).
-"""
-
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.contact import ContactSchedule, Phase, StanceSequence
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
-from manikin.planning.com.com_constraints import GeometricConstraint
-from manikin.planning.com.com_problem import CentroidalProblem, MarginSpace, Weights
+from manikin.planning.com.com_problem import CentroidalProblem, Weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,58 +162,36 @@ class KeyframeProblem:
         mass: float,
         recording: RecordedCom,
         *,
-        degree: int = 5,
         control_points: int | None = None,
-        start_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
-        goal_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
-        start_acceleration: ArrayLike | None = None,
-        goal_acceleration: ArrayLike | None = None,
-        required_margin: float = 0.0,
-        margin_space: MarginSpace = "wrench",
-        support_distance: float | None = None,
-        geometric: Sequence[GeometricConstraint] = (),
-        weights: Weights | None = None,
         frame_spacing: float = FRAME_SPACING,
+        **requirements: Any,
     ) -> None:
         """Put the problem together.
 
         Args:
             mass: [kg].
             recording: Samples, key frames and stances.
-            degree: Of the spline, >= 3.
             control_points: At least one more than there are key frames and end conditions; the
                 number of key frames plus 7 when omitted.
-            start_velocity: (3,) [m/s] (5.15), or None when free.
-            goal_velocity: (3,) [m/s] (5.16), or None when free.
-            start_acceleration: (3,) [m/s^2], or None when free; needs a velocity too.
-            goal_acceleration: (3,) [m/s^2], or None when free; needs a velocity too.
-            required_margin: The whole motion has to keep it [N.m] or [N].
-            margin_space: What the margin measures.
-            support_distance: Largest distance of the CoM from every active contact [m].
-            geometric: Further constraints on the CoM position.
-            weights: Qv and Qj of the objective, and a Qa that the thesis does not have; those of
-                margin and duration play no part.
             frame_spacing: Least distance of an added key frame from the others [s].
+            requirements: Further arguments of :class:`CentroidalProblem`: degree, conditions at the ends (an
+                acceleration needs a velocity), margin, support distance, geometric constraints, and weights,
+                of which those of margin and duration play no part.
 
         Raises:
             InputError: If a value is not usable or there are too few control points.
         """
-        requirements = CentroidalProblem(
-            mass, recording.sequence, recording.com[0], recording.com[-1],
-            start_velocity=start_velocity, goal_velocity=goal_velocity,
-            start_acceleration=start_acceleration, goal_acceleration=goal_acceleration,
-            degree=degree, margin_space=margin_space, required_margin=required_margin,
-            support_distance=support_distance, geometric=geometric,
-            weights=Weights() if weights is None else weights,
-        )  # fmt: skip
+        asked = CentroidalProblem(
+            mass, recording.sequence, recording.com[0], recording.com[-1], **requirements
+        )
         frames = len(recording.key_frames)
         if control_points is None:
-            control_points = max(frames + EXTRA_CONTROL_POINTS, degree + 1)
-        _check_control_points(control_points, frames, requirements)
-        _check_weights(requirements.weights)
+            control_points = max(frames + EXTRA_CONTROL_POINTS, asked.degree + 1)
+        _check_control_points(control_points, frames, asked)
+        _check_weights(asked.weights)
         spacing = finite_number(frame_spacing, "keyframes frame_spacing [s]", above=0.0)
         values = {
-            "recording": recording, "requirements": requirements,
+            "recording": recording, "requirements": asked,
             "control_points": int(control_points), "frame_spacing": spacing,
         }  # fmt: skip
         for name, value in values.items():
@@ -231,7 +205,6 @@ class KeyframeProblem:
 
         Args:
             problem: Whose body, margin, constraints, weights and conditions at the ends are taken over.
-            recording: Samples, key frames and stances.
             control_points: The number of key frames plus 7 when omitted.
 
         Raises:

@@ -252,14 +252,18 @@ def _end_conditions(
     return start, goal
 
 
+def quadrature(degree: int, knots: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Nodes on [0, 1] and weights, (n,) each, exact for squared derivatives of a spline."""
+    nodes, shares = np.polynomial.legendre.leggauss(degree)
+    breaks = np.unique(knots)
+    half = 0.5 * np.diff(breaks)[:, None]
+    return (breaks[:-1, None] + half * (1.0 + nodes)).ravel(), (half * shares).ravel()
+
+
 def _grams(problem: CentroidalProblem, knots: FloatArray, duration: float) -> FloatArray:
     """(3, n + 1, n + 1) matrices of the objective, by quadrature that is exact for the polynomials."""
     k, weights = problem.degree, problem.weights
-    nodes, shares = np.polynomial.legendre.leggauss(k)
-    breaks = np.unique(knots)
-    half = 0.5 * np.diff(breaks)[:, None]
-    times = (breaks[:-1, None] + half * (1.0 + nodes)).ravel()
-    share = (half * shares).ravel()
+    times, share = quadrature(k, knots)
     total = np.zeros((3, len(knots) - k - 1, len(knots) - k - 1))
     for order, diagonal in enumerate((weights.velocity, weights.acceleration, weights.jerk), start=1):
         basis = basis_matrix(k, knots, times, order) / duration**order

@@ -32,6 +32,7 @@ from manikin.planning.com.feasibility import (
     Feasibility,
     assess_feasibility,
     best_margin_at,
+    misplaced,
     polytopes_of,
 )
 from manikin.planning.com.keyframe_problem import KeyframeProblem
@@ -41,7 +42,7 @@ from manikin.planning.com.keyframe_spline import (
     phases_touching,
     spline_of,
 )
-from manikin.planning.com.timing_free import CentroidalResult, limiting_at
+from manikin.planning.com.timing_free import CentroidalResult, missed_margin
 
 MAX_ROUNDS = 30
 """Key frames that are tried before the method gives up."""
@@ -88,9 +89,6 @@ def plan_com_through_key_frames(problem: KeyframeProblem) -> KeyframeResult:
     :mod:`manikin.planning.com.keyframe_spline`. A trajectory that does not meet its own
     certificate, measured every millisecond, gets key frames until it does or no sample of the
     recording is left that would help.
-
-    Args:
-        problem: What to find.
 
     Returns:
         A result that holds the trajectory or says which requirement could not be met.
@@ -208,37 +206,26 @@ class _Search:
         points, margin, row = programme.most_margin()
         phase = int(programme.phases[row])
         time = float(self.problem.recording.time[frames[programme.frames[row]]])
-        trajectory = self._trajectory(programme, points)
-        limit = limiting_at(requirements, trajectory, self.polytopes[phase], time)
-        return Failure(
-            "balance margin",
+        what = (
             f"no spline of degree {programme.degree} with {len(points)} control points through the "
-            f"{len(frames)} key frames keeps the required margin at all of them: the largest is "
-            f"{margin:.2f} {requirements.margin_unit}, limited in phase {phase} at {time:.3f} s by "
-            f"{limit.description}; required {requirements.required_margin:.2f} {requirements.margin_unit}",
-            phase, time, limit.effector,
-        )  # fmt: skip
+            f"{len(frames)} key frames keeps the required margin at all of them: the largest is {margin:.2f}"
+        )
+        trajectory = self._trajectory(programme, points)
+        return missed_margin(requirements, trajectory, self.polytopes, phase, time, what)
 
     def _explain(self, attempt: _Attempt) -> Failure:
         """Name what the best attempt breaks between its key frames."""
-        unit, certificate = self.problem.requirements.margin_unit, attempt.certificate
+        certificate = attempt.certificate
         count = len(attempt.frames) - len(self.problem.recording.key_frames)
         tried = f"with {count} key frames added, and no further sample of the recording helps"
         worst = certificate.largest
         if worst.requirement != "balance margin":
             return Failure(worst.requirement, f"{worst} {tried}", worst.phase, worst.time)
-        polytope = self.polytopes[certificate.limiting_phase]
-        limit = limiting_at(
-            self.problem.requirements, attempt.trajectory, polytope, certificate.limiting_time
-        )
-        reason = (
-            f"the largest margin found is {certificate.min_margin:.2f} {unit}, limited in phase "
-            f"{certificate.limiting_phase} at {certificate.limiting_time:.3f} s by {limit.description}, "
-            f"{tried}; required {self.problem.requirements.required_margin:.2f} {unit}"
-        )
-        return Failure(
-            "balance margin", reason, certificate.limiting_phase, certificate.limiting_time, limit.effector
-        )
+        what = f"the largest margin found is {certificate.min_margin:.2f}"
+        return missed_margin(
+            self.problem.requirements, attempt.trajectory, self.polytopes, certificate.limiting_phase,
+            certificate.limiting_time, what, f", {tried}",
+        )  # fmt: skip
 
 
 def _assess(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Feasibility:
@@ -250,23 +237,14 @@ def _assess(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Fe
 
 def _position_failure(problem: KeyframeProblem) -> Failure | None:
     """Find a key frame whose recorded position breaks a constraint; passing it, the motion would as well."""
-    requirements, recording = problem.requirements, problem.recording
+    recording = problem.recording
     for number, frame in enumerate(recording.key_frames):
         time, com = float(recording.time[frame]), recording.com[frame]
-        phase = int(recording.schedule.phase_at(time))
         what = f"recorded CoM {np.round(com, 3).tolist()} of key frame {number} at {time:.3f} s"
-        for constraint in requirements.geometric:
-            violation = float(constraint.violation(com))
-            if violation > TOLERANCE:
-                reason = f"{what} violates '{constraint.name}' by {violation:.4f} m"
-                return Failure(constraint.name, reason, phase, time)
-        limit = requirements.support_distance
-        for index in phases_touching(recording.schedule, time) if limit is not None else ():
-            for contact in recording.sequence[index].stance:
-                distance = float(np.linalg.norm(com - contact.position))
-                if limit is not None and distance > limit + TOLERANCE:
-                    reason = f"{what} is {distance:.3f} m from {contact.effector}; the limit is {limit:.3f} m"
-                    return Failure("support distance", reason, index, time, contact.effector)
+        phases = phases_touching(recording.schedule, time)
+        failure = misplaced(problem.requirements, com, phases, what, TOLERANCE)
+        if failure is not None:
+            return replace(failure, time=time)
     return None
 
 

@@ -2,21 +2,16 @@
 
 :func:`~manikin.planning.com.keyframes.plan_com_through_key_frames` passes the recorded positions exactly, as
 [Qiu2012]_ 5.3 does. Where a walk's supports last a tenth of a second, a centimetre of error asks for
-accelerations that no foot can give, and further key frames make it worse. Here the key frames pull, balance
-is imposed all along, and the motion is measured every millisecond. Where it strays from the recording,
-the sample that is farthest off becomes one more key frame. With the recorded rate of the angular momentum the
-plan keeps its balance twice: as a point mass, as in the thesis, and with a rate near the recorded one.
+accelerations that no foot can give, and further key frames make it worse. Here the key frames pull, and the
+motion is measured every millisecond. Where it strays from the recording, the sample that is farthest off
+becomes one more key frame.
 
-Also here. The quadratic programme of a CoM that stays near key frames and keeps its balance all the time.
-
-A recorded position is not exact, so that the one CoM that passes all of them may be out of balance where a
-person was not. Here the key frames pull instead, and balance is imposed every ten milliseconds: the
-pseudo-wrench ``m [a - g; p x (a - g)]`` ([Qiu2012]_ 4.6), bilinear in position and acceleration, is
-linearised about the last solution; the rows' lengths, which make the margin one about the CoM, are
-those at the last solution. Where the recorded rate of the angular momentum is known, the plan has
-one too, near it, and both wrenches keep their balance: that of the point mass and that of the body which
-turns ([Qiu2012]_ 4.51). More margin than has to be kept is wished for, and what lacks of it is paid for.
-All this is our own.
+Balance is imposed every ten milliseconds by a quadratic programme: the pseudo-wrench ``m [a - g; p x (a -
+g)]`` ([Qiu2012]_ 4.6), bilinear in position and acceleration, is linearised about the last solution; the
+rows' lengths, which make the margin one about the CoM, are those at the last solution. Where the recorded
+rate of the angular momentum is known, the plan has one too, near it, and both wrenches keep their balance:
+that of the point mass, as in the thesis, and that of the body which turns ([Qiu2012]_ 4.51). More margin than
+has to be kept is wished for, and what lacks of it is paid for. All this is our own.
 """
 
 import time as clock
@@ -38,6 +33,7 @@ from manikin.planning.com.com_certificate import TOLERANCE, Residuals, measure, 
 from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory, Weights
 from manikin.planning.com.feasibility import Failure, Feasibility, assess_feasibility, polytopes_of
 from manikin.planning.com.keyframe_problem import KeyframeProblem, RecordedCom
+from manikin.planning.com.keyframe_spline import quadrature
 from manikin.planning.com.timing_free import CentroidalResult
 
 DEGREE = 5
@@ -258,10 +254,7 @@ def _smoothness(knots: FloatArray, duration: float, weights: Weights) -> FloatAr
 
 def _squared(knots: FloatArray, duration: float, costs: Mapping[int, float]) -> FloatArray:
     """(n, n) mean over time of the weighted squared derivatives by order, exact for the polynomials."""
-    nodes, shares = np.polynomial.legendre.leggauss(DEGREE)
-    breaks = np.unique(knots)
-    half = 0.5 * np.diff(breaks)[:, None]
-    times, share = (breaks[:-1, None] + half * (1.0 + nodes)).ravel(), (half * shares).ravel()
+    times, share = quadrature(DEGREE, knots)
     total = np.zeros((len(knots) - DEGREE - 1,) * 2)
     for order, cost in costs.items():
         basis = basis_matrix(DEGREE, knots, times, order) / duration**order

@@ -146,7 +146,6 @@ def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> ComProg
     """The compiled optimisation of a problem, shared by all problems of the same structure.
 
     Args:
-        problem: What to find.
         facets: Indices of the facets imposed in each phase.
     """
     return transcribe(
@@ -174,7 +173,6 @@ def optimise(
     """Run the solver once from the given Bezier points and durations.
 
     Args:
-        problem: What to find.
         polytopes: W_i of the phases about ``problem.reference``.
         facets: Indices of the facets imposed in each phase.
         targets: Bounds used at the samples.

@@ -1,6 +1,6 @@
 """The timing-free method: CoM trajectory, durations and margin in one optimisation ([Qiu2012]_ 5.4).
 
-Also here. First trajectory for the optimisation: of a pendulum on the supports, or through their centres.
+It starts from the path of a pendulum on the supports, or from one through their centres.
 """
 
 import itertools
@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
 
 from manikin.balance import LimitingConstraint, WrenchPolytope
-from manikin.contact import ContactKind, Stance
+from manikin.contact import ContactKind
 from manikin.numerics.spatial import GRAVITY, GRAVITY_VECTOR, FloatArray, skew
 from manikin.numerics.spline import BSpline, clamped_knots, end_control_points, start_control_points
 from manikin.planning.com.com_certificate import Residuals, measure
@@ -81,8 +81,6 @@ def guess(
     """Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s] to start from.
 
     Args:
-        problem: What to find.
-        style: How to guess.
         polytopes: W_i of the phases about ``problem.reference``.
     """
     durations = _guess_durations(problem, style.stretch, polytopes)
@@ -128,8 +126,9 @@ def _pendulum(problem: CentroidalProblem, instants: FloatArray) -> BSpline:
     ])  # fmt: skip
     values = np.vstack([weight * wanted, np.zeros_like(wanted)])
     rest = np.zeros(3)
-    first = start_control_points(k, knots, problem.start_com, _or(problem.start_velocity, rest), rest)
-    last = end_control_points(k, knots, problem.goal_com, _or(problem.goal_velocity, rest), rest)
+    speeds = [rest if v is None else v for v in (problem.start_velocity, problem.goal_velocity)]
+    first = start_control_points(k, knots, problem.start_com, speeds[0], rest)
+    last = end_control_points(k, knots, problem.goal_com, speeds[1], rest)
     points = np.linspace(problem.start_com, problem.goal_com, count)
     points[: len(first)], points[count - len(last) :] = first, last
     inner = slice(len(first), count - len(last))
@@ -139,10 +138,6 @@ def _pendulum(problem: CentroidalProblem, instants: FloatArray) -> BSpline:
     if way[-1] > 0.0:
         points[inner, 2] = np.interp(way[inner], way[[0, -1]], points[[0, -1], 2])
     return BSpline(k, knots, points)
-
-
-def _or(given: FloatArray | None, default: FloatArray) -> FloatArray:
-    return default if given is None else given
 
 
 def _guess_durations(
@@ -180,17 +175,12 @@ def _guess_key_positions(problem: CentroidalProblem, instants: FloatArray, pull:
     positions = problem.start_com + progress * (problem.goal_com - problem.start_com)
     stances = [phase.stance for phase in problem.sequence]
     for index, (before, after) in enumerate(itertools.pairwise(stances), start=1):
-        centre = _shared_centre(before, after)
-        if centre is not None:
-            positions[index, :2] += pull * (centre[:2] - positions[index, :2])
+        # Towards the contacts held across the key instant, or towards all when none is.
+        held = [contact.position for contact in before if contact.effector in after]
+        held = held or [contact.position for stance in (before, after) for contact in stance]
+        if held:
+            positions[index, :2] += pull * (np.mean(held, axis=0)[:2] - positions[index, :2])
     return positions
-
-
-def _shared_centre(before: Stance, after: Stance) -> FloatArray | None:
-    """Mean position of the contacts held across a key instant, or of all when none is."""
-    held = [contact.position for contact in before if contact.effector in after]
-    held = held or [contact.position for stance in (before, after) for contact in stance]
-    return np.mean(held, axis=0) if held else None
 
 
 MAX_ROUNDS = 6
@@ -285,9 +275,6 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     facet that was left out the facet is added, and the programme is solved again. A result
     that does not meet its own certificate is a failure.
 
-    Args:
-        problem: What to find.
-
     Returns:
         A result that holds the trajectory or says which requirement could not be met.
     """
@@ -353,7 +340,6 @@ def limiting_at(
 
     Args:
         problem: Says what the margin measures.
-        trajectory: The trajectory.
         polytope: Of the phase of that time, about ``problem.reference``.
         time: [s].
     """
@@ -391,11 +377,34 @@ def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], be
         return Failure(
             worst.requirement, f"no trajectory found: {worst} in the best attempt", worst.phase, worst.time
         )
-    polytope = polytopes[found.limiting_phase]
-    limit = limiting_at(problem, best.trajectory, polytope, found.limiting_time)
-    place = f"in phase {found.limiting_phase} at {found.limiting_time:.3f} s by {limit.description}"
+    what = f"the largest margin found is {found.min_margin:.2f}"
+    return missed_margin(problem, best.trajectory, polytopes, found.limiting_phase, found.limiting_time, what)
+
+
+def missed_margin(
+    problem: CentroidalProblem,
+    trajectory: CentroidalTrajectory,
+    polytopes: Sequence[WrenchPolytope],
+    phase: int,
+    time: float,
+    what: str,
+    tried: str = "",
+) -> Failure:
+    """Failure that names the contact limiting the margin of a trajectory.
+
+    Args:
+        problem: What was asked.
+        trajectory: The best one found.
+        polytopes: W_i of the phases about ``problem.reference``.
+        phase: Phase in which the margin is smallest.
+        time: When [s].
+        what: How large the margin is, in words without the unit.
+        tried: What was tried, in words.
+    """
+    limit = limiting_at(problem, trajectory, polytopes[phase], time)
+    unit = problem.margin_unit
     reason = (
-        f"the largest margin found is {found.min_margin:.2f} {problem.margin_unit}, limited {place}; "
-        f"required {problem.required_margin:.2f} {problem.margin_unit}"
+        f"{what} {unit}, limited in phase {phase} at {time:.3f} s by {limit.description}{tried}; "
+        f"required {problem.required_margin:.2f} {unit}"
     )
-    return Failure("balance margin", reason, found.limiting_phase, found.limiting_time, limit.effector)
+    return Failure("balance margin", reason, phase, time, limit.effector)

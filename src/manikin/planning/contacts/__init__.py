@@ -16,17 +16,15 @@ from manikin.planning.contacts.efort import (
     efort,
     force_ellipsoid,
     force_transmission_ratio,
-    limb_strength,
     pulling_efort,
     velocity_ellipsoid,
 )
-from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit
-from manikin.planning.contacts.follow_guide import ExtendSettings, follow_guide
-from manikin.planning.contacts.follow_guide_with_limbs import (
+from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit, starts_on_limbs
+from manikin.planning.contacts.follow_guide import (
+    ExtendSettings,
     LimbExtendSettings,
-    LimbStart,
+    follow_guide,
     follow_guide_with_limbs,
-    starts_on_limbs,
 )
 from manikin.planning.contacts.generator import (
     ContactGenerator,
@@ -50,17 +48,14 @@ from manikin.planning.contacts.heuristics import (
     heuristic_named,
 )
 from manikin.planning.contacts.limb_collisions import LimbCollisions
-from manikin.planning.contacts.limb_places import Foothold, Footholds, FootholdSettings, LimbPlaces, Near
+from manikin.planning.contacts.limb_places import Footholds, LimbPlaces
 from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import (
     LimbSamples,
-    load_samples,
     manipulability,
     mirrored,
     sample_limb,
     sample_limbs,
-    samples_for,
-    save_samples,
 )
 
 __all__ = [
@@ -79,8 +74,6 @@ __all__ = [
     "Endpoints",
     "ExtendSettings",
     "Extension",
-    "Foothold",
-    "FootholdSettings",
     "Footholds",
     "GeneratedContact",
     "GeneratorSettings",
@@ -92,9 +85,7 @@ __all__ = [
     "LimbExtendSettings",
     "LimbPlaces",
     "LimbSamples",
-    "LimbStart",
     "Manipulability",
-    "Near",
     "PlanCertificate",
     "Posed",
     "PostureFinder",
@@ -116,16 +107,12 @@ __all__ = [
     "force_transmission_ratio",
     "heading_of",
     "heuristic_named",
-    "limb_strength",
-    "load_samples",
     "make_contact",
     "manipulability",
     "mirrored",
     "pulling_efort",
     "sample_limb",
     "sample_limbs",
-    "samples_for",
-    "save_samples",
     "starts_on_limbs",
     "velocity_ellipsoid",
 ]

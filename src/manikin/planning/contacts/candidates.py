@@ -119,8 +119,6 @@ class SurfaceTable:
         the polygon, the extents of the hull.
 
         Args:
-            situation: Where the limb is.
-            samples: Samples of the limb.
             tolerance: How far beyond the hull a surface may be [m].
         """
         hull, radius = samples.hull
@@ -184,10 +182,6 @@ class SurfaceTable:
             return bool((corners @ self._walls[number].T <= self._wall_offsets[number]).all())
         return bool((self.surfaces[number].outside(corners) <= 0.0).all())
 
-    def height_of(self, point: FloatArray, numbers: IntArray) -> FloatArray:
-        """(m,) signed distance of one world point to the planes of some surfaces [m]."""
-        return self.normals[numbers] @ point - self.offsets[numbers]
-
 
 def find_candidates(
     table: SurfaceTable,
@@ -202,10 +196,7 @@ def find_candidates(
     """Select the samples in contact (step 2, [Tonneau2015]_ 4.3): near the plane and over the polygon.
 
     Args:
-        table: Surfaces of the scene.
         numbers: Those within reach.
-        situation: Where the limb is.
-        samples: Samples of the limb.
         tolerance: Largest distance of an effector to the plane, on either side [m].
         max_tilt: Largest angle between the effector's z axis and the normal [rad]; what is
             tilted more cannot be aligned by small moves of the joints.

@@ -60,9 +60,7 @@ def footprint(
     """(c, 3) points of the effector's frame that must lie on the surface [m].
 
     Args:
-        body: The body.
         limb: Its limb, whose own patch goes before the body's soles.
-        kind: How it touches.
         rules: Which part of a sole has to touch; all of it when omitted.
 
     Raises:
@@ -92,12 +90,8 @@ def make_contact(
     """Contact of a limb's effector.
 
     Args:
-        body: The body.
-        limb: The limb.
-        kind: How it touches.
         position: (3,) in the world [m].
         rotation: (3, 3) effector-to-world; its z column is the normal.
-        rules: Friction and strengths.
 
     Raises:
         ContactError: If a value is out of its range, or a sole is asked for of a body without.
@@ -205,7 +199,6 @@ class ContactPlan:
         """Plan with the centre of mass of its last posture.
 
         Args:
-            body: The body.
             stages: From the start to the goal.
             goal: (nq,) posture with which the last one ends.
             hinge_pace: Mean speed of the hinge that turns most between two postures [rad/s].
@@ -319,9 +312,6 @@ def certify_plan(
     """Measure every posture of a plan.
 
     Args:
-        body: The body.
-        scene: Its surroundings.
-        plan: The plan.
         model: Contact model; with the default cap of the body when omitted.
     """
     model = model or ContactModel.of_body(body.mass)

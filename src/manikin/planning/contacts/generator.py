@@ -119,11 +119,7 @@ class ContactGenerator:
         """Prepare a scene.
 
         Args:
-            body: A body with limbs.
-            scene: Its surroundings.
             samples: Samples by name of the limb, see :func:`manikin.planning.contacts.sample_limbs`.
-            settings: How to search.
-            rules: What contacts can carry.
 
         Raises:
             BodyError: If samples belong to no limb of the body.
@@ -156,8 +152,6 @@ class ContactGenerator:
 
         Args:
             q: (nq,) the body; all but the limb stays as it is.
-            limb: Name of the limb.
-            task: What is to be done.
             heuristic: What to prefer; EFORT when omitted.
             kind: How the effector touches; the limb's own way when omitted.
 
@@ -181,11 +175,6 @@ class ContactGenerator:
         """Find the best contacts of one limb in different places, best first.
 
         Args:
-            q: As for :meth:`request`.
-            limb: As there.
-            task: As there.
-            heuristic: As there.
-            kind: As there.
             most: Largest number of contacts.
             apart: Distance between two of them [m].
 

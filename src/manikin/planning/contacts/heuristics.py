@@ -27,7 +27,6 @@ def cached_score(candidates: Candidates, spacing: float, value: Callable[[int], 
     """(n,) scores; candidates on one surface and in one cell of a grid share that of their first.
 
     Args:
-        candidates: n of them.
         spacing: Of the grid [m].
         value: Score of a candidate by its row.
     """
@@ -43,11 +42,7 @@ def contact_at(
     """The contact that a candidate makes, turned onto its surface the shortest way.
 
     Args:
-        situation: Body and limb.
         candidates: Where the limb may touch.
-        row: Of the candidate.
-        kind: How it touches.
-        rules: Friction and strengths.
     """
     turn = onto_normal(situation.rotation @ candidates.rotations[row], candidates.normals[row])
     return make_contact(situation.state.body, situation.limb, kind, candidates.points[row], turn, rules)

@@ -148,9 +148,6 @@ class FarPairs:
         """Prepare the pairs.
 
         Args:
-            body: The body.
-            limb: Its limb.
-            parts: Of the scene.
             shapes: Shapes of the body, then the parts.
             placed: Where they are, updated by the caller.
             pairs: (shape of the limb, part, or shape of the body) each.
@@ -264,9 +261,6 @@ class DeepSamples:
         """Place the balls of all samples.
 
         Args:
-            body: The body.
-            chain: Its limb.
-            samples: Samples of the limb.
             collisions: Its exact collision test, whose pairs these are.
         """
         self._collisions = collisions
@@ -305,7 +299,6 @@ class DeepSamples:
         """(n,) number of a pair in which a sample is deeper than ``depth`` [m], or -1.
 
         Args:
-            around: See :meth:`around`.
             rows: (n,) samples.
             depth: [m].
         """

@@ -9,7 +9,14 @@ import pinocchio as pin
 from manikin.balance.static import StaticRegion
 from manikin.body import BodyModel, Configuration, with_root
 from manikin.contact import Contact, ContactModel, FrictionModel, Stance
-from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
+from manikin.kinematics import (
+    Placement,
+    PostureProblem,
+    Preferences,
+    SolverSettings,
+    generate_posture,
+    touching_pairs,
+)
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import Proximity, Scene
 
@@ -86,10 +93,7 @@ class PostureFinder:
         """Prepare a scene.
 
         Args:
-            body: The body.
-            scene: Its surroundings.
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
-            settings: What to keep to.
         """
         self.body, self._root = with_root(body)
         self.scene, self._reference = scene, reference
@@ -113,6 +117,7 @@ class PostureFinder:
         inset: float | None = None,
         restarts: bool = False,
         placements: Mapping[str, Placement] | None = None,
+        preferences: Preferences | None = None,
     ) -> Posed:
         """Find a posture that holds contacts and rests on some of them alone.
 
@@ -125,6 +130,7 @@ class PostureFinder:
             inset: Distance of that place to the edges of where it may rest [m]; the settings' when omitted.
             restarts: Whether to try again from crouched postures.
             placements: Where further effectors should be, by name.
+            preferences: Weights of what is not required; the default ones when omitted.
         """
         if place is None:
             near = Configuration(self.body, start).com[:2] if guide is None else self._over(guide)
@@ -137,7 +143,7 @@ class PostureFinder:
         problem = PostureProblem(
             self.body,
             tuple(held.values()),
-            {**self._wish(guide), **(placements or {})},
+            {**({} if guide is None else self.led(guide)), **(placements or {})},
             com=np.array([*place, np.nan]),
             proximity=self._proximity,
             clearance=self.settings.clearance,
@@ -146,13 +152,12 @@ class PostureFinder:
             range_margin=self.settings.range_margin,
             learnt_margin=self.settings.learnt_margin,
             reference=self._reference,
+            preferences=preferences or Preferences(),
         )
         once = SolverSettings(
-            tolerance=self.settings.tolerance,
-            iterations=self.settings.iterations,
-            restarts=False,
+            tolerance=self.settings.tolerance, iterations=self.settings.iterations, restarts=False,
             explain=False,
-        )
+        )  # fmt: skip
         if guide is not None:
             # The guide's trunk is free, so that from there no obstacle is passed on its wrong side.
             led = np.concatenate([guide, start[7:]])
@@ -166,15 +171,11 @@ class PostureFinder:
         """(2,) where the centre of mass is in a body whose root has a (7,) pose: a person's over the root."""
         return guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
 
-    def _wish(self, guide: FloatArray | None) -> dict[str, Placement]:
-        if guide is None:
-            return {}
-        pose = pin.XYZQUATToSE3(guide)
-        return {
-            self._root: Placement(
-                pose.translation, pose.rotation, self.settings.turn_weight, self.settings.root_weight
-            )
-        }
+    def led(self, guide: FloatArray) -> dict[str, Placement]:
+        """Wish for the root to be near a (7,) pose, by the root's effector."""
+        pose, settings = pin.XYZQUATToSE3(guide), self.settings
+        wish = Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)
+        return {self._root: wish}
 
     def _touching(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
         for contact in held.values():

@@ -1,7 +1,4 @@
-"""One task-efficient contact of a scenario: what ``manikin contact`` answers.
-
-Also here. Contacts of all limbs of a body that is moved by hand: what the viewer's interactive mode shows.
-"""
+"""Contacts for one task: of one limb, for ``manikin contact``, and of all limbs of a body moved by hand."""
 
 import time
 from collections.abc import Sequence
@@ -12,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.body import BodyModel, Configuration, limb_named
+from manikin.body import BodyModel, Configuration, Limb, limb_named
 from manikin.body.limbs import parent_segment
 from manikin.contact import ContactKind
 from manikin.errors import BodyError, InputError
 from manikin.kinematics import LimbKinematics
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.planning.contacts.contact_plan import ContactRules
-from manikin.planning.contacts.efort import Task, efort
+from manikin.planning.contacts.efort import Task, efort, unit_direction
 from manikin.planning.contacts.generator import ContactGenerator, GeneratedContact
 from manikin.planning.contacts.heuristics import Heuristic, heuristic_named
 from manikin.planning.contacts.samples import sample_limb, sample_limbs
@@ -147,11 +144,7 @@ def find_contact(
     """Answer one question about a body in a scene.
 
     Args:
-        body: A body with limbs.
-        scene: Its surroundings.
         q: (nq,) the body; all but the limb stays as it is.
-        question: What is asked.
-        rules: What contacts can carry.
 
     Raises:
         InputError: If the limb or the heuristic is not known, the direction is zero, or the limb has
@@ -159,16 +152,16 @@ def find_contact(
     """
     check_limbs(body)
     limb = limb_named(body, question.limb)
-    roles = _roles(question, limb.kind)
-    tasks = [_task(question, role) for role in roles]
+    unit_direction(question.task, "task")
     heuristic = heuristic_named(question.heuristic, question.seed, pulling=question.pulling)
+    kind = question.kind or (ContactKind.GRASP if question.pulling else None)
     started = time.perf_counter()
     samples = sample_limb(body, limb, np.random.default_rng(question.seed), question.samples)
     generator = ContactGenerator(body, scene, {limb.name: samples}, rules=rules)
-    _ask(generator, q, question, heuristic, roles, tasks)  # as in a dialogue, where caches are filled
+    asked = generator, q, limb, question.task, question.role, heuristic, kind, question.pulling
+    _ask(*asked)  # as in a dialogue, where caches are filled
     prepared = time.perf_counter()
-    found, wall = _ask(generator, q, question, heuristic, roles, tasks)
-    role, result, score = max(found, key=lambda item: -np.inf if item[2] is None else item[2])
+    role, result, score, wall = _ask(*asked)
     return ContactAnswer(question, np.array(q), result, role, score, prepared - started, wall)
 
 
@@ -185,23 +178,26 @@ def check_limbs(body: BodyModel) -> None:
 def _ask(
     generator: ContactGenerator,
     q: FloatArray,
-    question: ContactQuestion,
+    limb: Limb,
+    direction: ArrayLike,
+    role: Role,
     heuristic: Heuristic,
-    roles: tuple[Role, ...],
-    tasks: list[Task],
-) -> tuple[list[tuple[Role, GeneratedContact, float | None]], float]:
-    """Answers for one role after the other, until one has a positive EFORT; wall time of the requests [s]."""
-    kind = question.kind or (ContactKind.GRASP if question.pulling else None)
-    found: list[tuple[Role, GeneratedContact, float | None]] = []
+    kind: ContactKind | None,
+    pulling: bool,
+) -> tuple[Role, GeneratedContact, float | None, float]:
+    """Role, answer and EFORT of the best role, asked until one is positive; wall time of the requests [s]."""
+    roles = (Role.BODY,) if limb.kind is ContactKind.SOLE else (Role.BODY, Role.OBJECT)
+    answers: list[tuple[Role, GeneratedContact, float | None]] = []
     wall = 0.0
-    for role, task in zip(roles, tasks, strict=True):
+    for tried in roles if role is Role.AUTO else (role,):
+        task = Task(direction, {limb.name} if tried is Role.OBJECT else ())
         started = time.perf_counter()
-        result = generator.request(q, question.limb, task, heuristic, kind=kind)
+        result = generator.request(q, limb.name, task, heuristic, kind=kind)
         wall += time.perf_counter() - started
-        found.append((role, result, reached_efort(generator.body, result, task, pulling=question.pulling)))
-        if (found[-1][2] or 0.0) > SOME_EFORT:
+        answers.append((tried, result, reached_efort(generator.body, result, task, pulling=pulling)))
+        if (answers[-1][2] or 0.0) > SOME_EFORT:
             break
-    return found, wall
+    return *max(answers, key=lambda item: -np.inf if item[2] is None else item[2]), wall
 
 
 def reached_efort(
@@ -219,22 +215,9 @@ def reached_efort(
     return -value if pulling else value
 
 
-def _roles(question: ContactQuestion, kind: ContactKind) -> tuple[Role, ...]:
-    if question.role is not Role.AUTO:
-        return (question.role,)
-    return (Role.BODY,) if kind is ContactKind.SOLE else (Role.BODY, Role.OBJECT)
-
-
-def _task(question: ContactQuestion, role: Role) -> Task:
-    try:
-        return Task(question.task, {question.limb} if role is Role.OBJECT else ())
-    except InputError as error:
-        raise InputError(str(error).replace("task direction", "task", 1)) from None
-
-
 @dataclass(frozen=True, eq=False)
 class LiveAnswer:
-    """What every limb found.
+    """Answers of all limbs.
 
     Attributes:
         q: (nq,) the body with each limb that found a contact in it.
@@ -277,12 +260,9 @@ class LiveContacts:
         """Sample the limbs and prepare the scene.
 
         Args:
-            body: A body with limbs.
-            scene: Its surroundings.
             q: (nq,) where it begins.
             samples: Number of samples of each limb.
             seed: Of the samples.
-            rules: What contacts can carry.
 
         Raises:
             BodyError: If the body has no limbs.
@@ -332,21 +312,12 @@ class LiveContacts:
         kind = ContactKind.GRASP if self.pulling else None
         q, answers, efforts = np.array(self.q), {}, {}
         for name in self.limbs:
-            for role in self._roles(name):
-                task = Task(self.direction, {name} if role is Role.OBJECT else ())
-                found = self._generator.request(q, name, task, heuristic, kind=kind)
-                effort = reached_efort(self.body, found, task, pulling=self.pulling)
-                if name not in answers or (effort is not None and effort > efforts.get(name, -np.inf)):
-                    answers[name] = found
-                    efforts |= {} if effort is None else {name: effort}
-                if (effort or 0.0) > SOME_EFORT:
-                    break
+            limb, asked = (
+                limb_named(self.body, name),
+                (self.direction, self.role, heuristic, kind, self.pulling),
+            )
+            _, answers[name], effort, _ = _ask(self._generator, q, limb, *asked)
+            efforts |= {} if effort is None else {name: effort}
             reached = answers[name].q
             q = q if reached is None else np.array(reached)
         return LiveAnswer(q, answers, efforts, time.perf_counter() - started)
-
-    def _roles(self, name: str) -> tuple[Role, ...]:
-        if self.role is not Role.AUTO:
-            return (self.role,)
-        feet = {limb.name for limb in self.body.limbs if limb.kind is ContactKind.SOLE}
-        return (Role.BODY,) if name in feet else (Role.BODY, Role.OBJECT)

@@ -53,9 +53,6 @@ def relax(
 
     Args:
         poses: (n, 7) along a guide, close together; the ends stay.
-        planner: Decides about poses.
-        rng: Source of all randomness.
-        settings: Numbers of the search.
 
     Returns:
         (m, 7) poses that all satisfy the condition, ``spacing`` apart or less.
@@ -82,8 +79,6 @@ def nearest_fit(
 
     Args:
         pose: (7,) wanted; returned as it is where the condition holds.
-        checker: Decides about poses.
-        settings: Heights and pitches that are tried.
     """
     if checker.holds(pose):
         return pose

@@ -2,14 +2,12 @@
 
 A pose that sees no guard becomes a guard; one that sees guards of several parts of the roadmap
 joins them; any other is rejected.  In print the visible guard is never remembered, so that every
-pose would become a guard; the test is the other way round here.
-
-Also here. Requests to a roadmap: joining start and goal, A*, and why there is no way ([Tonneau2015]_ 6.3.1).
+pose would become a guard; the test is the other way round here.  A request joins start and goal and finds the
+shortest way by A*, or says why there is none ([Tonneau2015]_ 6.3.1).
 """
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import networkx as nx
 import numpy as np
@@ -78,14 +76,7 @@ class Roadmap:
 
     def copy(self) -> "Roadmap":
         """A copy that can grow without changing this one."""
-        return Roadmap(
-            self.settings,
-            self.graph.copy(),
-            self.samples,
-            self.rejected,
-            self._poses.copy(),
-            list(self._part),
-        )
+        return replace(self, graph=self.graph.copy(), _poses=self._poses.copy(), _part=list(self._part))
 
     def joined(self, first: int, second: int) -> bool:
         """Whether two nodes lie in one part."""
@@ -122,11 +113,7 @@ class Roadmap:
         return way if first < second else way.reversed()
 
     def consider(self, pose: FloatArray, planner: LocalPlanner, rng: np.random.Generator) -> bool:
-        """One pass of Algorithm 4: keep a pose as a guard or as a connection, or reject it.
-
-        Returns:
-            Whether it was kept.
-        """
+        """One pass of Algorithm 4: whether a pose (7,) is kept, as a guard or as a connection."""
         seen: dict[int, tuple[int, Way]] = {}
         for node in self.nearest_nodes(pose, guards_only=True):
             part = self._root(node)
@@ -178,29 +165,6 @@ def grow(
             roadmap.consider(pose, planner, rng)
 
 
-def build_roadmap(
-    sampler: PoseSampler,
-    planner: LocalPlanner,
-    rng: np.random.Generator,
-    settings: RoadmapSettings | None = None,
-    poses: Sequence[FloatArray] = (),
-) -> Roadmap:
-    """Build a roadmap of a scene ([Tonneau2015]_ Algorithm 4).
-
-    Args:
-        sampler: Draws poses.
-        planner: Joins them.
-        rng: Source of all randomness.
-        settings: When to stop and whom to ask.
-        poses: Poses (7,) that become guards before the first draw, whatever they see.
-    """
-    roadmap = Roadmap(settings or RoadmapSettings())
-    for pose in poses:
-        roadmap.add(pose, guard=True)
-    grow(roadmap, sampler, planner, rng, roadmap.settings.samples)
-    return roadmap
-
-
 @dataclass(frozen=True, eq=False)
 class Route:
     """Way through a roadmap, or why there is none.
@@ -249,12 +213,6 @@ def find_route(roadmap: Roadmap, planner: LocalPlanner, start: int, goal: int) -
     """Shortest way between two nodes (Algorithm 5, A*), its straight parts spelled out.
 
     The estimate is the distance 6.3 itself, which never overestimates, because it is a metric.
-
-    Args:
-        roadmap: The roadmap.
-        planner: Knows how ways are joined.
-        start: Node.
-        goal: Node.
     """
     if not roadmap.joined(start, goal):
         return Route(None, failure=_walled_off(roadmap, start, goal), where="roadmap")

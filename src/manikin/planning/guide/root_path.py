@@ -4,7 +4,7 @@ Positions and quaternions are blended by the same basis functions and the quater
 afterwards, so that a control pose acts on its neighbourhood only.  The three Euler angles of
 [Tonneau2015]_ would be singular for a crawling trunk.
 
-Also here. From a polygonal way to a short, smooth path ([Tonneau2015]_ 6.3.2).
+A polygonal way becomes a short, smooth path in three steps ([Tonneau2015]_ 6.3.2).
 
 1. Pruning (Algorithm 6, read "if l(P_i, P_j) then remove").
 2. Approximation by a B-spline whose control poses lie on the way, more of them until the condition
@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
-from manikin.numerics.spline import check_clamped, derivative_matrix
+from manikin.numerics.spline import check_clamped, clamped_knots, derivative_matrix
 from manikin.planning.guide.root_pose import angles_between, between
 from manikin.planning.guide.steering import LocalPlanner
 
@@ -97,12 +97,12 @@ class RootPath:
 
         Args:
             control_points: (n, 7), n >= 2; it begins at the first and ends at the last.
-            limits: Speed limits.
             degree: Degree, lowered to n - 1 where there are fewer points.
         """
         points = np.asarray(control_points, dtype=np.float64)
         degree = min(degree, len(points) - 1)
-        return cls(degree, even_knots(degree, len(points)), points, limits)
+        knots = clamped_knots(degree, np.linspace(0.0, 1.0, len(points) - degree + 1))
+        return cls(degree, knots, points, limits)
 
     @property
     def start(self) -> FloatArray:
@@ -133,11 +133,6 @@ class RootPath:
         """(n,) parameter in [0, 1] at (n,) times [s]."""
         shares, law = self._law
         return np.interp(np.atleast_1d(np.asarray(times, dtype=np.float64)), law, shares)
-
-    def time_of(self, shares: ArrayLike) -> FloatArray:
-        """(n,) times [s] at (n,) values of the parameter."""
-        grid, law = self._law
-        return np.interp(np.atleast_1d(np.asarray(shares, dtype=np.float64)), grid, law)
 
     def velocities(self, times: ArrayLike) -> FloatArray:
         """(n, 6) speed along the world axes [m/s] and about the root's axes [rad/s] at (n,) times [s].
@@ -210,12 +205,6 @@ class RootPath:
         return grid, np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def even_knots(degree: int, count: int) -> FloatArray:
-    """Clamped knots from 0 to 1 with evenly spaced inner ones, for ``count`` control points."""
-    inner = np.linspace(0.0, 1.0, count - degree + 1)
-    return np.concatenate([np.zeros(degree), inner, np.ones(degree)])
-
-
 def _one_hemisphere(quaternions: FloatArray) -> FloatArray:
     """Unit quaternions with signs such that neighbours are less than half a turn apart."""
     unit = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
@@ -253,7 +242,6 @@ def prune(poses: FloatArray, planner: LocalPlanner) -> FloatArray:
 
     Args:
         poses: (n, 7) joined by straight ways.
-        planner: Decides about straight ways.
 
     Returns:
         (k, 7), k <= n, with the same ends.
@@ -288,10 +276,7 @@ def approximate(
 
     Args:
         poses: (n, 7) joined by straight ways along which the condition holds.
-        planner: Decides about poses.
-        limits: Speed limits.
         rng: Places the control poses.
-        settings: How many there are at first.
 
     Returns:
         A path along which the condition holds; of degree 1 where no spline was found.
@@ -333,9 +318,7 @@ def shorten(
 
     Args:
         path: A path along which the condition holds.
-        planner: Decides about poses.
         rng: Chooses the stretches.
-        settings: How many are tried.
     """
     wanted = settings or ShortcutSettings()
     if path.degree < 2 or len(path.control_points) < 4:

@@ -88,11 +88,6 @@ class SamplingRegion:
             raise InputError("sampling region has nothing to lie around; valid: a finite obstacle or a pose")
         return cls(corners.min(axis=0) - margin, corners.max(axis=0) + margin, yaw, pitch, roll)
 
-    @property
-    def key(self) -> str:
-        """Text that is equal for equal values."""
-        return repr((self.lower.tolist(), self.upper.tolist(), self.yaw, self.pitch, self.roll))
-
     def turns(self, count: int, rng: np.random.Generator) -> FloatArray:
         """(count, 4) random quaternions xyzw within the bounds."""
         if self.yaw is None and self.pitch is None and self.roll is None:

@@ -141,10 +141,6 @@ def measure_act(
     """Measure an executed act, or None where the motion ended before its force was held.
 
     Args:
-        motion: What was executed.
-        schedule: Its contacts.
-        act: What was to be done.
-        timing: When.
         mass: Of the body [kg].
         friction: Coulomb coefficient of pressing palms.
     """

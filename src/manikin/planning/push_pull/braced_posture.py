@@ -1,7 +1,4 @@
-"""The posture that acts: trunk, hands and feet by EFORT, then balance, strength and obstacles.
-
-Also here. From the way to an act to the act: the last contacts of a contact plan.
-"""
+"""The posture that acts: trunk, hands and feet by EFORT, then balance, strength and obstacles."""
 
 import itertools
 from collections import Counter
@@ -12,16 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.limbs import PELVIS as ROOT
 from manikin.contact import Contact, FrictionModel, grasp
-from manikin.kinematics import (
-    Placement,
-    PostureProblem,
-    Preferences,
-    SolverSettings,
-    generate_posture,
-    touching_pairs,
-)
+from manikin.kinematics import Preferences
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts import (
     ContactGenerator,
@@ -31,6 +20,7 @@ from manikin.planning.contacts import (
     GeneratedContact,
     Heuristic,
     LimbSamples,
+    PostureFinder,
     PostureFinderSettings,
     Stage,
     WeightedSum,
@@ -38,7 +28,7 @@ from manikin.planning.contacts import (
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.push_pull.act import Act, ActKind, BracedForces, largest_force, share_force
 from manikin.planning.push_pull.stance_heuristics import Footing, Loads, Mirrored, Natural
-from manikin.scene import Proximity, Scene, Surface
+from manikin.scene import Scene, Surface
 
 ARMS = ("left_arm", "right_arm")
 LEGS = ("right_leg", "left_leg")
@@ -150,12 +140,8 @@ def find_braced_posture(
 
     Args:
         body: A body with arms, legs and soles.
-        scene: Its surroundings.
-        samples: Of its limbs.
-        act: What is to be done.
         near: (2,) where the body comes from; it acts on the part of the object nearest to there [m].
         level: Height of the ground [m].
-        settings: Where to try.
         hands_by: What hands prefer; EFORT, pulling EFORT for a pull, when omitted.
         feet_by: What feet prefer; EFORT when omitted.
         reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
@@ -177,9 +163,9 @@ class _Search:
         self._body, self._scene, self._act, self._settings = body, scene, act, settings
         self._rules = ContactRules(friction=settings.friction)
         self._generator = ContactGenerator(body, scene, samples, rules=self._rules)
-        self._poser = PostureFinderSettings(natural=any(item.natural for item in samples.values()))
-        self._proximity = Proximity(body, scene)
         self._reference = body.standing_posture() if reference is None else reference
+        asked = PostureFinderSettings(natural=any(item.natural for item in samples.values()))
+        self._poser = PostureFinder(body, scene, self._reference, asked)
         self._reasons: dict[int, Counter[str]] = {step: Counter() for step in _STEPS}
         self._tried = 0
         self._strongest = 0.0
@@ -244,36 +230,15 @@ class _Search:
         if margin < self._settings.margin:
             self._reasons[_FEET][UNBALANCED] += 1
             return None
-        found = self._pose({**feet, **hands}, posture, q[:7], place)
-        return None if found is None else self._strong(found, feet, hands, margin)
-
-    def _pose(
-        self, contacts: dict[str, Contact], start: FloatArray, root: FloatArray, place: FloatArray
-    ) -> FloatArray | None:
-        """Posture on the contacts with its centre of mass over a place, free of obstacles, or None."""
-        pose, settings = pin.XYZQUATToSE3(root), self._poser
-        touching = [(name, self._scene.touched_obstacle(contact)) for name, contact in contacts.items()]
-        problem = PostureProblem(
-            self._body,
-            tuple(contacts.values()),
-            {ROOT: Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)},
-            com=np.array([*place, np.nan]),
-            proximity=self._proximity,
-            clearance=settings.clearance,
-            self_clearance=settings.clearance,
-            ignore=touching_pairs(self._body, touching),
-            range_margin=settings.range_margin,
-            learnt_margin=settings.learnt_margin,
-            reference=self._reference,
+        contacts = {**feet, **hands}
+        posed = self._poser.pose(
+            contacts, contacts, posture, place=place, placements=self._poser.led(q[:7]),
             preferences=Preferences(grasp=FLAT_PALMS),
-        )
-        found = generate_posture(problem, start, settings=SolverSettings(
-            tolerance=settings.tolerance, iterations=settings.iterations, restarts=False, explain=False,
-        ))  # fmt: skip
-        if not found.succeeded:
-            self._reasons[_POSTURE][found.failure or "no posture"] += 1
+        )  # fmt: skip
+        if posed.q is None:
+            self._reasons[_POSTURE][posed.reason] += 1
             return None
-        return np.array(found.q)
+        return self._strong(posed.q, feet, hands, margin)
 
     def _strong(
         self, q: FloatArray, feet: dict[str, Contact], hands: dict[str, Contact], margin: float
@@ -381,7 +346,6 @@ def with_hands(body: BodyModel, way: ContactPlan, brace: Brace) -> ContactPlan:
     """The way to the act and the hands put to the object, both at once.
 
     Args:
-        body: The body.
         way: Contacts from the start to the feet of the act.
         brace: The posture that acts, on the feet of the way's last stage.
     """
