@@ -31,8 +31,7 @@ class Residual:
     Attributes:
         requirement: ``"balance margin"``, ``"support distance"``, ``"phase duration"``,
             ``"total duration"``, ``"start position"``, ... or the name of a geometric constraint.
-        value: Largest violation; negative is what is left to spare.
-        unit: Of the value.
+        value: Largest violation [``unit``]; negative is what is left to spare.
         phase: Where it happens, or None for the whole motion.
         time: When it happens [s], or None.
     """
@@ -61,8 +60,8 @@ class Residuals:
     Attributes:
         items: One entry per requirement.
         min_margin: Smallest margin [N.m] or [N].
-        limiting_phase: Phase in which it occurs.
-        limiting_time: Instant at which it occurs [s].
+        limiting_phase: Phase of the smallest margin.
+        limiting_time: Instant of the smallest margin [s].
         min_zmp_distance: Least distance of the ZMP to the edge of the support polygon, negative
             outside [m]; of the phases whose contacts lie in one plane, None without any.
     """
@@ -89,11 +88,7 @@ class Residuals:
         return all(item.value <= tolerance for item in self.items)
 
     def table(self, problem: CentroidalProblem) -> RequirementTable:
-        """The margin, the total duration, and the most violated of the other requirements.
-
-        Args:
-            problem: Whose requirements were measured.
-        """
+        """The margin, the total duration, and the most violated of the other requirements of a problem."""
         others = [item for item in self.items if item.requirement not in ("balance margin", "total duration")]
         worst = max(others, key=lambda item: item.severity, default=None)
         duration = next((item for item in self.items if item.requirement == "total duration"), None)
@@ -156,11 +151,9 @@ def facet_margins(
 def measure(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
 ) -> Residuals:
-    """Measure every requirement of ``problem`` on a trajectory.
+    """Measure every requirement of ``problem`` on any trajectory through as many phases.
 
-    Args:
-        trajectory: Any trajectory through the same number of phases.
-        polytopes: W_i of the phases about ``problem.reference``.
+    The polytopes W_i of the phases are about ``problem.reference``.
     """
     times = phase_times(trajectory)
     margins = phase_margins(problem, trajectory, polytopes)

@@ -37,11 +37,7 @@ class KeyPlane:
     offset: float
 
     def __init__(self, key: int, normal: ArrayLike, offset: float) -> None:
-        """Normalise the normal, and the offset with it.
-
-        Raises:
-            InputError: If the key is not at least 1, or the normal vanishes.
-        """
+        """Normalise the normal, and the offset with it."""
         vector = frozen_array(normal, "key plane normal", (3,))
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
@@ -139,12 +135,7 @@ class _Below:
 def height_band(
     lower: CoordinateFunction, upper: CoordinateFunction
 ) -> tuple[GeometricConstraint, GeometricConstraint]:
-    """The CoM between two surfaces ([Qiu2012]_ 5.29).
-
-    Args:
-        lower: Least height [m] at (x, y, z), such as a :class:`BentSurface`.
-        upper: Greatest height [m] at (x, y, z).
-    """
+    """The CoM between two heights [m] at (x, y, z), such as :class:`BentSurface` ([Qiu2012]_ 5.29)."""
     return (
         GeometricConstraint("height above the lower surface", _Above(lower)),
         GeometricConstraint("height below the upper surface", _Below(upper)),
@@ -196,11 +187,8 @@ class Zone:
     def share(self, x: Any, y: Any) -> Any:
         """1 inside, 0 beyond the onset of any edge, twice continuously differentiable between.
 
-        The product of the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` over the edges.
-
-        Args:
-            x: Floats, arrays or CasADi symbols [m].
-            y: The same.
+        The product of the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` over the edges, of floats, arrays or
+        CasADi symbols [m].
         """
         share = 1.0
         for normal, offset in zip(self.normals, self.offsets, strict=True):

@@ -127,9 +127,8 @@ class CentroidalTrajectory(Displayed):
     def pseudo_wrench(self, time: ArrayLike, reference: ArrayLike | None = None) -> FloatArray:
         """(..., 6) ``[m (a - g); (p - o) x m (a - g) + Ldot]`` about ``reference`` o [N, N.m].
 
-        Moments are about the world origin when it is omitted.
-
-        [Qiu2012]_ 4.6 for a point mass, 4.51 with the rate of its angular momentum.
+        [Qiu2012]_ 4.6 for a point mass, 4.51 with the rate of its angular momentum; o is the world's origin
+        when omitted.
         """
         rate = None if self.turning is None else self.angular_momentum_rate(time)
         return pseudo_wrench(self.mass, self.position(time), self.acceleration(time), rate, reference)
@@ -160,10 +159,7 @@ class CentroidalTrajectory(Displayed):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], sequence: StanceSequence) -> Self:
-        """Rebuild a trajectory written by :meth:`to_dict`.
-
-        Args:
-            sequence: The stances, which the dictionary does not hold.
+        """Rebuild what :meth:`to_dict` wrote, with the stances, which the dictionary does not hold.
 
         Raises:
             InputError: If a key is missing.
@@ -234,15 +230,13 @@ class Weights:
 class CentroidalProblem:
     """A CoM trajectory to find through a sequence of stances ([Qiu2012]_ 5.18-5.28).
 
+    Velocities and accelerations at the ends are (3,), or None when free [m/s, m/s^2] (5.24-5.25).
+
     Attributes:
         mass: [kg].
         sequence: Stances with the bounds of their durations.
         start_com: (3,) p_i [m] (5.22).
         goal_com: (3,) p_f [m] (5.23).
-        start_velocity: (3,) [m/s] (5.24), or None when free.
-        goal_velocity: (3,) [m/s] (5.25), or None when free.
-        start_acceleration: (3,) [m/s^2], or None when free.
-        goal_acceleration: (3,) [m/s^2], or None when free.
         degree: Degree of the spline, >= 3; it has ``phases + degree`` control points.
         margin_space: Whether the margin is a wrench [N.m] or a force at the CoM [N].
         required_margin: d_min must not be smaller (5.21) [N.m] or [N].

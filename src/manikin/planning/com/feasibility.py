@@ -4,7 +4,7 @@ A failure also says why a stance cannot work at all: friction too low for a slop
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,12 +60,9 @@ def low_friction(
     problem: CentroidalProblem,
     measure: Callable[[Sequence[WrenchPolytope]], float],
 ) -> str:
-    """Say that a quantity would suffice with firm friction; empty when friction is not the cause.
+    """Say that a quantity of some stances would suffice with firm friction; empty when it is not the cause.
 
-    Args:
-        stances: What the quantity depends on.
-        problem: Where it occurs.
-        measure: The quantity from the stances' polytopes; it suffices above the required margin.
+    ``measure`` gives the quantity from the stances' polytopes; it suffices above the required margin.
     """
     least = least_friction(stances)
     if least >= FIRM_FRICTION:
@@ -89,13 +86,10 @@ def with_firm_friction(problem: CentroidalProblem) -> CentroidalProblem:
 
 
 def _firm(stance: Stance) -> Stance:
-    contacts = [
-        contact
-        if contact.kind is ContactKind.GRASP
-        else replace(contact, friction=max(contact.friction, FIRM_FRICTION))
-        for contact in stance
-    ]
-    return stance.with_contacts(contacts)
+    return stance.with_contacts([
+        c if c.kind is ContactKind.GRASP else replace(c, friction=max(c.friction, FIRM_FRICTION))
+        for c in stance
+    ])  # fmt: skip
 
 
 def out_of_reach(problem: CentroidalProblem, phase: int) -> str | None:
@@ -193,16 +187,14 @@ def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
     The thesis calls it the radius of the Chebyshev ball; the *inscribed* one is meant. An
     empty intersection has the (negative) radius by which the facets would have to move out.
 
-    Args:
-        polytopes: W_i of n phases.
-
     Returns:
-        (n - 1,).
+        (n - 1,) of the W_i of n phases.
     """
-    return np.array([
-        _largest_distance(both, np.ones(len(both)))
-        for both in (a.intersection(b) for a, b in itertools.pairwise(polytopes))
-    ])  # fmt: skip
+    return np.array([_largest_distance(both, np.ones(len(both))) for both in _intersections(polytopes)])
+
+
+def _intersections(polytopes: Sequence[Polytope]) -> Iterator[Polytope]:
+    return (a.intersection(b) for a, b in itertools.pairwise(polytopes))
 
 
 def margin_bounds(polytopes: Sequence[Polytope]) -> FloatArray:
@@ -214,16 +206,10 @@ def margin_bounds(polytopes: Sequence[Polytope]) -> FloatArray:
     bound is a linear programme in the wrench. It takes the place of the largest ball of Proposition 2
     ([Qiu2012]_ 5.4.3), which is about a fixed point. Like that one it is necessary, not sufficient.
 
-    Args:
-        polytopes: W_i of n phases, all about one point.
-
     Returns:
-        (n - 1,) [N.m]; negative when no wrench is in both polytopes.
+        (n - 1,) of the W_i of n phases about one point [N.m]; negative when no wrench is in both polytopes.
     """
-    return np.array([
-        _largest_distance(both, _least_lengths(both.H))
-        for both in (a.intersection(b) for a, b in itertools.pairwise(polytopes))
-    ])  # fmt: skip
+    return np.array([_largest_distance(both, _least_lengths(both.H)) for both in _intersections(polytopes)])
 
 
 def _least_lengths(H: FloatArray) -> FloatArray:
@@ -235,16 +221,12 @@ def _least_lengths(H: FloatArray) -> FloatArray:
 
 
 def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Feasibility:
-    """Test everything that needs no optimisation.
+    """Test everything that needs no optimisation, from the W_i of the phases about ``problem.reference``.
 
-    Durations against their bounds, whether the legs reach the contacts of each phase, end points
-    against their bounds, whether any phase lifts the weight,
-    whether the friction holds the body at both ends, then emptiness of the
-    intersections (Proposition 1) and the bound of the margin in them against the required one
-    (Proposition 2), then whether any acceleration balances the CoM at the start and at the goal.
-
-    Args:
-        polytopes: W_i of the phases about ``problem.reference``.
+    Durations against their bounds, whether the legs reach the contacts of each phase, end points against
+    their bounds, whether any phase lifts the weight, whether the friction holds the body at both ends, then
+    emptiness of the intersections (Proposition 1) and the bound of the margin in them against the required
+    one (Proposition 2), then whether any acceleration balances the CoM at the start and at the goal.
     """
     radii = _bounds(problem, polytopes)
     failure = (
@@ -451,8 +433,7 @@ def best_margin_at(
 ) -> float:
     """Largest margin at a CoM position over all accelerations, or with the given one.
 
-    At a fixed position the pseudo-wrench is linear in the acceleration, so this is a linear
-    programme.
+    At a fixed position the pseudo-wrench is linear in the acceleration: a linear programme.
     """
     slopes = row_slopes(polytope, problem, com)
     arm = com - problem.reference
@@ -460,13 +441,8 @@ def best_margin_at(
     gain = problem.mass * np.vstack([np.eye(3), skew(arm)])
     if acceleration is not None:
         return float(np.min((still - polytope.H @ gain @ acceleration) / slopes))
-    found = linprog(
-        [0.0, 0.0, 0.0, -1.0],
-        np.column_stack([polytope.H @ gain, slopes]),
-        still,
-        bounds=(None, None),
-        method="highs",
-    )
+    rows = np.column_stack([polytope.H @ gain, slopes])
+    found = linprog([0.0, 0.0, 0.0, -1.0], rows, still, bounds=(None, None), method="highs")
     return float(found.x[-1]) if found.success else np.inf
 
 
@@ -475,10 +451,7 @@ def row_slopes(polytope: Polytope, problem: CentroidalProblem, com: FloatArray) 
 
     Its length with moments about the CoM, or about the world origin; ``|H1 + H2 p^|`` for forces.
 
-    Args:
-        polytope: About ``problem.reference``.
-        problem: Says what the margin measures.
-        com: In the world [m].
+    The polytope is about ``problem.reference``; the problem says what the margin measures.
     """
     place = np.asarray(com, dtype=np.float64)
     point = np.zeros_like(place) if problem.margin_space == "wrench_about_origin" else place

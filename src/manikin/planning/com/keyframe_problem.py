@@ -47,8 +47,7 @@ class RecordedCom:
             time: (n,) [s], increasing; any origin.
             com: (n, 3) [m].
             sequence: Stances, one per phase, each with at least one contact.
-            key_times: (phases + 1,) [s], where the support changes, with both ends; each is
-                moved to the nearest sample.
+            key_times: (phases + 1,) changes of the support, with both ends; moved to the nearest sample [s].
             angular_momentum_rate: (n, 3) about the CoM [N.m]; None where it is not known.
 
         Raises:
@@ -60,8 +59,17 @@ class RecordedCom:
         wanted = frozen_array(key_times, "recording key times [s]", (len(sequence) + 1,))
         _check_increasing(times, "recording time")
         _check_increasing(wanted, "recording key times")
-        _check_supported(sequence)
-        _check_inside(times, wanted)
+        for number, phase in enumerate(sequence):
+            if not len(phase.stance):
+                raise InputError(
+                    f"recording has no support in phase {number}; valid: at least one contact in every phase"
+                )
+        slack = float(np.median(np.diff(times)))
+        if wanted[0] < times[0] - slack or wanted[-1] > times[-1] + slack:
+            raise InputError(
+                f"recording lasts from {times[0]:g} to {times[-1]:g} s but its key times from "
+                f"{wanted[0]:g} to {wanted[-1]:g} s; valid: key times inside the recording"
+            )
         frames = np.array([int(np.argmin(np.abs(times - instant))) for instant in wanted])
         for index in np.flatnonzero(np.diff(frames) < 1):
             raise InputError(
@@ -69,18 +77,23 @@ class RecordedCom:
                 f"{wanted[index + 1]:g} s; valid: samples that are closer than the shortest phase"
             )
         kept = slice(frames[0], frames[-1] + 1)
-        instants = times[frames] - times[frames[0]]
+        durations = np.diff(times[frames] - times[frames[0]]).tolist()
         turning = angular_momentum_rate
         if turning is not None:
             turning = frozen_array(turning, "recording angular momentum rate [N.m]", (len(times), 3))
             turning = frozen_array(turning[kept], "recording angular momentum rate [N.m]")
+        key_frames = frames - frames[0]
+        key_frames.setflags(write=False)
         values = {
             "time": frozen_array(times[kept] - times[frames[0]], "recording time [s]"),
             "com": frozen_array(positions[kept], "recording com [m]"),
-            "key_frames": _frozen_indices(frames - frames[0]),
-            "sequence": _with_durations(sequence, np.diff(instants)),
+            "key_frames": key_frames,
+            "sequence": StanceSequence([
+                Phase(part.stance, lasting, lasting)
+                for part, lasting in zip(sequence, durations, strict=True)
+            ]),
             "angular_momentum_rate": turning,
-        }
+        }  # fmt: skip
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -104,34 +117,6 @@ def _check_increasing(times: FloatArray, name: str) -> None:
     if len(times) < 2 or len(steps):
         found = f"have {len(times)} entries" if len(times) < 2 else f"fall or stay at entry {steps[0] + 1}"
         raise InputError(f"{name} values {found}; valid: at least two, strictly increasing seconds")
-
-
-def _check_supported(sequence: StanceSequence) -> None:
-    for number, phase in enumerate(sequence):
-        if not len(phase.stance):
-            raise InputError(
-                f"recording has no support in phase {number}; valid: at least one contact in every phase"
-            )
-
-
-def _check_inside(times: FloatArray, key_times: FloatArray) -> None:
-    slack = float(np.median(np.diff(times)))
-    if key_times[0] < times[0] - slack or key_times[-1] > times[-1] + slack:
-        raise InputError(
-            f"recording lasts from {times[0]:g} to {times[-1]:g} s but its key times from "
-            f"{key_times[0]:g} to {key_times[-1]:g} s; valid: key times inside the recording"
-        )
-
-
-def _with_durations(sequence: StanceSequence, durations: FloatArray) -> StanceSequence:
-    pairs = zip(sequence, durations.tolist(), strict=True)
-    return StanceSequence([Phase(phase.stance, duration, duration) for phase, duration in pairs])
-
-
-def _frozen_indices(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    values = np.array(values, dtype=np.int64)
-    values.setflags(write=False)
-    return values
 
 
 EXTRA_CONTROL_POINTS = 7

@@ -65,6 +65,10 @@ class KeyframeProgramme:
         """Mean over time of the weighted squared derivatives of (n + 1, 3) control points."""
         return float(np.einsum("ia,aij,ja->", control_points, self.grams, control_points))
 
+    def spline(self, control_points: FloatArray) -> BSpline:
+        """Spline over [0, 1] of (n + 1, 3) control points."""
+        return BSpline(self.degree, self.knots, control_points)
+
     def margins(self, control_points: FloatArray) -> FloatArray:
         """(m,) margin of every balance row [N.m] or [N]."""
         return (self.bounds - self.rows @ control_points.ravel()) / self.slopes
@@ -184,7 +188,15 @@ def build_keyframe_programme(
         control_points: Their number.
     """
     duration = float(schedule.instants[-1])
-    ends = _end_conditions(problem, duration)
+    given = (
+        (problem.start_velocity, problem.start_acceleration),
+        (problem.goal_velocity, problem.goal_acceleration),
+    )
+    # First and second derivative over normalised time at both ends, where imposed.
+    ends = [
+        [value * duration**order for order, value in enumerate(pair, start=1) if value is not None]
+        for pair in given
+    ]
     knots = keyframe_knots(problem.degree, times / duration, control_points, *map(len, ends))
     k = problem.degree
     equalities = [basis_matrix(k, knots, np.minimum(times / duration, 1.0))]
@@ -216,9 +228,9 @@ def keyframe_knots(
     Args:
         degree: Degree k.
         key_frames: (f,) increasing, from 0 to 1.
-        control_points: At least f plus the numbers of derivatives.
+        control_points: At least f plus the numbers of derivatives imposed at start and goal.
         start_derivatives: Number of derivatives imposed at the start.
-        goal_derivatives: At the end.
+        goal_derivatives: Number of derivatives imposed at the goal.
 
     Returns:
         (control_points + degree + 1,).
@@ -230,26 +242,6 @@ def keyframe_knots(
     sites = [0.0] * start_derivatives + sites + [1.0] * goal_derivatives
     inner = [float(np.mean(sites[j : j + degree])) for j in range(1, control_points - degree)]
     return clamped_knots(degree, [0.0, *inner, 1.0])
-
-
-def spline_of(programme: KeyframeProgramme, control_points: FloatArray) -> BSpline:
-    """Spline over [0, 1] of (n + 1, 3) control points."""
-    return BSpline(programme.degree, programme.knots, control_points)
-
-
-def _end_conditions(
-    problem: CentroidalProblem, duration: float
-) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
-    """First and second derivative over normalised time at both ends, where imposed."""
-    given = (
-        (problem.start_velocity, problem.start_acceleration),
-        (problem.goal_velocity, problem.goal_acceleration),
-    )
-    start, goal = (
-        tuple(value * duration**order for order, value in enumerate(pair, start=1) if value is not None)
-        for pair in given
-    )
-    return start, goal
 
 
 def quadrature(degree: int, knots: FloatArray) -> tuple[FloatArray, FloatArray]:

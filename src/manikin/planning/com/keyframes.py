@@ -40,7 +40,6 @@ from manikin.planning.com.keyframe_spline import (
     KeyframeProgramme,
     build_keyframe_programme,
     phases_touching,
-    spline_of,
 )
 from manikin.planning.com.timing_free import CentroidalResult, missed_margin
 
@@ -88,10 +87,7 @@ def plan_com_through_key_frames(problem: KeyframeProblem) -> KeyframeResult:
     Every programme is convex and solved to its one optimum; see
     :mod:`manikin.planning.com.keyframe_spline`. A trajectory that does not meet its own
     certificate, measured every millisecond, gets key frames until it does or no sample of the
-    recording is left that would help.
-
-    Returns:
-        A result that holds the trajectory or says which requirement could not be met.
+    recording is left that would help; then the result says which requirement could not be met.
     """
     return _Search(problem).run()
 
@@ -176,9 +172,8 @@ class _Search:
         )  # fmt: skip
 
     def _trajectory(self, programme: KeyframeProgramme, control_points: FloatArray) -> CentroidalTrajectory:
-        schedule = self.problem.recording.schedule
-        spline = spline_of(programme, control_points)
-        return CentroidalTrajectory(self.problem.requirements.mass, spline, schedule)
+        mass, schedule = self.problem.requirements.mass, self.problem.recording.schedule
+        return CentroidalTrajectory(mass, programme.spline(control_points), schedule)
 
     def _next_frame(self, attempt: _Attempt) -> int | None:
         """Sample nearest to the worst violation, among those far enough from all key frames."""

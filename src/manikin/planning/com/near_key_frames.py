@@ -107,13 +107,9 @@ class NearProgramme:
     def of(
         cls, mass: float, polytopes: Sequence[WrenchPolytope], recording: RecordedCom, weights: Weights
     ) -> "NearProgramme":
-        """Lay out knots and instants.
+        """Lay out knots and instants for polytopes W_i of the phases about one point; the mass is in kg.
 
-        Args:
-            mass: [kg].
-            polytopes: W_i of the phases about one point.
-            recording: Stances with their instants, from 0 on, and the rate of the angular momentum.
-            weights: Of velocity, acceleration and jerk; the first entry of each counts for all three axes.
+        Of the weights, those of velocity, acceleration and jerk count, the first entry for all three axes.
         """
         schedule = recording.schedule
         duration = float(schedule.instants[-1])
@@ -136,11 +132,9 @@ class NearProgramme:
         return None if self.turning is None else BSpline(DEGREE, self.knots, TURN * points[:, 3:])
 
     def free(self, shares: FloatArray, wanted: FloatArray) -> FloatArray:
-        """(n, 3 or 6) control points without regard to balance; the last three of the turning.
+        """(n, 3 or 6) control points near (f, 3) ``wanted`` [m] at (f,) ``shares`` of [0, 1], unbalanced.
 
-        Args:
-            shares: (f,) key frames on [0, 1].
-            wanted: (f, 3) CoM there [m].
+        The last three of six are those of the turning.
         """
         solved = [np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)]
         return np.asarray(np.hstack(solved), dtype=np.float64)
@@ -445,7 +439,7 @@ class _Search:
 
 
 def _ways(trajectory: CentroidalTrajectory) -> tuple[CentroidalTrajectory, ...]:
-    """The trajectory, and without its turning."""
+    """The trajectory, and the same without its turning."""
     return (trajectory,) if trajectory.turning is None else (trajectory, replace(trajectory, turning=None))
 
 

@@ -1,8 +1,6 @@
 """One optimisation of the timing-free method: from a guess to a measured attempt.
 
-Also here. Which facets of the polytopes the optimisation has to know about.
-
-Far from all facets ever limit a motion: near an upright stance those of friction and of the
+By far not all facets of the polytopes limit a motion: near an upright stance those of friction and of the
 normal-force cap are hundreds of newtons away. The programme is given the nearest ones only,
 and every solution is measured against all of them; facets found violated are added and the
 programme is solved again (constraint generation).
@@ -53,11 +51,11 @@ def nearest_facets(distances: Sequence[FloatArray], count: int = FIRST_COUNT) ->
 def with_violated(
     chosen: FacetIndices, distances: Sequence[FloatArray], margin: float, step: int = FIRST_COUNT // 2
 ) -> FacetIndices:
-    """Add to each phase its nearest left-out facets, up to ``step``, that are nearer than ``margin``.
+    """Add to each phase up to ``step`` nearest facets left out so far if one is nearer than ``margin``.
 
     Args:
         chosen: Facets of the last programme.
-        distances: Of its solution, from :func:`facet_distances`.
+        distances: Distances of its solution, see :func:`facet_distances` [N.m] or [N].
         margin: Distance that all facets should keep [N.m] or [N].
         step: Number of facets that a phase with a violation receives.
     """
@@ -143,11 +141,7 @@ class Attempt:
 
 
 def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> ComProgram:
-    """The compiled optimisation of a problem, shared by all problems of the same structure.
-
-    Args:
-        facets: Indices of the facets imposed in each phase.
-    """
+    """The compiled optimisation of a problem, shared by all problems of the same structure."""
     return transcribe(
         ComStructure(
             degree=problem.degree,
@@ -287,16 +281,8 @@ def trajectory_of(
     durations = np.clip(durations, problem.min_durations, problem.max_durations)
     spline = spline_from_bezier(
         bezier, durations,
-        start=_given(problem.start_com, problem.start_velocity, problem.start_acceleration),
-        goal=_given(problem.goal_com, problem.goal_velocity, problem.goal_acceleration),
+        start=(problem.start_com, problem.start_velocity, problem.start_acceleration),
+        goal=(problem.goal_com, problem.goal_velocity, problem.goal_acceleration),
     )  # fmt: skip
     instants = np.concatenate([[0.0], np.cumsum(durations)])
     return CentroidalTrajectory(problem.mass, spline, ContactSchedule(problem.sequence, instants))
-
-
-def _given(
-    position: FloatArray, velocity: FloatArray | None, acceleration: FloatArray | None
-) -> tuple[FloatArray, ...]:
-    if velocity is None:
-        return (position,)
-    return (position, velocity) if acceleration is None else (position, velocity, acceleration)

@@ -78,11 +78,7 @@ def guess_styles(problem: CentroidalProblem) -> tuple[GuessStyle, ...]:
 def guess(
     problem: CentroidalProblem, style: GuessStyle, polytopes: Sequence[WrenchPolytope]
 ) -> tuple[FloatArray, FloatArray]:
-    """Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s] to start from.
-
-    Args:
-        polytopes: W_i of the phases about ``problem.reference``.
-    """
+    """Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s] to start from."""
     durations = _guess_durations(problem, style.stretch, polytopes)
     instants = np.concatenate([[0.0], np.cumsum(durations)])
     if style.pull is None:
@@ -160,13 +156,8 @@ def can_rest(polytope: WrenchPolytope, mass: float) -> bool:
     The wrench ``[m (-g); p ^ m (-g)]`` is linear in the position ``p``: a linear programme.
     """
     weight = -mass * GRAVITY_VECTOR
-    found = linprog(
-        np.zeros(3),
-        polytope.H[:, 3:] @ -skew(weight),
-        polytope.h - polytope.H[:, :3] @ weight,
-        bounds=(None, None),
-        method="highs",
-    )
+    rows, bounds = polytope.H[:, 3:] @ -skew(weight), polytope.h - polytope.H[:, :3] @ weight
+    found = linprog(np.zeros(3), rows, bounds, bounds=(None, None), method="highs")
     return found.status != INFEASIBLE
 
 
@@ -273,10 +264,7 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     Every solution is measured every millisecond against all facets and all bounds. Where a
     requirement is broken between the samples it is asked for with more distance, where by a
     facet that was left out the facet is added, and the programme is solved again. A result
-    that does not meet its own certificate is a failure.
-
-    Returns:
-        A result that holds the trajectory or says which requirement could not be met.
+    that does not meet its own certificate is a failure that says which requirement could not be met.
     """
     began = time.perf_counter()
     polytopes = polytopes_of(problem)
@@ -336,13 +324,7 @@ def _hopeless(attempt: Attempt, targets: MarginTargets) -> bool:
 def limiting_at(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytope: WrenchPolytope, time: float
 ) -> LimitingConstraint:
-    """Contact and limit nearest to the wrench of a trajectory at a time.
-
-    Args:
-        problem: Says what the margin measures.
-        polytope: Of the phase of that time, about ``problem.reference``.
-        time: [s].
-    """
+    """Contact and limit nearest to the wrench of a trajectory at a time [s], in the polytope of its phase."""
     fixed = problem.margin_space == "wrench_about_origin"
     about = np.zeros(3) if fixed else trajectory.position(time)
     return polytope.limiting(trajectory.pseudo_wrench(time, problem.reference), about)
@@ -390,7 +372,7 @@ def missed_margin(
     what: str,
     tried: str = "",
 ) -> Failure:
-    """Failure that names the contact limiting the margin of a trajectory.
+    """Failure that names the contact limiting the margin of the best trajectory.
 
     Args:
         problem: What was asked.

@@ -10,7 +10,7 @@ formulation has the control points themselves as unknowns; the set of trajectori
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from math import comb
@@ -153,13 +153,8 @@ def transcribe(structure: ComStructure) -> ComProgram:
     builder.add("total_duration", ca.sum1(builder.durations) - builder.total)
     builder.add("required_margin", builder.margin + builder.shortfall)
     objective = _objective(builder)
-    unknowns = ca.vertcat(
-        *[ca.vec(b) for b in builder.bezier],
-        builder.durations,
-        builder.total,
-        builder.margin,
-        builder.shortfall,
-    )
+    bezier = [ca.vec(points) for points in builder.bezier]
+    unknowns = ca.vertcat(*bezier, builder.durations, builder.total, builder.margin, builder.shortfall)
     problem = {
         "x": unknowns,
         "p": ca.vertcat(*[ca.vec(p) for p in builder.parameters.values()]),
@@ -315,28 +310,26 @@ def _squared_integral(points: ca.SX, duration: ca.SX, order: int, diagonal: ca.S
 def bernstein_gram(degree: int) -> FloatArray:
     """(k + 1, k + 1) integrals over [0, 1] of the products of Bernstein polynomials."""
     index = range(degree + 1)
-    return np.array(
-        [
-            [comb(degree, i) * comb(degree, j) / comb(2 * degree, i + j) / (2 * degree + 1) for j in index]
-            for i in index
-        ]
-    )
+    return np.array([
+        [comb(degree, i) * comb(degree, j) / comb(2 * degree, i + j) / (2 * degree + 1) for j in index]
+        for i in index
+    ])  # fmt: skip
 
 
 def spline_from_bezier(
     bezier: FloatArray,
     durations: FloatArray,
     *,
-    start: tuple[FloatArray, ...],
-    goal: tuple[FloatArray, ...],
+    start: tuple[FloatArray | None, ...],
+    goal: tuple[FloatArray | None, ...],
 ) -> BSpline:
     """B-spline on normalised time with the key instants as internal knots ([Qiu2012]_ 5.4.3).
 
     Args:
         bezier: (phases, k + 1, 3) Bezier points of the phases [m].
         durations: (phases,) [s].
-        start: Position and, where imposed, velocity and acceleration at the start, met exactly.
-        goal: The same at the end.
+        start: Position, velocity and acceleration at the start, met exactly up to the first that is None.
+        goal: Position, velocity and acceleration at the goal, likewise.
     """
     k = bezier.shape[1] - 1
     instants = np.concatenate([[0.0], np.cumsum(durations)])
@@ -351,8 +344,11 @@ def spline_from_bezier(
     return BSpline.fit(k, knots, np.minimum(times, 1.0), values, first=first, last=last)
 
 
-def _per_normalised_time(derivatives: tuple[FloatArray, ...], total: float) -> list[FloatArray]:
-    return [value * total**order for order, value in enumerate(derivatives)]
+def _per_normalised_time(derivatives: tuple[FloatArray | None, ...], total: float) -> Iterator[FloatArray]:
+    for order, value in enumerate(derivatives):
+        if value is None:
+            return
+        yield value * total**order
 
 
 def _differences(points: ca.SX, order: int) -> ca.SX:

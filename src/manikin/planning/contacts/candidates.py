@@ -113,13 +113,10 @@ class SurfaceTable:
         self.filled: NDArray[np.bool_] = areas >= np.prod(self.side_high - self.side_low, axis=1) * (1 - 1e-9)
 
     def within_reach(self, situation: Situation, samples: LimbSamples, tolerance: float) -> IntArray:
-        """Surfaces that may meet the reach of a limb (step 1): no reachable one is left out.
+        """Surfaces that may meet the reach of a limb, give or take a tolerance [m] (step 1); none is missed.
 
         The box of the polygon must meet the ball of the reach, and, along the normal and the sides of
         the polygon, the extents of the hull.
-
-        Args:
-            tolerance: How far beyond the hull a surface may be [m].
         """
         hull, radius = samples.hull
         away = np.clip(situation.origin, self._low, self._high) - situation.origin
@@ -139,12 +136,9 @@ class SurfaceTable:
     def over(
         self, points: FloatArray, numbers: IntArray, margin: FloatArray | float = 0.0
     ) -> NDArray[np.bool_]:
-        """(n,) whether points project into the polygon of their surface.
+        """(n,) whether world points (n, 3) [m] project into the polygons of their surfaces, (n,) indices.
 
-        Args:
-            points: (n, 3) in the world [m].
-            numbers: (n,) indices of the surfaces.
-            margin: (n,) or one distance that points may lie outside [m].
+        They may lie outside by a margin, one or (n,) [m].
         """
         beyond = np.einsum("nei,ni->ne", self._walls[numbers], points) - self._wall_offsets[numbers]
         inside = (beyond <= np.asarray(margin)[..., None]).all(axis=1)
@@ -217,14 +211,9 @@ def find_candidates(
         rows, owner, points = rows.take(inside), owner.take(inside), points.take(inside, axis=0)
     surfaces = numbers.take(owner)
     return Candidates(
-        rows,
-        surfaces,
-        points,
-        table.normals.take(surfaces, axis=0),
-        samples.products.take(rows, axis=0),
-        samples.manipulability.take(rows),
-        samples.rotations.take(rows, axis=0),
-    )
+        rows, surfaces, points, table.normals.take(surfaces, axis=0), samples.products.take(rows, axis=0),
+        samples.manipulability.take(rows), samples.rotations.take(rows, axis=0),
+    )  # fmt: skip
 
 
 def _near_planes(

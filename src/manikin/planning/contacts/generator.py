@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -78,9 +78,8 @@ class GeneratedContact:
         tried: How many of them were tried, or, without a contact, were found impossible.
         failure: What kept the limb from a contact, or None.
         message: The failure in words, or an empty text.
-        gap: Distance of the effector from its contact in ``q`` [m]: none where joints close it.  A limb
-            without joints touches where the root puts it, at most the settings' tolerance away; it is for
-            whoever places the root to close the rest.
+        gap: Distance of the effector from its contact in ``q`` [m]: none where joints close it, at most the
+            settings' tolerance for a limb without joints, which touches where the root puts it.
     """
 
     limb: str
@@ -172,18 +171,13 @@ class ContactGenerator:
         most: int = 1,
         apart: float = 0.05,
     ) -> list[GeneratedContact]:
-        """Find the best contacts of one limb in different places, best first.
+        """Find the best contacts of one limb in different places, best first; one answer where there is none.
+
+        The other arguments and errors are those of :meth:`request`.
 
         Args:
             most: Largest number of contacts.
             apart: Distance between two of them [m].
-
-        Returns:
-            Contacts, or one answer without a contact.
-
-        Raises:
-            BodyError: As there.
-            ContactError: As there.
         """
         if limb not in self._tools:
             raise BodyError(f"no samples of limb {limb!r}; valid: {', '.join(self._tools) or 'none'}")
@@ -198,13 +192,9 @@ class ContactGenerator:
             max_tilt=self.settings.max_tilt, footprint=footprint(self.body, tools.limb, touch, self.rules),
         )  # fmt: skip
         if not len(candidates):
-            names = sorted({self._table.surfaces[number].obstacle for number in near})
-            return [
-                _failure(
-                    limb, Hindrance.SURFACE, f"no sample of {limb} lies flat on a surface of "
-                    f"{', '.join(names)}, though these are near",
-                )
-            ]  # fmt: skip
+            names = ", ".join(sorted({self._table.surfaces[number].obstacle for number in near}))
+            message = f"no sample of {limb} lies flat on a surface of {names}, though these are near"
+            return [_failure(limb, Hindrance.SURFACE, message)]
         scores = (heuristic or Efort()).score(situation, candidates)
         return self._choose(tools, situation, candidates, scores, touch, most, apart)
 
@@ -231,7 +221,9 @@ class ContactGenerator:
         for row, goal in self._worth_trying(tools, situation, candidates, order, faults):
             if tried == self.settings.tries:
                 break
-            if found and _is_near(candidates.points[row], found, apart):
+            point = candidates.points[row]
+            places = (item.contact.position for item in found if item.contact is not None)
+            if any(np.linalg.norm(point - place) < apart for place in places):
                 continue
             tried += 1
             aligned = tools.aligner.align(*goal, allowed)
@@ -248,11 +240,16 @@ class ContactGenerator:
                 faults[hit] += 1
                 continue
             turn = situation.rotation @ aligned.rotation
-            if flat and not self._table.carries_one(candidates.points[row] + sole @ turn.T, surface):
+            if flat and not self._table.carries_one(point + sole @ turn.T, surface):
                 faults[_TILTED] += 1
                 continue
-            made = self._found(tools.limb, kind, candidates, row, turn, q.copy(), scores, tried)
-            found.append(made if len(tools.chain) else replace(made, gap=aligned.error))
+            contact = make_contact(
+                self.body, tools.limb, kind, point, onto_normal(turn, candidates.normals[row]), self.rules
+            )
+            found.append(GeneratedContact(
+                tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacle,
+                float(scores[row]), len(candidates), tried, gap=0.0 if len(tools.chain) else aligned.error,
+            ))  # fmt: skip
             if len(found) == most:
                 break
         return found or [_none_fits(tools.limb.name, faults, len(candidates))]
@@ -282,23 +279,6 @@ class ContactGenerator:
             goals = tools.goals(situation, candidates, rows)
             yield from zip(rows.tolist(), zip(*goals, strict=True), strict=True)
             size = max(size, _SOME)
-
-    def _found(
-        self,
-        limb: Limb,
-        kind: ContactKind,
-        candidates: Candidates,
-        row: int,
-        turn: FloatArray,
-        q: FloatArray,
-        scores: FloatArray,
-        tried: int,
-    ) -> GeneratedContact:
-        surface = self._table.surfaces[int(candidates.surfaces[row])]
-        rotation = onto_normal(turn, surface.normal)
-        contact = make_contact(self.body, limb, kind, candidates.points[row], rotation, self.rules)
-        score = float(scores[row])
-        return GeneratedContact(limb.name, contact, q, surface.obstacle, score, len(candidates), tried)
 
 
 class _LimbTools:
@@ -347,12 +327,6 @@ def _order(scores: FloatArray) -> NDArray[np.int64]:
     left = np.ones(len(order), dtype=bool)
     left[steps] = False
     return order[np.concatenate([steps, np.flatnonzero(left)])]
-
-
-def _is_near(point: FloatArray, found: list[GeneratedContact], apart: float) -> bool:
-    """Whether one of the contacts is nearer to a point (3,) than a distance [m]."""
-    places = (item.contact.position for item in found if item.contact is not None)
-    return any(np.linalg.norm(point - place) < apart for place in places)
 
 
 def _failure(

@@ -1,7 +1,4 @@
-"""What makes one contact better than another: interchangeable scores of candidates.
-
-Also here. Scores that hardly change within a small place, asked once for each.
-"""
+"""What makes one contact better than another: interchangeable scores of candidates."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,11 +21,12 @@ from manikin.planning.contacts.samples import LimbSamples
 
 
 def cached_score(candidates: Candidates, spacing: float, value: Callable[[int], float]) -> FloatArray:
-    """(n,) scores; candidates on one surface and in one cell of a grid share that of their first.
+    """(n,) scores that hardly change within a small place: one for each surface and cell of a grid.
 
     Args:
-        spacing: Of the grid [m].
-        value: Score of a candidate by its row.
+        candidates: n of them.
+        spacing: Size of the cells [m].
+        value: Score of a candidate by its row, asked of the first one in each cell.
     """
     keys = np.column_stack([candidates.surfaces, np.round(candidates.points / spacing)])
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)

@@ -133,43 +133,32 @@ class PostureFinder:
             preferences: Weights of what is not required; the default ones when omitted.
         """
         if place is None:
-            near = Configuration(self.body, start).com[:2] if guide is None else self._over(guide)
-            place = self._region(carrying).nearest(
-                np.asarray(near), self.settings.inset if inset is None else inset
-            )
+            if guide is None:
+                near = np.asarray(Configuration(self.body, start).com[:2])
+            else:  # over the root of a person, and over what a creature has ahead of its root
+                near = guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
+            place = self._region(carrying).nearest(near, self.settings.inset if inset is None else inset)
         if place is None:
             return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
         self.searches += 1
+        settings, led = self.settings, {} if guide is None else self.led(guide)
         problem = PostureProblem(
-            self.body,
-            tuple(held.values()),
-            {**({} if guide is None else self.led(guide)), **(placements or {})},
-            com=np.array([*place, np.nan]),
-            proximity=self._proximity,
-            clearance=self.settings.clearance,
-            self_clearance=self.settings.clearance,
-            ignore=self._touching(held),
-            range_margin=self.settings.range_margin,
-            learnt_margin=self.settings.learnt_margin,
-            reference=self._reference,
+            self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
+            proximity=self._proximity, clearance=settings.clearance, self_clearance=settings.clearance,
+            ignore=self._touching(held), range_margin=settings.range_margin,
+            learnt_margin=settings.learnt_margin, reference=self._reference,
             preferences=preferences or Preferences(),
-        )
-        once = SolverSettings(
-            tolerance=self.settings.tolerance, iterations=self.settings.iterations, restarts=False,
-            explain=False,
         )  # fmt: skip
+        once = SolverSettings(
+            tolerance=settings.tolerance, iterations=settings.iterations, restarts=False, explain=False
+        )
         if guide is not None:
             # The guide's trunk is free, so that from there no obstacle is passed on its wrong side.
-            led = np.concatenate([guide, start[7:]])
-            found = generate_posture(problem, led, settings=once)
-            if found.succeeded:
-                return Posed(found.q)
-        found = generate_posture(problem, start, settings=replace(once, restarts=restarts))
-        return Posed(found.q) if found.succeeded else Posed(None, found.failure or "no posture")
-
-    def _over(self, guide: FloatArray) -> FloatArray:
-        """(2,) where the centre of mass is in a body whose root has a (7,) pose: a person's over the root."""
-        return guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
+            result = generate_posture(problem, np.concatenate([guide, start[7:]]), settings=once)
+            if result.succeeded:
+                return Posed(result.q)
+        result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
+        return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
 
     def led(self, guide: FloatArray) -> dict[str, Placement]:
         """Wish for the root to be near a (7,) pose, by the root's effector."""
@@ -187,7 +176,6 @@ class PostureFinder:
         """Where the body may rest; asked again and again for the same contacts."""
         key = frozenset(carrying.values())
         if key not in self._regions:
-            self._regions[key] = StaticRegion.of(
-                Stance(tuple(carrying.values()), model=self._model), self.body.mass
-            )
+            stance = Stance(tuple(carrying.values()), model=self._model)
+            self._regions[key] = StaticRegion.of(stance, self.body.mass)
         return self._regions[key]
