@@ -25,7 +25,7 @@ class CentroidalTrajectory(Displayed):
     derivatives are zero.
 
     Attributes:
-        mass: [kg].
+        mass: Mass of the body [kg].
         spline: B-spline on [0, 1] in three dimensions [m].
         schedule: Stances with their key instants [s]; the motion starts at 0.
         binding_until: A whole body must keep its CoM on the trajectory until then [s]; after
@@ -201,9 +201,9 @@ class Weights:
     its number of samples, in the limit of many. Its sum has no acceleration term.
 
     Attributes:
-        margin: [1/(N.m)] or [1/N].
-        smoothness: Of S as a whole.
-        duration: [1/s].
+        margin: Weight of d_min [1/(N.m)] or [1/N].
+        smoothness: Weight of S as a whole.
+        duration: Weight of T [1/s].
         velocity: Diagonal of Qv [s^2/m^2].
         acceleration: Diagonal of Qa [s^4/m^2].
         jerk: Diagonal of Qj [s^6/m^2].
@@ -233,7 +233,7 @@ class CentroidalProblem:
     Velocities and accelerations at the ends are (3,), or None when free [m/s, m/s^2] (5.24-5.25).
 
     Attributes:
-        mass: [kg].
+        mass: Mass of the body [kg].
         sequence: Stances with the bounds of their durations.
         start_com: (3,) p_i [m] (5.22).
         goal_com: (3,) p_f [m] (5.23).
@@ -244,8 +244,8 @@ class CentroidalProblem:
         geometric: Further constraints on the CoM position.
         key_planes: Planes behind which the CoM must be at single key instants, neither the first nor the
             last, where the CoM is given.
-        max_duration: Of the whole motion [s].
-        weights: Of the objectives (5.28).
+        max_duration: Longest duration of the whole motion [s].
+        weights: Weights of the objectives (5.28).
         samples: n_s, balance is imposed at j = 0 ... n_s in every phase.
     """
 

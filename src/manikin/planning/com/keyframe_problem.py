@@ -133,7 +133,7 @@ class KeyframeProblem:
     Attributes:
         recording: Samples, key frames and stances.
         requirements: What the motion has to keep, with the timing and the ends of the recording.
-        control_points: Of the spline, before key frames are added; each added one brings one more.
+        control_points: Their number before key frames are added; each added one brings one more.
         frame_spacing: Least distance of an added key frame from the others [s].
     """
 
@@ -154,7 +154,7 @@ class KeyframeProblem:
         """Put the problem together.
 
         Args:
-            mass: [kg].
+            mass: Mass of the body [kg].
             recording: Samples, key frames and stances.
             control_points: At least one more than there are key frames and end conditions; the
                 number of key frames plus 7 when omitted.

@@ -38,7 +38,7 @@ class KeyframeProgramme:
     with the margin d.
 
     Attributes:
-        degree: Of the spline.
+        degree: Degree of the spline.
         knots: (n + k + 2,) on [0, 1].
         equalities: (e, n + 1) E.
         values: (e, 3) [m].
@@ -161,7 +161,7 @@ class KeyframeSolution:
     Attributes:
         control_points: (n + 1, 3) [m].
         multipliers: (m,) >= 0 of the balance rows.
-        iterations: Of the solver.
+        iterations: Iterations of the solver.
     """
 
     control_points: FloatArray

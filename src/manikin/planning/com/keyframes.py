@@ -56,7 +56,7 @@ class KeyframeResult(CentroidalResult):
         frames: Samples of the recording that the trajectory passes, in order.
         added: Those among them that were added, in the order of their addition.
         least_margins: Least margin of the motion after each solution [N.m] or [N].
-        programme: Of the last solution; None when nothing was attempted.
+        programme: Programme of the last solution; None when nothing was attempted.
     """
 
     keyframes: KeyframeProblem

@@ -81,7 +81,7 @@ class NearProgramme:
     """Everything about the programme that does not depend on the last solution.
 
     Attributes:
-        mass: [kg].
+        mass: Mass of the body [kg].
         reference: (3,) point of the polytopes' moments [m].
         polytopes: W_i of the phases about ``reference``.
         knots: On [0, 1].
@@ -409,7 +409,7 @@ class _Search:
         return _Attempt(frames, points, trajectory, problem, worst)
 
     def _margins(self, attempt: _Attempt) -> list[FloatArray]:
-        """Of each phase, the lesser ones of the point mass and of the body that turns."""
+        """Margins of each phase, the lesser of the point mass and of the body that turns [N.m]."""
         found = [phase_margins(attempt.problem, way, self.polytopes) for way in _ways(attempt.trajectory)]
         return [np.minimum.reduce(margins) for margins in zip(*found, strict=True)]
 

@@ -126,7 +126,7 @@ class Attempt:
         certificate: Its residuals.
         bezier: (phases, k + 1, 3) Bezier points [m], to start again from.
         durations: (phases,) [s].
-        iterations: Of the solver.
+        iterations: Iterations of the solver.
         margin: d_min at the samples over the imposed facets [N.m] or [N].
         converged: Whether the solver reports an optimum.
     """

@@ -58,10 +58,10 @@ INFEASIBLE = 2
 """Status of a linear programme without a solution."""
 
 GUESS_STYLES = (GuessStyle(0.5, 1.5), GuessStyle(0.3, 1.2), GuessStyle(0.7, 2.5))
-"""Of any motion."""
+"""Ways of guessing any motion."""
 
 PENDULUM = GuessStyle(None, 1.5)
-"""Of a body on its feet, before the others."""
+"""Way of guessing the motion of a body on its feet, tried before the others."""
 
 _PENDULUM_SAMPLES = 5
 _JERK_TIME = 0.02
@@ -193,9 +193,9 @@ class CentroidalResult(Displayed):
         trajectory: The trajectory; None when it failed.
         certificate: Requirements measured every millisecond; of the best attempt when it
             failed, None when nothing was attempted.
-        iterations: Of the solver, over all rounds.
+        iterations: Iterations of the solver over all rounds.
         rounds: Number of optimisations.
-        wall_time: [s].
+        wall_time: Wall time of the search [s].
     """
 
     problem: CentroidalProblem

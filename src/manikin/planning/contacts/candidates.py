@@ -152,13 +152,9 @@ class SurfaceTable:
     def carries(
         self, points: FloatArray, turns: FloatArray, numbers: IntArray, footprint: FloatArray
     ) -> NDArray[np.bool_]:
-        """(n,) whether the whole footprint of placed effectors projects into their polygons.
+        """(n,) whether the whole footprint (c, 3) [m] of placed effectors projects into their polygons.
 
-        Args:
-            points: (n, 3) places of the effectors in the world [m].
-            turns: (n, 3, 3) from their axes to the world's.
-            numbers: (n,) indices of the surfaces.
-            footprint: (c, 3) points of the effector's frame [m].
+        The effectors are at points (n, 3) of the world [m], turned by (n, 3, 3), on surfaces of (n,) indices.
         """
         if self.filled[numbers].all():
             sides = self.frames[self.group[numbers], 1:]
@@ -190,7 +186,10 @@ def find_candidates(
     """Select the samples in contact (step 2, [Tonneau2015]_ 4.3): near the plane and over the polygon.
 
     Args:
-        numbers: Those within reach.
+        table: Surfaces of the scene.
+        numbers: Indices of those within reach.
+        situation: Where the limb is.
+        samples: Samples of the limb.
         tolerance: Largest distance of an effector to the plane, on either side [m].
         max_tilt: Largest angle between the effector's z axis and the normal [rad]; what is
             tilted more cannot be aligned by small moves of the joints.

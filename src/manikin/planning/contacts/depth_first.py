@@ -136,12 +136,7 @@ class SearchLog:
     """What a search has cost, and why changes were refused."""
 
     def __init__(self, poser: PostureFinder, most: int) -> None:
-        """Begin to count.
-
-        Args:
-            poser: Looks for postures, perhaps after other searches.
-            most: Postures that may be looked for.
-        """
+        """Begin to count the postures that ``poser`` looks for, ``most`` at most."""
         self._poser, self._before, self._most = poser, poser.searches, most
         self._reasons: Counter[str] = Counter()
 
@@ -163,8 +158,8 @@ class SearchLog:
         """A search without a plan, with its commonest reason.
 
         Args:
-            what: Could not be done.
-            length: Of the guide [m].
+            what: What could not be done.
+            length: Length of the guide [m].
             farthest: How far along it the root came [m].
             backtracks: Changes taken back.
         """
@@ -176,11 +171,9 @@ class SearchLog:
 
 
 def search_depth_first(first: PartialPlan, moves: Moves[Change], log: SearchLog, length: float) -> Extension:
-    """Grow a plan until it is finished, nothing is left to try, or the search is spent.
+    """Grow a plan along a guide of a length [m] until it is done, nothing is left, or the search is spent.
 
-    Args:
-        log: Bounds and records the search; the moves refuse in it.
-        length: Of the guide [m].
+    The log bounds and records the search; the moves refuse in it.
     """
     grown = [(first, _followers(first, moves, log))]
     backtracks, farthest = 0, 0.0

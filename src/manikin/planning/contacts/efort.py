@@ -62,12 +62,8 @@ def unit_direction(direction: ArrayLike, name: str = "task direction") -> FloatA
 def force_transmission_ratio(products: FloatArray, direction: ArrayLike) -> FloatArray:
     """``f_T = (v^T J J^T v)^(-1/2)``, the force along ``v`` of unit torque (5.11) [N per N.m].
 
-    Args:
-        products: (n, 3, 3) ``J J^T`` [m^2].
-        direction: (3,) ``v`` in the same frame; only its direction counts.
-
-    Returns:
-        (n,); infinite where the limb carries the direction without torque.
+    From (n, 3, 3) ``J J^T`` [m^2] and a vector ``v`` (3,) in the same frame, of which the direction counts;
+    (n,), infinite where the limb carries it without torque.
     """
     v = unit_direction(direction)
     squares = np.maximum((products.reshape(-1, 9) @ np.outer(v, v).ravel()), 0.0)

@@ -81,7 +81,7 @@ class Endpoints:
             friction: Coulomb coefficient of the soles.
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
             natural: Whether hips and shoulders keep to their learnt ranges.
-            friction_model: Of the stances.
+            friction_model: Friction model of the stances.
         """
         self._body, self._scene, self._friction = body, scene, friction
         self._stature = stature_of(body)
@@ -95,7 +95,7 @@ class Endpoints:
         Args:
             at: (2,) below the root, or of the middle of the buttocks on a seat [m].
             heading: Where to face [rad].
-            height: Of the surface to stand or sit on [m].
+            height: Height of the surface to stand or sit on [m].
         """
         reasons: list[str] = []
         tried = self._seated if habit is Habit.SEATED else self._standing

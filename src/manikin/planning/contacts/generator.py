@@ -54,7 +54,7 @@ class GeneratorSettings:
         tolerance: Largest distance of a sample's effector to a surface, closed by inverse kinematics; of a
             limb without joints it stays [m].
         max_tilt: Largest angle between the effector's z axis and the normal before the alignment [rad].
-        point_tilt: The same after it, for points, grasps and limbs without joints; soles lie flat [rad].
+        point_tilt: That angle after the alignment of points, grasps and limbs without joints [rad].
         tries: Candidates that are aligned and tested before giving up.
     """
 

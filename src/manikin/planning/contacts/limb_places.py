@@ -91,13 +91,9 @@ class Footholds:
         }
 
     def near(self, foot: str, wanted: FloatArray, yaw: float, friction: float) -> list[Contact]:
-        """Contacts of a foot around a place, the nearest first.
+        """Contacts of a foot around a place (3,) of its sole's middle [m], the nearest first.
 
-        Args:
-            foot: Its effector.
-            wanted: (3,) where the middle of the sole should be [m].
-            yaw: Heading of the toes [rad].
-            friction: Coulomb coefficient.
+        The toes head to ``yaw`` [rad]; the friction is a Coulomb coefficient.
         """
         places = [place for surface in self._surfaces for place in self._on(surface, wanted, yaw)]
         length, width = self._size
@@ -269,7 +265,7 @@ class LimbPlaces:
             limbs: Limbs that make contacts.
             kinds: How each touches, by name of the limb.
             reference: (nq,) posture in which every limb is where it should be relative to the root.
-            samples: Of the limbs; made when omitted.
+            samples: Samples of the limbs; made when omitted.
         """
         self.limbs = {limb.effector: limb for limb in limbs}
         self._kinds = kinds
@@ -307,7 +303,7 @@ class LimbPlaces:
         """Contacts of one limb, the best first; one answer without a contact where there is none.
 
         Args:
-            effector: Of the limb.
+            effector: Effector of the limb.
             q: (nq,) the body; all but the limb stays as it is.
             root: (7,) pose of the root at which the limb should be where it should be.
             direction: (3,) where the scene shall push the limb.

@@ -33,11 +33,11 @@ class PostureFinderSettings:
         range_margin: Angle to the ends of the joint ranges [rad].
         natural: Whether hips and shoulders of a human keep to their learnt volumes as well.
         inset: Distance of the centre of mass to the edges of the region where it may rest [m].
-        root_weight: Of the distance between the root and the guide [1/m^2].
-        turn_weight: Of the angle between the root and the guide [1/rad^2].
+        root_weight: Weight of the distance between the root and the guide [1/m^2].
+        turn_weight: Weight of the angle between the root and the guide [1/rad^2].
         tolerance: Largest residual of a contact [m, rad].
-        iterations: Of each search.
-        friction_model: Of the stances on which the body has to be able to rest.
+        iterations: Iterations of each search.
+        friction_model: Friction model of the stances on which the body has to be able to rest.
     """
 
     clearance: float = 0.014
@@ -56,7 +56,7 @@ class PostureFinderSettings:
         return LEARNT_MARGIN if self.natural else None
 
     def scaled(self, factor: float) -> "PostureFinderSettings":
-        """The same for a body of another size: lengths times a factor."""
+        """Settings for a body of another size: lengths times a factor."""
         return replace(
             self, clearance=factor * self.clearance, inset=factor * self.inset,
             root_weight=self.root_weight / factor**2,

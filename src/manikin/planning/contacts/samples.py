@@ -1,6 +1,6 @@
 """Sampled configurations of a limb, made once and asked often ([Tonneau2015]_ 5.1.4, 5.3.1)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -105,9 +105,9 @@ def sample_limb(
         count: Number of samples that are kept, > 0.
         threshold: Smallest manipulability kept, as a share of the largest among the first
             ``count`` samples, in [0, 1).
-        natural: Whether hips and shoulders of the human keep to their learnt volumes (4.3.3) and not
-            to the intervals of their hinges alone; of no effect on other limbs. Off unless asked for:
-            the recordings hold no movement of the largest amplitude, and climbing needs more.
+        natural: Whether hips and shoulders of the human keep to their learnt volumes (4.3.3) and not to the
+            intervals of their hinges alone. Off unless asked for: the recordings hold no movement of the
+            largest amplitude, and climbing needs more.
 
     Raises:
         BodyError: If a value is out of its range, or fewer than one sample in fifty passes.
@@ -122,7 +122,10 @@ def sample_limb(
     parts: list[tuple[FloatArray, ...]] = []
     kept, drawn, least = 0, 0, None
     while kept < count:
-        part, values = _placed(chain, source.random_angles(rng, count))
+        angles = source.random_angles(rng, count)
+        placed = chain.place(angles)
+        products = placed.jacobians @ placed.jacobians.transpose(0, 2, 1)
+        part, values = (angles, placed.positions, placed.rotations, products), manipulability(products)
         least = share * float(values.max()) if least is None else least
         good = values >= least
         parts.append(tuple(values[good] for values in part))
@@ -133,17 +136,8 @@ def sample_limb(
                 "largest; valid: a smaller threshold"
             )
     joined = [np.concatenate(arrays)[:count] for arrays in zip(*parts, strict=True)]
-    origin = limb_origin(body, limb)
-    return LimbSamples(
-        limb, parent_segment(body, limb), origin, *joined, threshold=float(least or 0.0), natural=natural
-    )
-
-
-def _placed(chain: LimbKinematics, angles: FloatArray) -> tuple[tuple[FloatArray, ...], FloatArray]:
-    """Angles, positions, rotations, products; and the manipulabilities."""
-    placed = chain.place(angles)
-    products = placed.jacobians @ placed.jacobians.transpose(0, 2, 1)
-    return (angles, placed.positions, placed.rotations, products), manipulability(products)
+    segment, origin = parent_segment(body, limb), limb_origin(body, limb)
+    return LimbSamples(limb, segment, origin, *joined, threshold=float(least or 0.0), natural=natural)
 
 
 def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
@@ -160,17 +154,10 @@ def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
             f"valid: {samples.limb.mirror or 'none'}"
         )
     flip: NDArray[np.float64] = np.outer(REFLECTION, REFLECTION)
-    return LimbSamples(
-        limb,
-        samples.segment,
-        samples.origin * REFLECTION,
-        samples.angles,
-        samples.positions * REFLECTION,
-        samples.rotations * flip,
-        samples.products * flip,
-        samples.threshold,
-        samples.natural,
-    )
+    return replace(
+        samples, limb=limb, origin=samples.origin * REFLECTION, positions=samples.positions * REFLECTION,
+        rotations=samples.rotations * flip, products=samples.products * flip,
+    )  # fmt: skip
 
 
 def sample_limbs(

@@ -49,7 +49,7 @@ class ContactQuestion:
         heuristic: Name of the preference, one of :data:`manikin.planning.contacts.HEURISTICS`.
         kind: How the effector touches; its own way when None.
         samples: Number of samples of the limb.
-        seed: Of the samples and of the random heuristic.
+        seed: Seed of the samples and of the random heuristic.
     """
 
     limb: str
@@ -72,11 +72,7 @@ class ContactQuestion:
         samples: int = 10_000,
         seed: int = 0,
     ) -> "ContactQuestion":
-        """Question from words.
-
-        Raises:
-            InputError: If a word is not known.
-        """
+        """Question from words; an InputError if one is not known."""
         if role not in list(Role):
             raise InputError(f"role is {role!r}; valid: {', '.join(Role)}")
         if kind is not None and kind not in list(ContactKind):
@@ -166,11 +162,7 @@ def find_contact(
 
 
 def check_limbs(body: BodyModel) -> None:
-    """Check that a body has limbs that can make contacts.
-
-    Raises:
-        BodyError: If it has none.
-    """
+    """Raise a BodyError if a body has no limbs that could make contacts."""
     if not body.limbs:
         raise BodyError(f"body {body.name!r} has no limbs; valid: a body with limbs, such as a human")
 
@@ -239,8 +231,8 @@ class LiveContacts:
         body: The body.
         scene: Its surroundings.
         q: (nq,) the body as it was put, before any limb is moved.
-        azimuth_deg: Of the task about the vertical, from world x [deg].
-        elevation_deg: Of the task above the horizon [deg].
+        azimuth_deg: Direction of the task about the vertical, from world x [deg].
+        elevation_deg: Direction of the task above the horizon [deg].
         limbs: Names of the limbs that are asked.
         heuristic: Name of the preference.
         role: What the limbs do with their contacts.
@@ -257,12 +249,7 @@ class LiveContacts:
         seed: int = 0,
         rules: ContactRules | None = None,
     ) -> None:
-        """Sample the limbs and prepare the scene.
-
-        Args:
-            q: (nq,) where it begins.
-            samples: Number of samples of each limb.
-            seed: Of the samples.
+        """Begin at a configuration (nq,), with a number of samples of each limb drawn from a seed.
 
         Raises:
             BodyError: If the body has no limbs.
@@ -280,12 +267,7 @@ class LiveContacts:
         )
 
     def move(self, position: ArrayLike, quaternion: ArrayLike) -> None:
-        """Put the root elsewhere.
-
-        Args:
-            position: (3,) of the root [m].
-            quaternion: (4,) xyzw of the root; normalised here.
-        """
+        """Put the root at a position (3,) [m] with a quaternion xyzw (4,), normalised here."""
         turn = frozen_array(quaternion, "quaternion", (4,))
         self.q[:3] = frozen_array(position, "position [m]", (3,))
         self.q[3:7] = turn / np.linalg.norm(turn)

@@ -162,6 +162,7 @@ def abstraction_of(
     """Abstraction of a body whose trunk is held in one posture.
 
     Args:
+        body: The body.
         volumes: Reach of each limb to be used.
         angles: Hinge angles of the trunk by name [rad]; the standing posture's where left out.
         trunk_scale: Factor on the radii and sides of the trunk's shapes, > 0.
@@ -174,10 +175,13 @@ def abstraction_of(
     wanted = _outside_limbs(body, volumes) if trunk_segments is None else list(trunk_segments)
     frames = _segment_frames(body, angles)
     shapes = [
-        _in_root(frames[name], f"{name}/{shape.name}", shape).enlarged(factor)
+        TrunkShape(
+            f"{name}/{shape.name}", shape.kind, shape.size, frames[name].act_points(shape.translation),
+            frames[name].rotation @ shape.rotation,
+        ).enlarged(factor)
         for name in wanted
         for shape in body.segment(name).shapes
-    ]
+    ]  # fmt: skip
     limbs = [
         LimbReach(volume.limb.name, frames[body.segment(volume.segment).name].act_points(volume.vertices))
         for volume in volumes
@@ -217,11 +221,6 @@ def _outside_limbs(body: BodyModel, volumes: Sequence[ReachVolume]) -> list[str]
         if segment.parent in in_limbs:
             in_limbs.add(segment.name)
     return [segment.name for segment in body.segments if segment.name not in in_limbs]
-
-
-def _in_root(frame: _Frame, name: str, shape: Shape) -> TrunkShape:
-    place = frame.act_points(shape.translation)
-    return TrunkShape(name, shape.kind, shape.size, place, frame.rotation @ shape.rotation)
 
 
 def _inscribed_ball(normals: FloatArray, offsets: FloatArray) -> tuple[FloatArray, float]:

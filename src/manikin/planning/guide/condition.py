@@ -195,27 +195,17 @@ class Condition:
     ) -> "Condition":
         """Condition that some limbs reach when upright and others when bent ([Tonneau2015]_ 6.4.2).
 
-        Args:
-            standing: Limbs that must reach when the trunk is tilted by ``upright`` or less.
-            bent: Limbs that must reach when it is tilted by ``upright`` or more.
-            upright: Border of the two [rad]; our choice.
+        The trunk is upright up to a tilt of ``upright`` [rad] and bent from there on; our choice.
         """
-        rules = (
-            LimbRule(tuple(standing), len(standing), (0.0, upright)),
-            LimbRule(tuple(bent), len(bent), (upright, float(np.pi))),
-        )
-        return cls(rules)
+        upper = LimbRule(tuple(standing), len(standing), (0.0, upright))
+        return cls((upper, LimbRule(tuple(bent), len(bent), (upright, float(np.pi)))))
 
     def surface(self, limb: str) -> UsableSurface:
         """Surfaces that count for a limb."""
         return self.surfaces.get(limb, _ANY)
 
     def check_names(self, limbs: Sequence[str]) -> None:
-        """Check every name against those of the limbs there are.
-
-        Raises:
-            InputError: If a name is unknown or more limbs are wanted than there are.
-        """
+        """Raise an InputError if a name is none of these limbs, or more limbs are wanted than there are."""
         named = [name for rule in self.rules for name in rule.required] + list(self.surfaces)
         unknown = sorted(set(named) - set(limbs))
         if unknown:

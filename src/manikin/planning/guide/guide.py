@@ -191,12 +191,9 @@ def plan_guide(
     shortcuts = world.settings.shortcut
     path = shorten(approximate(pruned, planner, task.limits, rng, shortcuts), planner, rng, shortcuts)
     counted = replace(
-        statistics,
-        asked=planner.asked,
-        route_poses=len(route.poses),
-        pruned_poses=len(pruned),
+        statistics, asked=planner.asked, route_poses=len(route.poses), pruned_poses=len(pruned),
         control_poses=len(path.control_points),
-    )
+    )  # fmt: skip
     return GuideResult(path, pruned, counted)
 
 

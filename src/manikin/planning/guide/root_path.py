@@ -93,11 +93,9 @@ class RootPath:
     def through(
         cls, control_points: ArrayLike, limits: RootLimits | None = None, degree: int = 3
     ) -> "RootPath":
-        """Spline with evenly spaced knots.
+        """Spline with evenly spaced knots from the first to the last of (n, 7) points, n >= 2.
 
-        Args:
-            control_points: (n, 7), n >= 2; it begins at the first and ends at the last.
-            degree: Degree, lowered to n - 1 where there are fewer points.
+        The degree is lowered to n - 1 where there are fewer points.
         """
         points = np.asarray(control_points, dtype=np.float64)
         degree = min(degree, len(points) - 1)
@@ -238,14 +236,7 @@ class ShortcutSettings:
 
 
 def prune(poses: FloatArray, planner: LocalPlanner) -> FloatArray:
-    """Leave out what a straight way skips (Algorithm 6).
-
-    Args:
-        poses: (n, 7) joined by straight ways.
-
-    Returns:
-        (k, 7), k <= n, with the same ends.
-    """
+    """Leave out of (n, 7) poses, joined by straight ways, what a straight way skips (Algorithm 6)."""
     kept, here, last = [0], 0, len(poses) - 1
     while here < last:
         ahead = range(last, here + 1, -1)
@@ -272,14 +263,9 @@ def approximate(
     rng: np.random.Generator,
     settings: ShortcutSettings | None = None,
 ) -> RootPath:
-    """Spline close to a polygonal way; with many control poses it becomes the way itself.
+    """Spline close to a way of (n, 7) poses joined by straight ways, along all of which the condition holds.
 
-    Args:
-        poses: (n, 7) joined by straight ways along which the condition holds.
-        rng: Places the control poses.
-
-    Returns:
-        A path along which the condition holds; of degree 1 where no spline was found.
+    With many control poses it becomes the way itself; it is of degree 1 where no other was found.
     """
     wanted = settings or ShortcutSettings()
     poses = _without_repeats(poses)
@@ -314,12 +300,7 @@ def shorten(
     rng: np.random.Generator,
     settings: ShortcutSettings | None = None,
 ) -> RootPath:
-    """Try random shortcuts; each one that is kept makes the way along the control poses quicker.
-
-    Args:
-        path: A path along which the condition holds.
-        rng: Chooses the stretches.
-    """
+    """Try random shortcuts; each one that is kept makes the way along the control poses quicker."""
     wanted = settings or ShortcutSettings()
     if path.degree < 2 or len(path.control_points) < 4:
         return path
@@ -353,7 +334,7 @@ def _spread(poses: FloatArray, times: FloatArray, count: int, rng: np.random.Gen
 
 
 def _with_small_turns(poses: FloatArray) -> FloatArray:
-    """The same way with poses in between, so that none is turned far from the one before."""
+    """The way with poses added in between, so that none is turned far from the one before."""
     pieces = [poses[:1]]
     for first, second in itertools.pairwise(poses):
         count = max(1, int(np.ceil(float(angles_between(first, second)) / _SMALL_TURN)))

@@ -39,8 +39,8 @@ class SamplingRegion:
         lower: (3,) lower corner of the box of positions [m].
         upper: (3,) upper corner [m].
         yaw: Smallest and largest angle [rad], or None.
-        pitch: The same; positive leans forward.
-        roll: The same.
+        pitch: Smallest and largest angle, positive leaning forward [rad], or None.
+        roll: Smallest and largest angle [rad], or None.
     """
 
     lower: FloatArray

@@ -107,9 +107,9 @@ class BracedForces:
     """Forces of a posture at rest that acts on an object.
 
     Attributes:
-        force: On the object along the act's direction [N].
+        force: Force on the object along the act's direction [N].
         torque_share: Largest torque of a joint as a share of its limit.
-        tightest: Name of that joint.
+        tightest: Name of the joint with the largest share.
         tau: (nv - 6,) torques [N.m].
         contact_force: (c, 6) force of the scene on each contact, in their order, and its moment about the
             contact's position [N, N.m].
@@ -136,14 +136,10 @@ def largest_force(
     friction: float = 0.7,
     friction_model: FrictionModel = "outer",
 ) -> BracedForces | None:
-    """The largest force that a posture can exert, or None where it cannot even stand.
+    """The largest force that a posture (nq,) can exert the way of an act, or None where it cannot even stand.
 
-    Args:
-        q: (nq,) posture.
-        contacts: Of feet and hands.
-        act: Where to; its force does not count.
-        friction: Coulomb coefficient of pressing palms.
-        friction_model: Of feet and palms.
+    The contacts are those of feet and hands; the friction is the Coulomb coefficient of pressing palms, the
+    friction model that of feet and palms.
     """
     programme = _Programme(body, q, contacts, act, friction, friction_model)
     return programme.solve(np.array([-1.0, 0.0]), (0.0, None), (1.0, 1.0))

@@ -37,10 +37,8 @@ LEGS = ("right_leg", "left_leg")
 BALANCED = 1e3
 """Weight of balance beside EFORT: among balanced places EFORT decides."""
 
-
 FLAT_PALMS = 3.0
 """Weight of the palms' turn against the face [1/rad^2]."""
-
 
 HANDS_ROOM = 0.2
 """Distance of the body's middle to the sides of what it acts on [m]; our choice."""
@@ -56,16 +54,16 @@ class BraceSettings:
     """Where the trunk is tried; lengths are those of a body of 1.75 m, the values are our choice.
 
     Attributes:
-        distances: Of the root from the face that is acted on [m].
-        heights: Of the root, relative to standing.
+        distances: Distances of the root from the face that is acted on [m].
+        heights: Heights of the root, relative to standing.
         leans: Pitch of the root the way of the act [rad].
         margin: Least margin of the feet about the CoM with no force and with all of it [N.m].
         torque_share: Largest share of a joint's strength.
         enough: Postures that act after which the best one is taken.
         palm_room: Distance of the palms to the face [m]: the wrist of our shapes is thicker than the hand.
-        samples: Of each limb.
+        samples: Number of samples of each limb.
         friction: Coulomb coefficient.
-        friction_model: Of feet and palms.
+        friction_model: Friction model of feet and palms.
     """
 
     distances: tuple[float, ...] = (0.60, 0.52, 0.68, 0.44, 0.76, 0.36, 0.30)
@@ -173,18 +171,19 @@ class _Search:
     def run(self, near: FloatArray, hands_by: Heuristic, feet_by: Heuristic) -> BraceResult:
         faces = self._faces()
         if not faces:
-            return self._failed(f"{self._act.obstacle} has no face against {self._act.kind}ing hands")
-        found: list[Brace] = []
+            reason = f"{self._act.obstacle} has no face against {self._act.kind}ing hands"
+            return BraceResult(None, self._tried, self._strongest, reason)
+        braces: list[Brace] = []
         for q in self._trunks(faces, near):
             self._tried += 1
             brace = self._at(q, hands_by, feet_by)
             if brace is not None:
-                found.append(brace)
-            if len(found) >= self._settings.enough:
+                braces.append(brace)
+            if len(braces) >= self._settings.enough:
                 break
-        if not found:
-            return self._failed(self._why())
-        best = min(found, key=lambda item: item.forces.torque_share)
+        if not braces:
+            return BraceResult(None, self._tried, self._strongest, self._why())
+        best = min(braces, key=lambda item: item.forces.torque_share)
         return BraceResult(best, self._tried, self._strongest)
 
     def _faces(self) -> list[Surface]:
@@ -203,7 +202,9 @@ class _Search:
         yaw = float(np.arctan2(facing[1], facing[0]))
         face = min(faces, key=lambda item: float((item.polygon @ facing).min()))
         depth = float((face.polygon @ facing).min())
-        middle = _beside(face.polygon @ across, float(near @ across))
+        sides = face.polygon @ across
+        low, high = float(sides.min()) + HANDS_ROOM, float(sides.max()) - HANDS_ROOM
+        middle = 0.5 * (low + high) if low >= high else float(np.clip(float(near @ across), low, high))
         size = stature_of(self._body) / 1.75
         forwards = 1.0 if act.kind is ActKind.PUSH else -1.0
         places = itertools.product(settings.leans, settings.heights, settings.distances)
@@ -256,7 +257,7 @@ class _Search:
         return Brace(q, feet, hands, forces, largest, margin)
 
     def _hands(self, q: FloatArray, heuristic: Heuristic) -> tuple[FloatArray, dict[str, Contact] | None]:
-        task, found = self._act.hand_task(ARMS), {}
+        task, hands = self._act.hand_task(ARMS), {}
         middle, across = np.array(q[:3]), np.array([-self._act.facing[1], self._act.facing[0], 0.0])
         order = heuristic
         for arm in ARMS:
@@ -268,13 +269,13 @@ class _Search:
                 self._reasons[_HANDS][f"{arm} prefers {answer.obstacle}"] += 1
                 return q, None
             q = answer.q
-            found[answer.contact.effector] = self._hold(answer.contact)
-            if len(found) == 2 and answer.score < 0.5 * BALANCED:
+            hands[answer.contact.effector] = self._hold(answer.contact)
+            if len(hands) == 2 and answer.score < 0.5 * BALANCED:
                 self._reasons[_HANDS]["the hands cannot act side by side"] += 1
                 return q, None
             alike = Mirrored(answer.contact.position, middle, across)
             order = WeightedSum([(1.0, heuristic), (BALANCED, alike)])
-        return q, found
+        return q, hands
 
     def _hold(self, contact: Contact) -> Contact:
         """The contact as one at which any force up to a hand's strength is felt."""
@@ -317,15 +318,6 @@ class _Search:
             f"with {act.force:g} N{best}{why}"
         )
 
-    def _failed(self, reason: str) -> BraceResult:
-        return BraceResult(None, self._tried, self._strongest, reason)
-
-
-def _beside(sides: FloatArray, wanted: float) -> float:
-    """Place across a face that is nearest to a wanted one and leaves room for both hands [m]."""
-    low, high = float(sides.min()) + HANDS_ROOM, float(sides.max()) - HANDS_ROOM
-    return 0.5 * (low + high) if low >= high else float(np.clip(wanted, low, high))
-
 
 REACHING_TIME = 1.2
 """Shortest time in which the hands go to the object [s]; our choice."""
@@ -343,12 +335,7 @@ def arrival(body: BodyModel, brace: Brace) -> Stage:
 
 
 def with_hands(body: BodyModel, way: ContactPlan, brace: Brace) -> ContactPlan:
-    """The way to the act and the hands put to the object, both at once.
-
-    Args:
-        way: Contacts from the start to the feet of the act.
-        brace: The posture that acts, on the feet of the way's last stage.
-    """
+    """The way to the feet of an act, and the hands put to the object, both at once."""
     last = way.stages[-1]
     reaching = Stage.of(body, last.contacts, last.q, REACHING_TIME, last.com_room)
     acting = Stage.of(body, {**last.contacts, **brace.hands}, brace.q, TOUCHING_TIME, ROOM)
