@@ -100,7 +100,15 @@ class KeyframeProgramme:
             SolverError: If the solver fails.
         """
         room = self._room()
-        points = room.points(room.most_margin()[0])
+        cost = np.zeros(room.basis.shape[1] + 1)
+        cost[-1] = -1.0
+        # The margin's unit makes its column as long as the others.
+        unit = 1.0 / float(np.median(room.slopes))
+        rows = np.column_stack([room.rows, unit * room.slopes])
+        result = linprog(cost, rows, room.bounds, bounds=(None, None), method="highs")
+        if not result.success:
+            raise SolverError(f"the linear programme of the key frames failed: {result.message}")
+        points = room.points(result.x[:-1])
         margins = self.margins(points)
         return points, float(margins.min()), int(np.argmin(margins))
 
@@ -139,20 +147,6 @@ class _Room:
         """(n + 1, 3) control points."""
         return self.particular + (self.basis @ y).reshape(3, -1).T
 
-    def most_margin(self) -> tuple[FloatArray, float]:
-        """Unknowns with the largest least margin, and that margin."""
-        cost = np.zeros(self.basis.shape[1] + 1)
-        cost[-1] = -1.0
-        # The margin's unit makes its column as long as the others.
-        unit = 1.0 / float(np.median(self.slopes))
-        found = linprog(
-            cost, np.column_stack([self.rows, unit * self.slopes]), self.bounds, bounds=(None, None),
-            method="highs",
-        )  # fmt: skip
-        if not found.success:
-            raise SolverError(f"the linear programme of the key frames failed: {found.message}")
-        return found.x[:-1], unit * float(found.x[-1])
-
 
 @dataclass(frozen=True, eq=False)
 class KeyframeSolution:
@@ -177,15 +171,15 @@ def build_keyframe_programme(
     positions: FloatArray,
     control_points: int,
 ) -> KeyframeProgramme:
-    """Write the programme of [Qiu2012]_ 5.3.2 for some key frames.
+    """Write the programme of [Qiu2012]_ 5.3.2 for (f,) times of key frames, both ends among them [s].
 
     Args:
         problem: Mass, degree, weights, margin and end conditions.
         polytopes: W_i of the phases about ``problem.reference``.
         schedule: Stances with their recorded instants [s].
-        times: (f,) key frames, both ends among them [s].
+        times: (f,) key frames [s].
         positions: (f, 3) CoM there [m].
-        control_points: Their number.
+        control_points: Number of control points.
     """
     duration = float(schedule.instants[-1])
     given = (

@@ -69,7 +69,10 @@ def with_violated(
 
 
 SHORTFALL_WEIGHT = 20.0
-"""First exact penalty of a margin below the required one [1/(N.m)] or [1/N]."""
+"""Exact penalty of a margin below the required one [1/(N.m)] or [1/N]."""
+
+DURATION_ROOM = 1e-7
+"""Distance kept from the total duration [s]."""
 
 LONGEST_PHASE = 20.0
 """Bound of a phase's duration where the problem gives none [s]; without it waiting has no end."""
@@ -82,14 +85,10 @@ class MarginTargets:
     Attributes:
         margin: Smallest margin [N.m] or [N].
         position: Distance kept from the geometric constraints and the support distance [m].
-        duration: Distance kept from the total duration [s].
-        shortfall_weight: Penalty of a smaller margin [1/(N.m)] or [1/N].
     """
 
     margin: float
     position: float = 3e-4
-    duration: float = 1e-7
-    shortfall_weight: float = SHORTFALL_WEIGHT
 
     @classmethod
     def of(cls, problem: CentroidalProblem) -> "MarginTargets":
@@ -107,9 +106,9 @@ class MarginTargets:
 
     def grown(self, problem: CentroidalProblem, certificate: Residuals) -> "MarginTargets":
         """Targets that make up for what the last solution broke between its samples."""
-        positions = ["support distance"] if problem.support_distance is not None else []
-        positions += [constraint.name for constraint in problem.geometric]
-        position = max((certificate[name].value for name in positions), default=0.0)
+        names = ["support distance"] if problem.support_distance is not None else []
+        names += [constraint.name for constraint in problem.geometric]
+        position = max((certificate[name].value for name in names), default=0.0)
         return replace(
             self,
             margin=self.margin + 1.2 * max(certificate["balance margin"].value, 0.0),
@@ -164,24 +163,25 @@ def optimise(
     bezier: FloatArray,
     durations: FloatArray,
 ) -> Attempt:
-    """Run the solver once from the given Bezier points and durations.
+    """Run the solver once from Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s].
 
     Args:
+        problem: What to find.
         polytopes: W_i of the phases about ``problem.reference``.
         facets: Indices of the facets imposed in each phase.
         targets: Bounds used at the samples.
-        bezier: (phases, k + 1, 3) [m].
-        durations: (phases,) [s].
+        bezier: Where to begin.
+        durations: Where to begin.
     """
     programme = build_programme(problem, facets)
-    lower, upper = _unknown_bounds(programme, problem, targets)
+    lower, upper = _unknown_bounds(programme, problem)
     row_lower, row_upper = _row_bounds(programme, problem, targets)
     unknowns = programme.pack_unknowns(
         bezier - problem.reference, durations, float(durations.sum()), problem.required_margin, 10.0
     )
     solution = programme.solver(
         x0=np.clip(unknowns, lower, upper),
-        p=programme.pack_parameters(_parameters(problem, polytopes, facets, targets)),
+        p=programme.pack_parameters(_parameters(problem, polytopes, facets)),
         lbx=lower, ubx=upper, lbg=row_lower, ubg=row_upper,
     )  # fmt: skip
     local, durations, margin = programme.unpack_unknowns(np.asarray(solution["x"], dtype=np.float64).ravel())
@@ -195,20 +195,14 @@ def optimise(
 
 
 def _parameters(
-    problem: CentroidalProblem,
-    polytopes: Sequence[WrenchPolytope],
-    facets: FacetIndices,
-    targets: MarginTargets,
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], facets: FacetIndices
 ) -> dict[str, object]:
     weights, reference = problem.weights, problem.reference
     values: dict[str, object] = {
-        "mass": problem.mass,
-        "weights": (weights.margin, weights.smoothness, weights.duration, targets.shortfall_weight),
-        "velocity": weights.velocity,
-        "acceleration": weights.acceleration,
-        "jerk": weights.jerk,
-        "reference": reference,
-    }
+        "mass": problem.mass, "reference": reference,
+        "weights": (weights.margin, weights.smoothness, weights.duration, SHORTFALL_WEIGHT),
+        "velocity": weights.velocity, "acceleration": weights.acceleration, "jerk": weights.jerk,
+    }  # fmt: skip
     for name in ("start_velocity", "start_acceleration", "goal_velocity", "goal_acceleration"):
         value = getattr(problem, name)
         values[name] = np.zeros(3) if value is None else value
@@ -216,30 +210,23 @@ def _parameters(
         # About the world origin the rows have one length all along; then they are given with length 1.
         fixed = problem.margin_space == "wrench_about_origin"
         length = row_slopes(polytope, problem, problem.start_com)[rows] if fixed else np.ones(len(rows))
-        values[f"H{index}"], values[f"h{index}"] = (
-            polytope.H[rows] / length[:, None],
-            polytope.h[rows] / length,
-        )
+        values[f"H{index}"] = polytope.H[rows] / length[:, None]
+        values[f"h{index}"] = polytope.h[rows] / length
         values[f"contacts{index}"] = [contact.position - reference for contact in phase.stance]
     for index, plane in enumerate(problem.key_planes):
-        values[f"normal{index}"], values[f"offset{index}"] = (
-            plane.normal,
-            plane.offset - plane.normal @ reference,
-        )
+        values[f"normal{index}"] = plane.normal
+        values[f"offset{index}"] = plane.offset - plane.normal @ reference
     return values
 
 
-def _unknown_bounds(
-    programme: ComProgram, problem: CentroidalProblem, targets: MarginTargets
-) -> tuple[FloatArray, FloatArray]:
+def _unknown_bounds(programme: ComProgram, problem: CentroidalProblem) -> tuple[FloatArray, FloatArray]:
     phases, k = programme.structure.phases, programme.structure.degree
     points = np.full((phases, k + 1, 3), np.inf)
     low, high = -points, points.copy()
     for bound in (low, high):
-        bound[0, 0], bound[-1, -1] = (
-            end - problem.reference for end in (problem.start_com, problem.goal_com)
-        )
-    total = np.inf if problem.max_duration is None else problem.max_duration - targets.duration
+        bound[0, 0] = problem.start_com - problem.reference
+        bound[-1, -1] = problem.goal_com - problem.reference
+    total = np.inf if problem.max_duration is None else problem.max_duration - DURATION_ROOM
     lower = programme.pack_unknowns(low, problem.min_durations, 0.0, -np.inf, 0.0)
     longest = np.maximum(LONGEST_PHASE, 2.0 * problem.min_durations)
     upper = programme.pack_unknowns(high, np.minimum(problem.max_durations, longest), total, np.inf, np.inf)

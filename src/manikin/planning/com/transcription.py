@@ -39,7 +39,7 @@ class ComStructure:
 
     Attributes:
         degree: Degree of the spline.
-        samples: n_s.
+        samples: n_s, samples of each phase but one.
         rows: Number of facets imposed in each phase.
         contacts: Number of contacts of each phase.
         margin_space: What the margin measures.
@@ -89,11 +89,10 @@ class ComProgram:
 
     def pack_parameters(self, values: dict[str, Any]) -> FloatArray:
         """Parameter vector from arrays by name."""
-        packed = []
-        for name, shape in self.parameters:
-            array = np.asarray(values[name], dtype=np.float64).reshape(shape)
-            packed.append(array.ravel(order="F"))
-        return np.concatenate(packed)
+        return np.concatenate([
+            np.asarray(values[name], dtype=np.float64).reshape(shape).ravel(order="F")
+            for name, shape in self.parameters
+        ])  # fmt: skip
 
     def pack_unknowns(
         self, bezier: FloatArray, durations: FloatArray, total: float, margin: float, shortfall: float
@@ -155,35 +154,21 @@ def transcribe(structure: ComStructure) -> ComProgram:
     objective = _objective(builder)
     bezier = [ca.vec(points) for points in builder.bezier]
     unknowns = ca.vertcat(*bezier, builder.durations, builder.total, builder.margin, builder.shortfall)
-    problem = {
-        "x": unknowns,
-        "p": ca.vertcat(*[ca.vec(p) for p in builder.parameters.values()]),
-        "f": objective,
-        "g": ca.vertcat(*builder.rows),
-    }
+    parameters = ca.vertcat(*[ca.vec(p) for p in builder.parameters.values()])
+    problem = {"x": unknowns, "p": parameters, "f": objective, "g": ca.vertcat(*builder.rows)}
     shapes = tuple((name, p.shape) for name, p in builder.parameters.items())
     return ComProgram(structure, _compile(problem), tuple(builder.groups), shapes)
 
 
 def _compile(problem: dict[str, ca.SX]) -> ca.Function:
+    ipopt = {
+        "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "adaptive_mu_globalization": "kkt-error",
+        "alpha_for_y": "min-dual-infeas", "max_iter": 250, "tol": 1e-5, "constr_viol_tol": 1e-8,
+        "bound_relax_factor": 0.0, "linear_solver": "mumps",
+    }  # fmt: skip
     options = {
-        "print_time": False,
-        "error_on_fail": False,
-        "calc_lam_p": False,
-        "no_nlp_grad": True,
-        "ipopt": {
-            "print_level": 0,
-            "sb": "yes",
-            "mu_strategy": "adaptive",
-            "adaptive_mu_globalization": "kkt-error",
-            "alpha_for_y": "min-dual-infeas",
-            "max_iter": 250,
-            "tol": 1e-5,
-            "constr_viol_tol": 1e-8,
-            "bound_relax_factor": 0.0,
-            "linear_solver": "mumps",
-        },
-    }
+        "print_time": False, "error_on_fail": False, "calc_lam_p": False, "no_nlp_grad": True, "ipopt": ipopt,
+    }  # fmt: skip
     return ca.nlpsol("timing_free", "ipopt", problem, options)
 
 
