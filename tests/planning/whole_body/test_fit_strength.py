@@ -29,7 +29,9 @@ def states_of(body, rng, n=3):
 def held_of(body, states, rng):
     """Each foot pressed with up to the body's weight somewhere near it."""
     model = body.pinocchio
-    joints = tuple(model.frames[body.effector_frame(name)].parentJoint for name in ("left_foot", "right_foot"))
+    joints = tuple(
+        model.frames[body.effector_frame(name)].parentJoint for name in ("left_foot", "right_foot")
+    )
     force = np.hstack([rng.uniform(-100, 100, (2, 2)), rng.uniform(200, 700, (2, 1))])
     point = np.array([[0.1, 0.2, 0.0], [0.0, -0.2, 0.0]])
     wrench = np.hstack([force, np.cross(point, force)])

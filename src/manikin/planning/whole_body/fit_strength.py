@@ -1,6 +1,6 @@
 """Joint torques beyond the strength as residuals of the whole-body fit, with their derivatives.
 
-The contact forces of an earlier motion are held, in world axes at their contacts, and the torques that inverse
+The contact forces of an earlier motion are held where they act, and the torques that inverse
 dynamics then asks of the joints are differentiated by posture and acceleration
 (:func:`pinocchio.computeRNEADerivatives`). With the centre of mass and the momentum on their plan the forces
 of a single support hardly depend on the posture, so that a step along these derivatives is one of the true
@@ -42,9 +42,7 @@ class HeldForces:
     hinges: tuple[int, ...]
 
     @classmethod
-    def of(
-        cls, body: BodyModel, schedule: ContactSchedule, motion: Motion, time: FloatArray
-    ) -> "HeldForces":
+    def of(cls, body: BodyModel, schedule: ContactSchedule, motion: Motion, time: FloatArray) -> "HeldForces":
         """Contact forces of a motion at other times.
 
         Args:
