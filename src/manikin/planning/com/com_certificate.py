@@ -167,7 +167,6 @@ def measure(
         shortfall,
         *_end_residuals(problem, trajectory),
         *_position_residuals(problem, trajectory, times),
-        *_key_plane_residuals(problem, trajectory),
         *_duration_residuals(problem, trajectory),
     )
     zmp = least_zmp_distance(
@@ -217,20 +216,13 @@ def _position_residuals(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: list[FloatArray]
 ) -> Iterator[Residual]:
     for requirement, excess in position_excess(problem, trajectory, times):
-        yield _worst(requirement, excess, times)
-
-
-def _key_plane_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
+        phase = int(np.argmax([values.max() for values in excess]))
+        worst = int(np.argmax(excess[phase]))
+        yield Residual(requirement, float(excess[phase][worst]), "m", phase, float(times[phase][worst]))
     for index, plane in enumerate(problem.key_planes):
         time = float(trajectory.schedule.instants[plane.key])
         beyond = float(plane.violation(trajectory.position(time)))
         yield Residual(f"key plane {index} at T_{plane.key}", beyond, "m", plane.key - 1, time)
-
-
-def _worst(requirement: str, values: list[FloatArray], times: list[FloatArray]) -> Residual:
-    phase = int(np.argmax([value.max() for value in values]))
-    index = int(np.argmax(values[phase]))
-    return Residual(requirement, float(values[phase][index]), "m", phase, float(times[phase][index]))
 
 
 def _duration_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:

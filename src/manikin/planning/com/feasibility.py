@@ -35,7 +35,8 @@ def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str
     """Say that the friction is too low to stand still on the slopes of a stance, or None."""
     if any(contact.kind is ContactKind.GRASP for contact in stance) or not len(stance):
         return None
-    steepness = [(_slope(contact.normal), contact) for contact in stance]
+    slopes = [float(np.arccos(np.clip(contact.normal[2], -1.0, 1.0))) for contact in stance]
+    steepness = list(zip(slopes, stance, strict=True))
     if not all(np.tan(angle) > contact.friction for angle, contact in steepness):
         return None
     try:
@@ -48,11 +49,6 @@ def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str
         f"nobody can stand on {', '.join(stance.effectors)}: a slope of {np.degrees(angle):.1f} degrees "
         f"needs a friction of at least {np.tan(angle):.2f}, {contact.effector} has {contact.friction:g}"
     )
-
-
-def _slope(normal: FloatArray) -> float:
-    """Angle of a surface to the horizontal [rad]."""
-    return float(np.arccos(np.clip(normal[2], -1.0, 1.0)))
 
 
 def low_friction(
@@ -228,11 +224,12 @@ def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]
     emptiness of the intersections (Proposition 1) and the bound of the margin in them against the required
     one (Proposition 2), then whether any acceleration balances the CoM at the start and at the goal.
     """
-    radii = _bounds(problem, polytopes)
+    radii, last = _bounds(problem, polytopes), len(problem.sequence) - 1
     failure = (
         _duration_failure(problem)
         or _reach_failure(problem)
-        or _end_failure(problem)
+        or misplaced(problem, problem.start_com, (0,), "start CoM")
+        or misplaced(problem, problem.goal_com, (last,), "goal CoM")
         or _weight_failure(problem, polytopes)
         or _slope_failure(problem, polytopes)
         or _intersection_failure(problem, radii)
@@ -245,12 +242,9 @@ def _bounds(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> FloatA
     """Upper bounds of the margin at the key instants; of forces only the sign counts."""
     if problem.margin_space != "wrench_about_origin":
         return margin_bounds(polytopes)
-    return intersection_radii([_about_origin(polytope, problem.reference) for polytope in polytopes])
-
-
-def _about_origin(polytope: Polytope, reference: FloatArray) -> Polytope:
-    H = polytope.H
-    return Polytope(np.hstack([H[:, :3] - np.cross(H[:, 3:], reference), H[:, 3:]]), polytope.h)
+    forces = [p.H[:, :3] - np.cross(p.H[:, 3:], problem.reference) for p in polytopes]
+    about_origin = [np.hstack([f, p.H[:, 3:]]) for f, p in zip(forces, polytopes, strict=True)]
+    return intersection_radii([Polytope(H, p.h) for H, p in zip(about_origin, polytopes, strict=True)])
 
 
 def _largest_distance(polytope: Polytope, lengths: FloatArray) -> float:
@@ -270,13 +264,6 @@ def _duration_failure(problem: CentroidalProblem) -> Failure | None:
         "durations",
         f"the phases last at least {shortest:.3f} s together, longer than max_duration "
         f"{problem.max_duration:.3f} s",
-    )
-
-
-def _end_failure(problem: CentroidalProblem) -> Failure | None:
-    last = len(problem.sequence) - 1
-    return misplaced(problem, problem.start_com, (0,), "start CoM") or misplaced(
-        problem, problem.goal_com, (last,), "goal CoM"
     )
 
 

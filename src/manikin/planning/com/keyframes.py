@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from manikin.balance import WrenchPolytope
-from manikin.contact import ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com.com_certificate import (
     TOLERANCE,
@@ -29,7 +28,6 @@ from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajec
 from manikin.planning.com.feasibility import (
     VANISHING_MARGIN,
     Failure,
-    Feasibility,
     assess_feasibility,
     best_margin_at,
     misplaced,
@@ -113,8 +111,11 @@ class _Search:
     def run(self) -> KeyframeResult:
         began = clock.perf_counter()
         self.polytopes = polytopes_of(self.problem.requirements)
-        feasibility = _assess(self.problem, self.polytopes)
-        failure, attempt = feasibility.failure, None
+        # Propositions 1 and 2 and the ends, then each recorded position by itself.
+        feasibility = assess_feasibility(self.problem.requirements, self.polytopes)
+        failure, attempt = feasibility.failure or _position_failure(self.problem), None
+        failure = failure or _key_frame_failure(self.problem, self.polytopes)
+        feasibility = replace(feasibility, failure=failure)
         if failure is None:
             first = tuple(self.problem.recording.key_frames.tolist())
             attempt = self._solve(first)
@@ -223,13 +224,6 @@ class _Search:
         )  # fmt: skip
 
 
-def _assess(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Feasibility:
-    """Propositions 1 and 2 and the ends, then each recorded position by itself."""
-    found = assess_feasibility(problem.requirements, polytopes)
-    failure = found.failure or _position_failure(problem) or _key_frame_failure(problem, polytopes)
-    return replace(found, failure=failure)
-
-
 def _position_failure(problem: KeyframeProblem) -> Failure | None:
     """Find a key frame whose recorded position breaks a constraint; passing it, the motion would as well."""
     recording = problem.recording
@@ -253,7 +247,9 @@ def _key_frame_failure(problem: KeyframeProblem, polytopes: Sequence[WrenchPolyt
             both = both.intersection(polytopes[phase])
         margin = best_margin_at(both, requirements, com, None)
         if margin <= max(requirements.required_margin, VANISHING_MARGIN):
-            held = _shared(schedule, phases)
+            stances = [schedule.sequence[phase].stance for phase in phases]
+            names = [name for name in stances[0].effectors if all(name in stance for stance in stances)]
+            held = ", ".join(names) or "no contact"
             return Failure(
                 "key frame balance",
                 f"recorded CoM {np.round(com, 3).tolist()} of key frame {number} at {time:.3f} s reaches a "
@@ -262,13 +258,6 @@ def _key_frame_failure(problem: KeyframeProblem, polytopes: Sequence[WrenchPolyt
                 phases[-1], time, held,
             )  # fmt: skip
     return None
-
-
-def _shared(schedule: ContactSchedule, phases: Sequence[int]) -> str:
-    """Contacts held in all of some phases."""
-    stances = [schedule.sequence[phase].stance for phase in phases]
-    names = [name for name in stances[0].effectors if all(name in stance for stance in stances)]
-    return ", ".join(names) or "no contact"
 
 
 def _measure(

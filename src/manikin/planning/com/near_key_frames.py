@@ -115,10 +115,11 @@ class NearProgramme:
         duration = float(schedule.instants[-1])
         spans = max(1, round(duration / KNOT_SPACING))
         knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, spans + 1))
+        costs = {1: weights.velocity[0], 2: weights.acceleration[0], 3: weights.jerk[0]}
         times, phases = _instants(schedule)
         shares = np.minimum(times / duration, 1.0)
         return cls(
-            mass, polytopes[0].reference, tuple(polytopes), knots, _smoothness(knots, duration, weights),
+            mass, polytopes[0].reference, tuple(polytopes), knots, _squared(knots, duration, costs),
             _turning(knots, duration, recording), phases,
             basis_matrix(DEGREE, knots, shares), basis_matrix(DEGREE, knots, shares, 2) / duration**2,
         )  # fmt: skip
@@ -190,7 +191,8 @@ class NearProgramme:
             bound = polytope.h - margin[phase] * length + by_acceleration @ gravity + moment @ np.cross(p, b)
             still = bound - by_acceleration @ (b + gravity) - by_position @ p
             bound += by_position @ self.reference
-            for turn in self._turns(polytope):
+            # Derivatives (facets, 3) by the turning: None of the point mass, those of the body that turns.
+            for turn in (None,) if self.turning is None else (None, TURN * polytope.H[:, 3:]):
                 room = still - (0.0 if turn is None else turn @ (self.position[row] @ near[:, 3:]))
                 chosen = np.argsort(room / length, kind="stable")[:FACETS]
                 block = (
@@ -214,10 +216,6 @@ class NearProgramme:
                 bounds.append((bound[chosen] - spare * length[chosen]) / scale)
         return sparse.vstack(blocks).tocsc(), np.concatenate(bounds)
 
-    def _turns(self, polytope: WrenchPolytope) -> list[FloatArray | None]:
-        """Derivatives (facets, 3) by the turning: None of the point mass, those of the body that turns."""
-        return [None] if self.turning is None else [None, TURN * polytope.H[:, 3:]]
-
 
 def _instants(schedule: ContactSchedule) -> tuple[FloatArray, np.ndarray]:
     times, phases = [], []
@@ -238,12 +236,6 @@ def _turning(
     pull = TURN_PULL / len(basis) * basis.T
     bend = _squared(knots, duration, {2: TURN_BEND})
     return pull @ basis + bend, -pull @ recording.angular_momentum_rate / TURN
-
-
-def _smoothness(knots: FloatArray, duration: float, weights: Weights) -> FloatArray:
-    """(n, n) objective of the CoM's derivatives, the first entry of each weight."""
-    kinds = (weights.velocity, weights.acceleration, weights.jerk)
-    return _squared(knots, duration, {order: kind[0] for order, kind in enumerate(kinds, start=1)})
 
 
 def _squared(knots: FloatArray, duration: float, costs: Mapping[int, float]) -> FloatArray:
@@ -336,7 +328,8 @@ class _Search:
         feasibility = assess_feasibility(self.problem.requirements, self.polytopes)
         failure, best = _hopeless(feasibility), None
         if failure is None:
-            best = self._best()
+            # The nearest of the balanced attempts, each with more key frames than the one before.
+            best = min(self._attempts(), key=self._order, default=None)
             failure = self._explain(best)
         succeeded = best is not None and failure is None
         distance = np.full(len(self.recording.time), np.nan) if best is None else self._distance(best)
@@ -350,14 +343,6 @@ class _Search:
             rounds=self.rounds, wall_time=clock.perf_counter() - began, keyframes=self.problem, frames=frames,
             added=tuple(frame for frame in frames if frame not in changes), distance=distance,
         )  # fmt: skip
-
-    def _best(self) -> _Attempt | None:
-        """The nearest of the balanced attempts, each with more key frames than the one before."""
-        best = None
-        for attempt in self._attempts():
-            if best is None or self._order(attempt) < self._order(best):
-                best = attempt
-        return best
 
     def _attempts(self) -> Iterator[_Attempt]:
         frames, start = tuple(self.recording.key_frames.tolist()), None

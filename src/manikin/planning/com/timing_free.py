@@ -309,16 +309,12 @@ def _rounds(
         kept = min(float(values[rows].min()) for values, rows in zip(distances, facets, strict=True))
         more_facets = with_violated(facets, distances, kept - NEGLIGIBLE * abs(kept))
         enough = all(len(new) == len(old) for new, old in zip(more_facets, facets, strict=True))
-        if enough and (attempt.certificate.within() or _hopeless(attempt, targets)):
-            return
+        hopeless = not attempt.converged or attempt.margin < targets.margin - 1e-3
+        if enough and (attempt.certificate.within() or hopeless):
+            return  # a violation that is more than an effect of sampling stays
         if enough:
             targets = targets.grown(problem, attempt.certificate)
         facets, bezier, durations = more_facets, attempt.bezier, attempt.durations
-
-
-def _hopeless(attempt: Attempt, targets: MarginTargets) -> bool:
-    """Whether a violation is more than an effect of sampling."""
-    return not attempt.converged or attempt.margin < targets.margin - 1e-3
 
 
 def limiting_at(

@@ -7,11 +7,9 @@ from manikin.planning.contacts.contact_plan import (
     PlanCertificate,
     Stage,
     certify_plan,
-    make_contact,
 )
 from manikin.planning.contacts.depth_first import Extension, GuideLine, heading_of
 from manikin.planning.contacts.efort import (
-    Ellipsoid,
     Task,
     efort,
     force_ellipsoid,
@@ -45,11 +43,10 @@ from manikin.planning.contacts.heuristics import (
     StrongEfort,
     WeightedSum,
     duration,
-    heuristic_named,
 )
 from manikin.planning.contacts.limb_collisions import LimbCollisions
 from manikin.planning.contacts.limb_places import Footholds, LimbPlaces
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
+from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
 from manikin.planning.contacts.samples import (
     LimbSamples,
     manipulability,
@@ -69,7 +66,6 @@ __all__ = [
     "ContactRules",
     "Duration",
     "Efort",
-    "Ellipsoid",
     "Endpoint",
     "Endpoints",
     "ExtendSettings",
@@ -87,7 +83,6 @@ __all__ = [
     "LimbSamples",
     "Manipulability",
     "PlanCertificate",
-    "Posed",
     "PostureFinder",
     "PostureFinderSettings",
     "Random",
@@ -106,8 +101,6 @@ __all__ = [
     "force_ellipsoid",
     "force_transmission_ratio",
     "heading_of",
-    "heuristic_named",
-    "make_contact",
     "manipulability",
     "mirrored",
     "pulling_efort",

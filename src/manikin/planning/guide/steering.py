@@ -88,7 +88,8 @@ class LocalPlanner:
 
         The answer does not depend on the order of the two.
         """
-        first, second = _ordered(first, second)
+        if tuple(first) > tuple(second):
+            first, second = second, first
         count = self.checker.steps_between(first, second)
         poses = between(first, second, np.arange(count + 1) / count)
         return self.poses_hold(poses, ends_hold=True)
@@ -155,11 +156,6 @@ class LocalPlanner:
         if angles_between(first, second) > 1e-9 and self.rotate_at(first, second, turn_at):
             return Way(turn_at)
         return None
-
-
-def _ordered(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The two in an order that does not depend on how they came."""
-    return (first, second) if tuple(first) <= tuple(second) else (second, first)
 
 
 _ORDERS: dict[int, list[int]] = {}

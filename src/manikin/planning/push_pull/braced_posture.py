@@ -169,7 +169,11 @@ class _Search:
         self._strongest = 0.0
 
     def run(self, near: FloatArray, hands_by: Heuristic, feet_by: Heuristic) -> BraceResult:
-        faces = self._faces()
+        faces = [
+            face
+            for face in self._scene.surfaces
+            if face.obstacle == self._act.obstacle and float(face.normal @ self._act.facing) < -0.7
+        ]
         if not faces:
             reason = f"{self._act.obstacle} has no face against {self._act.kind}ing hands"
             return BraceResult(None, self._tried, self._strongest, reason)
@@ -185,14 +189,6 @@ class _Search:
             return BraceResult(None, self._tried, self._strongest, self._why())
         best = min(braces, key=lambda item: item.forces.torque_share)
         return BraceResult(best, self._tried, self._strongest)
-
-    def _faces(self) -> list[Surface]:
-        """Surfaces of the object that look at the body."""
-        return [
-            face
-            for face in self._scene.surfaces
-            if face.obstacle == self._act.obstacle and float(face.normal @ self._act.facing) < -0.7
-        ]
 
     def _trunks(self, faces: list[Surface], near: FloatArray) -> Iterator[FloatArray]:
         """Postures before the nearest face, the trunk at the settings' places."""
@@ -269,21 +265,18 @@ class _Search:
                 self._reasons[_HANDS][f"{arm} prefers {answer.obstacle}"] += 1
                 return q, None
             q = answer.q
-            hands[answer.contact.effector] = self._hold(answer.contact)
+            # Held so that any force up to a hand's strength is felt.
+            contact, away = answer.contact, self._settings.palm_room * answer.contact.normal
+            hands[contact.effector] = grasp(
+                contact.effector, contact.position + away, max_force=self._rules.grasp_force,
+                rotation=contact.rotation_contact_to_world,
+            )  # fmt: skip
             if len(hands) == 2 and answer.score < 0.5 * BALANCED:
                 self._reasons[_HANDS]["the hands cannot act side by side"] += 1
                 return q, None
             alike = Mirrored(answer.contact.position, middle, across)
             order = WeightedSum([(1.0, heuristic), (BALANCED, alike)])
         return q, hands
-
-    def _hold(self, contact: Contact) -> Contact:
-        """The contact as one at which any force up to a hand's strength is felt."""
-        away = self._settings.palm_room * contact.normal
-        return grasp(
-            contact.effector, contact.position + away, max_force=self._rules.grasp_force,
-            rotation=contact.rotation_contact_to_world,
-        )  # fmt: skip
 
     def _feet(
         self, q: FloatArray, loads: Loads, heuristic: Heuristic
