@@ -136,10 +136,7 @@ def phase_margins(
 
 
 def facet_margins(
-    problem: CentroidalProblem,
-    trajectory: CentroidalTrajectory,
-    polytope: WrenchPolytope,
-    times: FloatArray,
+    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytope: WrenchPolytope, times: FloatArray
 ) -> Iterator[FloatArray]:
     """(up to 1024, facets) distances to every facet at the given times, in blocks [N.m] or [N]."""
     for start in range(0, len(times), _BLOCK):

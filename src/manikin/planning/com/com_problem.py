@@ -74,21 +74,21 @@ class CentroidalTrajectory(Displayed):
         """
         if self.turning is not None or other.turning is not None:
             raise SplineError("trajectories that turn cannot be joined; valid: those of point masses")
-        k, here, there = self.spline.degree, self.spline, other.spline
+        k, leading, following = self.spline.degree, self.spline, other.spline
         gaps = [
             float(np.abs(self._derivative(self.duration, d) - other._derivative(0.0, d)).max())
             for d in range(3)
         ]
-        if there.degree != k or max(gaps) > 1e-4:
+        if following.degree != k or max(gaps) > 1e-4:
             raise SplineError(
-                f"trajectories of degrees {k} and {there.degree} meet with gaps of {gaps[0]:.2g} m, "
+                f"trajectories of degrees {k} and {following.degree} meet with gaps of {gaps[0]:.2g} m, "
                 f"{gaps[1]:.2g} m/s and {gaps[2]:.2g} m/s^2; valid: one degree, and the second starts as the "
                 "first ends"
             )
         total = self.duration + other.duration
         first, second = (
-            here.knots * (self.duration / total),
-            1.0 - (1.0 - there.knots) * (other.duration / total),
+            leading.knots * (self.duration / total),
+            1.0 - (1.0 - following.knots) * (other.duration / total),
         )
         # Two continuous derivatives: the joint is k - 2 knots.
         joint = np.full(k - 2, self.duration / total)
@@ -97,11 +97,11 @@ class CentroidalTrajectory(Displayed):
         times = np.unique(np.concatenate([np.linspace(a, b, 4 * k) for a, b in itertools.pairwise(inner)]))
         before = times <= joint[0]
         wanted = np.concatenate([
-            here(np.clip(times[before] * total / self.duration, 0.0, 1.0)),
-            there(np.clip(1.0 - (1.0 - times[~before]) * total / other.duration, 0.0, 1.0)),
+            leading(np.clip(times[before] * total / self.duration, 0.0, 1.0)),
+            following(np.clip(1.0 - (1.0 - times[~before]) * total / other.duration, 0.0, 1.0)),
         ])  # fmt: skip
         spline = BSpline.fit(
-            k, knots, times, wanted, first=here.control_points[:1], last=there.control_points[-1:]
+            k, knots, times, wanted, first=leading.control_points[:1], last=following.control_points[-1:]
         )
         phases = (*self.schedule.sequence, *other.schedule.sequence)
         instants = np.concatenate([self.schedule.instants, self.duration + other.schedule.instants[1:]])
@@ -241,7 +241,6 @@ class CentroidalProblem:
         margin_space: Whether the margin is a wrench [N.m] or a force at the CoM [N].
         required_margin: d_min must not be smaller (5.21) [N.m] or [N].
         support_distance: Largest distance of the CoM from every active contact (5.26) [m].
-        geometric: Further constraints on the CoM position.
         key_planes: Planes behind which the CoM must be at single key instants, neither the first nor the
             last, where the CoM is given.
         max_duration: Longest duration of the whole motion [s].

@@ -252,8 +252,8 @@ def _largest_distance(polytope: Polytope, lengths: FloatArray) -> float:
     cost = np.zeros(polytope.dimension + 1)
     cost[-1] = -1.0
     rows = np.column_stack([polytope.H, lengths])
-    found = linprog(cost, rows, polytope.h, bounds=(None, None), method="highs")
-    return float(found.x[-1]) if found.success else np.inf
+    result = linprog(cost, rows, polytope.h, bounds=(None, None), method="highs")
+    return float(result.x[-1]) if result.success else np.inf
 
 
 def _duration_failure(problem: CentroidalProblem) -> Failure | None:
@@ -268,11 +268,7 @@ def _duration_failure(problem: CentroidalProblem) -> Failure | None:
 
 
 def misplaced(
-    problem: CentroidalProblem,
-    com: FloatArray,
-    phases: Sequence[int],
-    what: str,
-    tolerance: float = ROUNDING,
+    problem: CentroidalProblem, com: FloatArray, phases: Sequence[int], what: str, tolerance: float = ROUNDING
 ) -> Failure | None:
     """Failure of a CoM position that is too far from a contact or breaks a constraint, or None.
 
@@ -355,8 +351,8 @@ def _largest_lift(polytope: Polytope) -> float:
     """Largest upward force of any admissible wrench [N]."""
     cost = np.zeros(polytope.dimension)
     cost[2] = -1.0
-    found = linprog(cost, polytope.H, polytope.h, bounds=(None, None), method="highs")
-    return -float(found.fun) if found.success else np.inf
+    result = linprog(cost, polytope.H, polytope.h, bounds=(None, None), method="highs")
+    return -float(result.fun) if result.success else np.inf
 
 
 def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Failure | None:
@@ -429,8 +425,8 @@ def best_margin_at(
     if acceleration is not None:
         return float(np.min((still - polytope.H @ gain @ acceleration) / slopes))
     rows = np.column_stack([polytope.H @ gain, slopes])
-    found = linprog([0.0, 0.0, 0.0, -1.0], rows, still, bounds=(None, None), method="highs")
-    return float(found.x[-1]) if found.success else np.inf
+    result = linprog([0.0, 0.0, 0.0, -1.0], rows, still, bounds=(None, None), method="highs")
+    return float(result.x[-1]) if result.success else np.inf
 
 
 def row_slopes(polytope: Polytope, problem: CentroidalProblem, com: FloatArray) -> FloatArray:

@@ -38,7 +38,6 @@ class KeyframeProgramme:
     with the margin d.
 
     Attributes:
-        degree: Degree of the spline.
         knots: (n + k + 2,) on [0, 1].
         equalities: (e, n + 1) E.
         values: (e, 3) [m].
@@ -82,14 +81,14 @@ class KeyframeProgramme:
         """
         room = self._room()
         limits = room.bounds - room.slopes * (margin + TIGHTENING)
-        found, _, flag, info = daqp.solve(
+        y, _, flag, info = daqp.solve(
             np.eye(room.basis.shape[1]), room.gradient, room.rows, limits,
             np.full(len(room.rows), -_NO_BOUND), np.zeros(len(room.rows), dtype=np.int32), primal_tol=1e-9,
         )  # fmt: skip
         if flag != 1:
             return None
         multipliers = np.array(info["lam"]) / room.scale
-        return KeyframeSolution(room.points(np.array(found)), multipliers, int(info["iterations"]))
+        return KeyframeSolution(room.points(np.array(y)), multipliers, int(info["iterations"]))
 
     def most_margin(self) -> tuple[FloatArray, float, int]:
         """Control points with the largest least margin at the key frames, that margin, and its row.

@@ -34,11 +34,7 @@ from manikin.planning.com.feasibility import (
     polytopes_of,
 )
 from manikin.planning.com.keyframe_problem import KeyframeProblem
-from manikin.planning.com.keyframe_spline import (
-    KeyframeProgramme,
-    build_keyframe_programme,
-    phases_touching,
-)
+from manikin.planning.com.keyframe_spline import KeyframeProgramme, build_keyframe_programme, phases_touching
 from manikin.planning.com.timing_free import CentroidalResult, missed_margin
 
 MAX_ROUNDS = 30
@@ -267,13 +263,13 @@ def _measure(
     frames: Sequence[int],
 ) -> Residuals:
     """Measure the requirements every millisecond, and the distance from the recording at the key frames."""
-    found = measure(problem.requirements, trajectory, polytopes)
+    certificate = measure(problem.requirements, trajectory, polytopes)
     times = problem.recording.time[list(frames)]
     errors = np.linalg.norm(trajectory.position(times) - problem.recording.com[list(frames)], axis=1)
     worst = int(np.argmax(errors))
     phase = int(trajectory.schedule.phase_at(times[worst]))
     distance = Residual("key frame position", float(errors[worst]), "m", phase, float(times[worst]))
-    return replace(found, items=(*found.items, distance))
+    return replace(certificate, items=(*certificate.items, distance))
 
 
 def _violations(

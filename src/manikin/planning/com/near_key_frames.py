@@ -368,11 +368,11 @@ class _Search:
         margin, attempt = np.full(len(self.polytopes), required + SPARE), None
         for _ in range(LINEARISATIONS):
             self.rounds += 1
-            found = self.programme.solve(shares, wanted, margin, points)
-            if found is None:
+            solution = self.programme.solve(shares, wanted, margin, points)
+            if solution is None:
                 return attempt
-            moved = float(np.abs(found[0] - points).max())
-            points, self.iterations = found[0], self.iterations + found[1]
+            moved = float(np.abs(solution[0] - points).max())
+            points, self.iterations = solution[0], self.iterations + solution[1]
             if moved > STILL:
                 continue
             attempt = self._measured(frames, points)
@@ -395,8 +395,8 @@ class _Search:
 
     def _margins(self, attempt: _Attempt) -> list[FloatArray]:
         """Margins of each phase, the lesser of the point mass and of the body that turns [N.m]."""
-        found = [phase_margins(attempt.problem, way, self.polytopes) for way in _ways(attempt.trajectory)]
-        return [np.minimum.reduce(margins) for margins in zip(*found, strict=True)]
+        both = [phase_margins(attempt.problem, way, self.polytopes) for way in _ways(attempt.trajectory)]
+        return [np.minimum.reduce(margins) for margins in zip(*both, strict=True)]
 
     def _distance(self, attempt: _Attempt) -> FloatArray:
         offset = attempt.trajectory.position(self.recording.time) - self.recording.com
@@ -404,13 +404,13 @@ class _Search:
 
     def _straying(self, attempt: _Attempt) -> list[int]:
         """The farthest sample between each two key frames, where it is too far off and not too near them."""
-        distance, time, found = self._distance(attempt), self.recording.time, []
+        distance, time, frames = self._distance(attempt), self.recording.time, []
         for before, after in zip(attempt.frames[:-1], attempt.frames[1:], strict=True):
             away = np.minimum(time - time[before], time[after] - time)
             usable = np.where(away >= self.problem.frame_spacing - TOLERANCE, distance, 0.0)
             if usable.max() > STRAY:
-                found.append(int(np.argmax(usable)))
-        return found
+                frames.append(int(np.argmax(usable)))
+        return frames
 
     def _explain(self, best: _Attempt | None) -> Failure | None:
         if best is None:

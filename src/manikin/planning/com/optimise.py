@@ -122,7 +122,6 @@ class Attempt:
 
     Attributes:
         trajectory: Whatever the solver ended with.
-        certificate: Its residuals.
         bezier: (phases, k + 1, 3) Bezier points [m], to start again from.
         durations: (phases,) [s].
         iterations: Iterations of the solver.

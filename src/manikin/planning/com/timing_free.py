@@ -157,8 +157,8 @@ def can_rest(polytope: WrenchPolytope, mass: float) -> bool:
     """
     weight = -mass * GRAVITY_VECTOR
     rows, bounds = polytope.H[:, 3:] @ -skew(weight), polytope.h - polytope.H[:, :3] @ weight
-    found = linprog(np.zeros(3), rows, bounds, bounds=(None, None), method="highs")
-    return found.status != INFEASIBLE
+    result = linprog(np.zeros(3), rows, bounds, bounds=(None, None), method="highs")
+    return result.status != INFEASIBLE
 
 
 def _guess_key_positions(problem: CentroidalProblem, instants: FloatArray, pull: float) -> FloatArray:
@@ -186,10 +186,8 @@ class CentroidalResult(Displayed):
     """A trajectory with its certificate, or why there is none.
 
     Attributes:
-        problem: What was asked.
         polytopes: W_i of the phases about ``problem.reference``.
         feasibility: Upper bounds of the margin at the key instants.
-        failure: Why it failed, or None.
         trajectory: The trajectory; None when it failed.
         certificate: Requirements measured every millisecond; of the best attempt when it
             failed, None when nothing was attempted.
@@ -346,17 +344,18 @@ def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], be
     The required margin is penalised and not imposed, so that an attempt that breaks nothing
     else has the largest margin that was found.
     """
-    found, worst = best.certificate, best.certificate.largest
+    certificate, worst = best.certificate, best.certificate.largest
     barrier = next((item for item in problem.geometric if item.impassable), None)
     if barrier is not None:
-        at = found[barrier.name]
+        at = certificate[barrier.name]
         return Failure(barrier.name, f"{barrier.impassable}; no way around it was found", at.phase, at.time)
     if worst.requirement != "balance margin":
         return Failure(
             worst.requirement, f"no trajectory found: {worst} in the best attempt", worst.phase, worst.time
         )
-    what = f"the largest margin found is {found.min_margin:.2f}"
-    return missed_margin(problem, best.trajectory, polytopes, found.limiting_phase, found.limiting_time, what)
+    what = f"the largest margin found is {certificate.min_margin:.2f}"
+    phase, instant = certificate.limiting_phase, certificate.limiting_time
+    return missed_margin(problem, best.trajectory, polytopes, phase, instant, what)
 
 
 def missed_margin(

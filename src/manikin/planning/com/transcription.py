@@ -38,13 +38,9 @@ class ComStructure:
     """What the programme's expressions depend on; numbers are its parameters.
 
     Attributes:
-        degree: Degree of the spline.
         samples: n_s, samples of each phase but one.
         rows: Number of facets imposed in each phase.
         contacts: Number of contacts of each phase.
-        margin_space: What the margin measures.
-        geometric: Functions of the geometric constraints.
-        limited_distance: Whether the CoM-support distance is limited.
         key_planes: Key instant of each plane.
     """
 
@@ -68,7 +64,6 @@ class ComProgram:
     """The compiled programme and the order of its rows.
 
     Attributes:
-        structure: What it was built for.
         solver: CasADi function made by ``nlpsol``; unknowns are the Bezier points of each
             phase (column by column), the durations and their sum [s], d_min and its shortfall below
             the required margin, both over MARGIN_SCALE.
@@ -187,8 +182,8 @@ def _add_samples(builder: _Builder, phase: int, mass: ca.SX) -> None:
             builder.add("distance", ca.sum2(offset * offset))
     inner = slice(1 if phase == 0 else 0, len(s) - 1 if phase == structure.phases - 1 else len(s))
     for index, function in enumerate(structure.geometric):
-        there = position[inner, :]
-        values = _symbolic(function, there + ca.repmat(builder.parameters["reference"], there.shape[0], 1))
+        within = position[inner, :]
+        values = _symbolic(function, within + ca.repmat(builder.parameters["reference"], within.shape[0], 1))
         builder.add(f"geometric{index}", values)
 
 

@@ -47,13 +47,7 @@ from manikin.planning.contacts.heuristics import (
 from manikin.planning.contacts.limb_collisions import LimbCollisions
 from manikin.planning.contacts.limb_places import Footholds, LimbPlaces
 from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
-from manikin.planning.contacts.samples import (
-    LimbSamples,
-    manipulability,
-    mirrored,
-    sample_limb,
-    sample_limbs,
-)
+from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
 
 __all__ = [
     "HEURISTICS",

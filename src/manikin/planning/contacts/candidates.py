@@ -19,8 +19,6 @@ class Situation:
     """Where a limb is and what it is asked for.
 
     Attributes:
-        state: The body as it is.
-        limb: The limb that shall make a contact.
         rotation: (3, 3) from the limb's frame to the world's.
         origin: (3,) of the limb's frame in the world [m].
         reaction: (3,) unit direction in the world in which the scene shall push the limb.
@@ -72,7 +70,6 @@ class SurfaceTable:
     """The surfaces of a scene as arrays, so that all are tested at once.
 
     Attributes:
-        surfaces: The surfaces.
         normals: (m, 3) their unit normals.
         offsets: (m,) of their planes along the normals [m].
         group: (m,) number of the direction that a surface has for its normal.
@@ -232,7 +229,7 @@ def _near_planes(
     upward, places = lines @ samples.upward.T, lines @ samples.positions.T
     shift = (table.lines @ situation.origin).tolist()
     own_group = table.group[numbers]
-    found: list[tuple[IntArray, IntArray, FloatArray]] = []
+    selected: list[tuple[IntArray, IntArray, FloatArray]] = []
     for group in set(own_group.tolist()):
         own = (own_group == group).nonzero()[0]
         surfaces = numbers[own]
@@ -250,8 +247,8 @@ def _near_planes(
             inside &= place >= ends[0][:, axis, None]
             inside &= place <= ends[1][:, axis, None]
         which, near = np.divmod(inside.ravel().nonzero()[0], len(rows) or 1)
-        found.append((rows.take(near), own.take(which), sign * (height.take(near) - planes.take(which))))
-    rows, owner, gap = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        selected.append((rows.take(near), own.take(which), sign * (height.take(near) - planes.take(which))))
+    rows, owner, gap = (np.concatenate(parts) for parts in zip(*selected, strict=True))
     return rows, owner, gap
 
 

@@ -48,10 +48,7 @@ class Extension:
     """A contact plan, or why there is none.
 
     Attributes:
-        plan: The plan, or None.
-        searches: Postures looked for.
         backtracks: Changes taken back.
-        failure: None, or the reason in one line.
         reached: Share of the guide that the farthest attempt got to.
     """
 

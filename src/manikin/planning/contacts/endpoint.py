@@ -54,7 +54,6 @@ class Endpoint:
 
     Attributes:
         stage: Contacts and posture at rest on them, or None.
-        failure: None, or the reason in one line.
     """
 
     stage: Stage | None

@@ -147,7 +147,7 @@ class _Move:
         limb: Its effector, or that of what makes no contacts, such as a seat.
         contact: Where it goes; None for what is left for good.
         along: How far along the guide each contact is then [m].
-        there: How far along it the root is then [m].
+        root_along: How far along it the root is then [m].
         lifting: (nq,) posture that rests on all other contacts; None where it is not known yet.
         start: (nq,) where the search for the posture on the new contact begins; ``lifting`` when None.
     """
@@ -155,7 +155,7 @@ class _Move:
     limb: str
     contact: Contact | None
     along: Mapping[str, float]
-    there: float
+    root_along: float
     lifting: FloatArray | None = None
     start: FloatArray | None = None
 
@@ -180,7 +180,7 @@ class _Moves:
         name, staying = move.limb, _without(move.limb, partial.last.contacts)
         landed = {**staying, name: contact}
         start = lifting if move.start is None else move.start
-        landing = self._pose(landed, staying, start, self._guide.at(move.there))
+        landing = self._pose(landed, staying, start, self._guide.at(move.root_along))
         if landing.q is None:
             self._log.refuse(f"{name} cannot be put down: {landing.reason}")
             return None
@@ -421,17 +421,17 @@ class _LimbMoves(_Moves):
         """Places ahead to which one limb may move."""
         staying = _without(name, partial.last.contacts)
         progress = {**partial.along, name: along}
-        there = float(np.mean([progress[other] for other in (*staying, name)]))
-        ahead = self._pose(staying, staying, lifting, self._guide.at(there))
+        root_along = float(np.mean([progress[other] for other in (*staying, name)]))
+        ahead = self._pose(staying, staying, lifting, self._guide.at(root_along))
         if ahead.q is None:
             self._log.refuse(f"the root cannot go on without {name}: {ahead.reason}")
             return
-        direction, root = self._direction(there), self._guide.at(along)
+        direction, root = self._direction(root_along), self._guide.at(along)
         for place in self._places.find(name, ahead.q, root, direction, self._settings.places):
             if place.contact is None or place.q is None:
                 self._log.refuse(place.message)
             else:
-                yield _Move(name, place.contact, progress, there, lifting, place.q)
+                yield _Move(name, place.contact, progress, root_along, lifting, place.q)
 
     def _direction(self, along: float) -> FloatArray:
         """(3,) where the scene shall push a limb: onward and up against the weight."""

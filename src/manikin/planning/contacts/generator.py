@@ -69,8 +69,6 @@ class GeneratedContact:
     """Answer to a request: a contact and the posture that makes it, or why there is none.
 
     Attributes:
-        limb: Name of the limb.
-        contact: The contact, or None.
         q: (nq,) the body with this limb in contact and all else as asked, or None.
         obstacle: Name of the obstacle touched, or None.
         score: Score of the candidate; minus infinity without one.
@@ -209,7 +207,7 @@ class ContactGenerator:
         apart: float,
     ) -> list[GeneratedContact]:
         """Steps 3 and 4: best first, the first that can be aligned and are free."""
-        found: list[GeneratedContact] = []
+        answers: list[GeneratedContact] = []
         faults: Counter[tuple[str, str]] = Counter()
         flat = kind is ContactKind.SOLE
         gap, allowed = tools.allowed(self.settings, flat=flat)
@@ -222,7 +220,7 @@ class ContactGenerator:
             if tried == self.settings.tries:
                 break
             point = candidates.points[row]
-            places = (item.contact.position for item in found if item.contact is not None)
+            places = (item.contact.position for item in answers if item.contact is not None)
             if any(np.linalg.norm(point - place) < apart for place in places):
                 continue
             tried += 1
@@ -246,13 +244,13 @@ class ContactGenerator:
             contact = make_contact(
                 self.body, tools.limb, kind, point, onto_normal(turn, candidates.normals[row]), self.rules
             )
-            found.append(GeneratedContact(
+            answers.append(GeneratedContact(
                 tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacle,
                 float(scores[row]), len(candidates), tried, gap=0.0 if len(tools.chain) else aligned.error,
             ))  # fmt: skip
-            if len(found) == most:
+            if len(answers) == most:
                 break
-        return found or [_none_fits(tools.limb.name, faults, len(candidates))]
+        return answers or [_none_fits(tools.limb.name, faults, len(candidates))]
 
     def _worth_trying(
         self,

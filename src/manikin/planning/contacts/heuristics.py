@@ -174,7 +174,6 @@ class Duration:
     The range of motion is the largest sphere inside the reach (7.1.1).
 
     Attributes:
-        reach: Reach of the limb.
         ahead: (rotation (3, 3) segment-to-world, position (3,) [m]) of the segment that carries the
             limb at the next configurations ``q_2 ... q_w``.
     """
@@ -218,7 +217,6 @@ class BalanceScore:
         binary: 1 where balanced and else 0, as printed (7.6), instead of the margin [N.m].
         spacing: Largest distance of candidates that share a margin [m].
         kind: How the new contact touches; the limb's own way when None.
-        rules: Friction and strengths.
     """
 
     held: Stance

@@ -292,7 +292,7 @@ class DeepSamples:
 
     def pairs(self, around: "Surroundings", rows: IntArray, depth: float) -> IntArray:
         """(n,) number of a pair in which each of (n,) samples is deeper than ``depth`` [m], or -1."""
-        found = np.full(len(rows), -1, dtype=np.int64)
+        numbers = np.full(len(rows), -1, dtype=np.int64)
         others, balls = around.reach.shape
         beyond = around.turns.reshape(-1, 3) @ self._centres[rows].reshape(-1, 3).T
         beyond = beyond.reshape(others, 3, len(rows), balls) - around.places[:, :, None, None]
@@ -306,8 +306,8 @@ class DeepSamples:
         least = (around.reach - depth)[:, None]
         deep = (squared < np.maximum(least, 0.0) ** 2) | (largest < np.minimum(least, 0.0))
         other, row, ball = deep.nonzero()
-        found[row] = around.pair[other, ball]
-        return found
+        numbers[row] = around.pair[other, ball]
+        return numbers
 
 
 @dataclass(frozen=True, eq=False)

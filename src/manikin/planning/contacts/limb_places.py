@@ -195,7 +195,6 @@ class Near:
     Attributes:
         place: (3,) where the effector should be [m].
         room: Distance from there that counts as much as the whole other preference [m].
-        other: The other preference.
         edges: Where there are edges, for a hand that has to have its fingers around one; None for others.
     """
 
@@ -314,16 +313,16 @@ class LimbPlaces:
         place = self.wanted(effector, root)
         edges = self._edges if kind is ContactKind.GRASP else None
         heuristic = Near((place[0], place[1], place[2]), ROOM * self.reach, Efort(), edges)
-        found = self._generators[kind].request_several(
+        answers = self._generators[kind].request_several(
             q, limb.name, Task(direction), heuristic, kind=kind, most=most, apart=0.07 * self.reach
         )
-        near = [item for item in found if item.contact is not None and item.score > 1.0 - FAR]
+        near = [item for item in answers if item.contact is not None and item.score > 1.0 - FAR]
         if len(near) < most and kind is not ContactKind.GRASP:
             near += self._nearest(limb, kind, q, place, heading_of(root), near)
-        if near or not found[0].found:
-            return near or found
+        if near or not answers[0].found:
+            return near or answers
         message = f"nothing for {limb.name} near {np.round(place, 2).tolist()} m"
-        return [replace(found[0], contact=None, q=None, failure=Hindrance.SURFACE, message=message)]
+        return [replace(answers[0], contact=None, q=None, failure=Hindrance.SURFACE, message=message)]
 
     def _nearest(
         self,
@@ -346,7 +345,7 @@ class LimbPlaces:
                 [np.where(points[:, 0] > points[:, 0].mean(), toes, points[:, 0]), points[:, 1:]]
             )
         outward = float(np.sign(self._wanted[limb.effector][1])) * TURN_OUT
-        found: list[tuple[float, GeneratedContact]] = []
+        offers: list[tuple[float, GeneratedContact]] = []
         taken = [item.contact.position for item in others if item.contact is not None]
         for surface in self._level:
             for turn in (0.0, outward) if kind is ContactKind.SOLE else (0.0,):
@@ -357,8 +356,8 @@ class LimbPlaces:
                 contact = make_contact(self._body, limb, kind, spot, rotation, self._rules)
                 score = -float(np.linalg.norm(spot - wanted)) / (ROOM * self.reach)
                 item = GeneratedContact(limb.name, contact, q, surface.obstacle, score, 0, 0)
-                found.append((-score + (0.1 if turn else 0.0), item))
-        return [item for cost, item in sorted(found, key=lambda pair: pair[0])[:NEAREST] if cost < 2.0]
+                offers.append((-score + (0.1 if turn else 0.0), item))
+        return [item for cost, item in sorted(offers, key=lambda pair: pair[0])[:NEAREST] if cost < 2.0]
 
     def _spot(self, surface: Surface, wanted: FloatArray, corners: FloatArray) -> FloatArray | None:
         """(3,) place on a surface nearest to a wanted one, corners (c, 3) about it inside, or None."""

@@ -24,7 +24,6 @@ class LimbSamples:
     """Random configurations of one limb, in the limb's frame.
 
     Attributes:
-        limb: The limb.
         segment: Name of the segment that carries it.
         origin: (3,) origin of the limb's frame in that segment [m].
         angles: (n, k) joint angles [rad].

@@ -42,7 +42,6 @@ class ContactQuestion:
     """What is asked of one limb.
 
     Attributes:
-        limb: Name of the limb.
         task: Direction of the task in the world; its length does not count.
         role: What the limb does.
         pulling: Whether it holds on and pulls instead of pressing (5.13).
@@ -86,9 +85,7 @@ class ContactAnswer:
     """The contact found, or why there is none.
 
     Attributes:
-        question: What was asked.
         q: (nq,) the body before.
-        result: The generator's answer.
         role: The role that was taken, never ``auto``.
         efort: EFORT of the posture found, with the sign of that role [N per N.m]; None without one.
         prepare_wall_s: Wall time of the samples, the scene's preparation and a first request [s].
@@ -105,37 +102,33 @@ class ContactAnswer:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON; the keys are documented in ``docs/json.md``."""
-        found, contact = self.result, self.result.contact
+        result, contact = self.result, self.result.contact
         return {
-            "found": found.found,
+            "found": result.found,
             "position": None if contact is None else contact.position,
             "normal": None if contact is None else contact.normal,
-            "obstacle": found.obstacle,
+            "obstacle": result.obstacle,
             "efort": self.efort,
-            "candidates": found.candidates,
+            "candidates": result.candidates,
             "wall_ms": 1e3 * self.wall_s,
-            "failure": None if found.found else found.message,
-            "hindrance": None if found.failure is None else str(found.failure),
-            "limb": found.limb,
+            "failure": None if result.found else result.message,
+            "hindrance": None if result.failure is None else str(result.failure),
+            "limb": result.limb,
             "kind": None if contact is None else str(contact.kind),
             "role": str(self.role),
             "heuristic": self.question.heuristic,
-            "score": found.score if found.found else None,
-            "gap_m": found.gap if found.found else None,
-            "tried": found.tried,
+            "score": result.score if result.found else None,
+            "gap_m": result.gap if result.found else None,
+            "tried": result.tried,
             "samples": self.question.samples,
             "seed": self.question.seed,
             "prepare_wall_ms": 1e3 * self.prepare_wall_s,
-            "q": found.q,
+            "q": result.q,
         }
 
 
 def find_contact(
-    body: BodyModel,
-    scene: Scene,
-    q: FloatArray,
-    question: ContactQuestion,
-    rules: ContactRules | None = None,
+    body: BodyModel, scene: Scene, q: FloatArray, question: ContactQuestion, rules: ContactRules | None = None
 ) -> ContactAnswer:
     """Answer one question about a body in a scene.
 
@@ -228,13 +221,10 @@ class LiveContacts:
     """The pose of a body, a task, and the contacts that follow from both.
 
     Attributes:
-        body: The body.
-        scene: Its surroundings.
         q: (nq,) the body as it was put, before any limb is moved.
         azimuth_deg: Direction of the task about the vertical, from world x [deg].
         elevation_deg: Direction of the task above the horizon [deg].
         limbs: Names of the limbs that are asked.
-        heuristic: Name of the preference.
         role: What the limbs do with their contacts.
         pulling: Whether they hold on and pull.
     """

@@ -54,7 +54,6 @@ class LimbReach:
     """Where one limb's effector can be, as a convex volume in the frame of the root.
 
     Attributes:
-        name: Name of the limb.
         vertices: (n, 3) corners of the hull [m].
         normals: (m, 3) unit normals of its faces, outward.
         offsets: (m,) so that the volume is ``normals x <= offsets`` [m].
@@ -227,5 +226,5 @@ def _inscribed_ball(normals: FloatArray, offsets: FloatArray) -> tuple[FloatArra
     """Centre and radius of the largest ball inside ``normals x <= offsets``."""
     rows = np.hstack([normals, np.ones((len(normals), 1))])
     bounds = [(None, None)] * 3 + [(0.0, None)]
-    found = linprog([0.0, 0.0, 0.0, -1.0], rows, offsets, bounds=bounds)
-    return found.x[:3], float(found.x[3])
+    result = linprog([0.0, 0.0, 0.0, -1.0], rows, offsets, bounds=bounds)
+    return result.x[:3], float(result.x[3])

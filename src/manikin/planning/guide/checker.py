@@ -58,9 +58,6 @@ class ReachabilityChecker:
     """Checks poses of one abstraction in one scene; use one instance per thread, as it has its own buffers.
 
     Attributes:
-        abstraction: The creature.
-        scene: The obstacles.
-        condition: What is asked.
         margins: What is kept in hand.
     """
 
@@ -169,16 +166,16 @@ class ReachabilityChecker:
         solid = self.inside_solid(pose)
         if solid is not None:
             return f"the trunk is inside {solid!r}"
-        lean, found = tilt(pose), self.reaching(pose)
-        have = f"within reach: {', '.join(found) or 'none'}"
+        lean, reached = tilt(pose), self.reaching(pose)
+        have = f"within reach: {', '.join(reached) or 'none'}"
         for rule in self.condition.rules:
             if not rule.holds_at(lean, self._tilt_slack):
                 continue
-            missing = [name for name in rule.required if name not in found]
+            missing = [name for name in rule.required if name not in reached]
             if missing:
                 return f"limb {missing[0]!r} reaches no usable surface ({have})"
-            if len(found) < rule.at_least:
-                return f"{len(found)} limbs reach a usable surface and {rule.at_least} are wanted ({have})"
+            if len(reached) < rule.at_least:
+                return f"{len(reached)} limbs reach a usable surface and {rule.at_least} are wanted ({have})"
         return None
 
     def steps(self, way: float, angle: float) -> int:
@@ -313,20 +310,20 @@ def _volume_object(limb: LimbReach, margin: float) -> _Target:
 
 def _targets(scene: Scene, triangles: SceneTriangles, surface: UsableSurface) -> list[_Target]:
     """What counts for a limb: endless shapes one by one, all triangles as one mesh."""
-    found = []
+    targets = []
     for item in scene:
         if endless(item) and surface.allows_obstacle(item.name):
             (part,) = collision_parts(item)
             two_sided = isinstance(part.geometry, coal.Plane)
             if surface.allows_normal(item.world_plane[0], two_sided=two_sided):
-                found.append((part.geometry, _place(part)))
+                targets.append((part.geometry, _place(part)))
     kept: NDArray[np.bool_] = triangles.usable(scene, surface)
     if kept.any():
         corners = triangles.corners[kept].reshape(-1, 3)
         vertices, inverse = np.unique(corners, axis=0, return_inverse=True)
         mesh = triangle_geometry(vertices, inverse.reshape(-1, 3).astype(np.int64))
-        found.append((mesh, pin.SE3.Identity()))
-    return found
+        targets.append((mesh, pin.SE3.Identity()))
+    return targets
 
 
 def _place(part: CollisionPart | TrunkShape) -> pin.SE3:

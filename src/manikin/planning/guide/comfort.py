@@ -160,11 +160,11 @@ def _raised(line: FloatArray, planner: LocalPlanner, settings: ComfortSettings) 
     chosen = [int(np.argmin(total + settings.change * moves[upright]))]
     for back in reversed(came_from[1:]):
         chosen.append(int(back[chosen[-1]]))
-    found = line.copy()
+    raised = line.copy()
     if len(line) > 2:
-        found[1:-1, _Z] = ideal[1:-1] - depth[chosen[::-1]]
-        found[1:-1, _PITCH] = pitch[chosen[::-1]]
-    return found
+        raised[1:-1, _Z] = ideal[1:-1] - depth[chosen[::-1]]
+        raised[1:-1, _PITCH] = pitch[chosen[::-1]]
+    return raised
 
 
 def _smoothed(line: FloatArray, planner: LocalPlanner) -> FloatArray:

@@ -47,7 +47,6 @@ class GuideSettings:
     """Everything that chapter 6 leaves to its user.
 
     Attributes:
-        margins: What planning keeps in hand.
         sampler: Numbers of Algorithm 3.
         roadmap: Numbers of Algorithm 4; its ``samples`` is the budget of one search.
         shortcut: Numbers of 6.3.2.
@@ -64,11 +63,8 @@ class GuideWorld:
     """Scene, creature and condition: what a roadmap is about.
 
     Attributes:
-        scene: The obstacles.
-        abstraction: The creature.
         region: Where roots are drawn.
         condition: What every pose must satisfy.
-        settings: Numbers of the algorithms.
     """
 
     scene: Scene
@@ -89,7 +85,6 @@ class GuideTask:
     Attributes:
         start: (7,) pose of the root.
         goal: (7,) pose of the root.
-        limits: Speed limits of the path.
     """
 
     start: FloatArray
@@ -132,10 +127,7 @@ class GuideResult:
     """A path of the root, or why there is none.
 
     Attributes:
-        path: The path, or None.
         milestones: (n, 7) poses that straight ways join, before the spline; None without a way.
-        statistics: What the search did.
-        failure: None, or the reason.
         where: ``"start"``, ``"goal"`` or ``"roadmap"``: what the failure is about.
     """
 

@@ -49,7 +49,6 @@ class Roadmap:
     """Poses and the ways between them.
 
     Attributes:
-        settings: How it was made.
         graph: Nodes 0, 1, ... with ``guard`` (bool); edges with ``weight``, the distance 6.3, and
             ``turn_at``, the share at which the root turns on the spot seen from the node of the
             smaller number, or None for a straight way.
@@ -173,7 +172,6 @@ class Route:
         poses: (n, 7) poses that straight ways join, from start to goal; None without a way.
         nodes: Nodes of the roadmap along it.
         length: Its length by the distance 6.3.
-        failure: None, or the reason.
         where: ``"start"``, ``"goal"`` or ``"roadmap"``: what the failure is about.
     """
 
@@ -231,11 +229,7 @@ def find_route(roadmap: Roadmap, planner: LocalPlanner, start: int, goal: int) -
 
 
 def request(
-    roadmap: Roadmap,
-    planner: LocalPlanner,
-    start: FloatArray,
-    goal: FloatArray,
-    rng: np.random.Generator,
+    roadmap: Roadmap, planner: LocalPlanner, start: FloatArray, goal: FloatArray, rng: np.random.Generator
 ) -> Route:
     """Ask a roadmap for a way between two poses (7,); the roadmap is left as it is."""
     unfit = unfit_end(planner, start, goal)
@@ -249,14 +243,14 @@ def request(
 
 def _walled_off(roadmap: Roadmap, start: int, goal: int) -> str:
     """Reason in words why no way joins two nodes."""
-    here = sorted(nx.node_connected_component(roadmap.graph, start))
-    there = sorted(nx.node_connected_component(roadmap.graph, goal))
-    places, others = roadmap.poses[here], roadmap.poses[there]
+    from_start = sorted(nx.node_connected_component(roadmap.graph, start))
+    from_goal = sorted(nx.node_connected_component(roadmap.graph, goal))
+    places, others = roadmap.poses[from_start], roadmap.poses[from_goal]
     apart = np.array([distance(others, pose, roadmap.settings.position_share) for pose in places])
     row, column = np.unravel_index(int(np.argmin(apart)), apart.shape)
     closest = [np.round(pose[:3], 2).tolist() for pose in (places[row], others[column])]
     return (
         f"the goal is walled off from the start as far as {roadmap.samples} sampled poses show: "
-        f"{len(here)} of {len(roadmap.poses)} poses of the roadmap can be reached from the start and "
-        f"{len(there)} from the goal; the closest two are at {closest[0]} m and {closest[1]} m"
+        f"{len(from_start)} of {len(roadmap.poses)} poses of the roadmap can be reached from the start and "
+        f"{len(from_goal)} from the goal; the closest two are at {closest[0]} m and {closest[1]} m"
     )

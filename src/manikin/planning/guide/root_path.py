@@ -222,7 +222,6 @@ class ShortcutSettings:
     Attributes:
         shortcuts: N, random shortcuts tried.
         spacing: Time between control poses of the first approximation [s].
-        degree: Degree of the spline.
     """
 
     shortcuts: int = 150
@@ -295,10 +294,7 @@ def path_holds(path: RootPath, planner: LocalPlanner, low: float = 0.0, high: fl
 
 
 def shorten(
-    path: RootPath,
-    planner: LocalPlanner,
-    rng: np.random.Generator,
-    settings: ShortcutSettings | None = None,
+    path: RootPath, planner: LocalPlanner, rng: np.random.Generator, settings: ShortcutSettings | None = None
 ) -> RootPath:
     """Try random shortcuts; each one that is kept makes the way along the control poses quicker."""
     wanted = settings or ShortcutSettings()

@@ -46,7 +46,6 @@ class Act:
 
     Attributes:
         kind: Push or pull.
-        obstacle: Name of the object.
         direction: (3,) unit, level: where the force on the object points.
         force: Its size [N].
     """
@@ -213,19 +212,19 @@ class _Programme:
         joints = np.hstack([self._maps[6:], np.zeros((len(body.torque_upper), 1))])
         most, least = body.torque_upper[:, None], body.torque_lower[:, None]
         below = np.vstack([np.hstack([-joints, -most]), np.hstack([joints, least])])
-        found = linprog(
+        result = linprog(
             np.concatenate([np.zeros(count), cost]),
             A_ub=below, b_ub=np.concatenate([-self._bias[6:], self._bias[6:]]),
             A_eq=equal, b_eq=np.concatenate([self._bias[:6], np.zeros(3)]),
             bounds=[*self._limits, force, share],
         )  # fmt: skip
-        if found.status in (2, 3):
+        if result.status in (2, 3):
             return None
-        if found.status != 0:
+        if result.status != 0:
             raise InputError(
-                f"forces of the posture cannot be computed ({found.message}); valid: finite values"
+                f"forces of the posture cannot be computed ({result.message}); valid: finite values"
             )
-        return self._forces(np.array(found.x))
+        return self._forces(np.array(result.x))
 
     def _forces(self, x: FloatArray) -> BracedForces:
         multipliers = x[:-2]

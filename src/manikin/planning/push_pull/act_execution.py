@@ -47,7 +47,6 @@ class PlannedAct:
     Attributes:
         motion: The whole of it.
         schedule: Its contacts in time.
-        timing: When the force acts.
         wishes: What each hand should feel.
     """
 

@@ -62,7 +62,6 @@ class BraceSettings:
         enough: Postures that act after which the best one is taken.
         palm_room: Distance of the palms to the face [m]: the wrist of our shapes is thicker than the hand.
         samples: Number of samples of each limb.
-        friction: Coulomb coefficient.
         friction_model: Friction model of feet and palms.
     """
 
@@ -109,10 +108,8 @@ class BraceResult:
     """A posture that acts, or why there is none.
 
     Attributes:
-        brace: The posture, or None.
         tried: Places of the trunk.
         strongest: Largest force of any balanced posture that was found [N]; 0 without one.
-        failure: None, or the reason in one line.
     """
 
     brace: Brace | None

@@ -122,7 +122,6 @@ class Footing:
         margin: Least margin that counts as balance [N.m].
         reach: (2,) how far the centre of mass may be moved [m].
         spacing: Largest distance of candidates that share an answer [m].
-        rules: Friction.
     """
 
     loads: Loads
