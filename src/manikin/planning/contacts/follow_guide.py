@@ -6,8 +6,9 @@ free of collision and at rest on the contacts that stay: one that still holds th
 one that already holds the new one.  Where there is none, a shorter step, another place or another
 limb is tried, and then the change before is taken back.
 
-A guide for any limbs may lead where no stance is upright, so that postures are found for the root where the
-guide has it at each change.  A limb in flight then passes a third posture, off the line between its contacts.
+Feet step to footholds below the guide until they are at their places at the goal.  Any limbs go to contacts
+of the :class:`~manikin.planning.contacts.ContactGenerator` until the root is at its goal, and a limb in
+flight has a third posture, off the line between its contacts.
 """
 
 from collections.abc import Iterator, Mapping
