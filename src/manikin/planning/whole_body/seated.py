@@ -8,6 +8,8 @@ posture, but a whole body need only follow it loosely.
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
 from manikin.contact import StanceSequence
@@ -76,7 +78,7 @@ def continue_seated(
         Configuration(body, posture.q).com,
         start_velocity=trajectory.velocity(end),
         start_acceleration=trajectory.acceleration(end),
-        goal_acceleration=(0.0, 0.0, 0.0),
+        goal_acceleration=np.zeros(3),
         degree=trajectory.spline.degree,
         weights=WEIGHTS,
         max_duration=LONGEST_SHARE * sum(phase.min_duration for phase in phases),
