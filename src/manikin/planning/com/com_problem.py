@@ -19,7 +19,7 @@ from manikin.runtime.display import Displayed
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CentroidalTrajectory(Displayed):
-    """``p(t) = p_s(sigma t)`` with ``sigma = 1 / T`` ([Qiu2012]_ 5.2-5.6).
+    """CoM in time, ``p(t) = p_s(sigma t)`` with ``sigma = 1 / T`` ([Qiu2012]_ 5.2-5.6).
 
     Before the start and after the end the body rests: the position is held and all
     derivatives are zero.
@@ -303,7 +303,7 @@ class CentroidalProblem:
 
     @property
     def margin_unit(self) -> str:
-        """``"N.m"`` or ``"N"``."""
+        """Unit of the margin, ``"N.m"`` or ``"N"``."""
         return _UNITS[self.margin_space]
 
     @property

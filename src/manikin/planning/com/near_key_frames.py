@@ -78,7 +78,7 @@ _NO_BOUND = 1e30
 
 @dataclass(frozen=True, eq=False)
 class NearProgramme:
-    """Everything about the programme that does not depend on the last solution.
+    """Quadratic programme of a CoM near key frames: what does not depend on the last solution.
 
     Attributes:
         mass: Mass of the body [kg].
