@@ -96,7 +96,7 @@ class PushOptions:
         """
         from manikin.numerics.spatial import finite_number
         from manikin.scenarios.planned import push_task
-        from manikin.simulation.recover import STRONGEST
+        from manikin.simulation.push_force import STRONGEST
 
         if self.body not in ("kudoh", "human"):
             raise InputError(f"--body is {self.body!r}; valid: kudoh or human")

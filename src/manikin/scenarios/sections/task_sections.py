@@ -27,7 +27,7 @@ from manikin.scenarios.validation import (
 )
 
 LARGEST_FORCE = 5000.0
-"""Some seven body weights, far beyond what can be held [N]; ``manikin.simulation.recover`` has the same."""
+"""Some seven body weights, far beyond what can be held [N]; the same in ``manikin.simulation.push_force``."""
 
 LARGEST_FREQUENCY = 100.0
 """Of a sine: ten of the physics' steps are left for each period [Hz]."""
