@@ -58,9 +58,9 @@ The integral of 1 + u² along the path, with u = dκ/ds in 1/m², free length, a
 the squared norm of both controls of the system (3.2) with the speed 1. [Why not the derivative of the
 curvature alone](api/walking.md), or its largest value (`docs/clothoid_words.py`): neither has an optimum,
 because loops may be as large as one likes. Of {clothoids} random goals of the grid, {extremal} have a word
-of three exact clothoid arcs, IDI or DID, that satisfies the maximum principle; large loops improve all. The price of the length
-makes the problem one with an optimum, and brings the longer words. Its arcs are monotone in the curvature,
-but no exact clothoids.
+of three exact clothoid arcs, IDI or DID, that satisfies the maximum principle; large loops improve all. The
+price of the length makes the problem one with an optimum, and brings the longer words. Its arcs are monotone
+in the curvature, but no exact clothoids.
 
 Headings may end up to one whole turn to either side. Each goal is solved by Newton's method from {guesses}
 guesses for each turn, then from the paths of its neighbours, until none gets cheaper.

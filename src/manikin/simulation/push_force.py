@@ -65,7 +65,7 @@ def push_near_com(
         force: (3,) in the world, at its largest [N].
         start: [s].
         duration: [s].
-        frequency: Frequency of the sine that begins with the push [Hz]; 0 for a constant force.
+        frequency: As of :class:`Push` [Hz].
         q: (nq,) the posture; the body's standing one when omitted.
 
     Raises:
@@ -100,7 +100,7 @@ def push_on_the_way(
         direction: Counter-clockwise from the forward axis that the pelvis has in the plan then [deg].
         start: In the motion's time [s].
         duration: [s].
-        frequency: Frequency of a sine that begins with the push [Hz]; 0 for a constant force.
+        frequency: As of :class:`Push` [Hz].
     """
     sample = min(int(np.searchsorted(motion.time, start)), len(motion.time) - 1)
     forward = rotation_from_quaternion(motion.q[sample : sample + 1, 3:7])[0][:, 0]

@@ -123,15 +123,7 @@ class World:
         point: ArrayLike | None = None,
         frequency: float = 0.0,
     ) -> None:
-        """Push a segment.
-
-        Args:
-            segment: Name of the segment.
-            force: (3,) in the world, at its largest [N].
-            start: Simulated time of its beginning [s].
-            duration: [s].
-            point: (3,) where it acts in the segment's frame [m]; its centre of mass when omitted.
-            frequency: Frequency of the sine that begins with the push [Hz]; 0 for a constant force.
+        """Push a segment; the arguments are those of :class:`~manikin.simulation.push_force.Push`.
 
         Raises:
             BodyError: If there is no such segment.

@@ -221,8 +221,8 @@ def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> F
         slot = len(ROOT) + body.joint_index(f"{side}_ankle_dorsiflexion")
         level[0, slot] += np.clip(pitch, -MOST_LEVELLED, MOST_LEVELLED)
     stances = [
-        _feet(body, level, np.linspace(*spans[side], 64)).clearance[number]
-        for number, side in enumerate(SIDES)
+        _feet(body, level, np.linspace(first, last, 64)).clearance[number]
+        for number, (first, last) in enumerate(spans[side] for side in SIDES)
     ]
     level[0, _HEIGHT] -= np.median(np.concatenate(stances))
     return level

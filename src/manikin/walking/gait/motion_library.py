@@ -235,8 +235,9 @@ def _library(file: Path, given: dict[str, Any]) -> MotionLibrary:
         )
     try:
         library = MotionLibrary(
-            names, tuple(given["kinds"].tolist()), *(given[name] for name in _SERIES), body.joint_names,
-            float(given["leg"]), tuple(given["acknowledgements"].tolist()),
+            names, tuple(given["kinds"].tolist()), joint_names=body.joint_names, leg=float(given["leg"]),
+            acknowledgements=tuple(given["acknowledgements"].tolist()),
+            **{name: given[name] for name in _SERIES},
         )  # fmt: skip
     except InputError as error:
         raise InputError(f"{file}: {error}") from None

@@ -139,7 +139,7 @@ class WalkRoute(SampledWalk):
 
     def segments(self) -> PathSegments:
         """Holonomic, nonholonomic and standing stretches ([Truong2010]_ Function 1)."""
-        return segment_path(ShoulderPaths.of_places(self.place, (len(self.time) - 1) / self.duration))
+        return segment_path(ShoulderPaths.of_walk(self))
 
     def as_obstacle(self, name: str, radius: float) -> WalkObstacle:
         """A disc of a radius [m] that goes along this route, for others to keep away from."""
@@ -242,7 +242,7 @@ def walking_route(
 def _walked(
     where: str, start: FloatArray, goal: FloatArray, objective: WalkObjective, **options: Any
 ) -> WalkingPath:
-    """A walking path whose messages say which waypoint it leads to."""
+    """A walking path whose error messages name its waypoint."""
     try:
         return walking_path(start, goal, objective, **options)
     except InputError as error:

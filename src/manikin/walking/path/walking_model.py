@@ -1,8 +1,7 @@
 """The unified walking model: a body on the floor that goes forward, sideways and turns ([Truong2010]_ 5.3).
 
 The thesis counts the lateral velocity to the right (5.5) and orders its state ``(x, y, theta, v_f, omega,
-v_l)``. Everywhere in this project left is positive, and lateral comes before angular:
-:func:`state_from_thesis` and :func:`state_to_thesis` are the only door between the two.
+v_l)``. Everywhere in this project left is positive, and lateral comes before angular.
 
 A walk costs time, accelerations and looking away from the goal ([Truong2010]_ 5.4-5.5).
 """
@@ -133,19 +132,13 @@ def experiment_targets() -> FloatArray:
     return np.array(targets)
 
 
-STATE = ("x", "y", "heading", "forward", "left", "angular")
-"""Order of a state: place [m] and heading [rad] in the world, velocities in the body frame [m/s, rad/s]."""
-
-CONTROL = ("forward", "left", "angular")
-"""Order of velocities and accelerations: along the body's x [m/s^2], its y [m/s^2], about z [rad/s^2]."""
-
-
 def state_derivative(state: ArrayLike, control: ArrayLike) -> FloatArray:
     """Rate of a state under accelerations ([Truong2010]_ 5.5, with left positive).
 
     Args:
-        state: (..., 6) in the order of :data:`STATE`.
-        control: (..., 3) accelerations in the order of :data:`CONTROL`: rates of the body velocities.
+        state: (..., 6) x, y [m], heading [rad], forward and left velocity [m/s], angular velocity [rad/s].
+        control: (..., 3) forward and left acceleration [m/s^2], angular acceleration [rad/s^2]: the rates of
+            the body velocities.
 
     Returns:
         (..., 6).
@@ -212,25 +205,13 @@ def body_motion(place: ArrayLike, rate: ArrayLike, second: ArrayLike) -> tuple[F
         second: (..., 3) second derivatives.
 
     Returns:
-        (..., 3) velocities and (..., 3) accelerations in the order of :data:`CONTROL`.
+        (..., 3) forward, left and angular velocities, and (..., 3) accelerations.
     """
     heading = _last(place, 3, "place")[..., 2]
     velocity, acceleration = to_body(heading, rate), to_body(heading, second)
     acceleration[..., 0] += velocity[..., 2] * velocity[..., 1]
     acceleration[..., 1] -= velocity[..., 2] * velocity[..., 0]
     return velocity, acceleration
-
-
-def state_from_thesis(state: ArrayLike) -> FloatArray:
-    """(..., 6) state of a (..., 6) state ``(x, y, theta, v_f, omega, v_l)`` of [Truong2010]_ 5.5."""
-    z = _last(state, 6, "state of the thesis")
-    return np.concatenate([z[..., :4], -z[..., 5:6], z[..., 4:5]], axis=-1)
-
-
-def state_to_thesis(state: ArrayLike) -> FloatArray:
-    """(..., 6) state ``(x, y, theta, v_f, omega, v_l)`` of [Truong2010]_ 5.5 of a (..., 6) state."""
-    z = _last(state, 6, "walking state")
-    return np.concatenate([z[..., :4], z[..., 5:6], -z[..., 4:5]], axis=-1)
 
 
 def _last(value: ArrayLike, size: int, name: str) -> FloatArray:

@@ -24,7 +24,7 @@ from manikin.numerics.signals import SHARES, low_passed
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.readers.skeleton_recording import Recording
 from manikin.recordings.reconstruction.anatomy import SIDES, segment_joint
-from manikin.walking.path.walking_path import WalkingPath
+from manikin.walking.path.walking_path import SampledWalk
 
 BREADTH = 0.36
 """Between the shoulder joints of a walker who has a path only [m]."""
@@ -81,7 +81,7 @@ class ShoulderPaths:
         return cls(left, right, recording.rate)
 
     @classmethod
-    def of_walk(cls, path: WalkingPath, breadth: float = BREADTH) -> Self:
+    def of_walk(cls, path: SampledWalk, breadth: float = BREADTH) -> Self:
         """Shoulders on both sides of a path, ``breadth`` [m] apart, see :meth:`of_places`."""
         return cls.of_places(path.place, (len(path.time) - 1) / path.duration, breadth)
 

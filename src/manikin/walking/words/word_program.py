@@ -258,10 +258,10 @@ def _definite(hessian: FloatArray, normal: FloatArray) -> NDArray[np.bool_]:
 
 
 def _only(values: _Values, index: NDArray[np.bool_]) -> _Values:
-    return _Values(*(part[index] for part in values))
+    return _Values._make(part[index] for part in values)
 
 
 def _either(better: NDArray[np.bool_], one: _Values, other: _Values) -> _Values:
     """The first where it is better, and else the other."""
     pairs = zip(one, other, strict=True)
-    return _Values(*(np.where(better if a.ndim == 1 else better[:, None], a, b) for a, b in pairs))
+    return _Values._make(np.where(better if a.ndim == 1 else better[:, None], a, b) for a, b in pairs)
