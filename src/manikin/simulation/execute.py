@@ -275,8 +275,8 @@ class _Run:
     def _counted_touches(self) -> tuple[Touch, ...]:
         """Unplanned touches that are a failure; an arm that swings in a recovery may brush the body."""
         pushed = min((push.start for push in self.pushes), default=np.inf)
-        own = {segment.name for segment in self.body.segments}
-        return tuple(t for t in self.world.touches if t.time < pushed or t.other not in own)
+        segments = {segment.name for segment in self.body.segments}
+        return tuple(t for t in self.world.touches if t.time < pushed or t.other not in segments)
 
 
 def _expected(interval: SupportInterval, time: float) -> bool:

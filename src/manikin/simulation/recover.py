@@ -4,7 +4,7 @@ import math
 import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import mujoco
@@ -150,9 +150,7 @@ class _Run:
         self.recorder = RecoveryRecorder(body, self.controller)
         self.grounds = tuple(ground.names)
         self.placed = Configuration(body)
-        self.stepping = SteppingRecovery(
-            body, self.controller, ground, replace(StepSettings(), most=task.steps)
-        )  # fmt: skip
+        self.stepping = SteppingRecovery(body, self.controller, ground, StepSettings(most=task.steps))
         ends = [push.start + max(push.duration, settings.delay) for push in task.pushes]
         self.rest_from = self.disturbed_until = max(ends, default=0.0)
 
@@ -186,9 +184,8 @@ class _Run:
                 progress(number / count)
         trace = self.recorder.trace(1e3 * control / (number + settle + 1))
         return judge(
-            self.body, self.controller, trace, self.task.pushes, str(self.task.feet), fallen,
-            self.world.touches, clock.perf_counter() - began, tuple(self.stepping.steps),
-            self.stepping.refused,
+            self.controller, trace, self.task.pushes, str(self.task.feet), fallen, self.world.touches,
+            clock.perf_counter() - began, tuple(self.stepping.steps), self.stepping.refused,
         )  # fmt: skip
 
     def _touching(self) -> dict[str, bool]:
@@ -206,9 +203,8 @@ class _Run:
     def _felt(self, q: FloatArray, time: float) -> FeltPush:
         """Wrench and generalised force of the pushes that act now, as the skin feels them."""
         acting = [push for push in self.task.pushes if push.active(time)]
-        felt = FeltPush.none(self.body.nv)
         if not acting:
-            return felt
+            return FeltPush.none(self.body.nv)
         state = self.placed.update(q)
         wrench, generalised = np.zeros(6), np.zeros(self.body.nv)
         for push in acting:
@@ -238,10 +234,10 @@ class _Run:
 
 def _check_standing(controller: BalanceRecovery, q: FloatArray) -> None:
     """Refuse a body that lies, leans or is about to fall over."""
-    place = controller.com[:2]
-    if controller.area.reach(place) >= 1.0:
+    com = controller.com[:2]
+    if controller.area.reach(com) >= 1.0:
         raise InputError(
-            f"the body does not stand: its centre of mass is over {np.round(place, 3).tolist()}, "
+            f"the body does not stand: its centre of mass is over {np.round(com, 3).tolist()}, "
             "outside its soles; valid: a posture that stands on both feet"
         )
     lean = trunk_lean(Configuration(controller.body, q), controller.groups)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from manikin.body import BodyModel, Configuration
+from manikin.body import Configuration
 from manikin.contact import Contact
 from manikin.control.recovery import BalanceRecovery, JointGroups, Strategy, capture_point
 from manikin.control.stepping import StepTaken
@@ -75,7 +75,7 @@ class Recovery(Displayed):
 
     @property
     def recovered(self) -> bool:
-        """Whether the body stands at the end, at rest and upright, on its own feet where they were."""
+        """Whether the body stands at the end, at rest and upright, on its feet where they were."""
         return not self.failure
 
     def strategy_share(self, strategy: Strategy) -> float:
@@ -126,7 +126,6 @@ class Recovery(Displayed):
 
 
 def judge(
-    body: BodyModel,
     controller: BalanceRecovery,
     trace: RecoveryTrace,
     pushes: Sequence[Push],
@@ -140,8 +139,7 @@ def judge(
     """Outcome of a push.
 
     Args:
-        body: The body.
-        controller: Its controller.
+        controller: Controller of the body.
         trace: Every control step.
         pushes: Pushes that disturbed it.
         feet: How its feet were on the ground.
@@ -156,13 +154,13 @@ def judge(
     start = min((push.start for push in pushes), default=0.0)
     control_from = start + controller.settings.delay
     level = [push.force[:2] for push in pushes if np.linalg.norm(push.force[:2]) > 0.0]
-    rests_from = _rests_from(body, controller, trace)
+    rests_from = _rests_from(controller, trace)
     excess = -trace.zmp_inside
     counted = (motion.time >= control_from - 1e-9) & np.isfinite(excess)
-    moved = _foot_motion(body, controller.soles, motion, steps)
-    segments = {segment.name for segment in body.segments}
+    moved, most = _foot_motion(controller, motion, steps), FOOT_SLID if steps else FOOT_MOVED
+    segments = {segment.name for segment in controller.body.segments}
     propped = [touch for touch in touches if touch.other not in segments]
-    fault = fallen or _fault(rests_from is not None, moved, propped, FOOT_SLID if steps else FOOT_MOVED)
+    fault = fallen or _fault(rests_from is not None, moved, propped, most)
     return Recovery(
         trace=trace,
         feet=feet,
@@ -178,7 +176,7 @@ def judge(
         soles=controller.soles,
         steps=steps,
         wall=wall,
-        requirements=_requirements(motion, fallen, propped, rests_from, moved, bool(steps)),
+        requirements=_requirements(motion, fallen, propped, rests_from, moved, most),
     )
 
 
@@ -188,7 +186,7 @@ def _requirements(
     propped: Sequence[Touch],
     rests_from: float | None,
     moved: float,
-    stepped: bool,
+    most: float,
 ) -> RequirementTable:
     end, first = float(motion.time[-1]), propped[0] if propped else None
     return RequirementTable((
@@ -198,8 +196,7 @@ def _requirements(
                     "" if first is None else f"{first.segment} on {first.other}"),
         Requirement("at_rest", "stands at rest and upright at the end", "", float(rests_from is not None),
                     ">=", 1.0, end),
-        Requirement("max_foot_motion_m", "a foot has moved by", "m", moved, "<=",
-                    FOOT_SLID if stepped else FOOT_MOVED, end),
+        Requirement("max_foot_motion_m", "a foot has moved by", "m", moved, "<=", most, end),
     ))  # fmt: skip
 
 
@@ -216,8 +213,8 @@ def at_rest(
     """Whether a body stands at rest: high, upright and slow, its centre of mass over its soles.
 
     Args:
-        state: Of the body; it is moved to ``q`` where the trunk has to be looked at.
-        controller: What keeps it.
+        state: State of the body; it is moved to ``q`` where the trunk has to be measured.
+        controller: Controller of the body.
         q: (nq,) configuration.
         com: (3,) centre of mass [m].
         velocity: (3,) of the centre of mass [m/s].
@@ -231,10 +228,10 @@ def at_rest(
     )
 
 
-def _rests_from(body: BodyModel, controller: BalanceRecovery, trace: RecoveryTrace) -> float | None:
+def _rests_from(controller: BalanceRecovery, trace: RecoveryTrace) -> float | None:
     """Time from which the body stands at rest to the end [s]; None if it does not."""
     samples = zip(trace.motion.time, trace.motion.q, trace.motion.com, trace.com_velocity, strict=True)
-    state, since = Configuration(body), None
+    state, since = Configuration(controller.body), None
     for time, *sample in reversed(list(samples)):
         if not at_rest(state, controller, *sample):
             break
@@ -269,12 +266,10 @@ def _explained(
     return f"{fault}; the capture point was {outside:.3f} m beyond the soles when the control began"
 
 
-def _foot_motion(
-    body: BodyModel, soles: Sequence[Contact], motion: Motion, steps: Sequence[StepTaken]
-) -> float:
+def _foot_motion(controller: BalanceRecovery, motion: Motion, steps: Sequence[StepTaken]) -> float:
     """Farthest that a foot is in the end from where it was put down, or where it was in the beginning [m]."""
-    first, last = Configuration(body, motion.q[0]), Configuration(body, motion.q[-1])
-    places = {contact.effector: first.effector_placement(contact.effector)[1] for contact in soles}
+    first, last = (Configuration(controller.body, motion.q[row]) for row in (0, -1))
+    places = {sole.effector: first.effector_placement(sole.effector)[1] for sole in controller.soles}
     places |= {step.foot: step.position for step in steps}
     return max(
         float(np.linalg.norm(last.effector_placement(name)[1] - place)) for name, place in places.items()
@@ -282,6 +277,6 @@ def _foot_motion(
 
 
 def _impulse(push: Push) -> float:
-    """Of a constant force, or of one half wave of a sine [N.s]."""
+    """Impulse of a constant force, or of one half wave of a sine [N.s]."""
     size = float(np.linalg.norm(push.force))
     return size / (np.pi * push.frequency) if push.frequency > 0.0 else size * push.duration

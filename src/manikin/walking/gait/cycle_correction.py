@@ -122,7 +122,9 @@ def as_one_person(
     means = np.concatenate([cycle.coefficients[:, 0] for cycle in cycles])
     reflected = np.concatenate([cycle.mirrored(body).coefficients[:, 0] for cycle in cycles])
     even, odd = _trends(velocities)
-    equal = _offsets(even, persons, [one for one in everyone if one != main], 0.5 * (means + reflected))
+    equal = _offsets(
+        even, persons, [name for name in everyone if name != main], 0.5 * (means + reflected)
+    )
     opposite = _offsets(odd, persons, everyone, 0.5 * (means - reflected))
     alike = []
     for cycle, person in zip(cycles, persons, strict=True):
@@ -137,7 +139,7 @@ def _offsets(
     trend: FloatArray, persons: Sequence[str], chosen: Sequence[str], means: FloatArray
 ) -> dict[str, FloatArray]:
     """(s,) offsets of the chosen persons from what the trend explains of (n, s) means."""
-    who = np.array([[float(person == one) for one in chosen] for person in persons])
+    who = np.array([[float(person == name) for name in chosen] for person in persons])
     table = np.hstack([trend, who.reshape(len(persons), len(chosen))])
     doubt = np.full(table.shape[1], DOUBT)
     doubt[: trend.shape[1]] = TREND_DOUBT
@@ -213,16 +215,15 @@ def levelled(body: BodyModel, coefficients: FloatArray, events: FloatArray) -> F
     """
     level = np.array(coefficients)
     landing, off, other = events
-    spans = {"left": (landing, 1.0), "right": (other, off)}
-    for number, side in enumerate(SIDES):
-        first, last = spans[side]
+    spans = ((landing, 1.0), (other, off))
+    for number, (first, last) in enumerate(spans):
         middle = first + np.linspace(MIDDLE[0], MIDDLE[1], 16) * (last - first)
         pitch = float(np.median(_feet(body, level, middle).pitch[number]))
-        slot = len(ROOT) + body.joint_index(f"{side}_ankle_dorsiflexion")
+        slot = len(ROOT) + body.joint_index(f"{SIDES[number]}_ankle_dorsiflexion")
         level[0, slot] += np.clip(pitch, -MOST_LEVELLED, MOST_LEVELLED)
     stances = [
         _feet(body, level, np.linspace(first, last, 64)).clearance[number]
-        for number, (first, last) in enumerate(spans[side] for side in SIDES)
+        for number, (first, last) in enumerate(spans)
     ]
     level[0, _HEIGHT] -= np.median(np.concatenate(stances))
     return level

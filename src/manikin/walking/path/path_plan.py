@@ -134,10 +134,10 @@ class Grid:
 
     def __init__(self, obstacles: Sequence[WalkObstacle], start: FloatArray, goal: FloatArray) -> None:
         """Lay out the cells from the resting ones of the obstacles and (3,) x, y [m], heading [rad]."""
-        resting = [one for one in obstacles if not one.moves]
+        resting = [item for item in obstacles if not item.moves]
         ends = np.vstack([start[:2], goal[:2]])
         corners = [
-            one.corners + one.displacements[0] + sign * one.radius for one in resting for sign in (-1, 1)
+            item.corners + item.displacements[0] + sign * item.radius for item in resting for sign in (-1, 1)
         ]
         points = np.vstack([ends, *corners])
         self._low, high = points.min(axis=0) - 1.0, points.max(axis=0) + 1.0
@@ -145,7 +145,7 @@ class Grid:
         self._shape = tuple(np.ceil((high - self._low) / self._cell).astype(int) + 1)
         rows, columns = np.indices(self._shape)
         self._centres = self._low + self._cell * np.column_stack([rows.ravel(), columns.ravel()])
-        rooms = [one.distance(self._centres[:, None], np.zeros(1))[:, 0] for one in resting]
+        rooms = [item.distance(self._centres[:, None], np.zeros(1))[:, 0] for item in resting]
         self._room = np.min(rooms, axis=0) if rooms else np.full(len(self._centres), np.inf)
         self._ends = [int(np.argmin(np.linalg.norm(self._centres - end, axis=1))) for end in ends]
 
@@ -283,7 +283,7 @@ def _check(task: WalkingTask) -> None:
         raise InputError(
             f"walking goal is {distance:g} m from the start; valid: {NEAREST:g} to {FARTHEST:g} m"
         )
-    resting = [one for one in task.obstacles if not one.moves]
+    resting = [item for item in task.obstacles if not item.moves]
     for name, place, obstacles in (("start", task.start, task.obstacles), ("goal", task.goal, resting)):
         distances = clearance(obstacles, task.walker, place[None], np.zeros(1))[0]
         for obstacle, left in zip(obstacles, distances, strict=True):
@@ -314,7 +314,7 @@ def _around(task: WalkingTask, free: WalkingPath) -> WalkingPath:
     transform_start_to_world = PlanarTransform(x, y, math.degrees(heading))
     transform_world_to_start = transform_start_to_world.inverse
     from_start = _from_start(task, transform_world_to_start)
-    blocking = [one for one, lack in zip(from_start.obstacles, short, strict=False) if lack > 0.0]
+    blocking = [item for item, lack in zip(from_start.obstacles, short, strict=False) if lack > 0.0]
     best = _on_ways(from_start, _in_frame(kept, from_start, transform_world_to_start, GRID), blocking)
     return _in_frame(best, task, transform_start_to_world)
 
@@ -338,14 +338,14 @@ def _from_start(task: WalkingTask, transform_world_to_start: PlanarTransform) ->
         task,
         start=np.zeros(3),
         goal=np.append(goal, task.goal[2] - task.start[2]).round(GOAL_GRID),
-        obstacles=tuple(one.moved(transform_world_to_start, GRID) for one in task.obstacles),
+        obstacles=tuple(item.moved(transform_world_to_start, GRID) for item in task.obstacles),
     )
 
 
 def _in_frame(
     path: WalkingPath, task: WalkingTask, transform: PlanarTransform, decimals: int | None = None
 ) -> WalkingPath:
-    """A path in the frame of another task, whose places are those of its own after a transform."""
+    """A path in the frame of another task, whose places are moved by a transform."""
     points = path.spline.control_points
     moved = np.column_stack([transform.points(points[:, :2]), points[:, 2] + transform.yaw])
     duration = path.duration
@@ -382,7 +382,7 @@ def _detour_guesses(
     for number, via in enumerate(detours(blocking, nearest, task.walker, task.start, task.goal)):
         way = guess_path(structure, "turning", task.start, task.goal, via)
         yield Guess(f"detour {number}", way, 1.2 * free.duration)
-    if any(one.moves for one in blocking):
+    if any(item.moves for item in blocking):
         for name, factor in (("straight on", 1.0), ("sooner", 0.7), ("later", 1.6)):
             yield Guess(name, free.spline.control_points, factor * free.duration)
 

@@ -206,13 +206,13 @@ def walking_route(
             raise InputError(f"{where} is passed with {waypoint.speed:g} m/s; valid: at most {limit:g} m/s")
         after = waypoints[number + 1].place if waypoint.speed > 0.0 else waypoint.place
         goal_velocity = _passing(waypoint, after, where)
-        still = [_later(one, clock) for one in obstacles]
+        still = [_later(item, clock) for item in obstacles]
         lack = room - float(clearance(still, walker, place[None], np.zeros(1)).min(initial=np.inf))
         if legs and lack > OVERLOOKED:
             break
         if not legs and clock > 0.0 and lack > OVERLOOKED:
-            # Somebody came during the wait: the first leg is found without them, and the route is blocked.
-            still = [one for one in still if not one.moves]
+            # An obstacle came during the wait: the first leg is found without it, and the route is blocked.
+            still = [item for item in still if not item.moves]
         apart = float(np.hypot(*(waypoint.place - place)[:2]))
         turn = abs(float(np.angle(np.exp(1j * (waypoint.place[2] - place[2])))))
         if apart >= NEAREST:
@@ -234,7 +234,7 @@ def walking_route(
             break
         clock += leg.duration + waypoint.wait
         place, velocity = leg.task.goal, goal_velocity
-    waits = (wait, *(one.wait for one in waypoints[: len(legs)]))
+    waits = (wait, *(item.wait for item in waypoints[: len(legs)]))
     route = WalkRoute(tuple(legs), waits)
     return replace(route, blocked=_blocked(route, obstacles, walker, room)) if route.succeeded else route
 
@@ -251,7 +251,7 @@ def _walked(
 
 def _blocked(route: WalkRoute, obstacles: Sequence[WalkObstacle], walker: Walker, room: float) -> str | None:
     """Which obstacle first comes too near on the whole route and, as long as anything moves, after it."""
-    end = max([route.duration, *(float(one.times[-1]) for one in obstacles if one.moves)])
+    end = max([route.duration, *(float(item.times[-1]) for item in obstacles if item.moves)])
     time = np.linspace(0.0, end, int(np.ceil(end / SAMPLING)) + 1)
     left = clearance(obstacles, walker, route.place_at(time), time)
     if not np.any(left < room - OVERLOOKED):

@@ -192,18 +192,18 @@ def _step(
     size, n = values.gradient.shape
     normal = values.q_gradient
     now = -np.einsum("ki,ki->k", values.gradient, normal) / np.einsum("ki,ki->k", normal, normal)
-    hessian, own = _hessian(goals, b, now)
+    hessian, diagonal = _hessian(goals, b, now)
     index = np.arange(n)
     system = np.zeros((size, n + 1, n + 1))
     system[:, :n, :n] = hessian
-    system[:, index, index] += damping[:, None] * own
+    system[:, index, index] += damping[:, None] * diagonal
     system[:, :n, n] = system[:, n, :n] = normal
     right = np.concatenate([-values.gradient, -values.q[:, None]], axis=1)
     solved = _solved(system, right)
     step = np.concatenate([np.zeros((size, 1)), solved[:, :n]], axis=1)
     # Coefficients of higher degrees bend less: compare gradients in the measure of the cost itself.
     rest = np.abs(values.gradient + now[:, None] * normal)
-    residual: FloatArray = np.max(rest / np.sqrt(own), axis=1) / np.sqrt(values.cost)
+    residual: FloatArray = np.max(rest / np.sqrt(diagonal), axis=1) / np.sqrt(values.cost)
     return step, solved[:, n], residual, hessian
 
 
@@ -234,10 +234,10 @@ def _hessian(goals: Goals, b: FloatArray, multiplier: FloatArray) -> tuple[Float
     hessian += bend[:, None, None] * p_gradient[:, :, None] * p_gradient[:, None, :]
     crossed = mixed[:, :, None] * p_gradient[:, None, :]
     hessian += crossed + crossed.transpose(0, 2, 1)
-    own = np.asarray(2.0 * cubed[:, None] * weights[1:], np.float64)
+    diagonal = np.asarray(2.0 * cubed[:, None] * weights[1:], np.float64)
     index = np.arange(degree - 1)
-    hessian[:, index, index] += own
-    return hessian, own
+    hessian[:, index, index] += diagonal
+    return hessian, diagonal
 
 
 @cache
