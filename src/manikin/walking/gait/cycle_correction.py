@@ -122,9 +122,7 @@ def as_one_person(
     means = np.concatenate([cycle.coefficients[:, 0] for cycle in cycles])
     reflected = np.concatenate([cycle.mirrored(body).coefficients[:, 0] for cycle in cycles])
     even, odd = _trends(velocities)
-    equal = _offsets(
-        even, persons, [name for name in everyone if name != main], 0.5 * (means + reflected)
-    )
+    equal = _offsets(even, persons, [name for name in everyone if name != main], 0.5 * (means + reflected))
     opposite = _offsets(odd, persons, everyone, 0.5 * (means - reflected))
     alike = []
     for cycle, person in zip(cycles, persons, strict=True):
