@@ -2,7 +2,7 @@
 
 A planned contact counts when its effector presses, and with no more of its area than touches: the points of
 the contact that are within :data:`TOUCHING` of the surface, and wherever the engine's contact points carry
-force. What touches without a plan and carries counts too. So the measured wrench of the scene lies in the
+force. Unplanned contacts that carry count too. So the measured wrench of the scene lies in the
 wrench polytope of the stance, up to :data:`TOUCHING`.
 """
 
@@ -27,7 +27,7 @@ TOUCHING = 1e-3
 lift by less, which a rigid sole on a rigid floor would not."""
 
 ALONG = 0.9
-"""Least cosine between the force's normal and the planned contact's for one to be the other."""
+"""Least cosine between the normals of a measured and a planned contact that are the same [-]."""
 
 
 @dataclass(frozen=True)
