@@ -26,7 +26,7 @@ from manikin.body.limbs import carrying_segment, hinge_line
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.motion.dynamics import FreeDynamics, centroidal_motion
+from manikin.motion.dynamics import CarriedForces, FreeDynamics, centroidal_motion
 from manikin.numerics.spatial import FloatArray
 from manikin.scene.distance import moves_by_joint
 
@@ -54,7 +54,9 @@ def full_motion(
     Returns:
         The motion, and (n, 6) its whole-body pseudo-wrench about the world origin.
     """
-    found = centroidal_motion(body, q, v, a)
+    found, load = centroidal_motion(body, q, v, a), CarriedForces.of(body, schedule, time, q, v, a)
+    if load is not None:
+        found = replace(found, wrench=found.wrench + load.wrench)
     forces = plan_forces(body, schedule, time, q, v, a)
     stances = [phase.stance for phase in schedule.sequence]
     margin = motion_margin(stances, schedule.phase_at(time), found.wrench, found.com, polytopes=polytopes)
@@ -226,7 +228,9 @@ def plan_forces(
         v: (n, nv) velocities.
         a: (n, nv) accelerations.
     """
-    dynamics = FreeDynamics.of(body, q, v, a)
+    dynamics, load = FreeDynamics.of(body, q, v, a), CarriedForces.of(body, schedule, time, q, v, a)
+    if load is not None:
+        dynamics = dynamics.carrying(load)
     names = schedule.sequence.effectors
     shares = load_shares(schedule, time, names)
     tau = np.zeros((len(time), body.nv))

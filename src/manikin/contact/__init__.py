@@ -15,11 +15,21 @@ from manikin.contact.contact import (
     sole_part,
     soles_overlap,
 )
-from manikin.contact.stance import ContactSchedule, Phase, Rolling, Stance, StanceSequence, Swing, roll_feet
+from manikin.contact.stance import (
+    CarriedLoad,
+    ContactSchedule,
+    Phase,
+    Rolling,
+    Stance,
+    StanceSequence,
+    Swing,
+    roll_feet,
+)
 
 __all__ = [
     "BODY_WEIGHTS_CAP",
     "FRICTION_MODELS",
+    "CarriedLoad",
     "Contact",
     "ContactKind",
     "ContactModel",

@@ -420,6 +420,7 @@ class _Planner:
             reference=_with_joints(reference, toes),
             reference_scale=scale,
             ignored=ignored_pairs(self.body, self.scene, schedule, time),
+            loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
             meeting=sliding_touchdown_at(self.body, self.scene, schedule, time),
         )
 
@@ -439,6 +440,8 @@ class _Planner:
         """(n,) margins of the planned centre of mass [N.m]."""
         schedule, com = self.trajectory.schedule, self.trajectory.position(time)
         wrench = pseudo_wrench(self.body.mass, com, self.trajectory.acceleration(time))
+        if any(phase.load is not None for phase in schedule.sequence):
+            wrench = self.trajectory.pseudo_wrench(time)
         stances = [phase.stance for phase in schedule.sequence]
         return motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=self._polytopes).margin
 
