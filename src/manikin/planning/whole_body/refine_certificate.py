@@ -11,7 +11,7 @@ wrenches that do so and stay as far as they can inside the limits of every conta
 ``s >= 0`` exactly where the margin of ``b`` in the stance's wrench polytope is not negative.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -278,10 +278,6 @@ def certify_refined(
         tightest_joint=body.joint_names[int(np.argmax(share.max(axis=0)))],
         worst_times_s=times,
     )
-
-
-Progress = Callable[[float], None]
-"""Told the share of the work that is done, in [0, 1]."""
 
 
 @dataclass(frozen=True)

@@ -198,7 +198,7 @@ class RefineObjective(MotionObjective):
 
     def _com_weight(self, scales: MotionScales) -> FloatArray:
         del scales
-        return self._targets.com_weight  # zero: there is no planned centre of mass
+        return self.targets.com_weight  # zero: there is no planned centre of mass
 
     def _add_dynamics(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> None:
         """Physics violation and balance, which depend on the wrench that the whole body needs."""
@@ -265,7 +265,7 @@ class RefineObjective(MotionObjective):
 
     def _add_place(self, out: FitLinearisation, motion: MotionSamples, scales: RefineScales) -> None:
         """Carry the pelvis about where the input does, and begin and end there."""
-        raw, reference = motion.raw[0], self._targets.reference
+        raw, reference = motion.raw[0], self.targets.reference
         weight = np.zeros_like(raw)
         weight[:, :3] = 1.0 / scales.guide_position
         weight[[0, -1]] = 1.0 / scales.end_angle
