@@ -25,6 +25,7 @@ from manikin.planning.com import CentroidalTrajectory
 from manikin.planning.whole_body.fit_job import CLEARANCE, FitAttempt, FitJob, Progress, no_progress
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
+from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.fit_targets import (
     FLAT_TOES,
     FitTargets,
@@ -87,7 +88,7 @@ PENALTIES = MappingProxyType(
         "max_joint_limit_violation_rad": ("joint_limit",),
         "max_velocity_share": ("joint_velocity",),
         "max_missing_wrench": ("force", "moment_share"),
-        "max_torque_share": ("force", "moment_share"),
+        "max_torque_share": ("force", "moment_share", "torque_share"),
     }
 )
 """Scales that decide each residual of the certificate.  Contacts and the centre of mass have multipliers,
@@ -207,6 +208,7 @@ class _Goal:
         guide: Postures that show the way.
         manner: How the body carries itself.
         straight_toes: Whether toes are straight while their sole is held.
+        forces: Motion at whose contact forces torques beyond the strength cost; None where no torque costs.
     """
 
     planner: "_Planner"
@@ -214,6 +216,7 @@ class _Goal:
     guide: Guide
     manner: PostureStyle
     straight_toes: bool
+    forces: Motion | None = None
 
     @property
     def schedule(self) -> ContactSchedule:
@@ -265,6 +268,7 @@ class _Goal:
             reference[:, 7 + joint] *= 1.0 - flat
             scale[:, 6 + joint] *= (FLAT_TOES / scale[:, 6 + joint]) ** flat
         lay_toes_flat(toes, reference, scale)
+        held = None if self.forces is None else HeldForces.of(planner.body, schedule, self.forces, time)
         return FitTargets(
             time=time,
             effectors=effector_targets(schedule, self.swings, time),
@@ -276,6 +280,7 @@ class _Goal:
             reference_scale=scale,
             ignored=ignored_pairs(planner.body, planner.scene, schedule, time),
             meeting=sliding_touchdown_at(planner.body, planner.scene, schedule, time),
+            forces=held,
         )
 
 
@@ -370,12 +375,14 @@ class _Planner:
 
     def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal]:
         """The next fit after one that breaks requirements."""
-        if last.is_caught:
-            return self.job.restart(last)
-        if number == 0 and last.broken & INEXACT:
-            scales = self.job.updated(last.scales, last.broken)
-            return self.job.attempt(last.goal, scales, fine=1, near=last.result.spline)
-        scales = self.job.updated(last.scales, last.broken, narrow=number > 0)
+        goal, broken = replace(last.goal, forces=None), last.broken
+        if last.is_caught:  # Fits that follow may have the finer knots again.
+            return replace(self.job.restart(replace(last, goal=goal)), fine=last.fine)
+        inexact, weak = number == 0 and bool(broken & INEXACT), "max_torque_share" in broken
+        scales = self.job.updated(last.scales, broken, narrow=number > 0)
+        if inexact or weak:
+            goal = replace(goal, forces=last.motion) if weak else goal
+            return self.job.attempt(goal, scales, max(last.fine, int(inexact)), last.result.spline)
         return self.job.improve(last, replace(scales, decrease=FIRST_DECREASE) if number == 0 else scales)
 
     def guide(
