@@ -278,7 +278,7 @@ class Replan:
         measured = self.adapted.certificate
         names = ("max_support_error_m", "max_com_error_m", "min_clearance_m", "max_torque_share")
         return {
-            **{name: float(getattr(measured, name)) for name in names},
+            **{name: measured.value(name) for name in names},
             "closest_pair": list(measured.closest_pair),
             "posture_rms_rad": self.adapted.posture_rms,
             "share_positive_margin": float(np.mean(self.adapted.motion.margin > 0.0)),

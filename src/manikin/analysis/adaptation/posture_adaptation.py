@@ -15,13 +15,13 @@ from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory, RecordedCom
+from manikin.planning.whole_body.certificate import MotionCertificate, certify
 from manikin.planning.whole_body.fit import spline_through
 from manikin.planning.whole_body.fit_job import FitJob
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
 from manikin.planning.whole_body.fit_targets import FitTargets, ignored_pairs, lay_toes_flat
 from manikin.planning.whole_body.sliding_touchdown import Ignored
-from manikin.planning.whole_body.whole_body_certificate import WholeBodyResiduals, certify
 from manikin.scene import Proximity, Scene
 from manikin.walking.gait.stance_foot import smooth_step
 
@@ -70,7 +70,7 @@ class AdaptedMotion:
     """
 
     motion: Motion
-    certificate: WholeBodyResiduals
+    certificate: MotionCertificate
     posture_rms: float
 
 

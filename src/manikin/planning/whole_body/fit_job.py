@@ -16,12 +16,10 @@ from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray
+from manikin.planning.whole_body.certificate import MotionCertificate
 from manikin.planning.whole_body.fit import DEGREE, FitResult, MotionFit, spline_through
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import MotionScales
-from manikin.planning.whole_body.refine_certificate import RefineResiduals
-from manikin.planning.whole_body.whole_body_certificate import WholeBodyResiduals
-from manikin.runtime.requirement import RequirementTable
 
 CAUGHT = -0.02
 """Below this clearance a part of the body is caught on the wrong side of another, and no small step leads
@@ -76,10 +74,8 @@ class FitGoal(Protocol):
 class MeasuredGoal(FitGoal, Protocol):
     """What a spline is fitted to and measured against."""
 
-    def measure(
-        self, spline: ConfigurationSpline
-    ) -> tuple[Motion, WholeBodyResiduals | RefineResiduals, RequirementTable]:
-        """Dense samples of a motion, what was measured on them, and the same beside its limits."""
+    def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
+        """Dense samples of a motion, and what was measured on them."""
         ...
 
 
@@ -98,8 +94,7 @@ class FitAttempt(Generic[G]):
         fit: The solver, with its multipliers and damping.
         result: What it found.
         motion: Dense samples.
-        certificate: Measured on them.
-        requirements: The certificate beside its limits.
+        certificate: Measured on them, beside its limits.
     """
 
     goal: G
@@ -109,18 +104,17 @@ class FitAttempt(Generic[G]):
     fit: MotionFit
     result: FitResult
     motion: Motion
-    certificate: WholeBodyResiduals | RefineResiduals
-    requirements: RequirementTable
+    certificate: MotionCertificate
 
     @property
     def broken(self) -> frozenset[str]:
         """Keys of the requirements that do not hold."""
-        return self.requirements.broken
+        return self.certificate.broken
 
     @property
     def is_caught(self) -> bool:
         """Whether a part of the body is on the wrong side of another or of an obstacle."""
-        return self.certificate.min_clearance_m < CAUGHT
+        return self.certificate.value("min_clearance_m") < CAUGHT
 
 
 @dataclass(eq=False)

@@ -26,11 +26,11 @@ from manikin.kinematics import Placement, PostureProblem, PostureResult, SolverS
 from manikin.motion.configuration_spline import align_quaternions
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyPlane, plan_com
+from manikin.planning.whole_body.certificate import WholeBodyRequirements
 from manikin.planning.whole_body.fit_targets import ignored_pairs
 from manikin.planning.whole_body.foot_roll import FootRoll, foot_roll
 from manikin.planning.whole_body.posture_style import READY, Guide, PostureStyle, reference_motion
 from manikin.planning.whole_body.sliding_touchdown import Ignored
-from manikin.planning.whole_body.whole_body_certificate import WholeBodyRequirements
 from manikin.scene import Proximity, Scene
 
 SETTINGS = SolverSettings(tolerance=1e-3, clearance_tolerance=2e-3, settled=2e-2, explain=False)

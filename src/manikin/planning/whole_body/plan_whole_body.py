@@ -22,6 +22,12 @@ from manikin.motion.configuration_spline import ConfigurationSpline, align_quate
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
+from manikin.planning.whole_body.certificate import (
+    MotionCertificate,
+    WholeBodyFailure,
+    WholeBodyRequirements,
+    certify,
+)
 from manikin.planning.whole_body.fit_job import CLEARANCE, FitAttempt, FitJob, Progress, no_progress
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
@@ -48,12 +54,6 @@ from manikin.planning.whole_body.posture_style import (
 from manikin.planning.whole_body.sliding_touchdown import Ignored, sliding_touchdown_at
 from manikin.planning.whole_body.swing import SwingLimits
 from manikin.planning.whole_body.swing_planner import FlightPlanner, PlannedSwing
-from manikin.planning.whole_body.whole_body_certificate import (
-    WholeBodyFailure,
-    WholeBodyRequirements,
-    WholeBodyResiduals,
-    certify,
-)
 from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import RequirementTable
 from manikin.scene import Proximity, Scene
@@ -127,8 +127,7 @@ class WholeBodyResult(Displayed):
     Attributes:
         motion: Sampled at 1 kHz; of the best attempt when it failed.
         spline: The motion in closed form.
-        certificate: Measured on the samples of the motion.
-        requirements: What the certificate was held against.
+        certificate: Measured on the samples of the motion, beside its limits.
         swings: The flights.
         guide: The guide postures.
         failure: Why it is no success, or None.
@@ -138,8 +137,7 @@ class WholeBodyResult(Displayed):
 
     motion: Motion
     spline: ConfigurationSpline
-    certificate: WholeBodyResiduals
-    requirements: RequirementTable
+    certificate: MotionCertificate
     swings: tuple[PlannedSwing, ...]
     guide: Guide
     failure: WholeBodyFailure | None
@@ -150,6 +148,11 @@ class WholeBodyResult(Displayed):
     def succeeded(self) -> bool:
         """Whether every requirement is kept."""
         return self.failure is None
+
+    @property
+    def requirements(self) -> RequirementTable:
+        """Every requirement with its measured value."""
+        return self.certificate.required
 
 
 def plan_whole_body(
@@ -228,7 +231,7 @@ class _Goal:
         del scales
         return MotionObjective(self.planner.body, self.planner.proximity, self._targets(time), basis)
 
-    def measure(self, spline: ConfigurationSpline) -> tuple[Motion, WholeBodyResiduals, RequirementTable]:
+    def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
         """Sample a fitted motion and certify it."""
         planner, schedule = self.planner, self.schedule
         duration = float(schedule.instants[-1])
@@ -240,12 +243,13 @@ class _Goal:
         certificate = certify(
             planner.body, planner.proximity, planner.trajectory, motion, ignored, wrench,
             sliding_touchdown_at(planner.body, planner.scene, schedule, time), planner.polytopes,
+            planner.settings.requirements,
         )  # fmt: skip
-        return motion, certificate, certificate.table(planner.settings.requirements)
+        return motion, certificate
 
-    def failure(self, table: RequirementTable) -> WholeBodyFailure | None:
+    def failure(self, certificate: MotionCertificate) -> WholeBodyFailure | None:
         """Why a motion to this goal is no success, or None."""
-        broken = table.first_broken
+        broken = certificate.first_broken
         if broken is None:
             return None
         reason, time = broken.reason, broken.time_s or 0.0
@@ -324,17 +328,17 @@ class _Planner:
         if searched is not None:
             best = self.job.better(best, self._attempt(searched, manner, progress))
         progress(1.0)
-        goal, table = best.goal, best.requirements
+        goal, failure = best.goal, best.goal.failure(best.certificate)
         return WholeBodyResult(
-            best.motion, best.result.spline, best.certificate, table, goal.swings, goal.guide,
-            goal.failure(table), best.result.iterations, clock.perf_counter() - began,
+            best.motion, best.result.spline, best.certificate, goal.swings, goal.guide, failure,
+            best.result.iterations, clock.perf_counter() - began,
         )  # fmt: skip
 
     def _search_again(
         self, swings: tuple[PlannedSwing, ...], best: FitAttempt[_Goal]
     ) -> tuple[PlannedSwing, ...] | None:
         """Replace the smooth swing in whose flight a requirement breaks, when there is one."""
-        broken = best.requirements.first_broken
+        broken = best.certificate.first_broken
         if broken is None:
             return None
         for index, item in enumerate(swings):

@@ -8,31 +8,33 @@ that breaks a requirement is repeated with other weights, knots, contacts or tim
 
 import time as clock
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, StanceSequence
+from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline
 from manikin.numerics.banded import SampledBasis
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.planning.contacts.efort import Task
+from manikin.planning.whole_body.certificate import (
+    MotionCertificate,
+    RefineRequirements,
+    WholeBodyFailure,
+    WholeBodyRequirements,
+    certify_refined,
+)
 from manikin.planning.whole_body.contact_variables import VariableChoice, Variables, VariableSamples, released
 from manikin.planning.whole_body.fit import DEGREE, spline_through
 from manikin.planning.whole_body.fit_job import FitAttempt, FitJob, Progress, no_progress
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import MotionScales, RefineScales
-from manikin.planning.whole_body.refine_certificate import (
-    RefineResiduals,
-    RefineResult,
-    RefineSettings,
-    certified_motion,
-    least_slack,
-)
 from manikin.planning.whole_body.refine_input import (
     ROUNDS,
     KeyPath,
@@ -45,14 +47,16 @@ from manikin.planning.whole_body.refine_input import (
 )
 from manikin.planning.whole_body.refine_measures import (
     STEP,
+    RefineMeasures,
     RefineObstacles,
+    balance_of,
     measure,
     rooms_of,
     sample_uniformly,
 )
 from manikin.planning.whole_body.refine_objective import RefineObjective, refine_targets
-from manikin.planning.whole_body.refine_physics import MarginCost
-from manikin.planning.whole_body.whole_body_certificate import WholeBodyFailure
+from manikin.planning.whole_body.refine_physics import MarginCost, least_slack
+from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable
 from manikin.scene import Proximity, Scene
 
@@ -99,6 +103,87 @@ PENALTIES = MappingProxyType(
 """Scales that decide each field of the certificate."""
 
 
+@dataclass(frozen=True)
+class RefineSettings:
+    """Options of :func:`refine_motion`.
+
+    Attributes:
+        knot_spacing: Largest distance of the spline's knots [s].
+        samples_per_span: Samples between two knots.
+        sampling: Spacing of the finished motion's samples, at which it is certified [s].
+        scales: Weights and limits of the fit.
+        requirements: What the finished motion must keep.
+        retime: Whether the motion may be slowed down.
+        friction_share: Share of the friction with which the margin is wanted; the certificate has all of it.
+        contact_variables: Whether contacts that the motion does not need, and whose effectors are not there,
+            are let go; else all contacts of the sequence are held.
+        speed_share: Share of the velocity limits up to which phases are shortened, as far as every
+            requirement is kept; None leaves them as they are.
+    """
+
+    knot_spacing: float = 0.1
+    samples_per_span: int = 3
+    sampling: float = 5.0e-3
+    scales: RefineScales = field(default_factory=RefineScales)
+    requirements: WholeBodyRequirements = field(default_factory=RefineRequirements)
+    retime: bool = True
+    friction_share: float = 0.8
+    contact_variables: bool = True
+    speed_share: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.speed_share is not None:
+            share = finite_number(self.speed_share, "refinement speed_share", above=0.0)
+            if share > 1.0:
+                raise InputError(f"refinement speed_share is {share:g}; valid: at most 1")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RefineResult(Displayed):
+    """A refined motion, or the best attempt and what it breaks.
+
+    Attributes:
+        motion: Densely sampled; its time begins where the input's does.
+        spline: The motion in closed form.
+        schedule: The contacts in the motion's own time, without those that were let go.
+        before: The input at the motion's own timing, joined by interpolation.
+        smoothed: The spline through the input from which the optimisation begins.
+        after: The refined motion.
+        certificate: Measured on the samples of the motion.
+        requirements: What the certificate and the contacts' limits were held against.
+        contact_slack: Room that all limits of the contacts have in common, the least at samples 10 ms
+            apart, by linear programs,
+            see :mod:`manikin.planning.whole_body.refine_physics` [N, N.m].
+        failure: Why it is no success, or None.
+        variables: Of each phase, the contact variable of each contact of the input's sequence, in [0, 1].
+        released: Phases and effectors of the contacts that were let go.
+        stretch: Duration of the motion relative to the input's.
+        iterations: Gauss-Newton steps.
+        wall_time: [s].
+    """
+
+    motion: Motion
+    spline: ConfigurationSpline
+    schedule: ContactSchedule
+    before: RefineMeasures
+    smoothed: RefineMeasures
+    after: RefineMeasures
+    certificate: MotionCertificate
+    requirements: RequirementTable
+    contact_slack: float
+    failure: WholeBodyFailure | None
+    variables: Variables
+    released: tuple[tuple[int, str], ...]
+    stretch: float
+    iterations: int
+    wall_time: float
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether every requirement is kept."""
+        return self.failure is None
+
+
 @dataclass(frozen=True, eq=False)
 class _Goal:
     """Keys and contacts at one timing.
@@ -123,14 +208,18 @@ class _Goal:
         wanted = job.rooms(self.schedule, job.settings.friction_share)
         return RefineObjective(job.body, job.proximity, targets, basis, wanted)
 
-    def measure(self, spline: ConfigurationSpline) -> tuple[Motion, RefineResiduals, RequirementTable]:
+    def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
         """Sample a motion and certify it."""
-        job = self.job
-        motion, certificate = certified_motion(
-            job.body, job.scene, job.proximity, self.schedule, job.rooms(self.schedule), spline,
-            job.settings.sampling, job.padded,
+        job, schedule, rooms = self.job, self.schedule, self.job.rooms(self.schedule)
+        time = sample_uniformly(schedule, job.settings.sampling)
+        polytopes = [room.polytope for room in rooms]
+        motion, wrench = full_motion(job.body, schedule, polytopes, time, *spline.evaluate(time))
+        balance, violation = balance_of(schedule, rooms, time, wrench, motion.com)
+        obstacles = RefineObstacles(job.body, job.scene, schedule, time, job.padded)
+        return motion, certify_refined(
+            job.body, job.proximity, schedule, obstacles, motion, violation, balance,
+            [room.is_flat for room in rooms], job.settings.requirements,
         )  # fmt: skip
-        return motion, certificate, certificate.table(job.settings.requirements)
 
     def at_rest(self) -> VariableSamples:
         """What the keys say about the contacts, before there is a motion."""
@@ -248,8 +337,8 @@ class Refinement:
             near = _retimed(best.result.spline, goal.schedule, shorter.schedule)
             trial = self._job.attempt(shorter, best.scales, best.fine, near)
             if trial.broken:
-                times = trial.certificate.worst_times_s
-                settled = settled.union(*(around(shorter.schedule, times[name]) for name in trial.broken))
+                times = (trial.certificate[key].time_s or 0.0 for key in trial.broken)
+                settled = settled.union(*(around(shorter.schedule, time) for time in times))
             else:
                 best = trial
         return best
@@ -264,7 +353,8 @@ class Refinement:
         """Give the worst phase more time."""
         before, path, schedule = last.goal.schedule, last.goal.path, last.goal.schedule
         for name in sorted(last.broken & _SLOWED):
-            when = float(np.interp(last.certificate.worst_times_s[name], before.instants, schedule.instants))
+            worst = last.certificate[name].time_s or 0.0
+            when = float(np.interp(worst, before.instants, schedule.instants))
             path, schedule = stretched_around(path, schedule, when, SLOWER)
         return _Goal(self, path, schedule)
 
@@ -294,7 +384,7 @@ class Refinement:
         )  # fmt: skip
         slack, when = least_slack(self.body, schedule, spline, time)
         table = RequirementTable((
-            *found.requirements,
+            *found.certificate.required,
             Requirement("min_contact_slack", "least slack of the contacts' limits", "N, N.m", slack, ">=",
                         0.0, when, tolerance=-LEAST_SLACK),
         ))  # fmt: skip
