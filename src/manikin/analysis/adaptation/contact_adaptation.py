@@ -105,8 +105,6 @@ def leaving_with_the_hinge(
     toe segment lies flat up to the end, and would hold the leg back.
 
     Args:
-        schedule: Contacts in time.
-        body: Whose.
         time: (n,) [s], on the schedule's clock.
         q: (n, nq) recorded postures then.
     """
@@ -146,7 +144,6 @@ def rising_at_once(
 
     Args:
         schedule: Contacts in time, a seat at one place.
-        body: Whose.
         time: (n,) [s], on the schedule's clock.
         q: (n, nq) recorded postures then.
     """
@@ -205,7 +202,6 @@ def scene_under(schedule: ContactSchedule, floor: float) -> Scene:
     """A floor, and a block under every contact above it; grasps hold on to nothing that is in the way.
 
     Args:
-        schedule: The contacts.
         floor: Height of the floor [m].
     """
     blocks: list[Obstacle] = []

@@ -85,10 +85,7 @@ def adapt_postures(
     """Fit one smooth motion to contacts and centre of mass that stays near recorded postures.
 
     Args:
-        body: The body.
-        scene: Obstacles and floor.
         trajectory: Centre of mass with the contacts.
-        polytopes: Of its phases.
         recorded: (n,) instants [s] and (n, nq) postures.
         clock: (k,) key instants of the trajectory and the recorded instants that they stand for [s].
     """
@@ -113,8 +110,6 @@ def rate_on_contacts(
     otherwise than they were recorded, and with them the rest of the body.
 
     Args:
-        body: The body.
-        scene: Obstacles and floor.
         recording: The recorded centre of mass on the contacts.
         recorded: (n,) instants [s] and (n, nq) postures.
     """
@@ -143,8 +138,6 @@ def rate_on_plan(
     At a recording's samples.
 
     Args:
-        body: The body.
-        scene: Obstacles and floor.
         trajectory: Planned near the recording, at its pace.
         recorded: (n,) instants [s] and (n, nq) postures.
         recording: On whose stances it was planned.
@@ -163,9 +156,6 @@ class _Task:
     """Recorded postures and the contacts to put them on, at the samples of a spline.
 
     Attributes:
-        body: The body.
-        proximity: Distances to the scene and within the body.
-        schedule: Contacts in time.
         job: Knots and samples of the spline.
         time: (n,) samples [s].
         reference: (n, nq) recorded postures, with the toes that the contacts need.

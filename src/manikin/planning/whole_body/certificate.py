@@ -184,15 +184,10 @@ def certify(
     """Measure a motion against its contacts, centre of mass, limits and obstacles.
 
     Args:
-        body: The body.
-        proximity: Distances to the scene and within the body.
-        trajectory: Planned centre of mass and contacts.
-        motion: The planned motion, densely sampled.
         ignored: Pairs that may touch, per sample.
         wrench: (n, 6) pseudo-wrench of the whole body about the world origin, per sample.
         meeting: What is met at speed, at the motion's samples.
         polytopes: Of the phases, where they are known.
-        requirements: Limits.
     """
     schedule = trajectory.schedule
     com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
@@ -225,15 +220,9 @@ def certify_refined(
     """Measure a refined motion against its contacts, limits and obstacles.
 
     Args:
-        body: The body.
-        proximity: Distances to the scene and within the body.
-        schedule: Contacts in time.
         obstacles: What may touch at the motion's samples.
-        motion: The motion, densely sampled.
         violation: (n,) its physics violation [N].
-        balance: Its margins.
         flat: Of each phase, whether its stance's wrenches fill no volume: margins do not count there.
-        requirements: Limits.
     """
     series = {**_kinematic_series(body, schedule, motion), "max_physics_violation": violation}
     worst = _worst(motion, series)
@@ -312,8 +301,6 @@ def _impacts(
     """Torques just after each contact that is made at speed, in time.
 
     Args:
-        body: The body.
-        schedule: Its contacts in time.
         time: (n,) [s].
         share: (n, nv - 6) shares of the torque limits.
     """
@@ -387,10 +374,6 @@ def deepest_penetration(
     """Measure every flight at every sample.
 
     Args:
-        body: The body.
-        proximity: Distances to the scene.
-        schedule: Contacts in time.
-        motion: The planned motion, densely sampled.
         ignored: Pairs of segment and obstacle that may touch, per sample; what every segment may
             touch is padded, and not measured.
 

@@ -31,7 +31,6 @@ class FitResult:
     """A fitted spline.
 
     Attributes:
-        spline: The motion.
         iterations: Gauss-Newton steps taken.
     """
 
@@ -45,7 +44,6 @@ class MotionFit:
     Args:
         objective: The residuals at samples of the spline.
         knots: Clamped knots of the spline [s].
-        scales: Residual scales and limits of the iteration.
     """
 
     def __init__(self, objective: MotionObjective, knots: FloatArray, scales: MotionScales) -> None:

@@ -87,12 +87,9 @@ class FitAttempt(Generic[G]):
     """One fit with its measured motion.
 
     Attributes:
-        goal: What was fitted to.
-        scales: Scales of the residuals.
         fine: How often the knots near the key instants were doubled.
         continued: Whether it went on from an earlier spline.
         fit: The solver, with its multipliers and damping.
-        result: What it found.
         motion: Dense samples.
         certificate: Measured on them, beside its limits.
     """

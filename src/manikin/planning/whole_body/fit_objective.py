@@ -116,9 +116,7 @@ class MotionObjective:
     """Evaluates and linearises the objective of a spline's control points.
 
     Args:
-        body: The body.
         proximity: Distances of the body to the scene and to itself, or None to ignore them.
-        targets: What to do.
         basis: The spline's basis at the targets' times.
     """
 
@@ -143,7 +141,6 @@ class MotionObjective:
 
         Args:
             points: (k, nq) control points.
-            scales: Scales of the residuals.
             shift: (n, task_rows) constants added to the scaled task residuals (multipliers).
         """
         motion = self._sampled(points)

@@ -162,9 +162,6 @@ class RefineScales(MotionScales):
 
         With lengths by ``l`` and masses by ``m``, at the same gravity, forces go by ``m``, moments by ``m l``
         and accelerations of the joints by ``1 / l``. Distances for safety shrink to a quarter at most.
-
-        Args:
-            body: The body.
         """
         plain = cls()
         if body.stature is not None:

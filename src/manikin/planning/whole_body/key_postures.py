@@ -137,8 +137,6 @@ def find_key_postures(
     """Look for a posture at every key instant until which the trajectory binds.
 
     Args:
-        body: The body.
-        scene: The obstacles and the floor.
         trajectory: Planned centre of mass with its contacts in time.
         manner: How the body carries itself where the task leaves freedom.
         requirements: What the finished motion must keep; the clearance is asked of the postures.
@@ -269,7 +267,6 @@ def requirements_at(
     pitch of its roll.  A contact that has yet to settle is only wished at its place.
 
     Args:
-        schedule: Contacts in time.
         key: Index of the key instant.
         rolls: Of :func:`rolls_of`.
 
@@ -419,7 +416,6 @@ def tighten(problem: CentroidalProblem, failed: tuple[KeyPosture, ...]) -> Centr
     where the centre of mass is given.
 
     Args:
-        problem: What was planned.
         failed: Key postures that were not found.
     """
     planes = []

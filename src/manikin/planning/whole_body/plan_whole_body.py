@@ -126,13 +126,8 @@ class WholeBodyResult(Displayed):
 
     Attributes:
         motion: Sampled at 1 kHz; of the best attempt when it failed.
-        spline: The motion in closed form.
         certificate: Measured on the samples of the motion, beside its limits.
-        swings: The flights.
-        guide: The guide postures.
-        failure: Why it is no success, or None.
         iterations: Of the fit.
-        wall_time: [s].
     """
 
     motion: Motion
@@ -170,12 +165,9 @@ def plan_whole_body(
     """Find a whole-body motion that keeps contacts, centre of mass and distances.
 
     Args:
-        body: The body.
-        scene: The obstacles and the floor.
         trajectory: Planned centre of mass with its contacts in time; its soles are those
             that the forces act on.
         rng: Source of all randomness (the Bi-RRT).
-        settings: Options.
         padded: Obstacles that any part of the body may lean on: it is kept off them where that is
             possible, but the certificate does not ask for it.
         key_postures: (phases + 1, nq) postures known for the key instants, which the motion stays near;
@@ -207,7 +199,6 @@ class _Goal:
 
     Attributes:
         planner: The job that it belongs to.
-        swings: The flights.
         guide: Postures that show the way.
         manner: How the body carries itself.
         straight_toes: Whether toes are straight while their sole is held.

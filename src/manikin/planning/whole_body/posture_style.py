@@ -47,7 +47,6 @@ class GuideFailure:
     Attributes:
         time: [s].
         phase: Index of the phase.
-        reason: What it misses, in one line.
     """
 
     time: float
@@ -101,9 +100,6 @@ def plan_guide(
     """Find a posture at each time, each one starting from the one before.
 
     Args:
-        body: The body.
-        proximity: Distances of the body to the scene and itself.
-        schedule: Contacts in time.
         time: (k,) [s].
         effectors: Targets at these times.
         com: (k, 3) centre of mass [m]; NaN leaves it free.
@@ -172,8 +168,6 @@ def _settling(
     """Places of the contacts that are still settling, on their way from where they touched.
 
     Args:
-        body: The body.
-        schedule: Contacts in time.
         time: [s].
         q: (nq,) posture before.
         touched: Where each of them touched, kept from posture to posture [m].
@@ -394,8 +388,6 @@ def reference_motion(
     """(n, nq) preferred posture carried along the centre of mass, facing as the feet do.
 
     Args:
-        body: The body.
-        trajectory: Centre of mass and contacts in time.
         time: (n,) [s].
         manner: Preferred posture and swing of the arms.
     """

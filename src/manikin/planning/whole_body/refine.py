@@ -144,7 +144,6 @@ class RefineResult(Displayed):
 
     Attributes:
         motion: Densely sampled; its time begins where the input's does.
-        spline: The motion in closed form.
         schedule: The contacts in the motion's own time, without those that were let go.
         before: The input at the motion's own timing, joined by interpolation.
         smoothed: The spline through the input from which the optimisation begins.
@@ -154,12 +153,10 @@ class RefineResult(Displayed):
         contact_slack: Room that all limits of the contacts have in common, the least at samples 10 ms
             apart, by linear programs,
             see :mod:`manikin.planning.whole_body.refine_physics` [N, N.m].
-        failure: Why it is no success, or None.
         variables: Of each phase, the contact variable of each contact of the input's sequence, in [0, 1].
         released: Phases and effectors of the contacts that were let go.
         stretch: Duration of the motion relative to the input's.
         iterations: Gauss-Newton steps.
-        wall_time: [s].
     """
 
     motion: Motion
@@ -190,8 +187,6 @@ class _Goal:
 
     Attributes:
         job: The refinement that it belongs to.
-        path: The keys.
-        schedule: Contacts in time.
     """
 
     job: "Refinement"
@@ -240,10 +235,6 @@ class Refinement:
     """One job, with what its attempts share.
 
     Args:
-        body: The body.
-        scene: Its surroundings.
-        settings: Options.
-        task: Direction of EFORT, or None.
         padded: Obstacles that any part of the body may lean on.
 
     Attributes:
@@ -275,8 +266,6 @@ class Refinement:
         """Fit, repair and measure.
 
         Args:
-            path: Key configurations.
-            schedule: Contacts in time.
             began: Reading of the clock from which the wall time counts [s].
             progress: Called with the share of the fits that are done.
         """
@@ -421,12 +410,9 @@ def refine_motion(
     """Turn key configurations and their contacts into a smooth motion in balance and without collision.
 
     Args:
-        body: The body.
-        scene: The obstacles and the floor.
         time: (n,) times of the key configurations [s].
         q: (n, nq) key configurations, joined by interpolation.
         schedule: Which effector holds which contact when, over the same interval; full soles only.
-        settings: Options.
         task: Direction of EFORT; the pelvis' displacement in each phase when omitted (7.9).
         padded: Obstacles that any part of the body may lean on.
         progress: Called now and then with the share done.

@@ -59,9 +59,6 @@ def limb_directions(
     Without a task the direction is that of the pelvis' displacement in the phase, as 7.9 wants.
 
     Args:
-        body: The body.
-        path: The input.
-        schedule: Contacts in time.
         time: (n,) [s].
         task: Direction of the task and the limbs that act on an object, or None.
     """
@@ -142,7 +139,6 @@ def contact_targets(
     """Where the contact variables want every effector.
 
     Args:
-        schedule: Contacts in time.
         time: (n,) [s].
         variables: Those of :func:`contact_variables`.
         approach: Weight of the distance to a contact's normal in flight, relative to that of a held

@@ -129,9 +129,6 @@ def stretched_for_speed(
     :data:`PEAK`, because a smooth motion is faster in the middle than on average.
 
     Args:
-        body: The body.
-        path: Key configurations.
-        schedule: Contacts in time.
         share: Of the velocity limits that may be used.
     """
     nodes = np.union1d(path.time, schedule.instants)
@@ -148,8 +145,6 @@ def stretched_around(
     """Slow down the phase at a time, and half as much the ones beside it.
 
     Args:
-        path: Key configurations.
-        schedule: Contacts in time.
         time: [s].
         factor: By which the phase gets longer.
     """
@@ -179,9 +174,7 @@ def shortening(
     """(phases,) factor on the duration of each phase, in [:data:`SHORTER`, 1].
 
     Args:
-        body: The body.
         motion: Its motion at the present timing.
-        schedule: Contacts in time.
         share: Of the velocity limits that the fastest joint of each phase should come up to.
         settled: Phases that stay as long as they are.
     """

@@ -67,9 +67,6 @@ class RefineObstacles:
     """What may be near what, at samples of a motion.
 
     Args:
-        body: The body.
-        scene: The obstacles.
-        schedule: Contacts in time.
         time: (n,) [s].
         padded: Obstacles that any part of the body may touch.
 
@@ -295,11 +292,8 @@ def measure(
     """Measure every term.
 
     Args:
-        body: The body.
-        proximity: Distances of the body to the scene and to itself.
         obstacles: What may touch at the samples.
         path: The input, for the directions of EFORT.
-        schedule: Contacts in time.
         rooms: Wrench polytope of each phase.
         time: (n,) samples at a constant step [s].
         q: (n, nq) configurations.

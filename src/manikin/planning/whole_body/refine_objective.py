@@ -58,7 +58,6 @@ class RefineTargets:
         load: (n, effectors) readiness of each to carry load, in the order of ``fit.effectors``.
         limbs: Directions of EFORT of the limbs, by effector.
         obstacles: What may touch, and how far flights keep off.
-        schedule: Contacts in time.
     """
 
     fit: FitTargets
@@ -135,9 +134,7 @@ class RefineObjective(MotionObjective):
     """Evaluates and linearises the objective of a spline's control points.
 
     Args:
-        body: The body.
         proximity: Distances of the body to the scene and to itself, or None to ignore them.
-        targets: What to do.
         basis: The spline's basis at the targets' times.
         rooms: Wrench polytope of each phase.
     """

@@ -127,7 +127,6 @@ class RefinedForces:
     """The contact forces that a stance can give.
 
     Args:
-        stance: The contacts.
         names: Effectors in the order of the contact variables' columns.
 
     Attributes:
@@ -253,7 +252,6 @@ def contact_slack(schedule: ContactSchedule, time: FloatArray, wrench: FloatArra
     """(n,) room that the limits of all contacts have in common, in the units of their rows [N, N.m].
 
     Args:
-        schedule: Contacts in time.
         time: (n,) [s].
         wrench: (n, 6) needed by the whole body, about the world origin.
 

@@ -60,8 +60,6 @@ def continue_seated(
     """Plan the phases in which the body sits and join them to the trajectory that led there.
 
     Args:
-        body: The body.
-        scene: The obstacles.
         trajectory: Centre of mass up to the touch of the seat.
         phases: The phases after it.
     """

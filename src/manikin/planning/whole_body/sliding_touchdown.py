@@ -87,9 +87,6 @@ def sliding_touchdown_at(
     """What is met at speed, from shortly before the touch until it has settled.
 
     Args:
-        body: The body.
-        scene: The obstacles.
-        schedule: Contacts in time.
         time: (n,) [s].
 
     Returns:
@@ -114,7 +111,6 @@ def sliding_touchdown_errors(
     """(n,) depth of what meets at speed in its surface, or its distance where it should touch [m].
 
     Args:
-        proximity: Distances to the scene.
         meeting: What is met, at the samples of the motion.
         motion: The planned motion, with n samples.
     """

@@ -155,12 +155,9 @@ def plan_swing(
     """Find a smooth flight from ``start`` to ``goal`` that keeps clear.
 
     Args:
-        start: Pose at lift-off.
-        goal: Pose at touch-down.
         start_time: Lift-off [s].
         end_time: Touch-down [s].
         clearance: Signed distance of the effector at a time and pose [m].
-        limits: What to keep.
         start_normal: (3,) normal of the surface that is left.
         end_normal: (3,) normal of the surface that is reached.
         pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
@@ -199,9 +196,7 @@ def check_swing(
     """Measure a curve against its limits, densely in time.
 
     Args:
-        curve: The flight.
         clearance: Signed distance of the effector at a time and pose [m].
-        limits: What to keep.
         instants: How many instants to look at; every ``limits.time_step`` when omitted.
     """
     state = curve.evaluate(_instants(curve, limits, instants))
@@ -266,7 +261,6 @@ class _Slack:
 
     Args:
         clearance: Signed distance of the effector at a time and pose [m].
-        limits: What to keep.
         count: Of the instants; every ``limits.time_step`` when omitted.
     """
 

@@ -103,8 +103,6 @@ class SwingCurve:
         The rotation follows the shortest turn with the timing of a straight flight.
 
         Args:
-            start: Pose at lift-off.
-            goal: Pose at touch-down.
             start_time: Lift-off [s].
             end_time: Touch-down [s].
             via: Points to pass: share of the duration in (0, 1) and (3,) position [m].
@@ -148,8 +146,6 @@ class SwingCurve:
         """Curve over one apex.
 
         Args:
-            start: Pose at lift-off.
-            goal: Pose at touch-down.
             start_time: Lift-off [s].
             end_time: Touch-down [s].
             height: Of the apex above the higher end, along the mean normal [m].

@@ -169,7 +169,6 @@ class EffectorClearance:
     """Callable ``(time, pose) -> signed distance [m]`` for one flying effector.
 
     Args:
-        body: The body.
         scene: The obstacles, the floor included.
         effector: Name of the flying effector.
         standing: Contacts of the other effectors during the flight.

@@ -72,9 +72,6 @@ def with_mid_flights(
     """Add postures along a clear curve inside each flight from a contact to another one.
 
     Args:
-        body: The body.
-        scene: The obstacles and the floor.
-        schedule: Contacts in time.
         path: Key configurations at least at both ends of each flight.
         padded: Obstacles that any part of the body may lean on.
 
@@ -196,8 +193,6 @@ class PlannedSwing:
     """A flight and the curve found for it.
 
     Attributes:
-        swing: The flight.
-        curve: Its curve, or the best attempt.
         method: ``"smooth"``, ``"bi-rrt"``, or ``"reach"`` for an effector that is free at one end.
         failure: None, or what the best attempt does not keep.
         roll: How the foot pitches; the curve is then that of the point it tilts about.
@@ -219,9 +214,6 @@ class FlightPlanner:
     """Plans the flights of one motion.
 
     Args:
-        body: The body.
-        scene: The obstacles.
-        trajectory: Centre of mass and contacts in time.
         limits: What a smooth swing must keep.
         rng: Source of all randomness of the search.
         reference: (time) -> (nq,) preferred posture, for the posture checks.

@@ -94,7 +94,6 @@ def smooth_path(
     Args:
         path: Path to shorten; its nodes are taken to be feasible.
         feasible: CHECK-PG, as for the search.
-        rng: Source of all randomness.
         limits: Speed limits, metric and density of the checks, as for the search.
         hints: Hints at the nodes of the path, for warm starts.
         iterations: How many replacements are tried.
@@ -262,8 +261,6 @@ class ClearFlight:
 
     Args:
         clearance: Signed distance of the effector at a time and pose [m].
-        start: Pose at lift-off.
-        goal: Pose at touch-down.
         start_time: Lift-off [s].
         end_time: Touch-down [s].
         limits: Clearance in flight and how it is gained near the contacts.
@@ -300,7 +297,6 @@ class SwingSearch:
     Attributes:
         curve: A smooth curve with a posture at every checked instant, or None.
         path: The shortened path it follows, or None when no path was found.
-        statistics: What the search did.
         failure: None, or why there is no curve.
     """
 
@@ -337,12 +333,9 @@ def search_swing(
     """Search a path with the Bi-RRT, shorten it and turn it into a smooth swing.
 
     Args:
-        start: Pose at lift-off.
-        goal: Pose at touch-down.
         start_time: Lift-off [s].
         end_time: Touch-down [s].
         feasible: CHECK-PG for the curve.
-        rng: Source of all randomness.
         roomy: Stricter CHECK-PG for the path, so that rounding its corners stays feasible;
             ``feasible`` itself when omitted.
         limits: Speed limits of the curve, metric and density of the checks.
