@@ -21,6 +21,7 @@ from manikin.planning.whole_body.fit_job import FitJob
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
 from manikin.planning.whole_body.fit_targets import FitTargets, ignored_pairs, lay_toes_flat
+from manikin.planning.whole_body.posture_style import Guide
 from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.scene import Proximity, Scene
 from manikin.walking.gait.stance_foot import smooth_step
@@ -256,7 +257,4 @@ def _steady_ends(time: FloatArray, second: FloatArray) -> FloatArray:
 
 def _postures(recorded: tuple[FloatArray, FloatArray], time: FloatArray) -> FloatArray:
     """(n, nq) postures between the recorded ones."""
-    known, q = recorded[0], align_quaternions(np.array(recorded[1]))
-    result = np.column_stack([np.interp(time, known, column) for column in q.T])
-    result[:, 3:7] /= np.linalg.norm(result[:, 3:7], axis=1, keepdims=True)
-    return result
+    return Guide(recorded[0], align_quaternions(np.array(recorded[1])), ()).at(time)

@@ -1,7 +1,4 @@
-"""How much the residuals of every whole-body spline matter, and how long its fit iterates.
-
-Also here. How much each residual of the whole-body fit matters. How much each term of the refinement matters.
-"""
+"""Scales of the residuals of a whole-body spline, planned or refined, and limits of its iteration."""
 
 from dataclasses import dataclass, replace
 from typing import Self

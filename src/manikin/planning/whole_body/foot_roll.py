@@ -16,7 +16,7 @@ from scipy.interpolate import BPoly
 
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
-from manikin.contact import Contact, ContactSchedule, SolePart, Swing
+from manikin.contact import ContactSchedule, SolePart, Swing
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.swing_path import Pose
 
@@ -141,13 +141,9 @@ def foot_roll(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> FootR
     flat = schedule.instants[swing.last_phase + 2] if end.part is SolePart.HEEL else land
     hinge = np.zeros(3) if toes is None else frame.rotation.T @ (toes.origin - frame.translation)
     return FootRoll(
-        np.array([up, off, land, flat]), _flat_pose(start), _flat_pose(end), hinge,
+        np.array([up, off, land, flat]), Pose.of(start), Pose.of(end), hinge,
         np.array([-0.5 * (body.sole_length or start.length), 0.0, 0.0]),
     )  # fmt: skip
-
-
-def _flat_pose(contact: Contact) -> Pose:
-    return Pose(contact.position, contact.rotation_contact_to_world)
 
 
 def _held(curve: BPoly, ends: FloatArray, time: FloatArray) -> FloatArray:

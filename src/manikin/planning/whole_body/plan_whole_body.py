@@ -53,7 +53,7 @@ from manikin.planning.whole_body.posture_style import (
 )
 from manikin.planning.whole_body.sliding_touchdown import Ignored, sliding_touchdown_at
 from manikin.planning.whole_body.swing import SwingLimits
-from manikin.planning.whole_body.swing_planner import FlightPlanner, PlannedSwing
+from manikin.planning.whole_body.swing_planner import FlightPlanner, PlannedSwing, leaning_pairs
 from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import RequirementTable
 from manikin.scene import Proximity, Scene
@@ -188,7 +188,7 @@ def plan_whole_body(
         known = Guide(trajectory.schedule.instants, align_quaternions(np.array(key_postures)), ())
     elif waypoints is not None:
         led = waypoints.guide()
-    leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
+    leaning = leaning_pairs(body, padded)
     planner = _Planner(body, scene, trajectory, rng, settings or WholeBodySettings(), leaning, known, led)
     return planner.run(began, progress or no_progress)
 

@@ -1,7 +1,4 @@
-"""How a body carries itself where the task leaves freedom.
-
-Also here. Postures along the motion that guide the whole-body fit. The posture a person would keep where the
-task leaves freedom.
+"""Postures that guide the whole-body fit, and the style that they keep where the task leaves freedom.
 
 At the key instants and every fraction of a second between them the posture generator finds a
 collision-free posture on the contacts, the swings and the centre of mass.  Like the key
@@ -24,7 +21,6 @@ from manikin.errors import InputError
 from manikin.kinematics import (
     Placement,
     PostureProblem,
-    PostureResult,
     Preferences,
     SolverSettings,
     generate_posture,
@@ -46,11 +42,9 @@ class GuideFailure:
 
     Attributes:
         time: [s].
-        phase: Index of the phase.
     """
 
     time: float
-    phase: int
     reason: str
 
 
@@ -131,11 +125,14 @@ def plan_guide(
         flying = [name for name in placements if effectors[name].weight[k] < 1.0]
         if not result.succeeded and flying:
             # In flight an effector need not pass exactly where its curve does.
-            loose = {n: _loosened(item) if n in flying else item for n, item in placements.items()}
+            loose = {
+                name: replace(item, position_weight=LOOSE_FLIGHT) if name in flying else item
+                for name, item in placements.items()
+            }
             retry = generate_posture(replace(problem, placements=loose), q, settings=settings)
             result = retry if retry.succeeded else result
         if not result.succeeded:
-            failures.append(_failure(schedule, float(instant), result))
+            failures.append(GuideFailure(float(instant), result.failure or "posture not found"))
         q = result.q
         found.append(q)
     return Guide(np.asarray(time), align_quaternions(np.array(found)), tuple(failures))
@@ -193,16 +190,8 @@ LOOSE_FLIGHT = 100.0
 """Weight of the place of a flying effector where it cannot be exact [1/m^2]."""
 
 
-def _loosened(placement: Placement) -> Placement:
-    return replace(placement, position_weight=LOOSE_FLIGHT)
-
-
 SETTLING_TURN = 10.0
 """Weight of its orientation [1/rad^2]."""
-
-
-def _failure(schedule: ContactSchedule, time: float, result: PostureResult) -> GuideFailure:
-    return GuideFailure(time, int(schedule.phase_at(time)), result.failure or "posture not found")
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,7 @@ flight, with a smooth ramp on the way.  The term is ``c (|e|^2 + |e'|^2)``: the 
 relative to its contact, and its speed.  The contacts are known here, so the variables are given and not
 unknowns; where ``c`` is 1 the place is met exactly by multipliers.
 
-Also here. The EFORT term: contacts keep the posture in which their limb presses well ([Tonneau2015]_
-7.8-7.9).
-
+The EFORT term ([Tonneau2015]_ 7.8-7.9) keeps contacts in postures in which their limb presses well:
 ``C = c / alpha`` for each limb in contact, with ``alpha = f_T (v . n)``.  As printed, the cost is
 singular or negative where the surface would have to pull (``alpha <= 0``), and 7.9 drops the contact
 variable and the unit length of the direction; here ``alpha`` is clamped to :data:`LEAST`, ``c`` is kept,

@@ -1,7 +1,4 @@
-"""What the refinement begins with: key configurations joined by interpolation, and their contacts in time.
-
-Also here. When a refined motion changes its contacts: phases that are slower than they have to be are
-shortened.
+"""Input of the refinement: key configurations joined by interpolation, their contacts, and their timing.
 
 The times of a contact sequence are a guess at an easy pace; [Tonneau2015]_ retimes by the joints' speed
 limits alone (4.4.2).  A phase whose joints stay far below their limits may be shorter; how much, balance and

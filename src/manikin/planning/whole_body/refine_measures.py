@@ -1,18 +1,14 @@
 """Every term of the refinement, measured on samples of a motion without its spline or solver.
 
 Velocities and accelerations are differences of the sampled configurations, so that the input, whose
-velocity jumps at its keys, and the refined motion are measured with the same yardstick.
-
-Also here. Obstacles in the refinement: what may touch, and how far an effector in flight keeps off its
-supports.
-
-An effector may touch what it holds, and that alone.  In flight it begins and ends at distance zero from
-its supports; in between it has to keep off them like everything else.
+velocity jumps at its keys, and the refined motion are measured in the same way.  An effector may touch what
+it holds, and that alone.  In flight it begins and ends at distance zero from its supports; in between it has
+to keep off them like everything else.
 """
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 
 import daqp
 import numpy as np
@@ -34,7 +30,7 @@ from manikin.planning.whole_body.refine_contacts import (
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.refine_physics import MarginCost, centre_of
 from manikin.planning.whole_body.sliding_touchdown import Ignored
-from manikin.planning.whole_body.swing_planner import touch_pairs
+from manikin.planning.whole_body.swing_planner import leaning_pairs, touch_pairs
 from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint, segment_of
 
@@ -85,7 +81,7 @@ class RefineObstacles:
         time: FloatArray,
         padded: Sequence[str] = (),
     ) -> None:
-        leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
+        leaning = leaning_pairs(body, padded)
         held = [
             leaning.union(*(touch_pairs(body, scene, contact) for contact in phase.stance))
             for phase in schedule.sequence
@@ -202,13 +198,6 @@ class RefineMeasures:
     def as_dict(self) -> dict[str, float]:
         """The measures by name."""
         return asdict(self)
-
-    def table(self, other: "RefineMeasures") -> str:
-        """Lines ``name  this -> other``."""
-        return "\n".join(
-            f"{item.name:32s}{getattr(self, item.name):12.4g} -> {getattr(other, item.name):12.4g}"
-            for item in fields(self)
-        )
 
 
 def sample_uniformly(schedule: ContactSchedule, step: float) -> FloatArray:

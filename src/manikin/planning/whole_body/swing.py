@@ -8,7 +8,7 @@ clearance, the control points of the best one are moved by sequential quadratic 
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import daqp
 import numpy as np
@@ -25,19 +25,6 @@ from manikin.planning.whole_body.swing_curve import (
     jerk_energy,
 )
 from manikin.planning.whole_body.swing_path import Pose
-
-__all__ = [
-    "Clearance",
-    "SwingCheck",
-    "SwingCurve",
-    "SwingLimits",
-    "SwingPlan",
-    "SwingState",
-    "check_swing",
-    "plan_swing",
-    "required_clearance",
-]
-
 
 Clearance = Callable[[float, Pose], float]
 """Signed distance [m] of an effector at a pose and a time [s] to everything it must not touch."""
@@ -117,14 +104,11 @@ class SwingPlan:
         curve: The curve found, or the best attempt when none keeps the limits.
         check: How it stands against the limits.
         candidates: Curves of the family that were tried.
-        refinements: Iterations of the optimisation.
     """
 
     curve: SwingCurve
     check: SwingCheck
     candidates: int = 0
-    refinements: int = 0
-    limits: SwingLimits = field(default_factory=SwingLimits)
 
     @property
     def succeeded(self) -> bool:
@@ -186,8 +170,7 @@ def plan_swing(
         for height, lateral, apex in _choices(heights)
     )  # fmt: skip
     best, best_check, tried = _first_clear(family, clearance, limits)
-    best, best_check, iterations = _refine(best, best_check, clearance, limits, normals, refine)
-    return SwingPlan(best, best_check, tried, iterations, limits)
+    return SwingPlan(*_refine(best, best_check, clearance, limits, normals, refine), tried)
 
 
 def check_swing(
@@ -214,23 +197,11 @@ def check_swing(
             f"[{place}]; required {required[worst]:.4f} m"
         )
     else:
-        failure = _hurry(curve, limits)
+        failure = curve.haste(limits.speed, limits.angular_speed)
     return SwingCheck(
         float(slack[worst - 1]), float(state.time[worst]), smallest,
         curve.peak_speed, curve.peak_angular_speed, failure,
     )  # fmt: skip
-
-
-def _hurry(curve: SwingCurve, limits: SwingLimits) -> str | None:
-    """Which speed is above its limit, if one is."""
-    if curve.peak_speed > limits.speed:
-        return f"speed reaches {curve.peak_speed:.2f} m/s; limit {limits.speed:.2f} m/s"
-    if curve.peak_angular_speed > limits.angular_speed:
-        return (
-            f"angular speed reaches {curve.peak_angular_speed:.2f} rad/s; "
-            f"limit {limits.angular_speed:.2f} rad/s"
-        )
-    return None
 
 
 def _first_clear(
@@ -246,7 +217,7 @@ def _first_clear(
     for curve in family:
         tried += 1
         slack = coarse.least(curve, least)
-        if slack >= -TOLERANCE and _hurry(curve, limits) is None:
+        if slack >= -TOLERANCE and curve.haste(limits.speed, limits.angular_speed) is None:
             slack = dense.least(curve, least)
             if slack >= -TOLERANCE:
                 return curve, check_swing(curve, clearance, limits), tried
@@ -337,13 +308,11 @@ def _refine(
     limits: SwingLimits,
     normals: tuple[FloatArray, FloatArray],
     iterations: int,
-) -> tuple[SwingCurve, SwingCheck, int]:
+) -> tuple[SwingCurve, SwingCheck]:
     """Move the control points until the curve keeps clear, at the least squared jerk."""
     n = len(best.control_position)
-    free = _free_directions(normals, n)
-    curve, done = best, 0
-    while done < iterations:
-        done += 1
+    free, curve = _free_directions(normals, n), best
+    for _ in range(iterations):
         step = _best_step(curve, clearance, limits, free)
         moved = curve.control_position + (free @ step).reshape(n, 3)
         curve = SwingCurve(curve.start_time, curve.end_time, moved, curve.control_rotation)
@@ -352,7 +321,7 @@ def _refine(
             best, best_check = curve, check
         if np.abs(step).max() < (SETTLED if check.kept else STATIONARY):
             break
-    return best, best_check, done
+    return best, best_check
 
 
 def _rank(curve: SwingCurve, check: SwingCheck) -> tuple[bool, float]:

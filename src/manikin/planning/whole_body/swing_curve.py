@@ -244,6 +244,16 @@ class SwingCurve:
         """Largest angular speed [rad/s], sampled at 1 % of the flight."""
         return float(np.linalg.norm(self._dense.angular_velocity, axis=1).max())
 
+    def haste(self, speed: float, angular_speed: float) -> str | None:
+        """Which peak speed is above its limit [m/s, rad/s], or None."""
+        if self.peak_speed > speed:
+            return f"speed reaches {self.peak_speed:.2f} m/s; limit {speed:.2f} m/s"
+        if self.peak_angular_speed > angular_speed:
+            return (
+                f"angular speed reaches {self.peak_angular_speed:.2f} rad/s; limit {angular_speed:.2f} rad/s"
+            )
+        return None
+
     @cached_property
     def peak_acceleration(self) -> float:
         """Largest linear acceleration [m/s^2], sampled at 1 % of the flight."""

@@ -1,10 +1,9 @@
 """A curve for every flight of a motion: smooth curves first, the Bi-RRT where they fail.
 
-Also here. Postures inside the flights of effectors: along a curve that is clear, not swung around.
-
-The key postures of a contact plan lie at the changes of contact, at most with one between.  Joined by
-lines they drag an effector through what it leaves, reaches or passes, and an optimisation that pushes it
-out may as well swing the limb aside as bend it, or be caught on the wrong side.
+Key postures of a contact plan get further postures along such curves.  They lie at the changes of contact,
+at most with one between; joined by lines they drag an effector through what it leaves, reaches or passes,
+and an optimisation that pushes it out may as well swing the limb aside as bend it, or be caught on the
+wrong side.
 """
 
 from collections.abc import Callable, Sequence
@@ -50,9 +49,6 @@ SEARCHES = 600
 ROOM = 0.01
 """Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
 
-REFINEMENTS = 20
-"""Most steps by which a curve is improved."""
-
 TURN_WEIGHT = 0.3
 """Weight of the effector's attitude on its curve, which is wished, not required [1/rad^2]."""
 
@@ -80,7 +76,6 @@ def with_mid_flights(
     """
     proximity, distance = Proximity(body, scene), RefineScales.of(body).safe_distance
     limits = SwingLimits(clearance=distance, time_step=TIME_STEP)
-    leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
     keys = dict(zip(path.time.tolist(), path.q, strict=True))
     for swing in schedule.sequence.swings():
         if swing.start is None or swing.end is None or not hangs(body, swing.effector):
@@ -88,7 +83,7 @@ def with_mid_flights(
         curve = _curve(body, scene, schedule, path, swing, limits)
         if curve is None:
             continue
-        touched = leaning.union(
+        touched = leaning_pairs(body, padded).union(
             *(touch_pairs(body, scene, item) for item in standing_during(schedule, swing))
         )
         for share in SHARES:
@@ -129,14 +124,14 @@ def _curve(
         return np.array([np.interp(time, times, column) for column in coms.T])
 
     clearance = EffectorClearance(body, scene, swing.effector, standing_during(schedule, swing), com)
-    first, last = (Pose(item.position, item.rotation_contact_to_world) for item in (swing.start, swing.end))
+    first, last = Pose.of(swing.start), Pose.of(swing.end)
     is_clear = ClearFlight(clearance, first, last, start, end, replace(limits, departure=DEPARTURE))
     between = zip(times[1:-1].tolist(), given[1:-1], strict=True)
-    if all(is_clear(time, _mid_flights_pose(body, q, swing)) for time, q in between):
+    if all(is_clear(time, Pose.in_posture(body, q, swing.effector)) for time, q in between):
         return None
     plan = plan_swing(
         first, last, start, end, clearance, limits=limits,
-        start_normal=swing.start.normal, end_normal=swing.end.normal, refine=REFINEMENTS,
+        start_normal=swing.start.normal, end_normal=swing.end.normal,
     )  # fmt: skip
     return plan.curve if plan.succeeded else _searched(clearance, first, last, (start, end), limits)
 
@@ -158,11 +153,6 @@ def _searched(
         first, last, *interval, check(0.0), np.random.default_rng(0), roomy=check(ROOM), iterations=SEARCHES
     )
     return found.curve
-
-
-def _mid_flights_pose(body: BodyModel, q: FloatArray, swing: Swing) -> Pose:
-    rotation, position = Configuration(body, q).effector_placement(swing.effector)
-    return Pose(np.array(position), np.array(rotation))
 
 
 LEVEL_BEHIND = 0.08
@@ -252,7 +242,7 @@ class FlightPlanner:
         if roll is not None:
             return self._plan_rolling(swing, roll)
         plan = plan_swing(
-            _pose(swing.start), _pose(swing.end), start, end, self._clearance(swing), limits=self._limits,
+            Pose.of(swing.start), Pose.of(swing.end), start, end, self._clearance(swing), limits=self._limits,
             start_normal=swing.start.normal, end_normal=swing.end.normal, pitch=self._pitch(swing, start),
         )  # fmt: skip
         smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure)
@@ -272,7 +262,9 @@ class FlightPlanner:
         contact = swing.end or swing.start
         assert contact is not None
         first, last = (
-            self._free_pose(swing.effector, time) if held is None else _pose(held)
+            Pose.in_posture(self._body, self._reference(time), swing.effector)
+            if held is None
+            else Pose.of(held)
             for held, time in ((swing.start, start), (swing.end, end))
         )
         plan = plan_swing(
@@ -280,10 +272,6 @@ class FlightPlanner:
             start_normal=contact.normal, end_normal=contact.normal, refine=0,
         )  # fmt: skip
         return PlannedSwing(swing, plan.curve, "reach")
-
-    def _free_pose(self, effector: str, time: float) -> Pose:
-        rotation, position = Configuration(self._body, self._reference(time)).effector_placement(effector)
-        return Pose(np.array(position), np.array(rotation))
 
     def _plan_rolling(self, swing: Swing, roll: FootRoll) -> PlannedSwing:
         """Find a smooth curve of the point about which the foot tilts."""
@@ -317,7 +305,7 @@ class FlightPlanner:
         assert swing.start is not None
         assert swing.end is not None
         start, end = self.schedule.swing_interval(swing)
-        ends = _pose(swing.start), _pose(swing.end)
+        ends = Pose.of(swing.start), Pose.of(swing.end)
         clearance = self._clearance(swing)
 
         def check(extra: float) -> PostureCheck:
@@ -381,11 +369,12 @@ def standing_during(schedule: ContactSchedule, swing: Swing) -> tuple[Contact, .
     return tuple(found.values())
 
 
+def leaning_pairs(body: BodyModel, padded: Sequence[str]) -> frozenset[tuple[str, str]]:
+    """Pairs of every segment with every obstacle that any part of the body may lean on."""
+    return frozenset((segment.name, name) for segment in body.segments for name in padded)
+
+
 def touch_pairs(body: BodyModel, scene: Scene, contact: Contact) -> frozenset[tuple[str, str]]:
     """Pairs of end segment and obstacle that a contact brings together."""
     obstacle = scene.touched_obstacle(contact, tolerance=0.02)
     return frozenset((segment, obstacle) for segment in end_segments(body, contact.effector))
-
-
-def _pose(contact: Contact) -> Pose:
-    return Pose(contact.position, contact.rotation_contact_to_world)
