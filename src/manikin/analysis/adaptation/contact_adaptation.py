@@ -1,7 +1,4 @@
-"""Stances and surfaces of a recorded person as a planned body can use them.
-
-Also here. Where effectors are in given postures.
-"""
+"""Stances and surfaces of a recorded person as a planned body can use them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
