@@ -24,12 +24,6 @@ from manikin.scene import Proximity
 from manikin.scene.distance import ProximitySamples
 from manikin.scene.distance_bounds import KnownDistances
 
-LEAST_MARGIN = 10.0
-"""Planned margins below this do not make the scale of the moments any finer [N.m]."""
-
-LEAST_FORCE_WEIGHT = 0.25
-"""Importance of the linear momentum's rate where the centre of mass only shows the way."""
-
 _RADIAL_SCALE = 0.05
 """Deviation of a raw quaternion's length from one that costs one unit."""
 
@@ -267,8 +261,10 @@ class MotionObjective:
         assert isinstance(scales, FitScales)
         targets, momentum = self.targets, motion.momentum
         scale = np.full((len(targets.time), 6), scales.force)
-        scale[:, :3] /= np.maximum(targets.com_weight, LEAST_FORCE_WEIGHT)[:, None]
-        scale[:, 3:] = scales.moment_share * np.maximum(targets.margin, LEAST_MARGIN)[:, None]
+        # Importance of the linear momentum's rate where the centre of mass only shows the way.
+        scale[:, :3] /= np.maximum(targets.com_weight, 0.25)[:, None]
+        # Planned margins below this do not make the scale of the moments any finer [N.m].
+        scale[:, 3:] = scales.moment_share * np.maximum(targets.margin, 10.0)[:, None]
         residual = momentum.value.copy()
         residual[:, :3] -= self._body.mass * targets.com_acceleration
         if targets.turning is not None:

@@ -102,9 +102,6 @@ PERSON_ROOT = 0.92
 PERSON_MASS = 75.0
 """Mass of that person [kg]."""
 
-LEAST_NEAR = 0.25
-"""Least factor on distances for safety."""
-
 
 @dataclass(frozen=True)
 class RefineScales(MotionScales):
@@ -164,7 +161,8 @@ class RefineScales(MotionScales):
         if body.stature is not None:
             return plain
         length = float(body.standing_posture()[2]) / PERSON_ROOT
-        force, near = body.mass / PERSON_MASS, max(length, LEAST_NEAR)
+        # Least factor on distances for safety.
+        force, near = body.mass / PERSON_MASS, max(length, 0.25)
         return replace(
             plain,
             safe_distance=plain.safe_distance * near, softness=plain.softness * near,

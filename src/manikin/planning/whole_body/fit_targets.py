@@ -208,12 +208,10 @@ def settled_share(schedule: ContactSchedule, phase: int, contact: Contact, time:
 def settling_map(contact: Contact, share: FloatArray) -> FloatArray:
     """(n, 3, 3) map of a settling contact's position error: soon whole along the normal, later across it."""
     normal = np.outer(contact.normal, contact.normal)
-    down = np.clip(LANDED_PER_SHARE * share, LEAST_SETTLED, 1.0)[:, None, None]
+    # How much sooner a settling contact is down on its surface than at its place.
+    down = np.clip(10.0 * share, LEAST_SETTLED, 1.0)[:, None, None]
     return down * normal + np.maximum(share, LEAST_SETTLED)[:, None, None] * (np.eye(3) - normal)
 
-
-LANDED_PER_SHARE = 10.0
-"""How much sooner a settling contact is down on its surface than at its place."""
 
 LEAST_SETTLED = 0.01
 """Importance of the place along the surface at the touch-down of a contact that settles."""
@@ -259,10 +257,6 @@ def flight_weight(share: FloatArray, middle: float, leaving: float, landing: flo
     return np.where(blend > 0.0, inside, 1.0)
 
 
-TAKING_HOLD = 0.35
-"""Time before its first contact in which an effector that was free may come close to it [s]."""
-
-
 def ignored_pairs(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
 ) -> tuple[Ignored, ...]:
@@ -286,7 +280,8 @@ def ignored_pairs(
             continue
         if swing.end is not None and swing.start is None:
             end = schedule.swing_interval(swing)[1]
-            landing.append((end - TAKING_HOLD, end, set(touch_pairs(body, scene, swing.end))))
+            # Time before its first contact in which an effector that was free may come close to it [s].
+            landing.append((end - 0.35, end, set(touch_pairs(body, scene, swing.end))))
             continue
         for index in range(swing.first_phase, swing.last_phase + 1):
             for contact in (swing.start, swing.end):

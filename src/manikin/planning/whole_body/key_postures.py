@@ -326,9 +326,6 @@ def _ignored(
     return tuple(one | other for one, other in zip(before, after, strict=True))
 
 
-MOST_REPLANS = 3
-"""Plans tried after the first one."""
-
 ROOM = 0.01
 """Distance that a new plan is kept inside the place where a posture begins to exist [m]."""
 
@@ -395,7 +392,7 @@ def find_eligible_plan(
             return Eligibility(plan, trajectory, postures, replans, None)
         worst = _most_hopeless(plan.problem, postures.failed)
         tightened = tighten(plan.problem, postures.failed) if replan else None
-        if tightened is None or replans == MOST_REPLANS:
+        if tightened is None or replans == 3:
             failure = IneligiblePlan("wholebody", f"{worst}; {_tried(replans)}", worst)
             return Eligibility(plan, trajectory, postures, replans, failure)
         again, replans = plan_com(tightened), replans + 1

@@ -58,15 +58,6 @@ from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import RequirementTable
 from manikin.scene import Proximity, Scene
 
-NEAR_FLIGHT = 0.05
-"""A requirement that breaks this close to a flight is put down to it [s]."""
-
-LOOSE_COM = 0.01
-"""Importance of a centre of mass that only shows the way."""
-
-SECOND_SEARCH = 600
-"""Random points of the Bi-RRT where a smooth curve exists but the body cannot follow it."""
-
 REPAIRS = 3
 """Most fits that follow a failed one with other weights."""
 
@@ -268,7 +259,8 @@ class _Goal:
             time=time,
             effectors=effector_targets(schedule, self.swings, time),
             com=trajectory.position(time),
-            com_weight=np.where(trajectory.binds(time), 1.0, LOOSE_COM),
+            # Importance of a centre of mass that only shows the way.
+            com_weight=np.where(trajectory.binds(time), 1.0, 0.01),
             com_acceleration=trajectory.acceleration(time),
             margin=planner.planned_margins(time),
             reference=reference,
@@ -334,9 +326,11 @@ class _Planner:
             return None
         for index, item in enumerate(swings):
             start, end = item.interval
-            near = start - NEAR_FLIGHT <= (broken.time_s or 0.0) <= end + NEAR_FLIGHT
+            # A requirement that breaks this close to a flight is put down to it [s].
+            near = start - 0.05 <= (broken.time_s or 0.0) <= end + 0.05
             if item.method == "smooth" and item.failure is None and item.roll is None and near:
-                other = self.flights.search(item.swing, item, iterations=SECOND_SEARCH)
+                # Random points of the Bi-RRT where a smooth curve exists but the body cannot follow it.
+                other = self.flights.search(item.swing, item, iterations=600)
                 if other.method != item.method:
                     return (*swings[:index], other, *swings[index + 1 :])
         return None

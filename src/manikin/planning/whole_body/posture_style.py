@@ -32,9 +32,6 @@ from manikin.planning.whole_body.fit_targets import EffectorTarget, settled_shar
 from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.scene import Proximity
 
-LEAST_WEIGHT = 0.05
-"""Targets of less importance than this are left to the fit."""
-
 
 @dataclass(frozen=True, eq=False)
 class GuideFailure:
@@ -126,7 +123,8 @@ def plan_guide(
         if not result.succeeded and flying:
             # In flight an effector need not pass exactly where its curve does.
             loose = {
-                name: replace(item, position_weight=LOOSE_FLIGHT) if name in flying else item
+                # Weight of the place of a flying effector where it cannot be exact [1/m^2].
+                name: replace(item, position_weight=100.0) if name in flying else item
                 for name, item in placements.items()
             }
             retry = generate_posture(replace(problem, placements=loose), q, settings=settings)
@@ -149,7 +147,8 @@ def _requirements(
     settling = {name for name in effectors if schedule.settling(time, name)[0]}
     placements = {}
     for name, target in effectors.items():
-        if name not in held and name not in settling and target.weight[k] >= LEAST_WEIGHT:
+        # Targets of less importance than this are left to the fit.
+        if name not in held and name not in settling and target.weight[k] >= 0.05:
             turn = (
                 target.rotation[k]
                 if target.rotation is not None and target.rotation_weight[k] > 0.5
@@ -181,17 +180,10 @@ def _settling(
             placements[contact.effector] = Placement(
                 start + share * (contact.position - start),
                 contact.rotation_contact_to_world,
-                rotation_weight=SETTLING_TURN,
+                # Weight of the orientation of a settling contact [1/rad^2].
+                rotation_weight=10.0,
             )
     return placements
-
-
-LOOSE_FLIGHT = 100.0
-"""Weight of the place of a flying effector where it cannot be exact [1/m^2]."""
-
-
-SETTLING_TURN = 10.0
-"""Weight of its orientation [1/rad^2]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,23 +63,11 @@ from manikin.scene import Proximity, Scene
 REPAIRS = 5
 """Most fits that follow a failed one with other weights, knots or timing."""
 
-SLOWER = 1.3
-"""Factor by which a phase gets longer in which balance or speed is missed again."""
-
-FINEST = 2
-"""How often the spline's knots near the key instants are doubled at most."""
-
 LEAST_SLACK = -1e-6
 """Slack of the contacts' limits below which no contact forces balance the body: 0 but for rounding."""
 
 SPARSE = 0.03
 """Spacing of the samples for which the contact variables are chosen [s]."""
-
-NEARLY = 0.02
-"""An effector this near its contact is meant to be there: that it is so exactly is for the repairs [m]."""
-
-PATIENT = 0.004
-"""Relative decrease of the objective below which a repair stops."""
 
 _SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin", "max_torque_share"})
 """Broken requirements that a slower motion may keep."""
@@ -254,11 +242,13 @@ class Refinement:
         self.variables: Variables = ()
         self._rooms: dict[tuple[StanceSequence, float], tuple[MarginCost, ...]] = {}
         self._job = FitJob(
-            settings.knot_spacing, settings.samples_per_span, penalties=PENALTIES, patience=PATIENT,
+            # Relative decrease of the objective below which a repair stops.
+            settings.knot_spacing, settings.samples_per_span, penalties=PENALTIES, patience=0.004,
             by_count=True, rescaled=True,
         )  # fmt: skip
         self._choice = VariableChoice(
-            body, scene, settings.scales, max(settings.requirements.support_error, NEARLY),
+            # An effector this near its contact is meant to be there: exactness is for the repairs [m].
+            body, scene, settings.scales, max(settings.requirements.support_error, 0.02),
             settings.friction_share,
         )  # fmt: skip
 
@@ -305,7 +295,8 @@ class Refinement:
             return job.restart(last, last.fine)
         scales = job.updated(last.scales, broken)
         slower = number > 0 and self.settings.retime and bool(broken & _SLOWED)
-        fine = last.fine + (last.fine < FINEST and bool(broken & _EXACT))
+        # How often the spline's knots near the key instants are doubled at most.
+        fine = last.fine + (last.fine < 2 and bool(broken & _EXACT))
         if not slower and fine == last.fine:
             return job.improve(last, scales)
         near = last.result.spline
@@ -344,7 +335,8 @@ class Refinement:
         for name in sorted(last.broken & _SLOWED):
             worst = last.certificate[name].time_s or 0.0
             when = float(np.interp(worst, before.instants, schedule.instants))
-            path, schedule = stretched_around(path, schedule, when, SLOWER)
+            # Factor by which a phase gets longer in which balance or speed is missed again.
+            path, schedule = stretched_around(path, schedule, when, 1.3)
         return _Goal(self, path, schedule)
 
     def _result(

@@ -106,13 +106,6 @@ def efort_with_derivative(
     return alpha, derivative
 
 
-RAMP = 0.15
-"""Longest time before and after a contact in which its variable is above 0 [s]."""
-
-RAMP_SHARE = 0.25
-"""The same as a share of the flight."""
-
-
 def contact_variables(schedule: ContactSchedule, time: FloatArray) -> dict[str, FloatArray]:
     """(n,) contact variable of every effector of the sequence at each time, in [0, 1]."""
     held = schedule.support(time, schedule.sequence.effectors)
@@ -122,7 +115,8 @@ def contact_variables(schedule: ContactSchedule, time: FloatArray) -> dict[str, 
     for swing in schedule.sequence.swings():
         start, end = schedule.swing_interval(swing)
         rows = (time >= start) & (time < end)
-        ramp = min(RAMP, RAMP_SHARE * (end - start))
+        # Time before and after a contact in which its variable is above 0 [s].
+        ramp = min(0.15, 0.25 * (end - start))
         for contact, away in ((swing.start, time - start), (swing.end, end - time)):
             if contact is not None:
                 near = np.clip(1.0 - away[rows] / ramp, 0.0, 1.0)

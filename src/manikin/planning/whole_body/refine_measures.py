@@ -34,12 +34,6 @@ from manikin.planning.whole_body.swing_planner import leaning_pairs, touch_pairs
 from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint, segment_of
 
-RISE = 0.3
-"""Share of a flight in which the wanted clearance to what was left, or is to be reached, rises or falls."""
-
-HELD_SHARE = 0.4
-"""Share of the wanted clearance that an effector in contact has to keep from other obstacles."""
-
 GRASPED = -0.05
 """Distance at which a hand that holds on to something begins to be pushed off it [m]."""
 
@@ -99,7 +93,9 @@ class RefineObstacles:
             rows = (time >= start) & (time < end)
             for contact, gone in ((swing.start, time - start), (swing.end, end - time)):
                 if contact is not None:
-                    share = np.clip(gone / (RISE * (end - start)), 0.0, 1.0)
+                    # Share of a flight in which the wanted clearance to what was left, or is to be reached,
+                    # rises or falls.
+                    share = np.clip(gone / (0.3 * (end - start)), 0.0, 1.0)
                     away = np.where(rows, share**2 * (3.0 - 2.0 * share), 1.0)
                     self._near[swing.effector] = np.minimum(self._near[swing.effector], away)
                     grasped = contact.kind is ContactKind.GRASP
@@ -139,7 +135,8 @@ class RefineObstacles:
         named = np.array([(segment_of(shape), segment_of(other)) for shape, other in found.pairs])
         for name, ends in self._ends.items():
             rows = np.isin(named[:, 0], ends) & np.isin(named[:, 1], self._obstacles)
-            share = np.maximum(self._near[name][found.sample[rows]], HELD_SHARE)
+            # Share of the wanted clearance that an effector in contact has to keep from other obstacles.
+            share = np.maximum(self._near[name][found.sample[rows]], 0.4)
             wanted[rows] = np.minimum(wanted[rows], share * safe)
         for side in self._sides:
             rows = np.zeros(len(wanted), dtype=bool)
@@ -153,9 +150,6 @@ class RefineObstacles:
 
 STEP = 0.01
 """Spacing of the samples that are measured [s]."""
-
-_GRAM = 1e-3
-"""Margin below which the missing wrench is computed [N.m]; above, it is zero."""
 
 
 @dataclass(frozen=True)
@@ -227,7 +221,8 @@ def physics_violation(room: MarginCost, stance_wrench: FloatArray) -> FloatArray
     H, h = np.array(room.polytope.H), room.polytope.h
     missing = np.zeros(len(stance_wrench))
     # Around the wrench itself, in units of the body's weight, the program is well scaled.
-    for k in np.flatnonzero(room.polytope.margin(stance_wrench) < -_GRAM):
+    # Above this margin [N.m] the missing wrench is zero.
+    for k in np.flatnonzero(room.polytope.margin(stance_wrench) < -1e-3):
         unit = max(1.0, float(np.abs(stance_wrench[k]).max()))
         bound = (h - H @ stance_wrench[k]) / unit
         found, _, flag, _ = daqp.solve(

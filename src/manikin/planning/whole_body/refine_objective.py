@@ -44,9 +44,6 @@ from manikin.scene.distance import ProximitySamples, moves_by_joint
 KNEE = "knee_flexion"
 """How the names of knees end."""
 
-_LEAST_CURVATURE = 1e-12
-"""Added to the curvature of the wrench's cost, relative to its largest element, to factorise it."""
-
 
 @dataclass(frozen=True, eq=False)
 class RefineTargets:
@@ -208,7 +205,8 @@ class RefineObjective(MotionObjective):
         # With the curvature L L^T, the rows L^T db and the residual L^-1 gradient have its gradient
         # and its Gauss-Newton matrix.
         size = np.abs(cost.curvature).max(axis=(1, 2))
-        root = np.linalg.cholesky(cost.curvature + (_LEAST_CURVATURE * size)[:, None, None] * np.eye(6))
+        # Added to the curvature of the wrench's cost, relative to its largest element, to factorise it.
+        root = np.linalg.cholesky(cost.curvature + (1e-12 * size)[:, None, None] * np.eye(6))
         residual = np.linalg.solve(root, cost.gradient[:, :, None])[:, :, 0]
         first, second, third = (root.transpose(0, 2, 1) @ part for part in wrench.jacobians)
         out.momentum = MomentumRate(residual, (first, second, third))

@@ -38,9 +38,6 @@ LATERALS = (0.0, 0.10, -0.10, 0.20, -0.20)
 APEXES = (0.5, 0.4, 0.6)
 """Shares of the duration at which the apex is passed that are tried."""
 
-COARSE = 13
-"""Instants at which a curve of the family is looked at before it is checked densely."""
-
 
 @dataclass(frozen=True)
 class SwingLimits:
@@ -213,7 +210,8 @@ def _first_clear(
     it. Instants at which curves were given up are looked at first.
     """
     best, least, tried = None, -np.inf, 0
-    coarse, dense = _Slack(clearance, limits, COARSE), _Slack(clearance, limits)
+    # Instants at which a curve of the family is looked at before it is checked densely.
+    coarse, dense = _Slack(clearance, limits, 13), _Slack(clearance, limits)
     for curve in family:
         tried += 1
         slack = coarse.least(curve, least)
@@ -341,14 +339,8 @@ def _free_directions(normals: tuple[FloatArray, FloatArray], n: int) -> FloatArr
     return np.hstack(columns)
 
 
-UNIT_JERK = 720.0
-"""Least integral of squared jerk of a rest-to-rest flight of 1 m in 1 s: the unit of effort."""
-
 TRUST = 0.05
 """Largest change of a control coordinate in one iteration [m]."""
-
-ROW_STEP = 0.012
-"""Spacing of the instants at which the optimisation linearises the distances [s]."""
 
 SETTLED = 0.004
 """Change of the control coordinates below which the optimisation stops [m]."""
@@ -366,7 +358,8 @@ BUFFER = 0.003
 def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, free: FloatArray) -> FloatArray:
     """One quadratic programme: least squared jerk under linearised distances and speeds."""
     n = len(curve.control_position)
-    energy = block_rows(jerk_energy(n) / UNIT_JERK)
+    # Least integral of squared jerk of a rest-to-rest flight of 1 m in 1 s: the unit of effort.
+    energy = block_rows(jerk_energy(n) / 720.0)
     distance_rows, distance_lower = _distance_rows(curve, clearance, limits)
     speed_rows, speed_lower = _speed_rows(curve, limits)
     rows = np.vstack([distance_rows, speed_rows]) @ free
@@ -395,7 +388,8 @@ def _distance_rows(
     curve: SwingCurve, clearance: Clearance, limits: SwingLimits
 ) -> tuple[FloatArray, FloatArray]:
     """Rows G and bounds l of ``G dx >= l`` from the distances near the required ones."""
-    state = curve.evaluate(_instants(curve, limits, max(33, int(curve.duration / ROW_STEP))))
+    # Spacing of the instants at which the optimisation linearises the distances [s].
+    state = curve.evaluate(_instants(curve, limits, max(33, int(curve.duration / 0.012))))
     distance = _distances(state, clearance)
     required = _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
     weights = basis((state.time - curve.start_time) / curve.duration, len(curve.control_position))

@@ -170,9 +170,6 @@ Placed = tuple[Any, Any]
 _ENDLESS = 1.0e9
 """Half the extent of what has no end (a floor) [m]."""
 
-_LIMB_SHARE = 0.75
-"""Share of the standing limb's last long segment that is kept clear of."""
-
 
 class EffectorClearance:
     """Callable ``(time, pose) -> signed distance [m]`` for one flying effector.
@@ -366,4 +363,5 @@ def _last_long_segment(body: BodyModel, contact: Contact) -> _StandingLimb | Non
         return None
     frame = body.effector(contact.effector)
     joint = contact.position - contact.rotation_contact_to_world @ frame.rotation.T @ frame.translation
-    return _StandingLimb(joint, max(radii), _LIMB_SHARE * length)
+    # Share of the standing limb's last long segment that is kept clear of.
+    return _StandingLimb(joint, max(radii), 0.75 * length)

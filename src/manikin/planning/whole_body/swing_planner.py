@@ -34,32 +34,11 @@ SHARES = (0.25, 0.5, 0.75)
 SAME_TIME = 0.01
 """A given posture this near to a new one is replaced by it [s]."""
 
-DEPARTURE = 0.1
-"""Distance that a given path has to gain per metre from a contact to count as clear."""
-
-LOOKS = 13
-"""Instants at which the given path is looked at: a flight that is clear already needs no curve."""
-
-TIME_STEP = 0.02
-"""Spacing of the instants at which a curve is checked [s]: it is a beginning, not the motion."""
-
-SEARCHES = 600
-"""Most random poses of a search for a way around."""
-
 ROOM = 0.01
 """Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
 
-TURN_WEIGHT = 0.3
-"""Weight of the effector's attitude on its curve, which is wished, not required [1/rad^2]."""
-
-COM_WEIGHT = 30.0
-"""Weight of a centre of mass between those at both ends [1/m^2]."""
-
 SETTINGS = SolverSettings(tolerance=1e-3, explain=False)
 """A flight without such a posture needs no reason, and a guess no exact contacts."""
-
-POSTURE_SHARE = 0.75
-"""Share of the wanted distance that such a posture keeps from everything that is not touched."""
 
 
 def with_mid_flights(
@@ -75,7 +54,8 @@ def with_mid_flights(
         The path with the postures that were found; a flight for which there is none stays as it is.
     """
     proximity, distance = Proximity(body, scene), RefineScales.of(body).safe_distance
-    limits = SwingLimits(clearance=distance, time_step=TIME_STEP)
+    # Spacing of the instants at which a curve is checked [s]: it is a beginning, not the motion.
+    limits = SwingLimits(clearance=distance, time_step=0.02)
     keys = dict(zip(path.time.tolist(), path.q, strict=True))
     for swing in schedule.sequence.swings():
         if swing.start is None or swing.end is None or not hangs(body, swing.effector):
@@ -92,9 +72,12 @@ def with_mid_flights(
             com = Configuration(body, guess).com
             problem = PostureProblem(
                 body, tuple(schedule.stance_at(time)),
-                {swing.effector: Placement(pose.position, pose.rotation, TURN_WEIGHT)},
-                com=np.array([com[0], com[1], np.nan]), com_weight=COM_WEIGHT,
-                proximity=proximity, clearance=POSTURE_SHARE * distance, ignore=touched, reference=guess,
+                {swing.effector: Placement(pose.position, pose.rotation, 0.3)},
+                # The effector's attitude and a centre of mass between those at both ends are wished, not
+                # required.
+                com=np.array([com[0], com[1], np.nan]), com_weight=30.0,
+                # Share of the wanted distance that the posture keeps from everything that is not touched.
+                proximity=proximity, clearance=0.75 * distance, ignore=touched, reference=guess,
             )  # fmt: skip
             found = generate_posture(problem, guess, settings=SETTINGS)
             if found.succeeded:
@@ -116,7 +99,8 @@ def _curve(
     assert swing.start is not None
     assert swing.end is not None
     start, end = schedule.swing_interval(swing)
-    times = np.linspace(start, end, LOOKS)
+    # A flight that is clear already at these instants needs no curve.
+    times = np.linspace(start, end, 13)
     given = path.at(times)
     coms = np.array([Configuration(body, q).com for q in given])
 
@@ -125,7 +109,8 @@ def _curve(
 
     clearance = EffectorClearance(body, scene, swing.effector, standing_during(schedule, swing), com)
     first, last = Pose.of(swing.start), Pose.of(swing.end)
-    is_clear = ClearFlight(clearance, first, last, start, end, replace(limits, departure=DEPARTURE))
+    # Distance that a given path has to gain per metre from a contact to count as clear.
+    is_clear = ClearFlight(clearance, first, last, start, end, replace(limits, departure=0.1))
     between = zip(times[1:-1].tolist(), given[1:-1], strict=True)
     if all(is_clear(time, Pose.in_posture(body, q, swing.effector)) for time, q in between):
         return None
@@ -149,30 +134,14 @@ def _searched(
 
         return feasible
 
-    found = search_swing(
-        first, last, *interval, check(0.0), np.random.default_rng(0), roomy=check(ROOM), iterations=SEARCHES
-    )
+    rng = np.random.default_rng(0)
+    found = search_swing(first, last, *interval, check(0.0), rng, roomy=check(ROOM), iterations=600)
     return found.curve
 
-
-LEVEL_BEHIND = 0.08
-"""A foot this far behind the centre of mass at lift-off is still swung level [m]."""
-
-PITCH_PER_METRE = 3.0
-"""Further behind than that, its toes are turned down by this much [rad/m]."""
-
-MOST_PITCH = 0.9
-"""Largest such turn [rad]."""
 
 REACHING_TIME = 0.7
 """A free hand begins to reach for its grasp this long before [s], and is put away as slowly."""
 
-
-ROLLING_CLEARANCE = 0.6
-"""Clearance of a rolling foot relative to that of a level one: people lift their toes by 1.5 cm."""
-
-ROLLING_DEPARTURE = 0.4
-"""Clearance it gains per metre, relative to that of a level one: it turns before it rises."""
 
 ROLLING_HEIGHTS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, *HEIGHTS[1:])
 """Apex heights of the point about which a rolling foot tilts: the ankle is lifted by the tilt already [m]."""
@@ -291,8 +260,10 @@ class FlightPlanner:
         start, end = self.schedule.swing_interval(swing)
         limits = replace(
             self._limits,
-            clearance=ROLLING_CLEARANCE * self._limits.clearance,
-            departure=ROLLING_DEPARTURE * self._limits.departure,
+            # Relative to a level foot: people lift their toes by 1.5 cm, and the foot turns before it
+            # rises.
+            clearance=0.6 * self._limits.clearance,
+            departure=0.4 * self._limits.departure,
         )
         plan = plan_swing(
             *roll.pivots, start, end, clearance, limits=limits,
@@ -330,7 +301,8 @@ class FlightPlanner:
         yaw = swing.start.yaw
         away = self._trajectory.position(lift_off) - swing.start.position
         behind = float(np.cos(yaw) * away[0] + np.sin(yaw) * away[1])
-        return float(np.clip(PITCH_PER_METRE * (behind - LEVEL_BEHIND), 0.0, MOST_PITCH))
+        # Toes turn down [rad/m] where the foot is further behind the centre of mass than 0.08 m.
+        return float(np.clip(3.0 * (behind - 0.08), 0.0, 0.9))
 
     def _clearance(self, swing: Swing, bend: Callable[[float], float] | None = None) -> EffectorClearance:
         return EffectorClearance(

@@ -308,10 +308,6 @@ class SwingSearch:
         return self.curve is not None
 
 
-PATH_SPEED_SHARE = 0.65
-"""Share of the speed limits left to the path: a flight from rest to rest is faster in its middle."""
-
-
 def search_swing(
     start: Pose,
     goal: Pose,
@@ -342,9 +338,8 @@ def search_swing(
         attempts: How many paths are searched when no smooth curve follows one.
     """
     limits = limits or FlightLimits()
-    slower = replace(
-        limits, speed=PATH_SPEED_SHARE * limits.speed, angular_speed=PATH_SPEED_SHARE * limits.angular_speed
-    )
+    # Speeds left to the path: a flight from rest to rest is faster in its middle.
+    slower = replace(limits, speed=0.65 * limits.speed, angular_speed=0.65 * limits.angular_speed)
     roomy = roomy or feasible
     for _ in range(max(1, attempts)):
         found = plan_flight(
