@@ -373,7 +373,7 @@ class Eligibility:
 def find_eligible_plan(
     first: CentroidalResult, realise: Realise, look: Look, *, replan: bool = True
 ) -> Eligibility:
-    """Test a plan at its key instants; plan again with tightened constraints while that may help.
+    """Test a plan at its key instants; plan again, three times at most, with tightened constraints.
 
     Args:
         first: A plan that succeeded.

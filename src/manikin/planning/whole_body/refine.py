@@ -88,7 +88,7 @@ PENALTIES = MappingProxyType(
         "max_torque_share": ("force",),
     }
 )
-"""Scales that decide each field of the certificate."""
+"""Scales that decide each residual of the certificate."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +139,7 @@ class RefineResult(Displayed):
         certificate: Measured on the samples of the motion.
         requirements: What the certificate and the contacts' limits were held against.
         contact_slack: Room that all limits of the contacts have in common, the least at samples 10 ms
-            apart, by linear programs,
-            see :mod:`manikin.planning.whole_body.refine_physics` [N, N.m].
+            apart, by linear programs, see :func:`.contact_slack` [N, N.m].
         variables: Of each phase, the contact variable of each contact of the input's sequence, in [0, 1].
         released: Phases and effectors of the contacts that were let go.
         stretch: Duration of the motion relative to the input's.
