@@ -30,7 +30,7 @@ from manikin.scene.distance import segment_of
 
 @dataclass(frozen=True)
 class WholeBodyRequirements:
-    """Limits that a whole-body motion must keep to count as a success; those of what is measured of it.
+    """Limits that a whole-body motion must keep to count as a success, as far as it is measured.
 
     Attributes:
         support_error: Largest distance of an effector from its contact [m].
