@@ -1,7 +1,6 @@
-"""A sequence of contacts with a posture for every change, as the contact planner finds it.
+"""A sequence of contacts with a posture for every change, as the contact planner finds it; its certificate.
 
-Also here. Certificate of a contact plan: every posture measured afresh, balance by other means than the
-search's. The contact that an effector makes where it has been put.
+The certificate measures every posture afresh, balance by other means than the search's.
 """
 
 import math
@@ -59,11 +58,7 @@ def footprint(
 ) -> FloatArray:
     """(c, 3) points of the effector's frame that must lie on the surface [m].
 
-    Args:
-        body: The body.
-        limb: Its limb, whose own patch goes before the body's soles.
-        kind: How it touches.
-        rules: Which part of a sole has to touch; all of it when omitted.
+    The limb's own patch goes before the body's soles, of which the rules may ask for a part only.
 
     Raises:
         ContactError: If a sole is asked for of a body without soles.
@@ -92,27 +87,20 @@ def make_contact(
     """Contact of a limb's effector.
 
     Args:
-        body: The body.
-        limb: The limb.
-        kind: How it touches.
         position: (3,) in the world [m].
         rotation: (3, 3) effector-to-world; its z column is the normal.
-        rules: Friction and strengths.
 
     Raises:
         ContactError: If a value is out of its range, or a sole is asked for of a body without.
     """
+    name = limb.effector
     if kind is ContactKind.GRASP:
-        return grasp(
-            limb.effector, position, max_force=rules.grasp_force, max_moment=rules.grasp_moment,
-            rotation=rotation,
-        )  # fmt: skip
+        force, moment = rules.grasp_force, rules.grasp_moment
+        return grasp(name, position, max_force=force, max_moment=moment, rotation=rotation)
     if kind is ContactKind.POINT:
-        return point(limb.effector, position, friction=rules.friction, rotation=rotation)
+        return point(name, position, friction=rules.friction, rotation=rotation)
     length, width = 2.0 * footprint(body, limb, kind)[0, :2]
-    whole = sole(
-        limb.effector, position, length=length, width=width, friction=rules.friction, rotation=rotation
-    )
+    whole = sole(name, position, length=length, width=width, friction=rules.friction, rotation=rotation)
     if rules.patch is None or limb.patch is not None:
         return whole
     return replace(whole, points=frozen_array(footprint(body, limb, kind, rules), "sole's patch [m]", (4, 3)))
@@ -202,14 +190,7 @@ class ContactPlan:
     def of(
         cls, body: BodyModel, stages: Sequence[Stage], goal: FloatArray, hinge_pace: float = HINGE_PACE
     ) -> "ContactPlan":
-        """Plan with the centre of mass of its last posture.
-
-        Args:
-            body: The body.
-            stages: From the start to the goal.
-            goal: (nq,) posture with which the last one ends.
-            hinge_pace: Mean speed of the hinge that turns most between two postures [rad/s].
-        """
+        """Plan that ends with a posture (nq,), with time for each change at an unhurried pace [rad/s]."""
         com = frozen_array(Configuration(body, goal).com, "goal com [m]", (3,))
         ends = [(stage.q, stage.com) for stage in stages[1:]] + [(goal, com)]
         timed = [
@@ -219,31 +200,19 @@ class ContactPlan:
         return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
 
     def sequence(self, model: ContactModel | None = None) -> StanceSequence:
-        """The stances in order, as the stages that follow take them.
-
-        Args:
-            model: Contact model of each; the default one without a cap when omitted.
-        """
+        """The stances in order, with a contact model; the default one without a cap when omitted."""
         stances = [Stance(list(stage.contacts.values()), model=model) for stage in self.stages]
         return StanceSequence(
             [Phase(stance, stage.min_duration) for stance, stage in zip(stances, self.stages, strict=True)]
         )
 
     def schedule(self, model: ContactModel) -> ContactSchedule:
-        """The stances in time, each as short as it may be, from zero on.
-
-        Args:
-            model: Contact model of each.
-        """
+        """The stances with a contact model in time, each as short as it may be, from zero on."""
         durations = [stage.min_duration for stage in self.stages]
         return ContactSchedule(self.sequence(model), np.concatenate([[0.0], np.cumsum(durations)]))
 
     def keys(self, instants: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Key times (k,) [s] and configurations (k, nq): at every change, and in between where there is one.
-
-        Args:
-            instants: (n + 1,) times of the changes [s].
-        """
+        """Key times (k,) [s] and configurations (k, nq): at (n + 1,) changes and, if any, in between."""
         times, keys = [float(instants[0])], [self.stages[0].q]
         ends = [*(stage.q for stage in self.stages[1:]), self.goal]
         for number, (stage, end) in enumerate(zip(self.stages, ends, strict=True)):
@@ -315,9 +284,6 @@ def certify_plan(
     """Measure every posture of a plan.
 
     Args:
-        body: The body.
-        scene: Its surroundings.
-        plan: The plan.
         model: Contact model; with the default cap of the body when omitted.
     """
     model = model or ContactModel.of_body(body.mass)
