@@ -15,11 +15,7 @@ from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number, frozen_
 
 
 def support_polygon(stance: Stance) -> FloatArray:
-    """Vertical projection of the hull of all soles' corners and points.
-
-    Returns:
-        (k, 2) counter-clockwise [m]; grasps do not count.
-    """
+    """(k, 2) hull of all soles' corners and points from above, counter-clockwise, without grasps [m]."""
     points = [c.points_in_world[:, :2] for c in stance if c.kind is not ContactKind.GRASP]
     return convex_polygon(np.vstack([np.zeros((0, 2)), *points]))
 
@@ -51,25 +47,13 @@ def zero_moment_point(
     o = np.zeros(3) if reference is None else np.asarray(reference, dtype=np.float64)
     drop = plane_height - o[..., 2]
     vertical = np.where(np.abs(w[..., 2]) > 0, w[..., 2], np.nan)
-    return np.stack(
-        [
-            o[..., 0] + (drop * w[..., 0] - w[..., 4]) / vertical,
-            o[..., 1] + (drop * w[..., 1] + w[..., 3]) / vertical,
-        ],
-        axis=-1,
-    )
+    x = o[..., 0] + (drop * w[..., 0] - w[..., 4]) / vertical
+    y = o[..., 1] + (drop * w[..., 1] + w[..., 3]) / vertical
+    return np.stack([x, y], axis=-1)
 
 
 def center_of_pressure(points: ArrayLike, normal_forces: ArrayLike) -> FloatArray:
-    """Mean of contact points weighted by their normal forces.
-
-    Args:
-        points: (n, d) of one surface [m].
-        normal_forces: (..., n), not negative [N].
-
-    Returns:
-        (..., d) [m]; not a number where nothing presses.
-    """
+    """(..., d) mean of contact points (n, d) [m] weighted by normal forces (..., n) [N]; NaN without load."""
     f = np.asarray(normal_forces, dtype=np.float64)
     total = f.sum(axis=-1, keepdims=True)
     return f @ np.asarray(points, dtype=np.float64) / np.where(total > 0, total, np.nan)

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt, label
 
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array, skew
 
 
 def ball_rotation(axes: ArrayLike, angles: ArrayLike) -> FloatArray:
@@ -35,8 +35,7 @@ def ball_rotation(axes: ArrayLike, angles: ArrayLike) -> FloatArray:
     """
     q = np.asarray(angles, dtype=np.float64)
     total = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
-    for number, (x, y, z) in enumerate(np.asarray(axes, dtype=np.float64)):
-        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    for number, cross in enumerate(skew(axes)):
         sine, cosine = np.sin(q[..., number])[..., None, None], np.cos(q[..., number])[..., None, None]
         total = total @ (np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross)
     return np.array(total)

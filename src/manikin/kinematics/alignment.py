@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from manikin.kinematics.limb_kinematics import LimbKinematics
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, skew
 
 LEVER = 0.3
 """What one radian of tilt weighs beside one metre [m]."""
@@ -94,8 +94,7 @@ def _forward(chain: LimbKinematics, q: Any) -> tuple[Any, Any, list[Any], list[A
 
 def _about(axis: FloatArray, angle: Any) -> Any:
     """Rotation about a unit axis."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = skew(axis)
     turned = ca.sin(angle) * _constant(cross) + (1.0 - ca.cos(angle)) * _constant(cross @ cross)
     return ca.SX(_constant(np.eye(3))) + turned
 

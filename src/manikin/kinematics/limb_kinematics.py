@@ -17,7 +17,7 @@ from manikin.body.model import BodyModel
 from manikin.body.natural_range import NaturalRange
 from manikin.body.segments import Limb
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, frozen_array, skew
+from manikin.numerics.spatial import FloatArray, cross, frozen_array, skew
 
 MIN_COUNT = 100
 """Fewest samples from which a hull is made; 10,000 are a fair picture ([Tonneau2015]_ 4.3.4)."""
@@ -252,7 +252,7 @@ class LimbKinematics:
         out.positions[rows] = point
         out.rotations[rows] = turn @ self.tip_rotation
         out.axes[rows] = axes.transpose(0, 2, 1)
-        out.jacobians[rows] = _cross(axes, point[:, None] - places).transpose(0, 2, 1)
+        out.jacobians[rows] = cross(axes, point[:, None] - places).transpose(0, 2, 1)
 
 
 def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:
@@ -267,14 +267,6 @@ def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:
             found.append(offset)
             offset = np.zeros(3)
     return np.reshape(found, (-1, 3)), offset + body.effector(limb.effector).translation
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products of (..., 3) by (..., 3), without the overhead of ``np.cross``."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
-    return out
 
 
 def _blocks(count: int) -> Iterator[slice]:

@@ -15,7 +15,7 @@ from manikin.balance.margin import force_levers, wrench_levers
 from manikin.contact import ContactKind, Stance, StanceSequence
 from manikin.errors import InputError
 from manikin.numerics.polytope import Polytope
-from manikin.numerics.spatial import GRAVITY, FloatArray, skew
+from manikin.numerics.spatial import GRAVITY, FloatArray, rows_about, skew
 from manikin.planning.com.com_problem import CentroidalProblem
 
 FIRM_FRICTION = 0.7
@@ -264,12 +264,7 @@ def _bounds(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> FloatA
     """Upper bounds of the margin at the key instants; of forces only the sign counts."""
     if problem.margin_space != "wrench_about_origin":
         return margin_bounds(polytopes)
-    return intersection_radii([_about_origin(polytope, problem.reference) for polytope in polytopes])
-
-
-def _about_origin(polytope: Polytope, reference: FloatArray) -> Polytope:
-    H = polytope.H
-    return Polytope(np.hstack([H[:, :3] - np.cross(H[:, 3:], reference), H[:, 3:]]), polytope.h)
+    return intersection_radii([Polytope(rows_about(P.H, -problem.reference), P.h) for P in polytopes])
 
 
 def _largest_distance(polytope: Polytope, lengths: FloatArray) -> float:
