@@ -1,12 +1,7 @@
 """Neutral description of a body: segments, hinges, shapes, effectors and limbs.
 
-Every engine model (Pinocchio, Coal, MuJoCo) is built from these values and from
-nothing else, so that the engines cannot disagree about what the body is.
-
-In the zero posture all segment frames are parallel to the world: x forward, y to
-the left, z up.
-
-Also here. Triangles of the body's collision shapes.
+Every engine model (Pinocchio, Coal, MuJoCo) is built from these values and from nothing else. In the zero
+posture all segment frames are parallel to the world: x forward, y to the left, z up.
 """
 
 from collections.abc import Mapping
@@ -195,10 +190,8 @@ class Limb:
 
     Its joints are those of its segments, in order; its frame has the origin of its first segment
     and the axes of that segment's parent. The effector's z axis is the normal of the contact, from
-    the scene into the body.
-
-    A contact of the trunk, as of a pelvis on a seat, is a limb without joints: its one segment is the
-    root, whose frame is the limb's own, and the effector goes where the root goes.
+    the scene into the body. A contact of the trunk, as of a pelvis on a seat, is a limb without joints:
+    its one segment is the root, whose frame is the limb's own.
 
     Attributes:
         name: Unique among the limbs.
@@ -221,11 +214,7 @@ class Limb:
 def check_limbs(
     limbs: tuple[Limb, ...], segments: Mapping[str, Segment], effectors: Mapping[str, Effector]
 ) -> None:
-    """Refuse limbs that are no chains, lack hinges, or name what does not exist.
-
-    Raises:
-        BodyError: Naming the limb and what would be valid.
-    """
+    """Raise a BodyError for limbs that are no chains, lack hinges, or name what does not exist."""
     names = [limb.name for limb in limbs]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:

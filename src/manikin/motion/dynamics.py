@@ -1,11 +1,9 @@
-"""What a motion needs from outside: the wrench that all contacts together must supply.
+"""Dynamics of sampled motions: the wrench that all contacts together must supply, and momentum rates.
 
-Two ways lead there. The rate of the centroidal momentum gives the wrench with the centre of mass and the
-angular momentum (:func:`centroidal_motion`); the recursive Newton-Euler equations give it with the torques of
-a body without contacts (:class:`FreeDynamics`). Both agree to rounding.
-
-Also here. Rate of the centroidal momentum of sampled motions, with exact derivatives by raw coordinates.
-Kinematics of a whole-body spline at its samples, with what one pass over them gives at once.
+The rate of the centroidal momentum gives the wrench with the centre of mass and the angular momentum
+(:func:`centroidal_motion`); the recursive Newton-Euler equations give it with the torques of a body without
+contacts (:class:`FreeDynamics`). Both agree to rounding. :class:`MotionSampler` evaluates a whole-body
+spline with exact derivatives by its raw coordinates.
 """
 
 from dataclasses import dataclass
@@ -83,13 +81,9 @@ class MomentumRateSamples:
         return MomentumRate(self._value, (blocks[0], blocks[1], blocks[2]))
 
     def _add_pelvis_turn(
-        self,
-        blocks: list[FloatArray],
-        states: StateSamples,
-        raw_second: FloatArray,
-        tangent: FloatArray,
+        self, blocks: list[FloatArray], states: StateSamples, raw_second: FloatArray, tangent: FloatArray,
         turn: TurnDerivatives,
-    ) -> None:
+    ) -> None:  # fmt: skip
         # With the world velocity of the pelvis held, its velocity in the pelvis frame turns.
         by_omega = self._by_v[:, :, 3:6] + self._by_a[:, :, :3] @ skew(states.v[:, :3])
         by_alpha = self._by_a[:, :, 3:6]
@@ -134,13 +128,7 @@ class MotionSamples:
 
 
 class MotionSampler:
-    """Evaluates splines of one basis.
-
-    Args:
-        body: The body.
-        frames: Names of the effectors whose frames are needed.
-        basis: The spline's basis at the samples.
-    """
+    """Evaluates splines of one basis, with the frames of some effectors of a body."""
 
     def __init__(self, body: BodyModel, frames: tuple[str, ...], basis: SampledBasis) -> None:
         self._model: pin.Model = body.pinocchio
@@ -155,9 +143,8 @@ class MotionSampler:
 
     def sample(self, points: FloatArray) -> MotionSamples:
         """Evaluate the spline with control points (k, nq)."""
-        raw = (
-            self._basis.evaluate(points), self._basis.evaluate(points, 1), self._basis.evaluate(points, 2)
-        )  # fmt: skip
+        basis = self._basis
+        raw = basis.evaluate(points), basis.evaluate(points, 1), basis.evaluate(points, 2)
         states, tangent = states_from_raw(*raw), tangent_map(raw[0])
         n, model, data = len(states.q), self._model, self._data
         momentum = MomentumRateSamples(model, n)
@@ -208,7 +195,7 @@ def centroidal_motion(body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArr
     """Wrench that the scene must apply to a body in motion, by the rate of its centroidal momentum.
 
     Args:
-        body: Who moves.
+        body: The body.
         q: (n, nq) configurations.
         v: (n, nv) velocities.
         a: (n, nv) accelerations.
@@ -239,14 +226,7 @@ class FreeDynamics:
 
     @classmethod
     def of(cls, body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray) -> "FreeDynamics":
-        """By the recursive Newton-Euler equations.
-
-        Args:
-            body: Who moves.
-            q: (n, nq) configurations.
-            v: (n, nv) velocities.
-            a: (n, nv) accelerations.
-        """
+        """By the recursive Newton-Euler equations; arguments as of :func:`centroidal_motion`."""
         model, data = body.pinocchio, body.pinocchio.createData()
         needed, jacobians = np.empty((len(q), model.nv)), np.empty((len(q), 6, model.nv))
         for k in range(len(q)):
