@@ -61,7 +61,7 @@ def learn(clips: Iterable[Mapping[str, FloatArray]]) -> dict[str, JointVolume]:
 
 
 def save_volumes(path: str | Path, volumes: Mapping[str, JointVolume], acknowledgement: str) -> None:
-    """Write volumes by segment into a NumPy archive, distances to 1e-4 rad, with a word about their sources."""
+    """Write volumes by segment into a NumPy archive, distances to 1e-4 rad, with their acknowledgement."""
     arrays: dict[str, Any] = {}
     for name, volume in volumes.items():
         arrays[f"{name}/origin"], arrays[f"{name}/step"] = volume.origin, np.array(volume.step)

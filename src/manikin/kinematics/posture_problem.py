@@ -1,7 +1,4 @@
-"""What a posture must satisfy and what it should look like.
-
-Also here. Hips and shoulders within the volumes that were learnt for them, as a requirement of a posture.
-"""
+"""Requirements and preferences of a posture."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -34,7 +31,7 @@ from manikin.scene.spheres import SphereProximity
 
 @dataclass(frozen=True, eq=False)
 class LearntRangeTerm:
-    """What each ball joint lacks of its learnt volume: ``r = min(d(q) - margin, 0)`` [rad].
+    """Violation of each ball joint's learnt volume: ``r = min(d(q) - margin, 0)`` [rad].
 
     ``d`` is the signed distance of its three angles to the surface of the volume ([Tonneau2015]_ 4.3.3).
 
@@ -72,7 +69,7 @@ class LearntRangeTerm:
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where an effector that touches nothing must be.
+    """Required or wished pose of an effector that touches nothing.
 
     Attributes:
         position: (3,) [m], or None to leave it free.
@@ -216,17 +213,16 @@ class PostureProblem:
         wishes: list[tuple[FloatArray, Term]] = [
             (hinge_weights(self.body, weights), ReferenceTerm(self.reference[7:]))
         ]
-        for contact in self.contacts:
-            if contact.kind is ContactKind.GRASP and contact.oriented:
-                weight = np.full(3, weights.grasp)
-                wishes.append((weight, RotationTerm(contact.effector, contact.rotation_contact_to_world)))
-        for name, placement in self.placements.items():
-            if placement.position is not None and placement.position_weight is not None:
-                weight = np.full(3, placement.position_weight)
-                wishes.append((weight, PositionTerm(name, placement.position)))
-            if placement.rotation is not None and placement.rotation_weight is not None:
-                weight = np.full(3, placement.rotation_weight)
-                wishes.append((weight, RotationTerm(name, placement.rotation)))
+        wishes += [
+            (np.full(3, weights.grasp), RotationTerm(contact.effector, contact.rotation_contact_to_world))
+            for contact in self.contacts
+            if contact.kind is ContactKind.GRASP and contact.oriented
+        ]
+        for name, item in self.placements.items():
+            if item.position is not None and item.position_weight is not None:
+                wishes.append((np.full(3, item.position_weight), PositionTerm(name, item.position)))
+            if item.rotation is not None and item.rotation_weight is not None:
+                wishes.append((np.full(3, item.rotation_weight), RotationTerm(name, item.rotation)))
         if self.com is not None and self.com_weight is not None and np.any(np.isfinite(self.com)):
             wishes.append((np.full(np.isfinite(self.com).sum(), self.com_weight), ComTerm(self.com)))
         if self.upright:
@@ -252,21 +248,14 @@ class PostureProblem:
 
 def hinge_weights(body: BodyModel, preferences: Preferences) -> FloatArray:
     """(nv - 6,) weight of each hinge: that of the first key its name contains."""
-    return np.array(
-        [
-            next((w for key, w in preferences.hinges.items() if key in name), preferences.hinge)
-            for name in body.joint_names
-        ]
-    )
+    return np.array([
+        next((w for key, w in preferences.hinges.items() if key in name), preferences.hinge)
+        for name in body.joint_names
+    ])  # fmt: skip
 
 
 def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
-    """Pairs (segment, obstacle) that a contact brings together: the effector's segment and its children.
-
-    Args:
-        body: The body.
-        effector_obstacles: Pairs of an effector and the obstacle it touches.
-    """
+    """Pairs (segment, obstacle) of contacts (effector, obstacle): the effector's segment and its children."""
     pairs = set()
     for effector, obstacle in effector_obstacles:
         segment = body.effector(effector).segment

@@ -201,15 +201,8 @@ def _mesh_part(obstacle: Obstacle, piece: MeshPiece) -> CollisionPart:
     else:
         geometry = triangle_geometry(piece.vertices, piece.faces)
         surface = ClosedSurface(piece.vertices, piece.faces, geometry) if piece.closed else None
-    return CollisionPart(
-        obstacle.name,
-        geometry,
-        obstacle.rotation,
-        obstacle.translation,
-        piece.vertices.min(axis=0),
-        piece.vertices.max(axis=0),
-        surface,
-    )
+    low, high = piece.vertices.min(axis=0), piece.vertices.max(axis=0)
+    return CollisionPart(obstacle.name, geometry, obstacle.rotation, obstacle.translation, low, high, surface)
 
 
 def _merged_open_pieces(mesh: Mesh) -> list[MeshPiece]:

@@ -48,14 +48,11 @@ def cover(shape: Shape, *, count: int | None = None, radius: float | None = None
         SceneError: If the shape is endless, both or neither limit is usable, or the radius
             is too small for the shape.
     """
-    if isinstance(shape, (Plane, HalfSpace)):
-        raise SceneError(f"a {type(shape).__name__} cannot be covered by spheres; valid: a shape with an end")
     if count is not None and radius is not None:
         raise SceneError(f"cover was given count {count} and radius {radius:g} m; valid: one of them")
     if radius is not None:
         return _cover_to_radius(shape, finite_number(radius, "cover radius [m]", above=0.0, error=SceneError))
-    if count is None:
-        count = _DEFAULT_COUNT
+    count = _DEFAULT_COUNT if count is None else count
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
         raise SceneError(f"cover count is {count!r}; valid: a whole number >= 1")
     return _cover_with(shape, int(count))
@@ -82,17 +79,15 @@ def _cover_to_radius(shape: Shape, radius: float) -> SphereCover:
 
 
 def _cover_with(shape: Shape, count: int) -> SphereCover:
+    if isinstance(shape, (Plane, HalfSpace)):
+        raise SceneError(f"a {type(shape).__name__} cannot be covered by spheres; valid: a shape with an end")
     if isinstance(shape, Sphere):
         return _made(np.zeros((1, 3)), np.array([shape.radius]), 0.0)
     if isinstance(shape, Capsule):
         return _capsule_cover(shape, count)
     if isinstance(shape, Box):
         return _box_cover(shape, count)
-    if isinstance(shape, Cylinder):
-        return _cylinder_cover(shape, count)
-    if isinstance(shape, Mesh):
-        return _mesh_cover(shape, count)
-    raise SceneError(f"a {type(shape).__name__} cannot be covered by spheres; valid: a shape with an end")
+    return _cylinder_cover(shape, count) if isinstance(shape, Cylinder) else _mesh_cover(shape, count)
 
 
 def _made(centres: FloatArray, radii: FloatArray, overshoot: float) -> SphereCover:
@@ -142,14 +137,9 @@ def _cylinder_cover(cylinder: Cylinder, count: int) -> SphereCover:
     """The better of slabs along the axis and the cells of the box around it that touch it."""
     slab = cylinder.length / count
     radius = float(np.hypot(cylinder.radius, slab / 2))
-    heights = _cell_centres(cylinder.length, count)
-    stack = _made(
-        np.column_stack([np.zeros((count, 2)), heights]),
-        np.full(count, radius),
-        radius - min(cylinder.radius, slab / 2),
-    )
+    centres = np.column_stack([np.zeros((count, 2)), _cell_centres(cylinder.length, count)])
+    best = _made(centres, np.full(count, radius), radius - min(cylinder.radius, slab / 2))
     around = Box((2 * cylinder.radius, 2 * cylinder.radius, cylinder.length))
-    best = stack
     for number in range(count, 2 * count + 1):  # culled corner cells make room for finer cells
         cells = _box_cover(around, number)
         divisions = _divisions(around.size, number)

@@ -98,13 +98,10 @@ class Mesh:
 
     @cached_property
     def pieces(self) -> "tuple[MeshPiece, ...]":
-        """Connected pieces, each with its own frame-free vertices."""
-        whole = as_trimesh(self.vertices, self.faces)
-        groups = trimesh.graph.connected_components(
-            whole.face_adjacency, nodes=np.arange(len(self.faces)), min_len=1
+        """Connected pieces, each with its own vertices."""
+        return tuple(
+            _piece(self.vertices, self.faces[group]) for group in _connected(self.vertices, self.faces)
         )
-        ordered = sorted((np.sort(group) for group in groups), key=lambda group: int(group[0]))
-        return tuple(_piece(self.vertices, self.faces[group]) for group in ordered)
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,12 +218,8 @@ def _checked_faces(faces: ArrayLike, vertex_count: int, source: str) -> IntArray
 def _cleaned(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, int]:
     """Merge vertices closer than a millionth of the size; drop degenerate and repeated triangles."""
     grid = max(float(np.ptp(points, axis=0).max()) * 1e-6, 1e-12)
-    _, first, inverse = np.unique(
-        np.round((points - points.min(axis=0)) / grid).astype(np.int64),
-        axis=0,
-        return_index=True,
-        return_inverse=True,
-    )
+    cells = np.round((points - points.min(axis=0)) / grid).astype(np.int64)
+    _, first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     merged = points[first]
     faces = inverse.reshape(-1)[triangles]
     corners = merged[faces]
@@ -249,17 +242,19 @@ def _check_extent(points: FloatArray, source: str) -> None:
         )
 
 
+def _connected(vertices: FloatArray, faces: IntArray) -> list[IntArray]:
+    """Indices of the faces of each connected piece, in the order of their first ones."""
+    adjacency = as_trimesh(vertices, faces).face_adjacency
+    groups = trimesh.graph.connected_components(adjacency, nodes=np.arange(len(faces)), min_len=1)
+    return sorted((np.sort(group) for group in groups), key=lambda group: int(group[0]))
+
+
 def _hulls(points: FloatArray, triangles: IntArray, convex: str, source: str) -> tuple[FloatArray, IntArray]:
     if convex not in ("hull", "parts"):
         raise SceneError(f"mesh {source!r} convex is {convex!r}; valid: no, hull, parts")
-    whole = as_trimesh(points, triangles)
-    groups = [np.arange(len(triangles))]
-    if convex == "parts":
-        groups = trimesh.graph.connected_components(
-            whole.face_adjacency, nodes=np.arange(len(triangles)), min_len=1
-        )
+    groups = _connected(points, triangles) if convex == "parts" else [np.arange(len(triangles))]
     vertices, faces, start = [], [], 0
-    for group in sorted(groups, key=lambda item: int(np.min(item))):
+    for group in groups:
         hull = _hull(points[np.unique(triangles[group])], source)
         vertices.append(np.asarray(hull.vertices))
         faces.append(np.asarray(hull.faces, dtype=np.int64) + start)
@@ -296,10 +291,5 @@ def _is_convex(vertices: FloatArray, faces: IntArray) -> bool:
     offsets = np.einsum("ij,ij->i", normals, corners[:, 0])
     tolerance = 1e-5 * float(np.ptp(vertices, axis=0).max())
     chunk = max(1, 2_000_000 // len(vertices))
-    return all(
-        bool(
-            (normals[start : start + chunk] @ vertices.T - offsets[start : start + chunk, None]).max()
-            <= tolerance
-        )
-        for start in range(0, len(faces), chunk)
-    )
+    rows = [slice(start, start + chunk) for start in range(0, len(faces), chunk)]
+    return all(bool((normals[r] @ vertices.T - offsets[r, None]).max() <= tolerance) for r in rows)

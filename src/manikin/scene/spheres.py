@@ -253,8 +253,8 @@ def _direction(vector: FloatArray) -> FloatArray:
 
 def _shape_cover(geometry: coal.CollisionGeometry, count: int) -> SphereCover:
     shape, centre = shape_of(geometry)
-    found = cover(shape, count=count)
-    return SphereCover(found.centres + centre, found.radii, found.overshoot)
+    spheres = cover(shape, count=count)
+    return SphereCover(spheres.centres + centre, spheres.radii, spheres.overshoot)
 
 
 def _count(count: int | Mapping[str, int] | None, name: str, default: int) -> int:
