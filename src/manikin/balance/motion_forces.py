@@ -202,16 +202,7 @@ def plan_forces(
     v: FloatArray,
     a: FloatArray,
 ) -> ContactForces:
-    """Distribute the contact forces of a motion and compute its joint torques.
-
-    Args:
-        body: The body.
-        schedule: Its contacts in time.
-        time: (n,) [s].
-        q: (n, nq) configurations.
-        v: (n, nv) velocities.
-        a: (n, nv) accelerations.
-    """
+    """Distribute the contact forces of a motion and compute its joint torques, see :func:`full_motion`."""
     dynamics = FreeDynamics.of(body, q, v, a)
     names = schedule.sequence.effectors
     shares = load_shares(schedule, time, names)

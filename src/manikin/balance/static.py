@@ -41,11 +41,9 @@ class StaticRegion:
         return len(self.polygon) < 3
 
     def nearest(self, point: FloatArray, inset: float) -> FloatArray | None:
-        """(2,) nearest place to a (2,) point that keeps a distance to the region's edges, or None.
+        """(2,) nearest point to a (2,) point [m] with a distance to the region's edges, or None.
 
-        Args:
-            point: [m].
-            inset: Distance to keep [m]; half of what is possible where the region is too narrow for it.
+        The distance is ``inset`` [m], or half or a quarter of it where the region is too narrow.
         """
         for distance in (inset, 0.5 * inset, 0.25 * inset):
             inner = self._inset(distance)

@@ -282,10 +282,8 @@ def wrench_polytope(
 ) -> WrenchPolytope:
     """Facets of W_p, each once ([Qiu2012]_ 4.36; ours are found from generators).
 
-    Args:
-        stance: Contacts with their contact model; none at all (flight) gives the single point 0.
-        friction_model: Replaces that of the stance.
-        reference: (3,) point of the moments [m].
+    Without any contact (flight) it is the single point 0. A ``friction_model`` replaces that of the stance;
+    ``reference`` (3,) is the point of the moments [m].
 
     Raises:
         ContactError: If the normal force of a contact is bounded by no cap.
@@ -309,15 +307,13 @@ def wrench_polytopes(
 ) -> tuple[WrenchPolytope, ...]:
     """W_p of several stances; a stance that is an earlier one moved elsewhere is not computed again.
 
-    Args:
-        stances: Contacts with their contact models.
-        reference: (3,) point of all moments [m]; of each stance the middle of its own contacts when omitted.
+    ``reference`` (3,) is the point of all moments [m]; when omitted, the middle of each stance's contacts.
 
     Raises:
         ContactError: If the normal force of a contact is bounded by no cap.
     """
     known: dict[tuple[Any, ...], WrenchPolytope] = {}
-    found = []
+    polytopes = []
     for stance in stances:
         centre = _middle(stance)
         shape = _shape_of(stance, centre)
@@ -325,8 +321,8 @@ def wrench_polytopes(
             known[shape] = wrench_polytope(stance, reference=centre)
         like = known[shape]
         local = WrenchPolytope(like.H, like.h, stance, centre, like.stance_cap_multipliers)
-        found.append(local if reference is None else local.at_reference(reference))
-    return tuple(found)
+        polytopes.append(local if reference is None else local.at_reference(reference))
+    return tuple(polytopes)
 
 
 def _middle(stance: Stance) -> FloatArray:

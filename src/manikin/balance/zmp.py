@@ -40,13 +40,9 @@ class SupportPlane:
     decisive: bool = True
 
     def zero_moment_point(self, wrench: ArrayLike) -> FloatArray:
-        """Point of the plane about which the contacts' moment is along its normal.
+        """(..., 2) point, in the plane's x and y, about which the moment is along its normal [m].
 
-        Args:
-            wrench: (..., 6) pseudo-wrench about the world origin [N, N.m].
-
-        Returns:
-            (..., 2) in the plane's own x and y [m].
+        Wrenches (..., 6) are about the world origin [N, N.m].
         """
         w = np.asarray(wrench, dtype=np.float64)
         force, moment = w[..., :3], w[..., 3:] - w[..., :3] @ skew(self.origin).T
@@ -80,13 +76,9 @@ def support_plane(stance: Stance) -> SupportPlane | None:
 
 
 def least_zmp_distance(samples: Iterable[tuple[Stance, FloatArray]]) -> float | None:
-    """Least distance of the ZMP to the edge of the support polygon over the stances in one plane.
+    """Least distance of the ZMP to the edge of the support polygon [m], None without a stance in one plane.
 
-    Args:
-        samples: Stances with the pseudo-wrenches (n, 6) about the world origin while they are held.
-
-    Returns:
-        [m], negative outside; None when no stance has its contacts in one plane.
+    Samples are stances with the pseudo-wrenches (n, 6) about the world origin while they are held.
     """
     distances = []
     for stance, wrench in samples:

@@ -117,8 +117,7 @@ class JointVolume:
     def distance(self, angles: ArrayLike) -> FloatArray:
         """(...) distance of (..., 3) angles to the surface, negative outside [rad].
 
-        Linear between the grid's points, whose distances differ by no more than they are apart. Off
-        the grid it is that of the nearest place on it, less the distance to there.
+        Linear between the grid's points; off the grid that of its nearest point, less the distance to it.
         """
         x, beyond = self._on_grid(angles)
         cell, share = self._cell(x)

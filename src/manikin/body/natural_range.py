@@ -99,13 +99,12 @@ class BallRange:
 class NaturalRange:
     """Normalised distance of a limb's angles to a violation of its range of motion.
 
-    Of a ball joint with a volume, it is the distance in the space of its three angles to the surface of
-    the volume or to the end of a hinge's interval, whichever is nearer, divided by the radius of the
-    largest ball inside. Of a hinge without one it is the distance to the nearer end of its interval,
-    divided by half the interval. Of a limb it is the least of its joints. So it is 0 at a violation,
-    negative beyond, and 1 only where every joint is as far from its limits as it can be, always where
-    there is none; 0.1 rad in one angle change it by no more than 0.1 rad over that radius
-    (over half the interval), times the square root of 3 at worst where the grid of the volume is coarse.
+    Of a ball joint with a volume, it is the distance in the space of its three angles to the surface of the
+    volume or to the end of a hinge's interval, whichever is nearer, divided by the radius of the largest ball
+    inside. Of any other hinge it is the distance to the nearer end of its interval, divided by half the
+    interval. Of a limb it is the least of its joints: 0 at a violation, negative beyond, and 1 only where
+    every joint is as far from its limits as it can be. 0.1 rad in one angle change it by no more than 0.1 rad
+    over that radius (over half the interval), times the square root of 3 at worst where the grid is coarse.
 
     Attributes:
         limb: The limb.
@@ -132,19 +131,11 @@ class NaturalRange:
         return bool(self.balls)
 
     def normalised(self, angles: ArrayLike) -> FloatArray:
-        """(n,) normalised distance of (n, k) angles, negative outside.
-
-        Raises:
-            BodyError: If the angles are not (n, k).
-        """
+        """(n,) normalised distance of (n, k) angles, negative outside."""
         return self._least(self._checked(angles), self._of_hinges)
 
     def volume_distance(self, angles: ArrayLike) -> FloatArray:
-        """(n,) the same of the ball joints with volumes alone; infinite without one.
-
-        Raises:
-            BodyError: If the angles are not (n, k).
-        """
+        """(n,) the same of the ball joints with volumes alone; infinite without one."""
         return self._least(self._checked(angles), lambda q: np.full(len(q), np.inf))
 
     def contains(self, angles: ArrayLike) -> NDArray[np.bool_]:

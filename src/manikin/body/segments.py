@@ -42,7 +42,7 @@ class Shape:
         kind: Sphere, capsule or box.
         size: (1,), (2,) or (3,) dimensions [m], see :class:`ShapeKind`.
         translation: (3,) centre of the shape in the segment frame [m].
-        rotation: (3, 3) rotation from the shape's axes to the segment's.
+        rotation: (3, 3) from the shape's axes to the segment's.
     """
 
     name: str
@@ -249,10 +249,7 @@ def _check_chain(limb: Limb, segments: Mapping[str, Segment]) -> None:
 
 
 def end_of(segment: Segment) -> FloatArray:
-    """(3,) end of a segment that carries no other, in its frame [m]: twice as far as its centre of mass.
-
-    A head ends straight above its joint, wherever its mass is.
-    """
+    """(3,) end of a last segment in its frame [m]: twice its centre of mass, of a head straight above."""
     end = 2.0 * segment.com
     return end * [0.0, 0.0, 1.0] if segment.name == "head" else end
 
@@ -291,12 +288,7 @@ def segments_by_name(segments: tuple[Segment, ...]) -> Mapping[str, Segment]:
 
 
 def segment_triangles(segment: Segment, rounds: int = 24) -> tuple[FloatArray, np.ndarray] | None:
-    """Vertices (n, 3) [m] and faces (m, 3) of all shapes in the segment's frame, or None.
-
-    Args:
-        segment: The segment.
-        rounds: Corners of the round cross-section of a capsule.
-    """
+    """Vertices (n, 3) [m] and faces (m, 3) of all shapes, capsules of ``rounds`` corners around, or None."""
     parts = [_placed(shape, rounds) for shape in segment.shapes]
     if not parts:
         return None

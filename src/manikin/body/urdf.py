@@ -23,14 +23,7 @@ _THINNEST = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class UrdfShape:
-    """A collision shape in the frame of its link.
-
-    Attributes:
-        kind: Sphere, capsule or box.
-        size: (1,), (2,) or (3,) as in :class:`manikin.body.ShapeKind` [m].
-        rotation: (3, 3) from the shape's axes to the link's.
-        translation: (3,) of its centre [m].
-    """
+    """A collision shape in the frame of its link, as :class:`manikin.body.Shape`."""
 
     kind: ShapeKind
     size: FloatArray
@@ -205,14 +198,9 @@ CONTINUOUS = float(np.pi)
 
 @dataclass(frozen=True, eq=False)
 class UrdfLink:
-    """A link.
+    """A link; the inertia (3, 3) is about the centre of mass (3,) [m] in its axes [kg.m^2].
 
-    Attributes:
-        name: Unique.
-        mass: [kg], 0 without an ``<inertial>``.
-        com: (3,) in the link's frame [m].
-        inertia: (3, 3) about the centre of mass, in the link's axes [kg.m^2].
-        shapes: What collides.
+    Without an ``<inertial>`` the mass is 0.
     """
 
     name: str

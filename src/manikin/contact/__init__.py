@@ -18,24 +18,7 @@ from manikin.contact.contact import (
 from manikin.contact.stance import ContactSchedule, Phase, Rolling, Stance, StanceSequence, Swing, roll_feet
 
 __all__ = [
-    "BODY_WEIGHTS_CAP",
-    "FRICTION_MODELS",
-    "Contact",
-    "ContactKind",
-    "ContactModel",
-    "ContactSchedule",
-    "FrictionModel",
-    "Phase",
-    "Rolling",
-    "SolePart",
-    "Stance",
-    "StanceSequence",
-    "Swing",
-    "default_normal_force_cap",
-    "grasp",
-    "point",
-    "roll_feet",
-    "sole",
-    "sole_part",
-    "soles_overlap",
-]
+    "BODY_WEIGHTS_CAP", "FRICTION_MODELS", "Contact", "ContactKind", "ContactModel", "ContactSchedule",
+    "FrictionModel", "Phase", "Rolling", "SolePart", "Stance", "StanceSequence", "Swing",
+    "default_normal_force_cap", "grasp", "point", "roll_feet", "sole", "sole_part", "soles_overlap",
+]  # fmt: skip

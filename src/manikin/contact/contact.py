@@ -223,11 +223,13 @@ def sole(
     signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0))
     corners = [[a * half_length, b * half_width, 0.0] for a, b in signs]
     made = _frictional(
-        where, effector, ContactKind.SOLE, position, corners, yaw, friction, normal, rotation,
-        normal_force_cap, torsion_limit,
-    )  # fmt: skip
-    settle = finite_number(settle, f"{where} settle [s]", at_least=0.0, error=ContactError)
-    return replace(made, settle=settle) if settle else made
+        ContactKind.SOLE, effector, position, corners, yaw, friction, normal, rotation, normal_force_cap
+    )
+    return replace(
+        made,
+        torsion_limit=_optional_limit(torsion_limit, f"{where} torsion_limit [N.m]"),
+        settle=finite_number(settle, f"{where} settle [s]", at_least=0.0, error=ContactError),
+    )
 
 
 def point(
@@ -240,11 +242,10 @@ def point(
     normal_force_cap: float | None = None,
 ) -> Contact:
     """Make a frictional point contact at a position (3,) [m]; other arguments as of :func:`sole`."""
-    where = f"point '{effector}'"
+    points = [[0.0, 0.0, 0.0]]
     return _frictional(
-        where, effector, ContactKind.POINT, position, [[0.0, 0.0, 0.0]], 0.0, friction, normal, rotation,
-        normal_force_cap, None,
-    )  # fmt: skip
+        ContactKind.POINT, effector, position, points, 0.0, friction, normal, rotation, normal_force_cap
+    )
 
 
 def grasp(
@@ -316,18 +317,10 @@ def sole_part(contact: Contact, part: SolePart, hinge: float) -> Contact:
 
 
 def _frictional(
-    where: str,
-    effector: str,
-    kind: ContactKind,
-    position: ArrayLike,
-    points: ArrayLike,
-    yaw: float,
-    friction: float,
-    normal: ArrayLike | None,
-    rotation: ArrayLike | None,
-    normal_force_cap: float | None,
-    torsion_limit: float | None,
-) -> Contact:
+    kind: ContactKind, effector: str, position: ArrayLike, points: ArrayLike, yaw: float, friction: float,
+    normal: ArrayLike | None, rotation: ArrayLike | None, normal_force_cap: float | None,
+) -> Contact:  # fmt: skip
+    where = f"{kind} '{effector}'"
     heading = finite_number(yaw, f"{where} yaw [rad]", error=ContactError)
     if rotation is not None:
         frame = check_rotation(rotation, f"{where} rotation", ContactError)
@@ -343,7 +336,6 @@ def _frictional(
         points=frozen_array(points, f"{where} points", (None, 3), ContactError),
         friction=finite_number(friction, f"{where} friction", above=0.0, error=ContactError),
         normal_force_cap=_optional_limit(normal_force_cap, f"{where} normal_force_cap [N]"),
-        torsion_limit=_optional_limit(torsion_limit, f"{where} torsion_limit [N.m]"),
     )
 
 

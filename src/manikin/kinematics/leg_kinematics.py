@@ -66,16 +66,7 @@ class LegKinematics:
     def feet(
         self, pelvis: FloatArray, place: FloatArray, angles: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Orientations and origins (ankles) of the feet.
-
-        Args:
-            pelvis: (n, 3, 3) from the pelvis' axes to the world's.
-            place: (n, 3) pelvis' origin [m].
-            angles: (n, h) of all hinges [rad].
-
-        Returns:
-            (2, n, 3, 3) from the feet's axes to the world's, and (2, n, 3) [m].
-        """
+        """Rotations (2, n, 3, 3) and origins (2, n, 3) [m] of the feet in the world, see :meth:`angles`."""
         a = angles[:, self.slots].transpose(2, 1, 0)
         thigh = _reflected(pelvis) @ _hip(a[0], a[1], a[2])
         shank = thigh @ _turn(a[3], "y") @ _turn(-a[4], "z")
@@ -87,17 +78,14 @@ class LegKinematics:
     def angles(
         self, pelvis: FloatArray, place: FloatArray, foot: FloatArray, ankle: FloatArray, angles: FloatArray
     ) -> FloatArray:
-        """Angles, within limits or not, that put the feet there; out of reach, as near as a leg gets.
+        """(n, h) angles, within limits or not, that place the feet, or come as near as possible [rad].
 
         Args:
             pelvis: (n, 3, 3) from the pelvis' axes to the world's.
             place: (n, 3) pelvis' origin [m].
             foot: (2, n, 3, 3) from the feet's axes to the world's.
             ankle: (2, n, 3) the feet's origins [m].
-            angles: (n, h) of all hinges, of which the rotations of the knees are kept [rad].
-
-        Returns:
-            (n, h) with those of the legs replaced [rad].
+            angles: (n, h) of all hinges; the rotations of the knees are kept [rad].
         """
         line = ankle - self.hips(pelvis, place)
         line[1] *= REFLECTION

@@ -63,11 +63,7 @@ class ReachVolume:
 
 
 def hull_of(limb: Limb, segment: str, points: FloatArray) -> ReachVolume:
-    """Convex hull of points (n, 3) in the frame of the carrying segment [m].
-
-    Raises:
-        BodyError: If the points lie in a plane, as those of a limb with one hinge do.
-    """
+    """Convex hull of points (n, 3) of the carrying segment [m]; BodyError if they lie in a plane."""
     if np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-9) < 3:
         raise BodyError(
             f"limb {limb.name!r} reaches points of a plane only; valid: an effector that moves in space"

@@ -212,13 +212,7 @@ class PostureCost:
         return np.linalg.norm(q[:, None, :3] + points - wanted, axis=2)
 
     def at(self, q: FloatArray, held: FloatArray, wanted: FloatArray) -> Evaluation:
-        """The cost of (n, nq) postures.
-
-        Args:
-            q: The postures.
-            held: (n, h), see :meth:`drawn_to`.
-            wanted: (n, k, 3) targets [m]; NaN where one is not seen.
-        """
+        """The cost of (n, nq) postures drawn to angles ``held``, with targets (n, k, 3) [m]."""
         placed, points = self._points.placed(q)
         error = points + (placed.roots - wanted.transpose(1, 2, 0))
         weights = self._points.weights[:, None] * ~np.isnan(error[:, 0])
@@ -291,19 +285,10 @@ class PointEquations:
     def assembled(
         self, columns: FloatArray, x: FloatArray, error: FloatArray, weights: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Half the gradient and the Gauss-Newton matrix of the weighted sum of squares.
+        """Half the gradient (n, d) and the lower Gauss-Newton matrix (n, d, d) of the weighted squares.
 
         Velocities are those of the root, linear and angular in its own axes, and of the hinges that are
-        :attr:`moving`.
-
-        Args:
-            columns: (nv, 6, n), see :class:`manikin.kinematics.point_targets.Placements`.
-            x: (k, 3, n) points from the root [m].
-            error: (k, 3, n) of the points from their targets [m].
-            weights: (k, n).
-
-        Returns:
-            (n, d) and (n, d, d), of which only the lower triangle is filled.
+        :attr:`moving`. Arguments are those of :class:`Evaluation`.
         """
         w, columns = weights[:, None], columns[self._velocities]
         wx, force = w * x, w * error

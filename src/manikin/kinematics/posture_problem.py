@@ -1,10 +1,11 @@
 """Requirements and preferences of a posture."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body.configuration import Configuration
@@ -269,3 +270,45 @@ def com_target(
 ) -> FloatArray:
     """(3,) centre-of-mass target with the axes that are not given left free."""
     return np.array([np.nan if value is None else float(np.asarray(value)) for value in (x, y, z)])
+
+
+def place_over_contacts(problem: PostureProblem, q: FloatArray) -> FloatArray:
+    """(nq,) posture ``q`` moved as a rigid whole to where its effectors must be.
+
+    The root is turned about the vertical to the mean heading of the required rotations and moved so that
+    the mean of the effectors' positions matches.
+    """
+    positions = [t for t in problem.requirements() if isinstance(t, PositionTerm)]
+    rotations = [t for t in problem.requirements() if isinstance(t, RotationTerm)]
+    feet = [t for t in positions if t.kind == "contact" and "foot" in t.effector] or positions
+    configuration = Configuration(problem.body, q)
+    turned = np.array(configuration.q)
+    if rotations:
+        turns = [t.rotation @ configuration.effector_placement(t.effector)[0].T for t in rotations]
+        headings = [np.arctan2(r[1, 0] - r[0, 1], r[0, 0] + r[1, 1]) for r in turns]
+        yaw = float(np.arctan2(np.sum(np.sin(headings)), np.sum(np.cos(headings))))
+        turn = pin.SE3(pin.utils.rotate("z", yaw), np.zeros(3))
+        turned[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(turned[:7]))
+        configuration.update(turned)
+    if feet:
+        offsets = [t.position - configuration.effector_placement(t.effector)[1] for t in feet]
+        turned[:3] += np.mean(offsets, axis=0)
+    elif problem.com is not None:
+        turned[:3] += np.nan_to_num(problem.com - configuration.com)
+    return turned
+
+
+def without_one(problem: PostureProblem) -> Iterator[tuple[str, PostureProblem]]:
+    """The problem with one requirement left out at a time, and the name of that."""
+    if problem.com is not None:
+        yield "the centre-of-mass requirement", replace(problem, com=None)
+    if problem.proximity is not None:
+        yield "the clearances", replace(problem, proximity=None)
+    if problem.learnt_margin is not None:
+        yield "the learnt ranges of motion", replace(problem, learnt_margin=None)
+    for contact in problem.contacts:
+        rest = tuple(other for other in problem.contacts if other is not contact)
+        yield f"contact '{contact.effector}'", replace(problem, contacts=rest)
+    for name in problem.placements:
+        rest_of = {key: value for key, value in problem.placements.items() if key != name}
+        yield f"placement '{name}'", replace(problem, placements=rest_of)

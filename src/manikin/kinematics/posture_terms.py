@@ -39,11 +39,9 @@ class Term(Protocol):
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """Residual and Jacobian at a configuration."""
-        ...
 
     def describe(self, residual: FloatArray) -> str:
         """Say in words what a residual of this term means."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -81,21 +81,14 @@ MOST_ROUNDS = 5
 def bounded_step(
     matrix: FloatArray, right: FloatArray, damping: float, lower: FloatArray, upper: FloatArray
 ) -> FloatArray:
-    """Solution of ``(matrix + damping) @ step = right`` within bounds.
+    """Solution (d,) of ``(matrix + damping) @ step = right`` within bounds.
 
     Unknowns that would leave their bounds are put on them, the others solved for again, until none leaves. An
     unknown that is on its bound and pushed outward stays there (Bertsekas, "Projected Newton methods for
     optimization problems with simple constraints", 1982).
 
-    Args:
-        matrix: (d, d), not indefinite; its lower triangle is read.
-        right: (d,).
-        damping: Added to the diagonal, above 0.
-        lower: (d,) at most 0.
-        upper: (d,) at least 0.
-
-    Returns:
-        (d,) step.
+    The lower triangle of the semidefinite matrix (d, d) is read; the damping is above 0, the lower bounds
+    (d,) are at most 0, the upper ones at least 0.
     """
     matrix = matrix.copy()
     matrix.reshape(-1)[:: len(right) + 1] += damping
@@ -149,7 +142,7 @@ def follow(
 
     Args:
         body: The body that carries the targets' points.
-        targets: Of n instants.
+        targets: Targets at n instants.
         starts: (n, nq) postures within the limits; the first is where the search begins, the others
             are tried where the search from the frame before leaves a point farther than :data:`POOR`.
         rate: Frames per second [Hz]; None for frames that are far from each other.

@@ -65,13 +65,7 @@ class MomentumRateSamples:
     def by_raw(
         self, states: StateSamples, raw: tuple[FloatArray, FloatArray, FloatArray], tangent: FloatArray
     ) -> MomentumRate:
-        """Differentiate by the raw coordinates (n, nq), their rates and second derivatives.
-
-        Args:
-            states: The states that were recorded.
-            raw: Raw spline values, rates and second derivatives.
-            tangent: (n, 7, 7) :func:`tangent_map` of the raw values.
-        """
+        """Differentiate by raw values, rates and second derivatives (n, nq), with :func:`tangent_map`."""
         turn = turn_derivatives(*(part[:, 3:7] for part in raw))
         blocks = [np.zeros((*self._by_q.shape[:2], raw[0].shape[1])) for _ in range(3)]
         for block, joints in zip(blocks, (self._by_q, self._by_v, self._by_a), strict=True):

@@ -40,11 +40,11 @@ _CHUNK = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Facets of a polytope around the origin.
+    """Facets ``H x <= h`` of a polytope around the origin, with unit rows.
 
     Attributes:
-        H: (m, d) unit normals.
-        h: (m,) offsets.
+        H: (m, d).
+        h: (m,).
         multipliers: (m, k) part of each offset that each level pays for.
         flat: (e, d) orthonormal directions across the affine hull (``flat @ x = 0``).
     """

@@ -30,15 +30,7 @@ def fourier_basis(phase: ArrayLike, harmonics: int = HARMONICS) -> FloatArray:
 
 
 def fourier_coefficients(samples: FloatArray, harmonics: int = HARMONICS) -> FloatArray:
-    """Coefficients of signals sampled at n even phases from 0, the last before 1.
-
-    Args:
-        samples: (n, s) of s signals, n > 2 harmonics.
-        harmonics: Largest k kept.
-
-    Returns:
-        (2 harmonics + 1, s): mean, cosines, sines.
-    """
+    """(2 harmonics + 1, s) mean, cosines, sines of signals (n, s) at n > 2 harmonics even phases from 0."""
     spectrum = np.fft.rfft(samples, axis=0)[: harmonics + 1] / len(samples)
     return np.concatenate([spectrum[:1].real, 2.0 * spectrum[1:].real, -2.0 * spectrum[1:].imag])
 

@@ -225,7 +225,7 @@ def start_control_points(
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
 ) -> FloatArray:
-    """First control points that give the wanted start ([Qiu2012]_ 2.45-2.47).
+    """(1 to 3, d) first control points that give the wanted start ([Qiu2012]_ 2.45-2.47).
 
     Args:
         degree: Degree k >= 2 when an acceleration is wanted.
@@ -233,9 +233,6 @@ def start_control_points(
         position: (d,) p(t_0).
         velocity: (d,) first derivative there; None leaves it free.
         acceleration: (d,) second derivative there; needs a velocity too.
-
-    Returns:
-        (1 to 3, d).
 
     Raises:
         SplineError: If an acceleration is given without a velocity.

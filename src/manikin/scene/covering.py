@@ -22,7 +22,7 @@ class SphereCover:
     Attributes:
         centres: (k, 3) [m].
         radii: (k,) [m].
-        overshoot: How far, at most, a sphere reaches beyond the shape [m] (an upper bound).
+        overshoot: Upper bound of how far a sphere reaches beyond the shape [m].
     """
 
     centres: FloatArray
@@ -34,19 +34,15 @@ class SphereCover:
 
 
 def cover(shape: Shape, *, count: int | None = None, radius: float | None = None) -> SphereCover:
-    """Cover a shape with spheres.
+    """Cover a shape, or the surface of a mesh that is not closed, with spheres.
 
     Args:
         shape: Any shape with an end; planes and half-spaces need no spheres.
         count: Largest number of spheres; 8 when neither is given.
         radius: Largest sphere radius [m]; as many spheres as it takes are used.
 
-    Returns:
-        Spheres whose union contains the shape; of a mesh that is not closed, its surface.
-
     Raises:
-        SceneError: If the shape is endless, both or neither limit is usable, or the radius
-            is too small for the shape.
+        SceneError: If the shape is endless, a limit is not usable, or the radius too small for the shape.
     """
     if count is not None and radius is not None:
         raise SceneError(f"cover was given count {count} and radius {radius:g} m; valid: one of them")
@@ -108,9 +104,7 @@ def _capsule_cover(capsule: Capsule, count: int) -> SphereCover:
 def _box_cover(box: Box, count: int) -> SphereCover:
     """Equal cells, one circumscribed sphere each, divided where it shrinks the spheres most."""
     cells = _divisions(box.size, count)
-    centres = np.array(
-        [_cell_centres(size, n) for size, n in zip(box.size, cells, strict=True)], dtype=object
-    )
+    centres = [_cell_centres(size, n) for size, n in zip(box.size, cells, strict=True)]
     grid = np.array(list(product(*centres)), dtype=np.float64)
     side = box.size / cells
     radius = float(np.linalg.norm(side) / 2)

@@ -38,12 +38,10 @@ class BodyGeometry(Protocol):
     @property
     def pinocchio(self) -> pin.Model:
         """Kinematic model."""
-        ...
 
     @property
     def geometry(self) -> pin.GeometryModel:
         """Collision shapes."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +71,7 @@ class ProximityResult:
 
 @dataclass(frozen=True, eq=False)
 class ProximitySamples:
-    """Close pairs of many configurations, ordered by sample.
-
-    Attributes:
-        sample: (k,) index of the configuration.
-        distance: (k,) as in :class:`ProximityResult` [m].
-        gradient: (k, nv) likewise.
-        pairs: k likewise.
-    """
+    """Close pairs of many configurations, ordered by sample (k,), otherwise as :class:`ProximityResult`."""
 
     sample: NDArray[np.int64]
     distance: FloatArray
@@ -106,13 +97,11 @@ class Clearance:
 class Proximity:
     """Distances of every body shape to every obstacle and to other body shapes.
 
-    Distances are exact for primitives and convex mesh pieces, with the penetration depth
-    as negative distance. Closed mesh pieces that are not convex give exact clearances and
-    a depth sampled on the body shape; open ones have no inside, and where a shape crosses
-    them the depth is that of the worst triangle.
+    Distances are exact for primitives and convex mesh pieces, negative by the penetration depth. Closed mesh
+    pieces that are not convex give exact clearances and a depth sampled on the body shape; open
+    ones have no inside, and where a shape crosses them the depth is that of the worst triangle.
 
-    One instance works on buffers of its own: use one per thread. Results do not depend on
-    earlier queries.
+    One instance works on buffers of its own: use one per thread. Results do not depend on earlier queries.
 
     Attributes:
         pairs: (body shape, obstacle or other body shape) of every pair checked.
@@ -202,12 +191,9 @@ class Proximity:
         return self.evaluate_placed(self.place(q_samples), activation, ignore)
 
     def evaluate_placed(
-        self,
-        placed: PlacedShapes,
-        activation: float = 0.1,
-        ignore: Ignored | Sequence[Ignored] = NOTHING,
+        self, placed: PlacedShapes, activation: float = 0.1, ignore: Ignored | Sequence[Ignored] = NOTHING,
         known: KnownDistances | None = None,
-    ) -> ProximitySamples:
+    ) -> ProximitySamples:  # fmt: skip
         """Measure every close pair of many configurations whose kinematics are known.
 
         A pair that was found far is measured again only when its shapes have moved so much
@@ -272,21 +258,11 @@ class Proximity:
     def minimum_over(
         self, q_samples: FloatArray, ignore: Ignored | Sequence[Ignored] = NOTHING, tolerance: float = 1e-6
     ) -> Clearance:
-        """Smallest signed distance over many configurations.
+        """Smallest signed distance over (n, nq) configurations, exact to ``tolerance`` [m].
 
-        Best first: every (sample, pair) has a lower bound, from covering spheres at first;
-        measuring one of them raises the bounds of its pair at all other samples, because a
-        distance changes no faster than the shape moves. Only what could still be the
-        minimum is measured, so the result is exact to ``tolerance``.
-
-        Args:
-            q_samples: (n, nq).
-            ignore: One set for all samples, or n sets.
-            tolerance: [m].
-
-        Raises:
-            SceneError: If the number of ignore sets is not n, or a sample is not a finite
-                vector of the body's size.
+        Best first: every (sample, pair) has a lower bound, from covering spheres at first; measuring one of
+        them raises the bounds of its pair at all other samples, because a distance changes no faster than the
+        shape moves. Only what could still be the minimum is measured. Raises as :meth:`evaluate_over`.
         """
         samples = [checked_configuration(self._model, q) for q in q_samples]
         considered = self._considered_over(ignore, len(samples))

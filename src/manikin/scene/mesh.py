@@ -17,6 +17,7 @@ IntArray = NDArray[np.int64]
 Convexity = Literal["no", "hull", "parts"]
 
 FORMATS = ("stl", "obj", "ply", "dae")
+_FORMATS_TEXT = ", ".join(f".{name}" for name in FORMATS)
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Units a mesh file may be said to be in, in metres."""
 
@@ -39,14 +40,14 @@ _DEGENERATE_HEIGHT = 1e-9  # [m]; a triangle flatter than this has no usable nor
 class Mesh:
     """A triangle mesh in its own frame.
 
-    Vertices at the same place are merged and degenerate triangles dropped on
-    construction, so that connected pieces and closed surfaces can be recognised.
+    Coincident vertices are merged and degenerate triangles dropped on construction, so that connected pieces
+    and closed surfaces can be recognised.
 
     Attributes:
         vertices: (n, 3) [m].
         faces: (m, 3) vertex indices, counter-clockwise seen from outside.
-        source: Where it came from, for messages (a path or a name).
-        dropped_faces: How many degenerate triangles were dropped.
+        source: Path or name, for messages.
+        dropped_faces: Number of degenerate triangles dropped.
     """
 
     vertices: FloatArray
@@ -74,8 +75,7 @@ class Mesh:
             max_faces: More triangles than this (after hulls) are refused.
 
         Raises:
-            SceneError: If the mesh is empty, not finite, badly indexed, of a suspicious
-                size or too large.
+            SceneError: If the mesh is empty, not finite, badly indexed, of a suspicious size or too large.
         """
         points = frozen_array(vertices, f"mesh {source!r} vertices", (None, 3), SceneError)
         triangles = _checked_faces(faces, len(points), source)
@@ -148,9 +148,9 @@ def load_mesh(
     file = Path(path)
     extension = file.suffix.lower().lstrip(".")
     if extension not in FORMATS:
-        raise SceneError(f"mesh file '{file}' has the extension '{file.suffix}'; valid: {_formats_text()}")
+        raise SceneError(f"mesh file '{file}' has the extension '{file.suffix}'; valid: {_FORMATS_TEXT}")
     if not file.is_file():
-        raise SceneError(f"mesh file '{file}' does not exist; valid: an existing {_formats_text()} file")
+        raise SceneError(f"mesh file '{file}' does not exist; valid: an existing {_FORMATS_TEXT} file")
     if unit is not None and unit not in UNITS:
         raise SceneError(f"mesh file '{file}' unit is {unit!r}; valid: {', '.join(UNITS)}")
     if up is not None and up not in _UP_TO_Z:
@@ -168,10 +168,6 @@ def as_trimesh(vertices: FloatArray, faces: IntArray) -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices=vertices, faces=faces, process=False, validate=False)
 
 
-def _formats_text() -> str:
-    return ", ".join(f".{name}" for name in FORMATS)
-
-
 def _read(file: Path, extension: str) -> trimesh.Trimesh:
     try:
         scene: Any = trimesh.load_scene(str(file), file_type=extension)
@@ -180,7 +176,7 @@ def _read(file: Path, extension: str) -> trimesh.Trimesh:
         reason = " ".join(str(error).split())[:120]
         raise SceneError(
             f"mesh file '{file}' cannot be read ({type(error).__name__}: {reason}); "
-            f"valid: a well-formed {_formats_text()} file"
+            f"valid: a well-formed {_FORMATS_TEXT} file"
         ) from None
     if mesh is None or not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise SceneError(f"mesh file '{file}' holds no triangles; valid: at least one")

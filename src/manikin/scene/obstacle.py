@@ -56,12 +56,7 @@ class Cylinder:
 
 @dataclass(frozen=True, eq=False)
 class Capsule:
-    """A cylinder along z closed by two half balls, centred on its frame.
-
-    Attributes:
-        radius: [m], > 0.
-        length: Of the cylindrical part [m], > 0; the whole is ``length + 2 radius`` long.
-    """
+    """A cylinder of ``radius`` and ``length`` [m] > 0 along z, with half balls on both ends, centred."""
 
     radius: float
     length: float
@@ -73,12 +68,7 @@ class Capsule:
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """The two-sided surface ``normal . x = offset``, without thickness or inside.
-
-    Attributes:
-        normal: (3,) unit vector (normalised on construction).
-        offset: Along the unit normal [m].
-    """
+    """The two-sided surface ``normal . x = offset`` [m] of a unit normal (3,), without inside."""
 
     normal: FloatArray
     offset: float
@@ -90,12 +80,7 @@ class Plane:
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace:
-    """Everything with ``normal . x <= offset``: a floor, a wall, the ground.
-
-    Attributes:
-        normal: (3,) unit vector out of the solid (normalised on construction).
-        offset: Along the unit normal [m].
-    """
+    """Everything with ``normal . x <= offset`` [m] of a unit normal (3,): a floor, a wall, the ground."""
 
     normal: FloatArray
     offset: float

@@ -149,9 +149,8 @@ class Scene(Displayed):
         name, distance = self.nearest(contact.position) if self.obstacles else ("", np.inf)
         if distance > GRASP_REACH:
             place = np.round(contact.position, 4).tolist()
-            nearest = (
-                f"the nearest, {name!r}, is {distance * 1000:.1f} mm away" if name else "the scene is empty"
-            )
+            away = f"the nearest, {name!r}, is {distance * 1000:.1f} mm away"
+            nearest = away if name else "the scene is empty"
             raise ContactError(
                 f"grasp '{contact.effector}' at {place} m holds on to nothing: {nearest}; "
                 f"valid: within {GRASP_REACH * 1000:g} mm of an obstacle"
