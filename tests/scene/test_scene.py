@@ -99,11 +99,3 @@ def test_grasps_need_a_surface_near_their_point_and_round_bars_are_found_by_dist
         scene.touched_obstacle(sole("left_foot", (0.5, 0.0, 0.5), **FOOT))
     with pytest.raises(SceneError, match="empty"):
         Scene([], None).nearest((0, 0, 0))
-
-
-def test_equal_scenes_have_equal_signatures_and_every_change_shows():
-    def built(size=0.2, height=0.0, name="platform", x=0.6):
-        return Scene([Obstacle(name, Box((1.0, 1.0, size)), translation=(x, 0.0, 0.1))], height).signature
-
-    assert built() == built()
-    assert len({built(), built(size=0.3), built(height=0.1), built(name="table"), built(x=0.7)}) == 5

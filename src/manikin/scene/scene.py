@@ -1,6 +1,5 @@
 """A scene: named obstacles and a floor."""
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +13,6 @@ from manikin.errors import ContactError, SceneError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
 from manikin.scene.collision import collision_parts
-from manikin.scene.mesh import Mesh
 from manikin.scene.obstacle import HalfSpace, Obstacle
 from manikin.scene.pair import Meter, part_meter
 from manikin.scene.surface import Surface, surfaces_of
@@ -92,16 +90,6 @@ class Scene(Displayed):
         unit = unit / np.linalg.norm(unit)
         limit = np.cos(max_angle)
         return tuple(surface for surface in self.surfaces if surface.normal @ unit >= limit)
-
-    @cached_property
-    def signature(self) -> str:
-        """Digest of every name, shape and placement; equal scenes have equal signatures."""
-        digest = hashlib.sha256()
-        for item in self.obstacles:
-            digest.update(f"{item.name}|{type(item.shape).__name__}|".encode())
-            for value in (item.rotation, item.translation, *_shape_values(item)):
-                digest.update(np.ascontiguousarray(value).tobytes())
-        return digest.hexdigest()
 
     def supporting_surface(
         self, contact: Contact, tolerance: float = 0.005, max_angle: float | None = None
@@ -199,10 +187,3 @@ def _misfit(surface: Surface, points: FloatArray, tolerance: float) -> float:
     """
     height = float(np.abs(surface.height(points)).max())
     return height if height > tolerance else max(height, float(surface.outside(points).max()))
-
-
-def _shape_values(item: Obstacle) -> list[FloatArray]:
-    shape = item.shape
-    if isinstance(shape, Mesh):
-        return [shape.vertices, shape.faces.astype(np.float64)]
-    return [np.atleast_1d(np.asarray(value, dtype=np.float64)) for value in vars(shape).values()]

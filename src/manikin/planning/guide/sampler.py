@@ -39,8 +39,8 @@ class SamplingRegion:
         lower: (3,) lower corner of the box of positions [m].
         upper: (3,) upper corner [m].
         yaw: Smallest and largest angle [rad], or None.
-        pitch: The same; positive leans forward.
-        roll: The same.
+        pitch: Smallest and largest angle, positive leaning forward [rad], or None.
+        roll: Smallest and largest angle [rad], or None.
     """
 
     lower: FloatArray
@@ -87,11 +87,6 @@ class SamplingRegion:
         if not len(corners):
             raise InputError("sampling region has nothing to lie around; valid: a finite obstacle or a pose")
         return cls(corners.min(axis=0) - margin, corners.max(axis=0) + margin, yaw, pitch, roll)
-
-    @property
-    def key(self) -> str:
-        """Text that is equal for equal values."""
-        return repr((self.lower.tolist(), self.upper.tolist(), self.yaw, self.pitch, self.roll))
 
     def turns(self, count: int, rng: np.random.Generator) -> FloatArray:
         """(count, 4) random quaternions xyzw within the bounds."""
