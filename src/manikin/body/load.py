@@ -21,9 +21,8 @@ def carrying(body: BodyModel, mass: float, hand: str = "both") -> BodyModel:
     """Return the body with a load in its hands.
 
     The load is a point mass at the origin of each hand's effector (the middle of the palm), rigidly held: it
-    has no size, no inertia of its own and meets nothing. It is part of the hand's segment, and with that of
-    everything that is computed or simulated with the body: mass, centre of mass, inertia, torques, forces and
-    margins. The strength stays that of the body alone.
+    has no size, no inertia of its own and meets nothing. It is part of the hand's segment, and thereby of
+    all masses, inertias, torques, forces and margins. The strength stays that of the body alone.
 
     Args:
         body: With the effectors ``left_hand`` and ``right_hand``.
@@ -73,10 +72,10 @@ def with_masses(body: BodyModel, masses: Mapping[str, float]) -> BodyModel:
     return replace(body, segments=tuple(segments), loads=loads, nominal_mass=nominal)
 
 
-def _with_point(segment: Segment, mass: float, place: FloatArray) -> Segment:
-    """The segment with a point mass [kg] at a place (3,) in its frame [m]."""
+def _with_point(segment: Segment, mass: float, position: FloatArray) -> Segment:
+    """The segment with a point mass [kg] at a position (3,) in its frame [m]."""
     total = segment.mass + mass
-    com = (segment.mass * segment.com + mass * place) / total
-    apart = place - segment.com
+    com = (segment.mass * segment.com + mass * position) / total
+    apart = position - segment.com
     square = segment.mass * mass / total * (apart @ apart * np.eye(3) - np.outer(apart, apart))
     return replace(segment, mass=total, com=com, inertia=segment.inertia + square)

@@ -27,25 +27,7 @@ from manikin.contact.stance import (
 )
 
 __all__ = [
-    "BODY_WEIGHTS_CAP",
-    "FRICTION_MODELS",
-    "CarriedLoad",
-    "Contact",
-    "ContactKind",
-    "ContactModel",
-    "ContactSchedule",
-    "FrictionModel",
-    "Phase",
-    "Rolling",
-    "SolePart",
-    "Stance",
-    "StanceSequence",
-    "Swing",
-    "default_normal_force_cap",
-    "grasp",
-    "point",
-    "roll_feet",
-    "sole",
-    "sole_part",
-    "soles_overlap",
-]
+    "BODY_WEIGHTS_CAP", "FRICTION_MODELS", "CarriedLoad", "Contact", "ContactKind", "ContactModel",
+    "ContactSchedule", "FrictionModel", "Phase", "Rolling", "SolePart", "Stance", "StanceSequence", "Swing",
+    "default_normal_force_cap", "grasp", "point", "roll_feet", "sole", "sole_part", "soles_overlap",
+]  # fmt: skip

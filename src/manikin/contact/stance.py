@@ -1,12 +1,9 @@
-"""A stance: the contacts that hold the body at one time.
+"""Stances, their sequences and schedules, and the rolling of feet over heel, full sole and toes.
 
-Also here. A sequence of stances with the bounds of their durations. When each stance of a sequence is held.
-Feet that roll: each support of a foot as heel, full sole and toes ([Qiu2012]_ 7.4.2, left open there).
-
-The expansion is our own. A foot lands on the edge of its heel while the other one still stands
-on its full sole, and rises onto its toes when the other one already does: the admissible wrenches
-of such a phase contain those of the full sole alone, so rolling never costs margin against
-single support.
+Rolling feet are left open in [Qiu2012]_ 7.4.2; the expansion is our own. A foot lands on the edge of its heel
+while the other one still stands on its full sole, and rises onto its toes when the other one already does:
+the admissible wrenches of such a phase contain those of the full sole alone, so rolling never costs margin
+against single support.
 """
 
 import itertools
@@ -58,13 +55,7 @@ class Stance(Displayed):
         *,
         model: ContactModel | None = None,
     ) -> None:
-        """Make a stance.
-
-        Args:
-            contacts: One per effector.
-            normal_force_cap: Of the contact model [N].
-            friction_model: Of the contact model.
-            model: The contact model as a whole; replaces the two.
+        """Make a stance of one contact per effector, with a contact model or its two values.
 
         Raises:
             ContactError: If an effector is held twice or the contact model is not usable.
@@ -118,11 +109,7 @@ class Stance(Displayed):
         return Stance(self.contacts, model=replace(self.model, friction=friction))
 
     def bounded(self, mass: float) -> "Stance":
-        """The stance itself, or with the default cap of a body where a normal force has no cap.
-
-        Args:
-            mass: Of the body [kg].
-        """
+        """The stance itself, with the default cap of a body's mass [kg] where a normal force has none."""
         if self.normal_force_cap is not None or all(
             contact.kind is ContactKind.GRASP or contact.normal_force_cap is not None for contact in self
         ):
@@ -232,10 +219,8 @@ class StanceSequence(Displayed):
 
     def swings(self) -> tuple[Swing, ...]:
         """Every flight of every effector, ordered by its first phase."""
-        found: list[Swing] = []
-        for effector in self.effectors:
-            found.extend(self._swings_of(effector))
-        return tuple(sorted(found, key=lambda swing: (swing.first_phase, swing.effector)))
+        swings = (swing for effector in self.effectors for swing in self._swings_of(effector))
+        return tuple(sorted(swings, key=lambda swing: (swing.first_phase, swing.effector)))
 
     def _swings_of(self, effector: str) -> Iterator[Swing]:
         held = [effector in phase.stance for phase in self.phases]
@@ -282,11 +267,7 @@ class ContactSchedule(Displayed):
         return np.diff(self.instants)
 
     def phase_at(self, time: ArrayLike) -> NDArray[np.int64]:
-        """Index of the phase at each time; the half-open ``[start, end)``, the last one closed.
-
-        Args:
-            time: Scalar or (n,) [s]; times outside are given the first or the last phase.
-        """
+        """Index of the phase ``[start, end)`` at each time [s]; outside, that of the first or the last."""
         index = np.searchsorted(self.instants, time, side="right") - 1
         return np.clip(index, 0, len(self.sequence) - 1)
 
@@ -350,10 +331,8 @@ def roll_feet(sequence: StanceSequence, hinge: float, rolling: Rolling | None = 
         rolling: Least durations of the parts.
     """
     rolling = rolling or Rolling()
-    phases: list[Phase] = []
-    for index in range(len(sequence)):
-        phases.extend(_split(sequence, index, hinge, rolling))
-    return StanceSequence(phases)
+    parts = (_split(sequence, index, hinge, rolling) for index in range(len(sequence)))
+    return StanceSequence([phase for split in parts for phase in split])
 
 
 def _split(sequence: StanceSequence, index: int, hinge: float, rolling: Rolling) -> Iterator[Phase]:

@@ -1,11 +1,9 @@
-"""What a motion needs from outside: the wrench that all contacts together must supply.
+"""Dynamics of sampled motions: the wrench that all contacts together must supply, and momentum rates.
 
-Two ways lead there. The rate of the centroidal momentum gives the wrench with the centre of mass and the
-angular momentum (:func:`centroidal_motion`); the recursive Newton-Euler equations give it with the torques of
-a body without contacts (:class:`FreeDynamics`). Both agree to rounding.
-
-Also here. Rate of the centroidal momentum of sampled motions, with exact derivatives by raw coordinates.
-Kinematics of a whole-body spline at its samples, with what one pass over them gives at once.
+The rate of the centroidal momentum gives the wrench with the centre of mass and the angular momentum
+(:func:`centroidal_motion`); the recursive Newton-Euler equations give it with the torques of a body without
+contacts (:class:`FreeDynamics`). Both agree to rounding. :class:`MotionSampler` evaluates a whole-body
+spline with exact derivatives by its raw coordinates.
 """
 
 from collections.abc import Sequence
@@ -70,13 +68,7 @@ class MomentumRateSamples:
     def by_raw(
         self, states: StateSamples, raw: tuple[FloatArray, FloatArray, FloatArray], tangent: FloatArray
     ) -> MomentumRate:
-        """Differentiate by the raw coordinates (n, nq), their rates and second derivatives.
-
-        Args:
-            states: The states that were recorded.
-            raw: Raw spline values, rates and second derivatives.
-            tangent: (n, 7, 7) :func:`tangent_map` of the raw values.
-        """
+        """Differentiate by raw values, rates and second derivatives (n, nq), with :func:`tangent_map`."""
         turn = turn_derivatives(*(part[:, 3:7] for part in raw))
         blocks = [np.zeros((*self._by_q.shape[:2], raw[0].shape[1])) for _ in range(3)]
         for block, joints in zip(blocks, (self._by_q, self._by_v, self._by_a), strict=True):
@@ -86,13 +78,9 @@ class MomentumRateSamples:
         return MomentumRate(self._value, (blocks[0], blocks[1], blocks[2]))
 
     def _add_pelvis_turn(
-        self,
-        blocks: list[FloatArray],
-        states: StateSamples,
-        raw_second: FloatArray,
-        tangent: FloatArray,
+        self, blocks: list[FloatArray], states: StateSamples, raw_second: FloatArray, tangent: FloatArray,
         turn: TurnDerivatives,
-    ) -> None:
+    ) -> None:  # fmt: skip
         # With the world velocity of the pelvis held, its velocity in the pelvis frame turns.
         by_omega = self._by_v[:, :, 3:6] + self._by_a[:, :, :3] @ skew(states.v[:, :3])
         by_alpha = self._by_a[:, :, 3:6]
@@ -137,13 +125,9 @@ class MotionSamples:
 
 
 class MotionSampler:
-    """Evaluates splines of one basis.
+    """Evaluates splines of one basis, with the frames of some effectors of a body.
 
-    Args:
-        body: The body.
-        frames: Names of the effectors whose frames are needed.
-        basis: The spline's basis at the samples.
-        loads: What is carried at each sample, or None where nothing is.
+    ``loads`` says what is carried at each sample, or None.
     """
 
     def __init__(
@@ -170,9 +154,8 @@ class MotionSampler:
 
     def sample(self, points: FloatArray) -> MotionSamples:
         """Evaluate the spline with control points (k, nq)."""
-        raw = (
-            self._basis.evaluate(points), self._basis.evaluate(points, 1), self._basis.evaluate(points, 2)
-        )  # fmt: skip
+        basis = self._basis
+        raw = basis.evaluate(points), basis.evaluate(points, 1), basis.evaluate(points, 2)
         states, tangent = states_from_raw(*raw), tangent_map(raw[0])
         n, model, data = len(states.q), self._model, self._data
         momentum = MomentumRateSamples(model, n)
@@ -246,7 +229,7 @@ def centroidal_motion(body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArr
     """Wrench that the scene must apply to a body in motion, by the rate of its centroidal momentum.
 
     Args:
-        body: Who moves.
+        body: The body.
         q: (n, nq) configurations.
         v: (n, nv) velocities.
         a: (n, nv) accelerations.
@@ -277,14 +260,7 @@ class FreeDynamics:
 
     @classmethod
     def of(cls, body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray) -> "FreeDynamics":
-        """By the recursive Newton-Euler equations.
-
-        Args:
-            body: Who moves.
-            q: (n, nq) configurations.
-            v: (n, nv) velocities.
-            a: (n, nv) accelerations.
-        """
+        """By the recursive Newton-Euler equations; arguments as of :func:`centroidal_motion`."""
         model, data = body.pinocchio, body.pinocchio.createData()
         needed, jacobians = np.empty((len(q), model.nv)), np.empty((len(q), 6, model.nv))
         for k in range(len(q)):
