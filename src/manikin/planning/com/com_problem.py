@@ -130,8 +130,8 @@ class CentroidalTrajectory(Displayed):
         """(..., 6) ``[m (a - g); (p - o) x m (a - g) + Ldot]`` about ``reference`` o [N, N.m].
 
         [Qiu2012]_ 4.6 for a point mass, 4.51 with the rate of its angular momentum; o is the world's origin
-        when omitted. A load of the phases moves with the CoM, at its offset from it; at a key instant the load
-        of ``phase`` counts, or of the later one.
+        when omitted. A load of the phases moves with the CoM, at its offset from it; at a key instant that of
+        ``phase`` counts, or of the later one.
         """
         rate = None if self.turning is None else self.angular_momentum_rate(time)
         position, acceleration = self.position(time), self.acceleration(time)
