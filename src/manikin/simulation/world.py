@@ -1,21 +1,28 @@
 """A running simulation: state, joint torques, pushes, grips and contact forces."""
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from manikin.body.load import with_masses
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, cross, finite_number, frozen_array
 from manikin.simulation.carrying import CarriedPoints, Sensed, Touch
-from manikin.simulation.compile import SimulationModel, obstacle_of, root_rotation
+from manikin.simulation.compile import SimulationModel, compile_model, obstacle_of, root_rotation
 from manikin.simulation.push_force import Push
 
 _NOTHING = (np.zeros((0, 2), dtype=int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
 """Contacts that carry in a step without any: geometries, points, normals, forces, friction."""
+
+_INERTIAL = (
+    "body_mass", "body_ipos", "body_iquat", "body_inertia", "body_subtreemass", "body_invweight0", "dof_M0",
+    "dof_invweight0", "actuator_acc0",
+)  # fmt: skip
+"""Arrays of the engine's model that depend on the masses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +70,7 @@ class World:
         self._masks: dict[tuple[tuple[str, ...], bool], NDArray[np.bool_]] = {}
         self._tables: dict[tuple[tuple[str, ...], str], NDArray[np.bool_]] = {}
         self._pushes: list[Push] = []
+        self._load: dict[str, float] = {}
         self._grips: dict[str, Grip] = {}
         self._grip_forces: dict[str, FloatArray] = {}
         self._touches: dict[tuple[str, str], Touch] = {}
@@ -112,6 +120,16 @@ class World:
         self._carried.clear()
 
     # --- what acts -------------------------------------------------------------------------
+
+    def carry(self, masses: Mapping[str, float]) -> None:
+        """Set the point masses that effectors carry, at rest in their frames [kg]; none sets all down."""
+        if masses == self._load:
+            return
+        model = self.model
+        loaded = compile_model(with_masses(model.body, masses), model.scene, model.options).mujoco
+        for name in _INERTIAL:
+            getattr(self._model, name)[:] = getattr(loaded, name)
+        self._load = dict(masses)
 
     def apply_push(
         self,

@@ -23,13 +23,13 @@ from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.execution_stage import act_of
 from manikin.planning.contacts import (
     ContactPlan,
+    Endpoint,
     Endpoints,
     ExtendSettings,
     Extension,
     GuideLine,
     LimbExtendSettings,
     LimbPlaces,
-    LimbStart,
     PostureFinder,
     PostureFinderSettings,
     Stage,
@@ -69,7 +69,7 @@ TURN = float(np.deg2rad(75.0))
 """How far the root may turn from the headings of start and goal, where these are that close [rad]."""
 
 SEARCHES_AGAIN = 60
-"""Postures that are looked for along every guide after the first."""
+"""Postures that are looked for along every guide after the first, which the others are much like."""
 
 
 def find_foot_contacts(
@@ -112,26 +112,24 @@ class _FootSearch:
         found = self._tally.along_guides(
             self._scenario.contacts.attempts,
             lambda: self._guide(first, goal),
-            lambda line, number: self._follow(line, start, goal, again=number > 0),
+            lambda line, number: self._follow(line, start, goal, number),
         )
         if found.plan is None:
             return found
         return replace(found, scenario=with_supports(self._scenario, found.plan))
 
-    def _follow(self, line: GuideLine, start: Stage, goal: Stage, *, again: bool) -> Extension:
-        """Contacts along a guide, with the hands on the object where there is an act."""
-        settings = self._settings(again=again)
-        found = follow_guide(self._body, self._scene, line, start, goal, settings, self._reference)
-        return found if found.plan is None else replace(found, plan=self._acting(found.plan))
-
-    def _settings(self, *, again: bool) -> ExtendSettings:
-        """How contacts are looked for; along another guide, which is much like the first, not as long."""
+    def _follow(self, line: GuideLine, start: Stage, goal: Stage, before: int) -> Extension:
+        """Contacts along a guide after others, with the hands on the object where there is an act."""
         options = self._scenario.contacts
-        settings = ExtendSettings(
-            stride=options.stride_m, friction=options.friction, natural=self._natural,
-            friction_model=self._scenario.contact_model.friction,
-        )  # fmt: skip
-        return replace(settings, searches=SEARCHES_AGAIN) if again else settings
+        settings = ExtendSettings(stride=options.stride_m)
+        if before:
+            settings = replace(settings, searches=SEARCHES_AGAIN)
+        asked = PostureFinderSettings(
+            natural=self._natural, friction_model=self._scenario.contact_model.friction
+        )
+        poser = PostureFinder(self._body, self._scene, self._reference, asked)
+        found = follow_guide(poser, line, start, goal, settings, friction=options.friction)
+        return found if found.plan is None else replace(found, plan=self._acting(found.plan))
 
     def _goal(self, start: Stage) -> Stage | str:
         """Where to go, or why there is no such place; for an act, on the level of the start."""
@@ -250,7 +248,7 @@ class _LimbSearch:
             return self._tally.failed(goal, "goal")
         first = next(starts)
         if first.stage is None:
-            return self._tally.failed(first.reason, "start")
+            return self._tally.failed(first.failure or "", "start")
         # Another guide begins at another start, as long as there are some.
         stages = [first.stage]
         others = (item.stage for item in starts if item.stage is not None)
@@ -287,18 +285,18 @@ class _LimbSearch:
             goal_distance=plain.goal_distance * max(size, SMALLEST) if not self._climbs else NEAR_GOAL,
         )
 
-    def _starts(self) -> Iterator[LimbStart]:
+    def _starts(self) -> Iterator[Endpoint]:
         """Where the body is at the start, the best first, or why it cannot be there."""
         state = self._scenario.file.task.start
         if self._body.stature is not None and state.posture != CLIMBING:
             found = stage_at(self._endpoints(), self._scenario, "start")
-            yield LimbStart(None, found) if isinstance(found, str) else LimbStart(found)
+            yield Endpoint(None, found) if isinstance(found, str) else Endpoint(found)
             return
         at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
         q = self._standing(at, yaw, state.height_m)
         for found in starts_on_limbs(self._poser, self._places, q, self._settings().shift_duration):
             where = f"the start: no posture at {at.round(3).tolist()} m: "
-            yield found if found.stage is not None else LimbStart(None, where + found.reason)
+            yield found if found.stage is not None else Endpoint(None, f"{where}{found.failure}")
 
     def _endpoints(self) -> Endpoints:
         return Endpoints(

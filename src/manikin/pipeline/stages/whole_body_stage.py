@@ -306,22 +306,22 @@ def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | No
     return motion
 
 
+ERRORS = (
+    "max_support_error_m", "max_meeting_error_m", "max_com_error_m", "min_clearance_m", "max_scuff_m",
+    "max_joint_limit_violation_rad", "max_velocity_share", "max_torque_share",
+)  # fmt: skip
+"""Keys of the certificate that the summary has."""
+
+
 def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
     """Return the ``wholebody`` block of the summary."""
     certificate = result.certificate
     return {
         "method": "follow",
-        "max_support_error_m": certificate.max_support_error_m,
-        "max_meeting_error_m": certificate.max_meeting_error_m,
-        "max_com_error_m": certificate.max_com_error_m,
-        "min_clearance_m": certificate.min_clearance_m,
+        **{key: certificate.value(key) for key in ERRORS},
         "closest_pair": list(certificate.closest_pair),
-        "max_scuff_m": certificate.max_scuff_m,
-        "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
-        "max_velocity_share": certificate.max_velocity_share,
-        "max_torque_share": certificate.max_torque_share,
-        "max_torque_joint": certificate.tightest_joint,
-        "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
+        "max_torque_joint": certificate["max_torque_share"].where,
+        "max_torque_at_s": certificate["max_torque_share"].time_s,
         "impacts": [asdict(impact) for impact in certificate.impacts],
         "min_margin": float(result.motion.margin.min()),
         "min_force_at_com_N": certificate.min_force_at_com_N,
