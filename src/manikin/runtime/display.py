@@ -1,7 +1,4 @@
-"""One line for a value at the prompt, and a table for it in a notebook.
-
-Also here. Packages that are also verbs of the library.
-"""
+"""One-line ``repr`` and notebook table of a value; packages that can be called as verbs."""
 
 import sys
 from collections.abc import Mapping, Sized
