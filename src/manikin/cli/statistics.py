@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from manikin.cli.console import BAD_INPUT, DONE, JsonOption, complain, print_json, refuse, stdout_kept_clean
+from manikin.cli.console import BAD_INPUT, DONE, JsonOption, SexOption, bars, complain, print_json, refuse
 from manikin.errors import InputError
 from manikin.runtime.progress import Interruption
 
 if TYPE_CHECKING:
     from manikin.recordings.statistics.clip_statistics import From, GroupStatistics, StatisticsSettings
-    from manikin.recordings.statistics.clips import ClipFiles
     from manikin.recordings.statistics.phases import By
 
 
-STAGE = "recordings"
 SEXES = ("male", "female")
 
 Box = tuple[float, float, float, float, float]
@@ -62,7 +60,7 @@ def statistics(
     by: Annotated[
         str, typer.Option(metavar="number|kind|effectors", help="What phases have in common.")
     ] = "kind",
-    sex: Annotated[str, typer.Option(metavar="male|female", help="Sex, for the segments' masses.")] = "male",
+    sex: SexOption = "male",
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write statistics.json, phases.csv and figures there.")
     ] = None,
@@ -71,13 +69,8 @@ def statistics(
     """Phase durations, sequences, placements, centre of mass over sets of recordings."""
     if published:
         options = {
-            "FILE": files,
-            "--bar": bar,
-            "--box": box,
-            "--limit": limit,
-            "--phases": phases,
-            "--start": start,
-        }
+            "FILE": files, "--bar": bar, "--box": box, "--limit": limit, "--phases": phases, "--start": start,
+        }  # fmt: skip
         for option, value in options.items():
             refuse(value is not None, option, "the published motions are numbers already")
         return _published(out, by, json=json)
@@ -85,9 +78,9 @@ def statistics(
         raise InputError("no FILE is given; valid: recordings, folders or patterns, or --published")
     settings = _settings(bar, box, limit, effectors, phases, start, origin)
     _check_by(by)
-    if sex not in SEXES:
+    if sex not in (None, *SEXES):
         raise InputError(f"--sex is {sex!r}; valid: {', '.join(SEXES)}")
-    return _recorded(files, settings, cast("By", by), sex, out, context.obj, json=json)
+    return _recorded(files, settings, cast("By", by), sex or "male", out, context.obj, json=json)
 
 
 def _recorded(
@@ -96,16 +89,10 @@ def _recorded(
 ) -> int:  # fmt: skip
     from manikin.recordings.statistics.clip_statistics import clip_as_dict, statistics_of
     from manikin.recordings.statistics.clips import grouped_files, read_clips
-    from manikin.runtime.progress import StageProgress
 
     chosen = grouped_files(files)
-    with stdout_kept_clean(), StageProgress() as bars:
-
-        def report(share: float, remark: str) -> None:
-            interruption.check()
-            bars(STAGE, share, remark)
-
-        read = read_clips(chosen, sex=sex, report=report)
+    with bars(interruption) as progress:
+        read = read_clips(chosen, sex=sex, report=lambda share, remark: progress("recordings", share, remark))
         found = statistics_of(read.clips, settings)
         content: dict[str, Any] = {
             "limit_m": settings.limit,
@@ -123,11 +110,6 @@ def _recorded(
         print_json(content)
     else:
         _print(found, by, settings.limit)
-    return _ending(read, out)
-
-
-def _ending(read: "ClipFiles", out: Path | None) -> int:
-    """Say what was refused, each in one line, and where the files are."""
     for reason in read.refused.values():
         complain(reason, BAD_INPUT)
     if out is not None and read.clips:

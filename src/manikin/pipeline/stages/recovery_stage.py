@@ -1,6 +1,7 @@
 """The recovery stage: a standing body is pushed and keeps its balance, in the physics engine."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
 
@@ -13,10 +14,13 @@ from manikin.pipeline.stages.context import Report, RunContext
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections.task_sections import PushSection, RecoverySection
 from manikin.simulation import (
+    DirectionSearch,
     Feet,
+    PushMap,
     PushTrials,
     Recovery,
     RecoveryTask,
+    equal_directions,
     feet_apart_posture,
     one_foot_posture,
     push_near_com,
@@ -30,7 +34,6 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     """Push the body of a scenario with a ``recovery`` section and measure what becomes of it.
 
     Args:
-        context: Of the run.
         report: Takes the ``push`` block, and the failure where the body does not stand in the end.
 
     Raises:
@@ -70,6 +73,33 @@ def push_trials(scenario: Scenario) -> PushTrials:
     section, push = _sections(scenario)
     body = scenario.build_body()
     return PushTrials(body, _task(scenario, section, body), _settings(section), push.duration_s, push.at_s)
+
+
+def push_map_searches(
+    scenarios: Sequence[Scenario], directions: int, tolerance: float
+) -> list[tuple[PushMap, list[DirectionSearch]]]:
+    """Empty maps of the largest impulses held, each with the searches of its directions.
+
+    Args:
+        scenarios: One with a ``recovery`` section for each map.
+        directions: How many, all around.
+        tolerance: Of the impulses [N.s].
+
+    Raises:
+        InputError: If a number is not usable.
+    """
+    angles = equal_directions(directions)
+    maps = []
+    for scenario in scenarios:
+        trials, (section, push) = push_trials(scenario), _sections(scenario)
+        conditions = {
+            "body": scenario.file.body.model_dump(mode="json", exclude_none=True),
+            **section.model_dump(mode="json", exclude={"duration_s"}),
+            "duration_s": push.duration_s, "tolerance_Ns": tolerance,
+        }  # fmt: skip
+        searches = [DirectionSearch(trials, angle, tolerance) for angle in angles]
+        maps.append((PushMap.empty(conditions, angles, trials.bound(angles)), searches))
+    return maps
 
 
 def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
