@@ -1,11 +1,7 @@
-"""A recorded person on one sheet: postures, supports, forces, balance, height, scores.
+"""A recorded person on one sheet: postures, supports, forces, margins, height and scores over time.
 
-All share one axis of time, band below band. The sheet is an SVG drawing and no figure of Matplotlib: there is
-one for every recording of a folder, and it is drawn in a hundredth of the time.
-
-Also here. Drawings for pages: lines, bars and words as SVG, which a browser draws sharply at any size.
-
-Making one takes a hundredth of what a figure of pixels takes.
+All share one axis of time, band below band. The sheet is an SVG drawing: there is one for every recording of
+a folder, and it is made in a hundredth of the time of a figure of Matplotlib.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

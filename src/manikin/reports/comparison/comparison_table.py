@@ -17,7 +17,7 @@ def report(comparison: RunComparison) -> Group:
     parts: list[RenderableType] = []
     if comparison.rows:
         parts.append(_timing_table(comparison))
-    if comparison.rows and shared_tracks(comparison):
+    if comparison.rows and shared_tracks(*comparison.runs):
         parts += [_com_table(comparison), _margin_table(comparison)]
     if comparison.postures:
         parts.append(_posture_table(comparison))
@@ -56,7 +56,7 @@ def _com_table(comparison: RunComparison) -> Table:
     table = _table("Centre of mass at equal shares of the matched phases [m]")
     for heading in ("stage", "RMS distance", "largest", "at [s]", "mean difference x", "y", "z"):
         table.add_column(escape(heading), justify="left" if heading == "stage" else "right")
-    for stage, tracks in shared_tracks(comparison).items():
+    for stage, tracks in shared_tracks(*comparison.runs).items():
         found = com_difference(comparison.rows, *tracks)
         if found is None:
             continue
@@ -70,7 +70,7 @@ def _com_table(comparison: RunComparison) -> Table:
 
 def _margin_table(comparison: RunComparison) -> Table:
     table = _table(f"Smallest margins: {comparison.names[0]} / {comparison.names[1]} (difference)")
-    shared = shared_tracks(comparison)
+    shared = shared_tracks(*comparison.runs)
     found = [margin_difference(comparison.rows, *tracks) for tracks in shared.values()]
     table.add_column("phase")
     for stage, margins in zip(shared, found, strict=True):

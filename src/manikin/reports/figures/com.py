@@ -1,9 +1,4 @@
-"""Position, velocity and acceleration of the centre of mass in time.
-
-Also here. The path of the centre of mass on the three coordinate planes, with the supports. Lowest centres of
-mass of several motions, and the room below what they passed. How far the centre of mass is from what supports
-it, while it does. Ways of the centre of mass of several motions, from the side and from above.
-"""
+"""Centre of mass: in time and on the coordinate planes; of several motions its path, height and supports."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -33,6 +28,7 @@ from manikin.reports.figures.style import (
     name_groups,
     need,
     new_grid,
+    note,
     span_at_least,
 )
 from manikin.reports.figures.timeline import timeline
@@ -76,7 +72,6 @@ def planes_grid(title: str, spans: FloatArray) -> tuple[Figure, GridSpec]:
     """Figure with a panel for each view, all to one scale as far as that is legible.
 
     Args:
-        title: Of the figure.
         spans: (3,) what is shown along each axis [m].
     """
     widths = [max(float(view(spans)[0]), 0.3 * float(spans.max())) for view in VIEWS]
@@ -112,7 +107,7 @@ def mark_instants(labels: Labels, axes: Axes, view: View, places: FloatArray, co
 
 @dataclass(frozen=True)
 class LowestPoints:
-    """Of one group of motions.
+    """Lowest centres of mass of one group of motions.
 
     Attributes:
         group: Its name.
@@ -182,8 +177,7 @@ def _dots(axes: Axes, number: int, values: Sequence[float], colour: str) -> None
     mean = sum(values) / len(values)
     axes.bar(number, mean, width=0.6, color=colour, alpha=0.35)
     axes.plot([number] * len(values), values, "o", color=colour, markersize=4)
-    axes.annotate(f"{mean:.2f}", (number, 0.0), (0, 3), textcoords="offset points", fontsize=7.5,
-                  ha="center")  # fmt: skip
+    note(axes, f"{mean:.2f}", (number, 0.0), fontsize=7.5)
 
 
 def com_distances_figure(
@@ -326,16 +320,9 @@ def com_figure(record: RunRecord) -> Figure:
     """
     tracks = need(record.tracks, "a motion of the centre of mass")
     shown = timeline(
-        record,
-        (14.0, 7.0),
-        "Centre of mass",
-        3,
-        len(QUANTITIES),
-        strip=0.14,
-        top=0.75,
-        between=0.22,
+        record, (14.0, 7.0), "Centre of mass", 3, len(QUANTITIES), strip=0.14, top=0.75, between=0.22,
         across=0.75,
-    )
+    )  # fmt: skip
     for column, (quantity, unit) in enumerate(QUANTITIES):
         shown.strip(column, quantity.capitalize(), named=column == 0)
         for row, axis in enumerate("xyz"):

@@ -1,8 +1,4 @@
-"""The contact strategy: one panel per phase.
-
-Also here. Which contacts were chosen: bodies in a scene side by side. Bodies and scenes as shaded solids in
-three dimensions.
-"""
+"""Contacts: those of each phase of a run, and those chosen for bodies shown as shaded solids in a scene."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -21,10 +17,9 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from manikin.body import BodyModel, Configuration
 from manikin.body.segments import segment_triangles
 from manikin.contact import Contact, ContactSchedule
-from manikin.errors import FigureError
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.figures.style import dress, need, new_figure, new_grid
+from manikin.reports.figures.style import dress, legend_in_title, need, new_figure, new_grid
 from manikin.reports.figures.views import (
     View,
     best_view,
@@ -78,8 +73,6 @@ def contact_choice_figure(
     Args:
         body: The body of all panels.
         scene: Its surroundings, as far as they are near.
-        panels: At least one.
-        title: Of the figure.
         elevation_deg: Height of the eye above the horizon [deg].
         azimuth_deg: Direction of the eye about the vertical [deg].
         columns: Panels in a row; all when omitted.
@@ -87,8 +80,7 @@ def contact_choice_figure(
     Raises:
         FigureError: If there is no panel.
     """
-    if not panels:
-        raise FigureError("contact choice figure has no panel; valid: at least one")
+    need(panels, "a panel", "at least one body")
     wide = columns or len(panels)
     rows = -(-len(panels) // wide)
     figure = new_figure(3.3 * wide, 3.9 * rows + 0.4, title)
@@ -162,7 +154,6 @@ def body_solids(body: BodyModel, q: FloatArray, marked: Iterable[str] = ()) -> l
     """Shapes of a body in one configuration.
 
     Args:
-        body: The body.
         q: (nq,) configuration.
         marked: Names of segments drawn in the executed motion's colour.
     """
@@ -330,14 +321,8 @@ def _legend(figure: Figure, schedule: ContactSchedule) -> None:
     axes = figure.axes[0]
     for name, colour in colours_of(schedule.sequence.effectors).items():
         axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
-    handles, labels = axes.get_legend_handles_labels()
-    handles += [Line2D([], [], color=COLOURS["ink"], linewidth=2.0), Patch(fill=False, linestyle="--")]
-    labels += ["centre of mass", "dashed or pale: left, or made next"]
-    figure.legend(
-        handles,
-        labels,
-        fontsize=8,
-        frameon=False,
-        loc="upper right",
-        ncols=max(2, int((figure.get_figwidth() - 3.5) / 1.35)),
-    )
+    keys = [
+        Line2D([], [], color=COLOURS["ink"], linewidth=2.0, label="centre of mass"),
+        Patch(fill=False, linestyle="--", label="dashed or pale: left, or made next"),
+    ]
+    legend_in_title(figure, axes, handles=keys, most=max(2, int((figure.get_figwidth() - 3.5) / 1.35)))

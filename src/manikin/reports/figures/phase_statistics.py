@@ -1,7 +1,4 @@
-"""How long the phases of several motions last, each and on average.
-
-Also here. Where several people put their feet and hands, seen from above.
-"""
+"""Phases and supports of several motions: durations, each and on average, and places seen from above."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -20,8 +17,11 @@ from manikin.reports.figures.style import (
     group_colours,
     group_keys,
     label_room,
+    legend_above,
+    legend_in_title,
     need,
     new_grid,
+    note,
     support_colour,
 )
 from manikin.runtime.palette import COLOURS, colours_of, readable
@@ -60,12 +60,10 @@ def placements_figure(groups: Mapping[str, Sequence[SupportPlacement]]) -> Figur
         axes.set_aspect("equal", adjustable="box", anchor="W")
         axes.plot(0.0, 0.0, "+", color=COLOURS["ink"], markersize=10, zorder=2)
         _draw(axes, found, colours)
-    keys = [
+    legend_in_title(figure, handles=[
         Line2D([], [], marker="o", linestyle="", color=colour, label=readable(effector))
         for effector, colour in colours.items()
-    ]
-    figure.legend(handles=keys, loc="upper right", ncols=len(keys), fontsize=8.5, frameon=False,
-                  borderaxespad=0.3)  # fmt: skip
+    ])  # fmt: skip
     return figure
 
 
@@ -144,7 +142,7 @@ def _draw_motions(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]]) -> N
     axes.set_ylim(level + 1.0, 0.6)
     keys = [Patch(color=colour, alpha=0.85, label=kind) for kind, colour in kinds.items()]
     keys.append(Patch(color=COLOURS["soft"], alpha=0.3, label="cut off by the recording"))
-    _legend(axes, keys)
+    legend_above(axes, keys, most=7)
 
 
 def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By) -> None:
@@ -159,8 +157,7 @@ def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By
             axes.bar(x, spread.mean, width=0.94 * width, color=colours[group], alpha=0.75)
             ends = [[spread.mean - spread.smallest], [spread.largest - spread.mean]]
             axes.errorbar(x, spread.mean, ends, color=COLOURS["ink"], linewidth=0.8, capsize=2)
-            axes.annotate(f"{spread.count}", (x, 0.0), (0, 2), textcoords="offset points", fontsize=6.5,
-                          ha="center", color="white", fontweight="bold")  # fmt: skip
+            note(axes, f"{spread.count}", (x, 0.0), 2, fontsize=6.5, color="white", fontweight="bold")
     dress(axes, "mean, least and largest [s]")
     axes.set_xticks(range(len(names)), [name.replace("+", "\n").replace("_", " ") for name in names])
     axes.grid(False, axis="x")
@@ -169,7 +166,7 @@ def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By
     if spreads:
         highest = max(spread.largest for spread in spreads)
         axes.set_ylim(0.0, min(1.06 * highest, BEYOND * max(spread.mean for spread in spreads)))
-    _legend(axes, group_keys(colours))
+    legend_above(axes, group_keys(colours), most=7)
 
 
 def _colour(kind: str, supports: int) -> str:
@@ -184,10 +181,3 @@ def _in_order(lists: Sequence[Sequence[str]]) -> list[str]:
             if name not in merged:
                 merged.insert(merged.index(before) + 1 if before in merged else 0, name)
     return merged
-
-
-def _legend(axes: Axes, keys: list[Patch]) -> None:
-    axes.legend(
-        handles=keys, fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.1, ncols=min(len(keys), 7), handlelength=1.2, columnspacing=1.2,
-    )  # fmt: skip

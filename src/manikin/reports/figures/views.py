@@ -21,6 +21,8 @@ _LINE = 1e-4
 """Projected areas below this are lines [m^2]."""
 _APART = 0.05
 """Contacts nearer to each other than this cannot be told apart [m]."""
+BOX_CORNERS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
+"""(8, 3) corners of a cube with an edge of 2 about the origin."""
 _CIRCLE = np.column_stack([np.cos(a := np.linspace(0.0, 2.0 * np.pi, 17)[:-1]), np.sin(a)])
 
 
@@ -127,9 +129,7 @@ def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: 
     """Draw the outlines of the finite obstacles near the box from ``low`` to ``high``, and the floor.
 
     Args:
-        axes: To draw on.
         scene: Obstacles and floor.
-        view: Direction.
         low: (3,) lower corner of what is looked at [m].
         high: (3,) upper corner [m].
     """
@@ -142,8 +142,7 @@ def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: 
             continue
         shape = obstacle.shape
         if isinstance(shape, Box):
-            signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
-            points = obstacle.to_world(signs * shape.size / 2)
+            points = obstacle.to_world(BOX_CORNERS * shape.size / 2)
         elif isinstance(shape, Mesh):
             points = obstacle.to_world(shape.vertices)
         else:
@@ -167,10 +166,8 @@ def draw_body(axes: Axes, body: BodyModel, q: FloatArray, view: View) -> None:
     """Draw the silhouettes of a body's shapes, the farthest first.
 
     Args:
-        axes: To draw on.
         body: Who.
         q: (nq,) configuration.
-        view: Direction.
     """
     data = body.pinocchio.createData()
     pin.framesForwardKinematics(body.pinocchio, data, np.asarray(q))
@@ -224,8 +221,7 @@ def sections(values: np.ndarray) -> list[slice]:
 
 def _outline(shape: Shape, rotation: FloatArray, centre: FloatArray, view: View) -> FloatArray:
     if shape.kind is ShapeKind.BOX:
-        signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
-        return convex_polygon(view(centre + (signs * shape.size / 2) @ rotation.T))
+        return convex_polygon(view(centre + (BOX_CORNERS * shape.size / 2) @ rotation.T))
     radius = float(shape.size[0])
     half = shape.size[1] / 2 * rotation[:, 2] if shape.kind is ShapeKind.CAPSULE else np.zeros(3)
     ends = view(np.array([centre - half, centre + half]))

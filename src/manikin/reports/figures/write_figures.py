@@ -68,8 +68,6 @@ def write_figures(
     A figure that the run has no data for (no execution, no hand, a wall) is left out.
 
     Args:
-        record: A run.
-        folder: Existing folder.
         on_done: Told the share of figures done after each.
 
     Returns:
