@@ -1,9 +1,4 @@
-"""Reading scenarios: the file, what it extends, the variant asked for and values set from outside.
-
-Also here. ``extends``: a scenario file that is built on another one. ``variants``: named changes of a
-scenario, kept in its own file. Finding scenario files: built-in ones by name, others by path, either with a
-variant.
-"""
+"""Reading of scenario files, with what they extend (``extends``) and their ``variants``."""
 
 import difflib
 from collections.abc import Mapping, Sequence
@@ -25,7 +20,6 @@ def read_extended(path: Path, above: tuple[Path, ...] = ()) -> Tree:
     """Read a scenario file, laid over the one it extends, if any.
 
     Args:
-        path: The file.
         above: Files that extend this one, the first at the front.
 
     Returns:
@@ -82,10 +76,6 @@ _NOT_IN_A_VARIANT = ("extends", VARIANTS)
 def variants_of(tree: Tree, source: str) -> dict[str, Tree]:
     """Changes of each variant, in the order of the file.
 
-    Args:
-        tree: Content of a scenario file.
-        source: Its name, for messages.
-
     Raises:
         ScenarioError: If a variant is not a mapping or holds a key that only a file has.
     """
@@ -111,11 +101,6 @@ def apply_variant(tree: Tree, variant: str, source: str) -> Tree:
     """Lay one variant over the scenario; the variants themselves stay.
 
     The name of the result is ``NAME@VARIANT``, unless the variant gives one.
-
-    Args:
-        tree: Content of a scenario file.
-        variant: Name of the variant.
-        source: Name of the file, for messages.
 
     Raises:
         ScenarioError: If there is no such variant, in one line with the valid names.
@@ -210,7 +195,6 @@ def load_scenario(
     Args:
         name_or_path: ``"platform"``, or the path of a YAML file; ``"walls@trial-4"`` asks for a
             variant as well.
-        variant: Name of one of the file's variants.
         overrides: Values to set, ``"supports.friction=0.5"`` each; see
             :func:`manikin.scenarios.scenario.override`.
 

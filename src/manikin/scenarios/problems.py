@@ -1,8 +1,4 @@
-"""The problems of the centre-of-mass planners that a scenario states.
-
-Also here. Constraints on the CoM's height from the overhead obstacles of a scene. Recorded motions that a
-scenario names.
-"""
+"""Problems of the centre-of-mass planners that a scenario states, with its constraints and recordings."""
 
 import itertools
 from collections.abc import Sequence
@@ -166,7 +162,6 @@ def load_recording(
 
     Args:
         path: Run directory or motion file.
-        sequence: The scenario's stances.
         stature: Of the scenario's body [m].
         level: Height of the supports below the CoM.
         transform_recording_to_world: From the file's coordinates to the scenario's.

@@ -1,7 +1,4 @@
-"""A scenario: the checked file, and the builders that turn it into the library's values.
-
-Also here. ``--set KEY=VALUE``: single values of a scenario, changed from outside.
-"""
+"""Scenario: a checked file, changed by ``--set KEY=VALUE``, and the builders of what it describes."""
 
 from __future__ import annotations
 
@@ -109,35 +106,23 @@ class Scenario(Displayed, ScenarioValues):
 
     def facts(self) -> dict[str, str]:
         """What a reader wants to know first."""
-        return {
-            "name": self.name,
-            "body": self.file.body.model,
-            "mass": f"{self.mass:.1f} kg",
-            "seed": str(self.seed),
-        }
+        model, mass = self.file.body.model, f"{self.mass:.1f} kg"
+        return {"name": self.name, "body": model, "mass": mass, "seed": str(self.seed)}
 
     def with_body(
-        self,
-        stature_m: float | None = None,
-        mass_kg: float | None = None,
-        sex: str | None = None,
-        age: float | None = None,
-        strength: float | None = None,
+        self, stature_m: float | None = None, mass_kg: float | None = None, sex: str | None = None,
+        age: float | None = None, strength: float | None = None,
         load: Mapping[str, float | str] | None = None,
-    ) -> Scenario:
+    ) -> Scenario:  # fmt: skip
         """Return the same scenario for another body; what is None stays.
 
         Raises:
             ScenarioError: If a value is out of its range.
         """
         given = {
-            "stature_m": stature_m,
-            "mass_kg": mass_kg,
-            "sex": sex,
-            "age": age,
-            "strength": strength,
+            "stature_m": stature_m, "mass_kg": mass_kg, "sex": sex, "age": age, "strength": strength,
             "load": load,
-        }
+        }  # fmt: skip
         return self._changed(body={k: v for k, v in given.items() if v is not None})
 
     def with_seed(self, seed: int) -> Scenario:
@@ -259,7 +244,6 @@ class Scenario(Displayed, ScenarioValues):
         """Check that every contact of the supports lies on a surface of the scene.
 
         Args:
-            scene: The built scene.
             tolerance: Largest gap and overhang of a contact point [m].
 
         Raises:

@@ -1,8 +1,4 @@
-"""The stances that a scenario lists, and whether they fit its scene.
-
-Also here. The contact that a section of a scenario or stance file describes. What the contacts of a scenario
-can carry, and on which part of a sole it may stand.
-"""
+"""Stances that a scenario lists, and whether they fit its scene."""
 
 import math
 from dataclasses import replace
@@ -45,8 +41,6 @@ def build_contact(
     """Build one contact from its section and the defaults around it.
 
     Args:
-        effector: Name of the effector.
-        entry: The contact's section.
         friction: Coulomb coefficient where the contact gives none.
         default_sole: Sole size where the contact gives none.
         planning: Let ``default_sole`` shrink a sole the contact gives itself.
@@ -100,7 +94,6 @@ def contact_rules(values: ScenarioValues, body: BodyModel) -> ContactRules:
     """Rules of the file's ``contacts`` for a body.
 
     Args:
-        values: The scenario's values.
         body: Its body; one without soles has no front of them.
     """
     options, patch = values.contacts, None
@@ -128,7 +121,6 @@ def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> Stance
     """Build the stances of the explicit supports; feet that roll have heel and toe phases.
 
     Args:
-        values: The scenario's values.
         planning: With the smaller soles, friction and force caps that planning balances on.
 
     Raises:
@@ -147,7 +139,6 @@ def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSe
     """Build the stances as the file lists them, with full soles.
 
     Args:
-        values: The scenario's values.
         planning: With the smaller soles, friction and force caps that planning balances on.
 
     Raises:
@@ -161,16 +152,11 @@ def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSe
     if cap is not None:
         model = replace(model, normal_force_cap=cap)
     try:
-        return StanceSequence(
-            [
-                Phase(
-                    Stance([_contact(values, *item, planning) for item in contacts.items()], model=model),
-                    section.min_duration_s,
-                    section.max_duration_s,
-                )
-                for section, contacts in zip(supports.phases, supports.resolved_phases(), strict=True)
-            ]
-        )
+        phases = []
+        for section, contacts in zip(supports.phases, supports.resolved_phases(), strict=True):
+            held = [_contact(values, *item, planning) for item in contacts.items()]
+            phases.append(Phase(Stance(held, model=model), section.min_duration_s, section.max_duration_s))
+        return StanceSequence(phases)
     except InputError as error:
         raise values.refused(("supports", "phases"), error) from None
 
@@ -179,8 +165,6 @@ def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> No
     """Check that every contact of the supports lies on a surface of the scene.
 
     Args:
-        values: The scenario's values.
-        scene: The built scene.
         tolerance: Largest gap and overhang of a contact point [m].
 
     Raises:
@@ -208,17 +192,7 @@ def _contact(values: ScenarioValues, effector: str, entry: ContactSection, plann
         friction = supports.planning_friction or friction
         default_sole = supports.planning_sole or default_sole
     if effector == "buttocks":
-        default_sole = _seat_patch(values.file.body.stature_m)
-    return build_contact(
-        effector,
-        entry,
-        friction,
-        default_sole,
-        planning=planning,
-        force_cap=supports.contact_normal_force_cap_N,
-    )
-
-
-def _seat_patch(stature: float) -> SoleSection:
-    """Rectangle of the body's buttocks that presses on a seat."""
-    return SoleSection(length_m=SEAT_LENGTH * stature, width_m=SEAT_WIDTH * stature)
+        stature = values.file.body.stature_m  # the rectangle of the buttocks that presses on a seat
+        default_sole = SoleSection(length_m=SEAT_LENGTH * stature, width_m=SEAT_WIDTH * stature)
+    cap = supports.contact_normal_force_cap_N
+    return build_contact(effector, entry, friction, default_sole, planning=planning, force_cap=cap)

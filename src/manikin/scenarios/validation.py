@@ -131,6 +131,21 @@ Weights3 = Annotated[
 ]
 
 
+def required(meaning: str) -> Any:
+    """Field of a section that has to be given."""
+    return Field(description=meaning)
+
+
+def preset(default: Any, meaning: str) -> Any:
+    """Field of a section with a default."""
+    return Field(default=default, description=meaning)
+
+
+def optional(meaning: str) -> Any:
+    """Field of a section that may be left out."""
+    return Field(default=None, description=meaning)
+
+
 def rule_error(rule: str) -> PydanticCustomError:
     """Make the error of a rule that pydantic does not know; ``rule`` says what is valid."""
     return PydanticCustomError("rule", "{rule}", {"rule": rule})
@@ -152,7 +167,6 @@ def validate(
     Args:
         model: The section at the root of the file.
         data: What the YAML reader returned.
-        source: Name of the file for messages.
         lines: Place (file and line) of each key, from the YAML reader.
 
     Raises:

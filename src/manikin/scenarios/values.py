@@ -79,8 +79,6 @@ class ScenarioValues:
     def mass(self) -> float:
         """Body mass, without a load [kg]."""
         if self.file.body.model in ("urdf", "kudoh"):
-            pass
-
             return build_body(self).own_mass
         return self.file.body.mass_kg
 

@@ -1,8 +1,4 @@
-"""The body and the scene that a scenario describes.
-
-Also here. Obstacles of a scenario file. Where the body is at the start of a scenario, before anything is
-planned.
-"""
+"""Scene of a scenario, and the posture of its body at the start."""
 
 from pathlib import Path
 
@@ -74,9 +70,6 @@ def start_posture(
     near which planning would seek holds.
 
     Args:
-        values: The scenario's values.
-        body: Its body.
-        scene: Its scene.
         at: Where to stand, x and y [m]; the file's own place when omitted.
         heading_deg: Where to face, counter-clockwise from world x [deg]; the file's own, or that of
             its feet, when omitted.
