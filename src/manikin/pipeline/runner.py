@@ -45,7 +45,6 @@ def run(
 
     Args:
         scenario: Name of a built-in scenario, a scenario file, or a scenario.
-        variant: Name of one of the scenario's variants.
         overrides: Values to set, ``"supports.friction=0.5"`` each.
         out: Run directory; nothing is written when omitted.
         seed: Seed of every random choice; the scenario's own when omitted.

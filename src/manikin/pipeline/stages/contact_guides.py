@@ -1,8 +1,6 @@
-"""Contacts along one guide after the other, until there are some, with what that costs.
+"""Search for contacts along guides of the root ([Tonneau2015]_ chapter 6), and what it found.
 
-Also here. Start and goal of a scenario as contacts with a posture. The way of the root from start to goal, as
-the contact planner follows it ([Tonneau2015]_ chapter 6). What the search for contacts found, or why it found
-nothing.
+A guide is a way of the root from start to goal. One is followed after the other until there are contacts.
 """
 
 import time as clock
@@ -59,7 +57,6 @@ def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) ->
     Args:
         world: Scene, abstraction of the body, region and condition of the way.
         ends: (2, 7) poses at start and goal; where they do not fit, the nearest that do are taken.
-        rng: Source of all randomness.
     """
     began = clock.perf_counter()
     checker = world.checker()

@@ -1,10 +1,7 @@
-"""The contacts stage: supports for a scenario that gives start and goal alone.
+"""Contact stage: supports for a scenario that gives start and goal alone ([Tonneau2015]_ chapters 6 and 7).
 
-Also here. Contacts of feet from start and goal: guide, contacts, and the scenario with what was found.
-Contacts of any limbs from start and goal: guide, then algorithm 7 ([Tonneau2015]_ chapters 6 and 7).
-
-For a scenario without supports whose body goes on its feet ([Tonneau2015]_ chapters 6 and 7); the hands
-join in where it ends with an act.
+A body goes on its feet, and the hands join in where it ends with an act; or any limbs make contacts
+(algorithm 7).
 """
 
 from collections.abc import Iterator
@@ -72,40 +69,38 @@ SEARCHES_AGAIN = 60
 """Postures that are looked for along every guide after the first."""
 
 
-def find_foot_contacts(
-    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
-) -> ContactSearch:
-    """Plan the supports of a body that goes on its feet.
+class _Search:
+    """Search for contacts between start and goal of a scenario."""
 
-    Args:
-        scenario: Without supports.
-        body: A human.
-        scene: Its scene.
-        rng: Source of all randomness.
-    """
-    return _FootSearch(scenario, body, scene, rng).run()
-
-
-class _FootSearch:
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
         self._tally = SearchTally()
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
-        self._reference = posture_style_of(scenario.manner).posture(body)
         self._natural = scenario.contacts.ranges == "learnt"
-        self._endpoints = Endpoints(
-            body, scene, scenario.contacts.friction, self._reference,
-            natural=self._natural, friction_model=scenario.contact_model.friction,
+
+    def _endpoints(self, reference: FloatArray | None = None) -> Endpoints:
+        return Endpoints(
+            self._body, self._scene, self._scenario.contacts.friction, reference,
+            natural=self._natural, friction_model=self._scenario.contact_model.friction,
         )  # fmt: skip
+
+
+class _FootSearch(_Search):
+    """Search for the contacts of a human on its feet."""
+
+    def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
+        super().__init__(scenario, body, scene, rng)
+        self._reference = posture_style_of(scenario.manner).posture(body)
+        self._places = self._endpoints(self._reference)
         self._brace: Brace | None = None
 
     def run(self) -> ContactSearch:
-        start = stage_at(self._endpoints, self._scenario, "start")
+        start = stage_at(self._places, self._scenario, "start")
         if isinstance(start, str):
             return self._tally.failed(start, "start")
         goal = self._goal(start)
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
-        standing = self._endpoints.risen(start) if "buttocks" in start.contacts else None
+        standing = self._places.risen(start) if "buttocks" in start.contacts else None
         if standing is not None and standing.stage is None:
             return self._tally.failed(standing.failure or "", "start")
         first = start if standing is None or standing.stage is None else standing.stage
@@ -137,7 +132,7 @@ class _FootSearch:
         """Where to go, or why there is no such place; for an act, on the level of the start."""
         act = act_of(self._scenario)
         if act is None:
-            return stage_at(self._endpoints, self._scenario, "goal")
+            return stage_at(self._places, self._scenario, "goal")
         samples = sample_limbs(self._body, self._rng, natural=self._natural)
         friction, model = self._scenario.contacts.friction, self._scenario.contact_model.friction
         found = find_braced_posture(
@@ -206,33 +201,17 @@ NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
 
-def find_limb_contacts(
-    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
-) -> ContactSearch:
-    """Plan contacts of the limbs that a scenario names, all limbs where it names none.
+class _LimbSearch(_Search):
+    """Search for contacts of the limbs that a scenario names, all limbs where it names none."""
 
-    Args:
-        scenario: Without supports.
-        body: Its body.
-        scene: Its scene.
-        rng: Source of all randomness.
-
-    Raises:
-        BodyError: If the body has no such limb.
-    """
-    return _LimbSearch(scenario, body, scene, rng).run()
-
-
-class _LimbSearch:
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
-        self._tally = SearchTally()
-        self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
+        super().__init__(scenario, body, scene, rng)
         self._limbs = _limbs(body, scenario.contact_limbs or ())
         self._kinds = {limb.name: _kind(body, limb) for limb in self._limbs}
         self._size = float(body.standing_posture()[2]) / STANDING_HEIGHT
         safe = max(self._size, SMALLEST)
-        self._reference = _as_climbing(body, scenario.manner)
-        self._natural = scenario.contacts.ranges == "learnt"
+        style = None if body.stature is None else posture_style_of(scenario.manner)
+        self._reference = np.array(body.standing_posture() if style is None else style.posture(body))
         settings = PostureFinderSettings(
             natural=self._natural, friction_model=scenario.contact_model.friction
         )
@@ -300,12 +279,6 @@ class _LimbSearch:
             where = f"the start: no posture at {at.round(3).tolist()} m: "
             yield found if found.stage is not None else LimbStart(None, where + found.reason)
 
-    def _endpoints(self) -> Endpoints:
-        return Endpoints(
-            self._body, self._scene, self._scenario.contacts.friction,
-            natural=self._natural, friction_model=self._scenario.contact_model.friction,
-        )  # fmt: skip
-
     def _goal(self) -> FloatArray | str:
         """(7,) pose of the root at the goal, or why there is none."""
         if self._body.stature is not None and not self._climbs:
@@ -355,13 +328,6 @@ def _kind(body: BodyModel, limb: Limb) -> ContactKind:
     return ContactKind.GRASP if body.stature is not None and "hand" in limb.effector else limb.kind
 
 
-def _as_climbing(body: BodyModel, manner: str) -> FloatArray:
-    """(nq,) posture to be like: of a manner for a person, else standing."""
-    if body.stature is None:
-        return np.array(body.standing_posture())
-    return posture_style_of(manner).posture(body)
-
-
 def find_supports(
     scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
 ) -> ContactSearch:
@@ -369,15 +335,12 @@ def find_supports(
 
     Args:
         scenario: Without supports.
-        body: Its body.
-        scene: Its scene.
-        rng: Source of all randomness.
 
     Raises:
         BodyError: If the scenario names a limb that the body has not.
     """
-    find = find_foot_contacts if scenario.contact_limbs is None else find_limb_contacts
-    return find(scenario, body, scene, rng)
+    search = _FootSearch if scenario.contact_limbs is None else _LimbSearch
+    return search(scenario, body, scene, rng).run()
 
 
 def plan_contacts(context: RunContext, report: Report) -> RunContext | None:

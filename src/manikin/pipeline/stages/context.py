@@ -1,19 +1,13 @@
-"""What every stage of a run reads: the scenario with its body, its scene and what was found before.
+"""Context, report and result of a run.
 
-Everything here is in the frame of the task (:mod:`manikin.scenarios.placement`): the stages work there, and
-results are moved to the world where they leave, in :class:`~manikin.pipeline.stages.context.Report` and
-:class:`~manikin.pipeline.stages.context.RunResult`.
-
-Also here. What a run reports: its summary and verdict, the files of its directory, its progress. The outcome
-of one run. Results of a run in the world: what was found in the frame of the task, moved to where that is.
-
-The stages work in the frame of the task; what leaves through here is in the world.
+The stages work in the frame of the task (:mod:`manikin.scenarios.placement`); results are moved to the world
+where they leave, in :class:`Report` and :class:`RunResult`.
 """
 
 import re
 import time as clock
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -240,7 +234,7 @@ class StageFailure:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the ``failure`` block of the summary."""
-        return {"stage": self.stage, "reason": self.reason, "time_s": self.time_s, "where": self.where}
+        return asdict(self)
 
 
 class Report:
@@ -262,7 +256,6 @@ class Report:
         Args:
             context: What is run.
             out: Run directory; nothing is written when None.
-            progress: Told how far the run is, or None.
             began: Reading of ``time.perf_counter`` when the run began [s].
 
         Raises:
@@ -301,7 +294,6 @@ class Report:
         """Say why the run is no success.
 
         Args:
-            stage: Stage that failed.
             reason: In one line; positions in it, in the frame of the task, are moved to the world.
             time: When in the motion [s].
             where: Phase, contact, limb or pair.
@@ -438,12 +430,7 @@ class RunResult:
         """Close the report of a run and gather what its stages returned.
 
         Args:
-            report: Of the run.
-            centroidal: Of the centre of mass.
-            wholebody: Of the whole body.
-            execution: Of the physics engine.
             planned: The planned motion, where no whole body was planned.
-            recovery: Of a recovery from a push.
         """
         executed = execution.motion if execution is not None else None
         if recovery is not None:

@@ -1,7 +1,6 @@
-"""The execution stage: the planned motion under control in the physics engine, and its report.
+"""Execution stage: the planned motion, with its act, under control in the physics engine.
 
-Also here. What an executed motion must keep. The act at the end of a scenario's motion: certified, appended
-to the motion, measured. A planned motion with its contacts in time, as it is handed to the physics engine.
+The act at the end of a motion is certified and appended to it before, and measured afterwards.
 """
 
 from dataclasses import dataclass
@@ -9,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from manikin.balance.contact_forces import FrictionUse, friction_share, friction_use
+from manikin.balance.contact_forces import FrictionUse, friction_share
 from manikin.contact import ContactKind, ContactSchedule, FrictionModel
 from manikin.control import ControlSettings, ReturnSettings, SupportSettings
 from manikin.motion import Motion
@@ -127,21 +126,14 @@ class PlannedMotion:
         return float(self.motion.time[-1])
 
 
-def use_of_friction(schedule: ContactSchedule, motion: Motion) -> dict[str, float | str]:
-    """Largest use of friction by the contact forces of a planned motion, for the run's summary."""
-    return friction_use(schedule, motion.time, motion.contact_names, motion.contact_force).summary()
-
-
 FORCE_ERROR = 0.05
 """Largest error of the mean force that was exerted, as a share of what is wanted."""
 
 
 def act_of(scenario: Scenario) -> Act | None:
     """The act of a scenario, or None."""
-    found = scenario.act
-    if found is None:
-        return None
-    return Act(ActKind(found.kind), found.on, found.direction, found.force_N)
+    act = scenario.act
+    return None if act is None else Act(ActKind(act.kind), act.on, act.direction, act.force_N)
 
 
 def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> PlannedMotion:
@@ -150,7 +142,6 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
     The last posture is certified for the act first.
 
     Args:
-        context: Of the run.
         report: Takes the ``act`` block.
         planned: The motion to the place of the act.
     """
@@ -185,7 +176,6 @@ def measured_act_failure(
     """Add what was exerted to the report; a failure where it is too little or too much, or nothing.
 
     Args:
-        context: Of the run.
         report: Has the ``act`` block.
         planned: The motion, with its act or without one.
         executed: What the physics engine made of it.
@@ -243,7 +233,6 @@ def execute_motion(
     :mod:`manikin.control.plan_return`.
 
     Args:
-        context: Of the run.
         report: Takes the ``execution`` block, and the failure of a motion that broke a requirement.
         planned: What is executed.
         requirements: What the execution must keep.

@@ -1,7 +1,7 @@
-"""The walking stage: ways over the floor, then the whole body along them.
+"""Walking stage: ways over the floor, then the whole body along them.
 
-Also here. A walk as a motion with its supports, forces and margins. A walk on footprints: the way over the
-floor first, then supports along it, for the stages that follow.
+A recorded walk follows the way with its supports, forces and margins. A planned walk puts footprints along
+it, for the stages that follow.
 """
 
 import math

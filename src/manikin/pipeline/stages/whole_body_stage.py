@@ -1,7 +1,6 @@
-"""The whole-body stage: a motion of all joints that follows the centre of mass, and its report.
+"""Stages of the centre of mass and of the whole body that follows it.
 
-Also here. Between centre of mass and whole body: postures at the key instants, and other plans where one
-fails. The centroidal stage: a balanced trajectory of the centre of mass, and its report.
+Between them lie the postures at the key instants; where one fails, the centre of mass is planned again.
 """
 
 from dataclasses import asdict, dataclass, replace
@@ -14,7 +13,6 @@ from manikin.balance.contact_forces import friction_use
 from manikin.contact import ContactSchedule, StanceSequence
 from manikin.motion import Motion
 from manikin.pipeline.stages.context import Report, RunContext, place, reason_in_world, trajectory_in_world
-from manikin.pipeline.stages.execution_stage import use_of_friction
 from manikin.planning.com import (
     CentroidalResult,
     CentroidalTrajectory,
@@ -27,6 +25,7 @@ from manikin.planning.com.com_certificate import phase_times
 from manikin.planning.whole_body import (
     Eligibility,
     KeyPostures,
+    RefineResult,
     WholeBodyResult,
     continue_seated,
     find_eligible_plan,
@@ -195,8 +194,6 @@ def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[
     """Take a plan into the report, with its trajectory.
 
     Args:
-        report: Of the run.
-        result: The plan.
         block: Its ``centroidal`` block.
     """
     report.finish("centroidal", block)
@@ -265,7 +262,6 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
     """Plan all joints along a trajectory of the centre of mass; None where there is none.
 
     Args:
-        context: Of the run.
         report: Takes the ``wholebody`` block.
         plan: The trajectory with its key postures.
     """
@@ -279,16 +275,32 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
         padded=context.padded, key_postures=context.known_postures, waypoints=plan.postures,
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
-    drawn = rng.bit_generator.state != unused
-    passage = context.passage(trajectory.schedule, result.motion).summary()
-    used = {"friction": use_of_friction(trajectory.schedule, result.motion)}
-    report.finish("wholebody", wholebody_summary(result) | passage | used | {"seed_matters": drawn})
+    block = wholebody_summary(result) | {"seed_matters": rng.bit_generator.state != unused}
+    report_whole_body(context, report, trajectory.schedule, result, block)
+    return result
+
+
+def report_whole_body(
+    context: RunContext, report: Report, schedule: ContactSchedule, result: WholeBodyResult | RefineResult,
+    block: dict[str, Any],
+) -> None:  # fmt: skip
+    """Take a motion of all joints into the report.
+
+    Args:
+        report: Takes the ``wholebody`` block.
+        schedule: Contacts of the motion in time.
+        block: What its method says of it.
+    """
+    passage = context.passage(schedule, result.motion).summary()
+    friction = friction_use(
+        schedule, result.motion.time, result.motion.contact_names, result.motion.contact_force
+    )
+    report.finish("wholebody", block | passage | {"friction": friction.summary()})
     report.require("wholebody", result.requirements)
     report.planned = result.succeeded
     if result.failure is not None:
         report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
-    report.keep_motions(trajectory.schedule, result.motion)
-    return result
+    report.keep_motions(schedule, result.motion)
 
 
 def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | None:
@@ -306,26 +318,30 @@ def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | No
     return motion
 
 
+def certificate_summary(certificate: Any) -> dict[str, Any]:
+    """What the summary says of a certificate of either method."""
+    same = (
+        "max_support_error_m", "min_clearance_m", "max_joint_limit_violation_rad", "max_velocity_share",
+        "max_torque_share", "min_force_at_com_N", "min_zmp_distance_m",
+    )  # fmt: skip
+    return {name: getattr(certificate, name) for name in same} | {
+        "closest_pair": list(certificate.closest_pair),
+        "max_torque_joint": certificate.tightest_joint,
+        "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
+    }
+
+
 def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
     """Return the ``wholebody`` block of the summary."""
     certificate = result.certificate
     return {
         "method": "follow",
-        "max_support_error_m": certificate.max_support_error_m,
+        **certificate_summary(certificate),
         "max_meeting_error_m": certificate.max_meeting_error_m,
         "max_com_error_m": certificate.max_com_error_m,
-        "min_clearance_m": certificate.min_clearance_m,
-        "closest_pair": list(certificate.closest_pair),
         "max_scuff_m": certificate.max_scuff_m,
-        "max_joint_limit_violation_rad": certificate.max_joint_limit_violation_rad,
-        "max_velocity_share": certificate.max_velocity_share,
-        "max_torque_share": certificate.max_torque_share,
-        "max_torque_joint": certificate.tightest_joint,
-        "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
         "impacts": [asdict(impact) for impact in certificate.impacts],
         "min_margin": float(result.motion.margin.min()),
-        "min_force_at_com_N": certificate.min_force_at_com_N,
-        "min_zmp_distance_m": certificate.min_zmp_distance_m,
         "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],
         "wall_s": result.wall_time,
     }
