@@ -1,7 +1,4 @@
-"""Bodies, scenes and stances from a few words.
-
-Also here. Balance of one stance, to print and to draw.
-"""
+"""Bodies, scenes, stances and their balance from a few words."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -218,12 +218,8 @@ def walk(
     """Walk to a place as people do: path by optimal control, whole body from recorded walks.
 
     Args:
-        to: Goal.
-        start: Where the walk begins.
         body: Who walks; the default human when omitted.
         max_speed: Limit of the speed over the floor [m/s].
-        seed: Of every random choice.
-        out: Run directory that is kept.
 
     Raises:
         InputError: If a value is not usable.
@@ -250,8 +246,6 @@ def push(
         direction: Of the force, counter-clockwise from the body's forward axis [deg].
         duration: Of the push [s].
         body: A human; the body of Kudoh when omitted.
-        seed: Of every random choice.
-        out: Run directory that is kept.
         recovery: Keys of a scenario's ``recovery``, such as ``feet="free"`` and ``steps=1``.
 
     Raises:
@@ -269,7 +263,6 @@ def compare(first: Run | str | Path, second: Run | str | Path) -> Comparison:
 
     Args:
         first: A run, or its directory.
-        second: Another one.
 
     Raises:
         InputError: If a directory is not that of a run.

@@ -1,7 +1,4 @@
-"""What every viewer shows: the server, the obstacles and the body's shapes.
-
-Also here. A page in the browser: its server, and the loop that serves it.
-"""
+"""A page in the browser: its server, and the obstacles and bodies that it shows."""
 
 import socket
 import threading
@@ -32,7 +29,6 @@ class Page(ABC):
         """Start the server.
 
         Args:
-            port: Port to listen on; 0 picks a free one.
             frame_rate: Largest number of pictures per second.
 
         Raises:
@@ -87,13 +83,11 @@ COLOURS = {
     "force": (230, 159, 0),
 }
 
-
 VIEW = np.array([-1.7, -1.9, 0.5])
 """Where new visitors look from, seen from what they look at [m]."""
 
 WHOLE = 2.0
 """Size of what is seen whole from there, a body aside [m]."""
-
 
 ABOVE = 0.35
 """From the origin of the head to a name above it [m]."""
@@ -101,9 +95,6 @@ ABOVE = 0.35
 
 def start_server(port: int) -> viser.ViserServer:
     """Start a server on this computer.
-
-    Args:
-        port: Port to listen on; 0 picks a free one.
 
     Raises:
         InputError: If the port is taken.
@@ -128,32 +119,27 @@ def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: 
             continue
         mesh = obstacle.to_trimesh()
         server.scene.add_mesh_simple(
-            f"/scene/{obstacle.name}",
-            np.asarray(mesh.vertices),
-            np.asarray(mesh.faces),
-            color=COLOURS["obstacle"],
-            opacity=0.55,
-            flat_shading=True,
-            side="double",
-        )
+            f"/scene/{obstacle.name}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
+            color=COLOURS["obstacle"], opacity=0.55, flat_shading=True, side="double",
+        )  # fmt: skip
     if scene is not None and scene.floor_height is not None:
-        height = scene.floor_height - 1e-3
         server.scene.add_grid(
-            "/floor",
-            width=8.0,
-            height=8.0,
-            cell_size=0.5,
-            plane="xy",
-            position=(0, 0, height),
-            infinite_grid=endless_floor,
-        )
+            "/floor", width=8.0, height=8.0, cell_size=0.5, plane="xy",
+            position=(0, 0, scene.floor_height - 1e-3), infinite_grid=endless_floor,
+        )  # fmt: skip
+
+
+def add_arrow(server: viser.ViserServer, name: str, colour: tuple[int, int, int]) -> viser.ArrowsHandle:
+    """Make the arrow of a force or a normal, which is placed later."""
+    points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]])
+    sizes = {"shaft_radius": 0.012, "head_radius": 0.03, "head_length": 0.06}
+    return server.scene.add_arrows(name, points, np.array(colour, dtype=np.uint8), visible=False, **sizes)
 
 
 def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) -> None:
     """Let new visitors look at a point from behind its right, from a person's height or above.
 
     Args:
-        server: Of the page.
         middle: (3,) the point [m].
         size: Of what is to be seen, a body aside: from farther away the larger it is [m].
     """
@@ -176,8 +162,6 @@ class BodyShapes:
         """Draw the body; what is inside it stays visible.
 
         Args:
-            server: Of the page.
-            body: Whose shapes.
             opacity: In [0, 1].
             root: Name of the body on the page.
         """

@@ -8,7 +8,7 @@ import numpy as np
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts import HEURISTICS
 from manikin.planning.contacts.single_contact import LiveAnswer, LiveContacts, Role
-from manikin.viewer.canvas import BodyShapes, Page, add_scene, look_at, side_colour
+from manikin.viewer.canvas import BodyShapes, Page, add_arrow, add_scene, look_at, side_colour
 
 FRAME_RATE = 60.0
 """Largest number of updates per second; a change that comes while one is made waits for the next."""
@@ -35,7 +35,6 @@ class ContactViewer(Page):
 
         Args:
             live: The body, its scene and where it begins.
-            port: Port to listen on; 0 picks a free one.
 
         Raises:
             InputError: If the port is taken.
@@ -101,15 +100,7 @@ class ContactViewer(Page):
         self.gizmo.on_update(lambda _: self.move(self.gizmo.position, self.gizmo.wxyz))
         self._task = scene.add_arrows("/task", _arrow(np.zeros(3), np.ones(3)), np.zeros(3, dtype=np.uint8))
         self._normals = {
-            limb.name: scene.add_arrows(
-                f"/contacts/{limb.name}",
-                _arrow(np.zeros(3), np.ones(3)),
-                np.array(side_colour(limb.name), dtype=np.uint8),
-                shaft_radius=0.012,
-                head_radius=0.03,
-                head_length=0.06,
-                visible=False,
-            )
+            limb.name: add_arrow(self.server, f"/contacts/{limb.name}", side_colour(limb.name))
             for limb in self.live.body.limbs
         }
 

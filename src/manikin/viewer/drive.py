@@ -76,9 +76,7 @@ class WalkViewer(Page):
         """Start the server and show the walker standing.
 
         Args:
-            controller: The walker.
             scene: Drawn, but not looked at by the walker.
-            port: Port to listen on; 0 picks a free one.
 
         Raises:
             InputError: If the scene has no floor, or the port is taken.
