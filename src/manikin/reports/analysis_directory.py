@@ -264,10 +264,10 @@ def _overview_page(
     known = [one for one in COLUMNS if one[2] and any(row[one[0]] is not None for row in rows)]
     shown = []
     for entry, file, row in zip(entries, files, rows, strict=True):
-        written = entry.job.directory is not None and entry.summary is not None
+        inside = None if entry.summary is None else entry.job.directory
         shown.append({
             "name": file.relative_to(shared).as_posix(),
-            "link": f"{entry.job.directory.relative_to(folder).as_posix()}/{REPORT}" if written else None,
+            "link": None if inside is None else f"{inside.relative_to(folder).as_posix()}/{REPORT}",
             **{key: None if row[key] is None else factor * row[key] for key, _, _, factor, _ in known},
         })  # fmt: skip
     columns = [{"key": key, "heading": heading, "decimals": digits} for key, _, heading, _, digits in known]

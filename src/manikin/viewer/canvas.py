@@ -132,8 +132,10 @@ def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: 
 def add_arrow(server: viser.ViserServer, name: str, colour: tuple[int, int, int]) -> viser.ArrowsHandle:
     """Make the arrow of a force or a normal, which is placed later."""
     points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]])
-    sizes = {"shaft_radius": 0.012, "head_radius": 0.03, "head_length": 0.06}
-    return server.scene.add_arrows(name, points, np.array(colour, dtype=np.uint8), visible=False, **sizes)
+    return server.scene.add_arrows(
+        name, points, np.array(colour, dtype=np.uint8), shaft_radius=0.012, head_radius=0.03,
+        head_length=0.06, visible=False,
+    )  # fmt: skip
 
 
 def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) -> None:

@@ -14,6 +14,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox, Transform
 
 from manikin.errors import FigureError
+from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
 from manikin.runtime.palette import COLOURS, readable
 
@@ -258,7 +259,7 @@ def legend_below_title(figure: Figure, keys: Sequence[Artist]) -> None:
     legend_in_title(figure, handles=keys, loc="upper left", borderaxespad=0.0, bbox_to_anchor=place)
 
 
-def draw_heading(axes: Axes, place: Sequence[float], length: float) -> None:
+def draw_heading(axes: Axes, place: Sequence[float] | FloatArray, length: float) -> None:
     """Draw an arrow from x, y [m] along the heading [rad] of a place (3,), so long [m]."""
     x, y, heading = (float(value) for value in place)
     tip = x + length * float(np.cos(heading)), y + length * float(np.sin(heading))
