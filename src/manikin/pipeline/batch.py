@@ -97,7 +97,7 @@ def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
         Job.of(name, variant, load_scenario(name, variant))
         for name in list_scenarios()
         for variant in (None, *list_variants(name))
-        if load_scenario(name, variant).has_stature or not statures
+        if load_scenario(name, variant).file.body.model == "human" or not statures
     )
 
 

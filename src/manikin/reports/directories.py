@@ -107,11 +107,7 @@ class MapDirectory(ResultDirectory):
             self.maps = self._continued(self.read(MAP))
 
     def keep(self, maps: Sequence[PushMap]) -> None:
-        """Write what is known by now.
-
-        Raises:
-            MotionFileError: If it cannot be written.
-        """
+        """Write what is known by now."""
         self.maps = tuple(maps)
         self.write(TABLE, _table(self.maps))
         self.write(MAP, maps_as_dict(self.maps))
@@ -121,7 +117,6 @@ class MapDirectory(ResultDirectory):
 
         Raises:
             FigureError: If no impulse was held.
-            MotionFileError: If it cannot be written.
         """
         save_figure(push_map_figure(self.maps, trials.soles()), self.figures / "push_map.png")
 
@@ -316,20 +311,12 @@ class WordsDirectory(ResultDirectory):
         }
 
     def begin(self, headings: Sequence[int]) -> None:
-        """Say which slices are asked for, before any is solved.
-
-        Raises:
-            MotionFileError: If it cannot be written.
-        """
+        """Say which slices are asked for, before any is solved."""
         self.write(WORDS, {"manikin": __version__, "complete": False, "grid": self.grid.as_dict(),
                            "headings_deg": list(headings)})  # fmt: skip
 
     def keep(self, solved: WordSlice) -> None:
-        """Write a slice.
-
-        Raises:
-            MotionFileError: If it cannot be written.
-        """
+        """Write a slice."""
         heading = round(solved.heading_deg)
         self.slices[heading] = solved
         file = self._file(heading)
@@ -337,11 +324,7 @@ class WordsDirectory(ResultDirectory):
             np.savez_compressed(opened, **{name: getattr(solved, name) for name in _ARRAYS})
 
     def finish(self, headings: Sequence[int]) -> dict[str, Any]:
-        """Write and return the summary of the slices that are asked for.
-
-        Raises:
-            MotionFileError: If it cannot be written.
-        """
+        """Write and return the summary of the slices that are asked for."""
         summary = partition_as_dict(self.grid, headings, self.slices)
         self.write(WORDS, summary)
         return summary
@@ -352,9 +335,6 @@ class WordsDirectory(ResultDirectory):
         Args:
             headings: Of the slices that are asked for [deg]; drawn are those of :data:`SHOWN_SLICES`, else
                 the first two.
-
-        Raises:
-            MotionFileError: If a figure cannot be written.
         """
         chosen = [heading for heading in SHOWN_SLICES if heading in headings] or list(headings[:2])
         slices = [self.slices[heading] for heading in chosen]

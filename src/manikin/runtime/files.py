@@ -27,6 +27,8 @@ FIGURES = "figures"
 class ResultDirectory:
     """Directory of one kind of result.
 
+    Whatever writes to it raises :class:`~manikin.errors.MotionFileError` if that is not possible.
+
     Attributes:
         path: The directory.
         kind: What the result is called in messages, such as ``"run"``.
@@ -77,9 +79,6 @@ class ResultDirectory:
         Args:
             name: Of the file, relative to the directory.
             content: Text, or plain values and arrays that become JSON.
-
-        Raises:
-            MotionFileError: If it cannot be written.
         """
         return write_result(self.path / name, content)
 
@@ -96,11 +95,7 @@ class ResultDirectory:
         return MotionFileError(f"{file}: is damaged; valid: as written by {self.writer}{advice}")
 
     def remove(self, *patterns: str) -> None:
-        """Remove files by their patterns.
-
-        Raises:
-            MotionFileError: If the directory cannot be written to.
-        """
+        """Remove files by their patterns."""
         with writing(self.path):
             for pattern in patterns:
                 for file in self.path.glob(pattern):

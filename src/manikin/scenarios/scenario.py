@@ -188,67 +188,40 @@ class Scenario(Displayed, ScenarioValues):
         return Scenario(validate(ScenarioFile, data, self.source), self.source, self.folder, {})
 
     def build_body(self) -> BodyModel:
-        """Build the body; its soles have the size that the supports give.
-
-        Raises:
-            ScenarioError: If the body's data are out of range.
-        """
+        """Build the body, see :func:`manikin.scenarios.values.build_body`."""
         from manikin.scenarios.values import build_body
 
         return build_body(self)
 
     def build_scene(self) -> Scene:
-        """Build the obstacles and the floor.
-
-        Raises:
-            ScenarioError: If a mesh cannot be read or a shape is degenerate.
-        """
+        """Build the obstacles and the floor, see :func:`manikin.scenarios.world.build_scene`."""
         from manikin.scenarios.world import build_scene
 
         return build_scene(self)
 
     def build_sequence(self, *, planning: bool = False) -> StanceSequence:
-        """Build the stances of the explicit supports.
-
-        Args:
-            planning: With the smaller soles that planning balances on, where given.
-
-        Raises:
-            ScenarioError: If there are no supports, or a contact slides between phases.
-        """
+        """Build the stances of the supports, see :func:`manikin.scenarios.sequence.stance_sequence`."""
         from manikin.scenarios.sequence import stance_sequence
 
         return stance_sequence(self, planning=planning)
 
     def build_centroidal_problem(self) -> CentroidalProblem:
-        """Build the problem of the centre-of-mass planner, see :mod:`manikin.scenarios.problems`.
-
-        Raises:
-            ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
-        """
+        """Build the problem of the centre-of-mass planner, see :mod:`manikin.scenarios.problems`."""
         from manikin.scenarios.problems import centroidal_problem
 
         return centroidal_problem(self)
 
     def build_keyframe_problem(self) -> KeyframeProblem | None:
-        """Build the problem of the keyframe-based planner; None when the file asks for another one.
+        """Build the problem of the keyframe-based planner, see :mod:`manikin.scenarios.problems`.
 
-        Raises:
-            ScenarioError: If the recording cannot be read or was made on other supports.
+        None when the file asks for another planner.
         """
         from manikin.scenarios.problems import keyframe_problem
 
         return keyframe_problem(self)
 
     def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
-        """Check that every contact of the supports lies on a surface of the scene.
-
-        Args:
-            tolerance: Largest gap and overhang of a contact point [m].
-
-        Raises:
-            ScenarioError: For the first contact that is off every surface or overlaps another.
-        """
+        """Check that contacts lie on surfaces, see :func:`manikin.scenarios.sequence.check_contacts`."""
         from manikin.scenarios.sequence import check_contacts
 
         check_contacts(self, scene, tolerance)

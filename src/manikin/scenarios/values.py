@@ -94,11 +94,6 @@ class ScenarioValues:
         return self.file.body.model == "point_mass"
 
     @property
-    def has_stature(self) -> bool:
-        """Whether the body is a person, whose stature may be chosen."""
-        return self.file.body.model == "human"
-
-    @property
     def contact_model(self) -> ContactModel:
         """Friction model of the file and the default cap of the body, for every stance of every stage."""
         return ContactModel.of_body(self.moved_mass, self.planning.friction_model)
@@ -112,11 +107,6 @@ class ScenarioValues:
     def refines(self) -> bool:
         """Whether the whole body's motion is found by refinement."""
         return self.file.wholebody.method == "refine"
-
-    @property
-    def pace(self) -> float:
-        """Speed of a refined motion relative to what its contacts come with."""
-        return self.file.wholebody.pace
 
     @property
     def execution_required(self) -> bool:

@@ -67,7 +67,7 @@ def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -
         keyed: Contacts with a posture at each change.
     """
     body, scene, padded = context.body, context.scene, context.padded
-    keyed = keyed.at_pace(context.scenario.pace).with_lifted_feet(body, scene, padded)
+    keyed = keyed.at_pace(context.scenario.file.wholebody.pace).with_lifted_feet(body, scene, padded)
     options = context.scenario.file.wholebody
     settings = RefineSettings(
         scales=RefineScales.of(body),
