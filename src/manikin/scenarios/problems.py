@@ -8,7 +8,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, ContactKind, ContactSchedule, StanceSequence
-from manikin.errors import InputError, ScenarioError
+from manikin.errors import InputError
 from manikin.kinematics.fold import HEAD_CLEARANCE, fold_under, lowest_ceiling
 from manikin.motion.file import MotionFile, read_motions
 from manikin.motion.motion import phases_of
@@ -228,7 +228,7 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
     options, seat = values.planning, values.seated_from
     rest = (0.0, 0.0, 0.0) if options.zero_end_accelerations else None
     given = {"degree": options.degree, "samples": options.samples}
-    try:
+    with values.refusing(("planning",)):
         return CentroidalProblem(
             values.moved_mass,
             _standing(values, planning=True),
@@ -246,10 +246,6 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
             weights=Weights(**options.weights.model_dump(exclude_none=True)),
             **{key: value for key, value in given.items() if value is not None},
         )
-    except ScenarioError:
-        raise
-    except InputError as error:
-        raise values.refused(("planning",), error) from None
 
 
 def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
@@ -262,17 +258,13 @@ def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
     if options.method != "keyframes" or options.recording is None:
         return None
     path, sequence = values.find_file(options.recording), stance_sequence(values, planning=True)
-    try:
+    with values.refusing(("planning", "recording")):
         frame = options.recording_frame
         recording = load_recording(
             path, sequence, values.file.body.stature_m, values.support_level(),
             IDENTITY if frame is None else frame.transform_to_world(),
         )  # fmt: skip
         return KeyframeProblem.of(centroidal_problem(values), recording, options.control_points)
-    except ScenarioError:
-        raise
-    except InputError as error:
-        raise values.refused(("planning", "recording"), error) from None
 
 
 def _standing(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:

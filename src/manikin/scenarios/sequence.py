@@ -20,11 +20,9 @@ from manikin.contact import (
     sole,
     soles_overlap,
 )
-from manikin.errors import InputError
 from manikin.numerics.spatial import rotation_from_normal, rotation_from_rpy
 from manikin.planning.contacts import ContactRules
 from manikin.scenarios.sections import ContactSection, SoleSection
-from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.values import ScenarioValues
 from manikin.scene import Scene
 
@@ -129,10 +127,8 @@ def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> Stance
     sequence, supports = flat_sequence(values, planning=planning), values.explicit_supports()
     if supports.foot == "flat":
         return sequence
-    try:
+    with values.refusing(("supports", "foot")):
         return roll_feet(sequence, (TOE_HINGE_FROM_HEEL - 0.5) * supports.sole.length_m)
-    except InputError as error:
-        raise values.refused(("supports", "foot"), error) from None
 
 
 def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
@@ -151,14 +147,12 @@ def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSe
     model = values.contact_model
     if cap is not None:
         model = replace(model, normal_force_cap=cap)
-    try:
+    with values.refusing(("supports", "phases")):
         phases = []
         for section, contacts in zip(supports.phases, supports.resolved_phases(), strict=True):
             held = [_contact(values, *item, planning) for item in contacts.items()]
             phases.append(Phase(Stance(held, model=model), section.min_duration_s, section.max_duration_s))
         return StanceSequence(phases)
-    except InputError as error:
-        raise values.refused(("supports", "phases"), error) from None
 
 
 def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> None:
@@ -178,11 +172,8 @@ def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> No
                     f"overlaps {first.effector}; valid: soles that lie side by side",
                 )
         for contact in stance:
-            try:
+            with values.refusing(("supports", "phases", number, contact.effector)):
                 scene.touched_obstacle(contact, tolerance)
-            except InputError as error:
-                path: KeyPath = ("supports", "phases", number, contact.effector)
-                raise values.refused(path, error) from None
 
 
 def _contact(values: ScenarioValues, effector: str, entry: ContactSection, planning: bool) -> Contact:

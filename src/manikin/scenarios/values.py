@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -282,9 +283,19 @@ class ScenarioValues:
         """The constraint on the centre of mass that has the key, or None."""
         return next((c for c in self.file.com_constraints if getattr(c, key) is not None), None)
 
-    def refused(self, path: KeyPath, error: InputError) -> ScenarioError:
-        """The library's error as one of this file, with the place of the key."""
-        return ScenarioError(f"{place(self.source, path, self.lines)}: {error}")
+    @contextmanager
+    def refusing(self, path: KeyPath) -> Iterator[None]:
+        """Context in which an error of the library becomes one of this file, with the place of the key.
+
+        Raises:
+            ScenarioError: If the library refuses a value.
+        """
+        try:
+            yield
+        except ScenarioError:
+            raise
+        except InputError as error:
+            raise ScenarioError(f"{place(self.source, path, self.lines)}: {error}") from None
 
     def error(self, path: KeyPath, text: str) -> ScenarioError:
         """An error that begins with the place of the key and goes on with the text."""
@@ -354,14 +365,14 @@ def build_body(values: ScenarioValues) -> BodyModel:
         body = body if load is None else carrying(body, load.mass_kg, load.hand)
         return with_further_contacts(body, data.further_contacts) if data.further_contacts else body
     except InputError as error:
-        path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)
-        raise values.refused(path, error) from None
+        with values.refusing(("supports", "sole") if "sole" in str(error) else ("body",)):
+            raise
 
 
 def _creature(values: ScenarioValues) -> BodyModel:
     """An insect, or the creature of a robot description."""
     data = values.file.body
-    try:
+    with values.refusing(("body",)):
         if data.model == "insect":
             return insect(data.length_m, data.mass_kg)
         sole = data.sole
@@ -372,5 +383,3 @@ def _creature(values: ScenarioValues) -> BodyModel:
             sole_length=None if sole is None else sole.length_m,
             sole_width=None if sole is None else sole.width_m,
         )
-    except InputError as error:
-        raise values.refused(("body",), error) from None

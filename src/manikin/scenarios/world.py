@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
-from manikin.errors import InputError, ScenarioError
+from manikin.errors import ScenarioError
 from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_rpy
 from manikin.planning.contacts import Endpoints, Habit
 from manikin.planning.whole_body.posture_style import posture_style_of
@@ -133,8 +133,6 @@ def build_scene(values: ScenarioValues) -> Scene:
     """
     obstacles = []
     for index, entry in enumerate(values.file.scene):
-        try:
+        with values.refusing(("scene", index)):
             obstacles.append(build_obstacle(entry, values.folder))
-        except InputError as error:
-            raise values.refused(("scene", index), error) from None
     return Scene(obstacles, floor_height=values.file.floor_height_m)

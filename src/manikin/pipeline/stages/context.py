@@ -22,12 +22,7 @@ from manikin.numerics.spline import BSpline
 from manikin.pipeline.run_directory import MOTION, RunDirectory, other_motion
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
-from manikin.planning.whole_body import (
-    RefineResult,
-    WholeBodyResult,
-    WholeBodySettings,
-    measure_passage,
-)
+from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings, measure_passage
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario

@@ -8,7 +8,7 @@ from itertools import groupby
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
 from manikin.control.recovery import RecoverySettings
-from manikin.errors import InputError, ScenarioError
+from manikin.errors import ScenarioError
 from manikin.numerics.spatial import rotation_from_yaw
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.scenarios import Scenario
@@ -43,12 +43,10 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     section, push = _sections(scenario)
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
     task, settings = _task(scenario, section, body), _settings(section)
-    try:
+    with scenario.refusing(("push",)):
         one = push_near_com(
             body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
         )
-    except InputError as error:
-        raise scenario.refused(("push",), error) from None
     task = replace(task, pushes=(one,))
     found = recover(
         body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
@@ -116,15 +114,11 @@ def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> Reco
     if section.support == "both":
         if section.feet_apart_m is None:
             return task
-        try:
+        with scenario.refusing(("recovery", "feet_apart_m")):
             return replace(task, q=feet_apart_posture(body, section.feet_apart_m))
-        except InputError as error:
-            raise scenario.refused(("recovery", "feet_apart_m"), error) from None
     foot = f"{section.support}_foot"
-    try:
+    with scenario.refusing(("recovery", "support")):
         return replace(task, q=one_foot_posture(body, foot), support=(foot,))
-    except InputError as error:
-        raise scenario.refused(("recovery", "support"), error) from None
 
 
 def _settings(section: RecoverySection) -> RecoverySettings:

@@ -120,7 +120,7 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
     path, bare = plan.route.legs[0], scenario.replaced(walking=None)
     rule = StepRule().scaled(context.body.stature or 1.75)
     height = context.scene.floor_height or 0.0
-    try:
+    with scenario.refusing(("walking",)):
         if stance is None:
             footprints = _along(path, rule, height, context)
             walked = walking_supports(footprints, bare)
@@ -130,8 +130,6 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
                 place_footprints(path, rule, first=first, height=height) for first in FEET
             ])  # fmt: skip
             walked = walk_before(footprints, bare)
-    except InputError as error:
-        raise scenario.refused(("walking",), error) from None
     report.finish(STAGE, path_block(plan) | {"steps": footprints.count})
     report.keep_scenario(walked)
     return replace(context, body=walked.build_body()).with_supports(walked)
@@ -264,10 +262,8 @@ def plan_walks(
         ScenarioError: If a way cannot be asked for: no floor, a start in an obstacle, a waypoint in vain.
     """
     scenario, section = context.scenario, _section(context.scenario)
-    try:
+    with scenario.refusing(("scene",)):
         standing = floor_plan(context.scene, context.body.stature or 2.0)
-    except InputError as error:
-        raise scenario.refused(("scene",), error) from None
     objective, radius = OBJECTIVES[section.weights], Walker().width / 2
     obstacles, others = list(standing), {}
     for number, other in enumerate(section.others):
@@ -307,12 +303,10 @@ def _route(
     max_speed: float,
     wait: float,
 ) -> WalkRoute:
-    try:
+    with scenario.refusing(key):
         return walking_route(
             start, stops, objective, obstacles=obstacles, room=room, max_speed=max_speed, wait=wait
         )
-    except InputError as error:
-        raise scenario.refused(key, error) from None
 
 
 def keep_paths(report: Report, plan: PlannedWalks) -> None:
