@@ -25,7 +25,7 @@ from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.planned import walk_before, walking_supports
-from manikin.scenarios.sections import StandSection, WalkingSection, WaypointSection
+from manikin.scenarios.sections import StandSection, WalkerSection, WalkingSection, WaypointSection
 from manikin.scenarios.sequence import flat_sequence
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.walking import (
@@ -38,7 +38,6 @@ from manikin.walking import (
     Walk,
     Walker,
     WalkingPath,
-    WalkObjective,
     WalkObstacle,
     WalkRoute,
     Waypoint,
@@ -266,23 +265,26 @@ def plan_walks(
         standing = floor_plan(context.scene, context.body.stature or 2.0)
     objective, radius = OBJECTIVES[section.weights], Walker().width / 2
     obstacles, others = list(standing), {}
+
+    def route_of(
+        key: KeyPath, who: WalkingSection | WalkerSection, begin: FloatArray, stops: list[Waypoint]
+    ) -> WalkRoute:
+        with scenario.refusing(key):
+            return walking_route(
+                begin, stops, objective, obstacles=obstacles, room=section.room_m,
+                max_speed=who.max_speed_m_s, wait=who.wait_s,
+            )  # fmt: skip
+
     for number, other in enumerate(section.others):
         key: KeyPath = ("walking", "others", number)
-        stops = [_waypoint(one) for one in other.via]
-        others[other.name] = _route(
-            scenario, key, place_of(other.start), stops, objective, obstacles, section.room_m,
-            other.max_speed_m_s, other.wait_s,
-        )  # fmt: skip
-        if others[other.name].succeeded:
-            obstacles.append(others[other.name].as_obstacle(other.name, radius))
+        other_route = route_of(key, other, place_of(other.start), [_waypoint(stop) for stop in other.via])
+        others[other.name] = other_route
+        if other_route.succeeded:
+            obstacles.append(other_route.as_obstacle(other.name, radius))
     began = clock.perf_counter()
     start = end_of(scenario, "start") if start is None else start
     goal = end_of(scenario, "goal") if goal is None else goal
-    stops = [*map(_waypoint, section.via), Waypoint(goal)]
-    route = _route(
-        scenario, ("walking",), start, stops, objective, obstacles, section.room_m, section.max_speed_m_s,
-        section.wait_s,
-    )  # fmt: skip
+    route = route_of(("walking",), section, start, [*map(_waypoint, section.via), Waypoint(goal)])
     return PlannedWalks(route, others, tuple(obstacles), clock.perf_counter() - began)
 
 
@@ -290,23 +292,6 @@ def _section(scenario: Scenario) -> WalkingSection:
     if scenario.walking is None:
         raise InputError(f"scenario {scenario.name!r} has no walk; valid: one with walking")
     return scenario.walking
-
-
-def _route(
-    scenario: Scenario,
-    key: KeyPath,
-    start: FloatArray,
-    stops: list[Waypoint],
-    objective: WalkObjective,
-    obstacles: list[WalkObstacle],
-    room: float,
-    max_speed: float,
-    wait: float,
-) -> WalkRoute:
-    with scenario.refusing(key):
-        return walking_route(
-            start, stops, objective, obstacles=obstacles, room=room, max_speed=max_speed, wait=wait
-        )
 
 
 def keep_paths(report: Report, plan: PlannedWalks) -> None:
