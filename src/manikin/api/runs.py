@@ -1,6 +1,6 @@
 """Runs: planned, executed, walked, pushed and compared, to print, draw and watch."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -99,9 +99,7 @@ class Run(Displayed):
         """
         from manikin.reports.figures import FIGURES
 
-        if figure not in FIGURES:
-            raise InputError(f"figure is {figure!r}; valid: {', '.join(FIGURES)}")
-        return FIGURES[figure](self.record)
+        return _drawn(FIGURES, figure, self.record)
 
     def view(self, port: int = 8080) -> None:
         """Play the motion in the browser until Ctrl-C, on this computer only."""
@@ -167,9 +165,7 @@ class Comparison(Displayed):
         """
         from manikin.reports.figures import COMPARISONS
 
-        if figure not in COMPARISONS:
-            raise InputError(f"figure is {figure!r}; valid: {', '.join(COMPARISONS)}")
-        return COMPARISONS[figure](self.result)
+        return _drawn(COMPARISONS, figure, self.result)
 
 
 def plan(scenario: str | Path | Scenario, **options: Any) -> Run:
@@ -207,14 +203,9 @@ def simulate(
 
 
 def walk(
-    to: Place,
-    *,
-    start: Place = (0.0, 0.0, 0.0),
-    body: BodyModel | None = None,
-    max_speed: float | None = None,
-    seed: int | None = None,
-    out: str | Path | None = None,
-) -> Run:
+    to: Place, *, start: Place = (0.0, 0.0, 0.0), body: BodyModel | None = None,
+    max_speed: float | None = None, seed: int | None = None, out: str | Path | None = None,
+) -> Run:  # fmt: skip
     """Walk to a place as people do: path by optimal control, whole body from recorded walks.
 
     Args:
@@ -230,15 +221,9 @@ def walk(
 
 
 def push(
-    force: float,
-    direction: float = 0.0,
-    *,
-    duration: float = 0.1,
-    body: BodyModel | None = None,
-    seed: int | None = None,
-    out: str | Path | None = None,
-    **recovery: Any,
-) -> Run:
+    force: float, direction: float = 0.0, *, duration: float = 0.1, body: BodyModel | None = None,
+    seed: int | None = None, out: str | Path | None = None, **recovery: Any,
+) -> Run:  # fmt: skip
     """Push a standing body and see whether it stays on its feet.
 
     Args:
@@ -271,6 +256,12 @@ def compare(first: Run | str | Path, second: Run | str | Path) -> Comparison:
 
     records = [run.record if isinstance(run, Run) else read_run(run) for run in (first, second)]
     return Comparison(compare_runs(*records))
+
+
+def _drawn(figures: Mapping[str, Callable[[Any], "Figure"]], name: str, data: Any) -> "Figure":
+    if name not in figures:
+        raise InputError(f"figure is {name!r}; valid: {', '.join(figures)}")
+    return figures[name](data)
 
 
 def _job_options(options: dict[str, Any]) -> dict[str, Any]:
