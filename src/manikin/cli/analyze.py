@@ -108,16 +108,16 @@ def _one(
         chosen = None if method is None else _method(method)
         if directory is not None:
             AnalysisDirectory(directory)
-        found, planned = analyze_file(path, options), None
+        result, planned = analyze_file(path, options), None
         if chosen is not None:
             from manikin.analysis.adaptation import adapt_recording
 
             planned = adapt_recording(
-                found.found, found.supports, method=chosen, execute=execute, friction=options.friction
+                result.found, result.supports, method=chosen, execute=execute, friction=options.friction
             )
         if directory is not None:
-            write_analysis(found, directory, draw=draw, plan=planned)
-    summary = summary_of(found, planned)
+            write_analysis(result, directory, draw=draw, plan=planned)
+    summary = summary_of(result, planned)
     failure = None if planned is None else summary["plan"]["failure"]
     if json:
         print_json(summary)
@@ -187,7 +187,7 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
         )
     if plates["torques"]:
         apart = ", ".join(
-            f"{joint.replace('_', ' ')} {one['rms_Nm']:.0f}" for joint, one in plates["torques"].items()
+            f"{joint.replace('_', ' ')} {item['rms_Nm']:.0f}" for joint, item in plates["torques"].items()
         )
         shown["plates: torques"] = f"{apart} N.m (RMS)"
     return shown

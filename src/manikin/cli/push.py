@@ -249,11 +249,11 @@ def _print_maps(maps: "list[PushMap]") -> None:
     """Directions and the largest impulses held, one column per map."""
     from manikin.simulation.push_map import told_apart
 
-    common, names = told_apart([one.conditions for one in maps])
+    common, names = told_apart([item.conditions for item in maps])
     typer.echo(f"largest impulse that is held [N.s]: {common}")
     rows = [["towards [deg]", *(name or "held" for name in names)]]
     for place, direction in enumerate(maps[0].directions):
-        rows.append([f"{direction:g}", *(_impulse(one.found[place]) for one in maps)])
+        rows.append([f"{direction:g}", *(_impulse(item.found[place]) for item in maps)])
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         typer.echo("  ".join(f"{text:>{width}}" for text, width in zip(row, widths, strict=True)))

@@ -93,11 +93,11 @@ def _recorded(
     chosen = grouped_files(files)
     with bars(interruption) as progress:
         read = read_clips(chosen, sex=sex, report=lambda share, remark: progress("recordings", share, remark))
-        found = statistics_of(read.clips, settings)
+        result = statistics_of(read.clips, settings)
         content: dict[str, Any] = {
             "limit_m": settings.limit,
             "overhead_m": None if settings.overhead is None else settings.overhead.height,
-            "groups": {group: one.as_dict() for group, one in found.items()},
+            "groups": {group: item.as_dict() for group, item in result.items()},
             "clips": [clip_as_dict(clip, settings) for clip in read.clips],
             "refused": [{"file": str(path), "reason": reason} for path, reason in read.refused.items()],
         }
@@ -105,11 +105,11 @@ def _recorded(
             from manikin.reports.directories import clip_figures, write_statistics
 
             sequences = [settings.phases_of(clip) for clip in read.clips]
-            write_statistics(out, content, sequences, clip_figures(read.clips, found, settings, by))
+            write_statistics(out, content, sequences, clip_figures(read.clips, result, settings, by))
     if json:
         print_json(content)
     else:
-        _print(found, by, settings.limit)
+        _print(result, by, settings.limit)
     for reason in read.refused.values():
         complain(reason, BAD_INPUT)
     if out is not None and read.clips:
@@ -122,9 +122,9 @@ def _published(out: Path | None, by: str, *, json: bool) -> int:
     from manikin.recordings.statistics.phases import published_heights, published_phases
 
     _check_by(by)
-    found, heights = published_statistics(), published_heights()
+    result, heights = published_statistics(), published_heights()
     content = {
-        "groups": {group: one.as_dict() for group, one in found.items()},
+        "groups": {group: item.as_dict() for group, item in result.items()},
         "com_standing_m": heights.standing,
         "com_lowest_m": dict(heights.lowest),
         "overhead_m": dict(heights.beams),
@@ -137,7 +137,7 @@ def _published(out: Path | None, by: str, *, json: bool) -> int:
     if json:
         print_json(content)
     else:
-        _print(found, cast("By", "number"), None)
+        _print(result, cast("By", "number"), None)
     return DONE
 
 
@@ -178,26 +178,26 @@ def _settings(
 
 
 def _print(groups: Mapping[str, "GroupStatistics"], by: "By", limit: float | None) -> None:
-    for group, one in groups.items():
-        typer.echo(f"{group}: {len(one.motions)} motions")
-        spreads = one.durations[by]
+    for group, item in groups.items():
+        typer.echo(f"{group}: {len(item.motions)} motions")
+        spreads = item.durations[by]
         width = max((len(name) for name in spreads), default=0)
         for name, s in spreads.items():
             typer.echo(
                 f"  {name:{width}}  n {s.count:3d}  mean {s.mean:.3f} s  SD {_known(s.deviation)}"
                 f"  CV {_known(s.variation)}  {s.smallest:.3f} to {s.largest:.3f}"
             )
-        _print_sequence(one)
-        for effector, s in one.distances.items():
-            within = f"; {100 * one.within[effector]:.1f} % within {limit:g} m" if one.within else ""
+        _print_sequence(item)
+        for effector, s in item.distances.items():
+            within = f"; {100 * item.within[effector]:.1f} % within {limit:g} m" if item.within else ""
             typer.echo(
                 f"  largest distance to {effector}: {s.mean:.3f} m, SD {_known(s.deviation)}, "
                 f"{s.smallest:.3f} to {s.largest:.3f}{within}"
             )
-        for motion, low in one.whole.items():
+        for motion, low in item.whole.items():
             tops = "".join(f", {part} {top:.2f}" for part, top in low.tops.items())
             typer.echo(f"  {motion}: lowest CoM {low.com_lowest:.2f} m at {low.com_lowest_at:.2f} s{tops}")
-        for motion, under in one.under:
+        for motion, under in item.under:
             room = "" if under.room is None else f", room {under.room:.2f}"
             typer.echo(
                 f"  {motion}: under it {under.start:.2f} to {under.end:.2f} s, CoM {under.com_lowest:.2f} m, "

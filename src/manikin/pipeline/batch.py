@@ -126,13 +126,13 @@ def run_jobs(
         runs that did and did not succeed; ``wall_s``.
     """
     began = clock.perf_counter()
-    found: dict[int, dict[str, Any]] = {}
+    result: dict[int, dict[str, Any]] = {}
     with closing(_completed(jobs, command, workers or usable_cores(), time_limit)) as completed:
         for index, entry in completed:
-            found[index] = entry
+            result[index] = entry
             if report is not None:
-                report(entry, len(found))
-    runs = [found[index] for index in range(len(jobs))]
+                report(entry, len(result))
+    runs = [result[index] for index in range(len(jobs))]
     return {"runs": runs, **counts(runs), "wall_s": clock.perf_counter() - began}
 
 

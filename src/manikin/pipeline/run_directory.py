@@ -232,8 +232,8 @@ def _read_walks(folder: Path) -> dict[str, FloatArray]:
     path = folder / STAGES / f"{WALK_PATHS}.json"
     with _undamaged(path):
         return {
-            name: np.column_stack([one["time_s"], np.reshape(one["place"], (-1, 3))]).astype(np.float64)
-            for name, one in (read_json(path) if path.is_file() else {}).items()
+            name: np.column_stack([item["time_s"], np.reshape(item["place"], (-1, 3))]).astype(np.float64)
+            for name, item in (read_json(path) if path.is_file() else {}).items()
         }
 
 

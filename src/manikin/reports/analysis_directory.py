@@ -59,8 +59,8 @@ def analyze_files(
         raise InputError(f"workers is {workers}; valid: at least 1")
     # Longest first, so that all processes end together.
     ordered = sorted(jobs, key=lambda job: -job.path.stat().st_size)
-    one = partial(analyze_one, options=options)
-    for _, entry in side_by_side(one, ordered, workers, "analysis", prepare=_prepare, method=SERVED):
+    item = partial(analyze_one, options=options)
+    for _, entry in side_by_side(item, ordered, workers, "analysis", prepare=_prepare, method=SERVED):
         yield entry
 
 
@@ -72,12 +72,12 @@ def _prepare() -> None:
 def analyze_one(job: AnalysisJob, options: AnalysisOptions) -> AnalysisEntry:
     """Measure one file and write its directory."""
     try:
-        found = analyze_file(job.path, options)
+        result = analyze_file(job.path, options)
     except (ManikinError, np.linalg.LinAlgError) as error:
         return AnalysisEntry(job, None, " ".join(str(error).split()))
     if job.directory is not None:
-        write_analysis(found, job.directory, draw=job.draw)
-    return AnalysisEntry(job, found.as_dict())
+        write_analysis(result, job.directory, draw=job.draw)
+    return AnalysisEntry(job, result.as_dict())
 
 
 def directories_for(paths: Sequence[Path], out: Path) -> list[Path]:
@@ -261,7 +261,7 @@ def _overview_page(
     """HTML of several recordings; columns without any value are left out."""
     files = [entry.job.path.resolve() for entry in entries]
     shared = Path(commonpath([file.parent for file in files]))
-    known = [one for one in COLUMNS if one[2] and any(row[one[0]] is not None for row in rows)]
+    known = [item for item in COLUMNS if item[2] and any(row[item[0]] is not None for row in rows)]
     shown = []
     for entry, file, row in zip(entries, files, rows, strict=True):
         inside = None if entry.summary is None else entry.job.directory

@@ -77,8 +77,8 @@ def maps_as_dict(maps: Sequence[PushMap]) -> dict[str, Any]:
     """Content of ``map.json``: the first map, the others under ``compared``."""
     first, *others = maps
     return {
-        "manikin": __version__, "complete": not any(one.missing for one in maps), **first.as_dict(),
-        "compared": [one.as_dict() for one in others],
+        "manikin": __version__, "complete": not any(item.missing for item in maps), **first.as_dict(),
+        "compared": [item.as_dict() for item in others],
     }  # fmt: skip
 
 
@@ -150,8 +150,8 @@ def _table(maps: Sequence[PushMap]) -> str:
     rows = []
     for number, item in enumerate(maps):
         bounds = item.bound or (None,) * len(item.directions)
-        for direction, found, bound in zip(item.directions, item.found, bounds, strict=True):
-            known = (None, None) if found is None else (found.held, found.beyond)
+        for direction, result, bound in zip(item.directions, item.found, bounds, strict=True):
+            known = (None, None) if result is None else (result.held, result.beyond)
             rows.append([number, direction, *known, bound])
     return csv_text(("map", "direction_deg", "impulse_Ns", "beyond_Ns", "bound_Ns"), rows)
 
@@ -196,12 +196,12 @@ def clip_figures(
     standing = [clip.standing_com for clip in clips if clip.standing_com is not None]
     drawn = {
         "phase_durations": lambda: phase_durations_figure([settings.phases_of(clip) for clip in clips], by),
-        "placements": lambda: placements_figure({group: one.placements for group, one in found.items()}),
+        "placements": lambda: placements_figure({group: item.placements for group, item in found.items()}),
         "com_paths": lambda: com_paths_figure(
             placed, [settings.origin_of(clip) for clip in placed], overhead=height
         ),
         "com_heights": lambda: com_heights_figure(
-            [LowestPoints.of(one, height) for one in found.values()],
+            [LowestPoints.of(item, height) for item in found.values()],
             sum(standing) / len(standing) if standing else None,
         ),
         "com_distances": lambda: com_distances_figure(
@@ -219,7 +219,7 @@ def clip_figures(
 
 def published_figures() -> dict[str, Figure]:
     """Figures of the published motions, by name; those of the means quoted in the thesis."""
-    quoted = [one for one in published_phases("left_foot") if not one.group.endswith("C3")]
+    quoted = [item for item in published_phases("left_foot") if not item.group.endswith("C3")]
     return {
         "phase_durations": phase_durations_figure(quoted),
         "com_heights": com_heights_figure(published_lowest(), published_heights().standing),
@@ -258,7 +258,7 @@ def partition_as_dict(
     """
     known = [slices[heading] for heading in headings if heading in slices]
     counts = count_words(known)
-    missed = [one.residuals() for one in known]
+    missed = [item.residuals() for item in known]
     names = {"position": "position_m", "heading": "heading_rad", "curvature": "curvature_per_m",
              "adjoint": "adjoint", "hamiltonian": "hamiltonian"}  # fmt: skip
     return {
@@ -267,10 +267,10 @@ def partition_as_dict(
         "solved": sum(counts.values()), "counts": counts, "shares": shares(counts),
         "others": [word for word in counts if word not in THESIS_WORDS],
         "max_residuals": {
-            key: max((float(getattr(one, name).max()) for one in missed), default=None)
+            key: max((float(getattr(item, name).max()) for item in missed), default=None)
             for name, key in names.items()
         },
-        "slices": {str(round(one.heading_deg)): count_words([one]) for one in known},
+        "slices": {str(round(item.heading_deg)): count_words([item]) for item in known},
     }  # fmt: skip
 
 

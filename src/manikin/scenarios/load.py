@@ -79,13 +79,13 @@ def variants_of(tree: Tree, source: str) -> dict[str, Tree]:
     Raises:
         ScenarioError: If a variant is not a mapping or holds a key that only a file has.
     """
-    found = tree.data.get(VARIANTS) if isinstance(tree.data, Mapping) else None
-    if found is None:
+    result = tree.data.get(VARIANTS) if isinstance(tree.data, Mapping) else None
+    if result is None:
         return {}
-    if not isinstance(found, Mapping):
+    if not isinstance(result, Mapping):
         here = place(source, (VARIANTS,), tree.lines)
-        raise ScenarioError(f"{here} is {found!r}; valid: a mapping of names and what they change")
-    for name, change in found.items():
+        raise ScenarioError(f"{here} is {result!r}; valid: a mapping of names and what they change")
+    for name, change in result.items():
         here = place(source, (VARIANTS, name), tree.lines)
         if not isinstance(name, str) or not name or set(name) & set("@/ "):
             raise ScenarioError(f"{here} is a name that cannot be asked for; valid: no @, / or space")
@@ -94,7 +94,7 @@ def variants_of(tree: Tree, source: str) -> dict[str, Tree]:
         for key in _NOT_IN_A_VARIANT:
             if key in change:
                 raise ScenarioError(f"{here}.{key} is not for a variant; valid: the other keys")
-    return {name: tree.under(VARIANTS, name) for name in found}
+    return {name: tree.under(VARIANTS, name) for name in result}
 
 
 def apply_variant(tree: Tree, variant: str, source: str) -> Tree:

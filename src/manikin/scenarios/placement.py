@@ -78,17 +78,17 @@ def moved_data(
     """
     implied = section.implied()
     section = section.model_copy(update=implied)
-    found = data | section.model_dump(mode="json", include=set(implied))
+    result = data | section.model_dump(mode="json", include=set(implied))
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
-        if value is None or name not in found:
+        if value is None or name not in result:
             continue
         kind = next((item for item in field.metadata if isinstance(item, FrameMoves)), None)
         if kind is None:
-            found[name] = _moved_inside(value, found[name], transform, decimals)
+            result[name] = _moved_inside(value, result[name], transform, decimals)
         else:
-            found[name] = _MOVED[kind](value, transform, decimals, section)
-    return found
+            result[name] = _MOVED[kind](value, transform, decimals, section)
+    return result
 
 
 def _moved_inside(value: Any, data: Any, transform: PlanarTransform, decimals: int) -> Any:

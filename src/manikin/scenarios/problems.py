@@ -65,8 +65,8 @@ def overhead_constraints(
         chosen = [item for item in finite if _hovers(item, soles) and _over(item, way)]
     else:
         chosen = [item for item in finite if item.name in names]
-    found = (_constraint(body, obstacle, soles) for obstacle in chosen)
-    return tuple(constraint for constraint in found if constraint is not None)
+    result = (_constraint(body, obstacle, soles) for obstacle in chosen)
+    return tuple(constraint for constraint in result if constraint is not None)
 
 
 def _way(sequence: StanceSequence, ends: tuple[FloatArray, FloatArray]) -> list[FloatArray]:
@@ -174,9 +174,9 @@ def load_recording(
     motion = next(reversed(content.motions.values()))
     table = phases_of(motion, content.schedule)
     wanted = [sorted(phase.stance.effectors) for phase in sequence]
-    found = [sorted(names) for names in table.supports]
-    if found != wanted:
-        raise InputError(f"{path}: {_difference(found, wanted)}; valid: a motion on the scenario's supports")
+    result = [sorted(names) for names in table.supports]
+    if result != wanted:
+        raise InputError(f"{path}: {_difference(result, wanted)}; valid: a motion on the scenario's supports")
     if content.schedule is not None:
         _check_places(path, content.schedule, sequence, transform_recording_to_world)
     com = _scaled(transform_recording_to_world.points(motion.com), content, stature, level)
@@ -286,11 +286,11 @@ def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
 
 def _height_constraints(values: ScenarioValues) -> tuple[GeometricConstraint, ...]:
     band, entry = values.height_band, values.constraint("overhead")
-    found = () if band is None else height_band(band.lower, band.upper)
+    result = () if band is None else height_band(band.lower, band.upper)
     if entry is None or entry.overhead is None:
-        return found
+        return result
     names = None if entry.overhead == "automatic" else tuple(entry.overhead)
     overhead = overhead_constraints(
         build_body(values), build_scene(values), _standing(values), (values.start_com, values.goal_com), names
     )
-    return (*found, *overhead)
+    return (*result, *overhead)

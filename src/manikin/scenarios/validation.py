@@ -229,7 +229,7 @@ def _section_of(annotation: Any) -> Any:
     """The section inside an annotation such as ``list[X]`` or ``X | None``."""
     if isinstance(annotation, type) and issubclass(annotation, Section):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _section_of(part)) is not None), None)
+    return next((result for part in get_args(annotation) if (result := _section_of(part)) is not None), None)
 
 
 def _key_path(key: str) -> Path:

@@ -93,12 +93,12 @@ def start_posture(
         return carried_to(posture_style_of(CLIMBING).posture(body), spot, yaw, level)
     if name != Habit.STANDING:
         spot = np.array(values.start_com[:2] if place is None else place)
-        found = Endpoints(
+        result = Endpoints(
             body, scene, friction_of(values), friction_model=values.contact_model.friction
         ).find(spot, yaw, Habit(name), start.height_m)
-        if found.stage is None:
-            raise ScenarioError(f"{values.source}: {found.failure}; valid: another place or posture")
-        return np.array(found.stage.q)
+        if result.stage is None:
+            raise ScenarioError(f"{values.source}: {result.failure}; valid: another place or posture")
+        return np.array(result.stage.q)
     q = turned(body.standing_posture(), yaw)
     q[2] += values.start_level
     q[:2] = place if place is not None else q[:2] + values.start_com[:2] - Configuration(body, q).com[:2]
@@ -107,22 +107,22 @@ def start_posture(
 
 def carried_to(q: FloatArray, at: ArrayLike, yaw: float, level: float) -> FloatArray:
     """(nq,) a posture made for the ground at the origin, at a place x and y and a level [m], turned [rad]."""
-    found = turned(q, yaw)
-    found[:2] = at
-    found[2] += level
-    return found
+    result = turned(q, yaw)
+    result[:2] = at
+    result[2] += level
+    return result
 
 
 def turned(q: FloatArray, yaw: float) -> FloatArray:
     """(nq,) the configuration with its root turned about the vertical through itself [rad]."""
-    found = np.array(q)
+    result = np.array(q)
     half = np.array([np.sin(0.5 * yaw), np.cos(0.5 * yaw)])
     x, y, z, w = q[3:7]
-    found[3:7] = (
+    result[3:7] = (
         half[1] * x - half[0] * y, half[1] * y + half[0] * x,
         half[1] * z + half[0] * w, half[1] * w - half[0] * z,
     )  # fmt: skip
-    return found
+    return result
 
 
 def build_scene(values: ScenarioValues) -> Scene:

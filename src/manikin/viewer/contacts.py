@@ -138,8 +138,8 @@ class ContactViewer(Page):
             head = answer.q[:3] + np.array([0.0, 0.0, 1.05])
             self._task.points = _arrow(head, TASK * self.live.direction)
             for name, arrow in self._normals.items():
-                found = answer.answers.get(name)
-                contact = None if found is None else found.contact
+                result = answer.answers.get(name)
+                contact = None if result is None else result.contact
                 if contact is not None:
                     arrow.points = _arrow(contact.position, NORMAL * contact.normal)
                 arrow.visible = contact is not None
@@ -149,8 +149,8 @@ class ContactViewer(Page):
 def _lines(answer: LiveAnswer) -> list[str]:
     """What each limb found, in one line each."""
     lines = []
-    for name, found in answer.answers.items():
-        words = f"{found.obstacle}, EFORT {answer.efforts[name]:.2f}" if found.found else found.message
+    for name, result in answer.answers.items():
+        words = f"{result.obstacle}, EFORT {answer.efforts[name]:.2f}" if result.found else result.message
         lines.append(f"- {name.replace('_', ' ')}: {words}")
     return lines
 

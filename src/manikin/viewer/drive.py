@@ -167,7 +167,7 @@ class WalkViewer(Page):
     def _slid(self, event: "GuiEvent[Any]") -> None:
         """Follow the sliders, unless it was this page that moved them."""
         if event.client is not None:
-            self.steer(np.array([one.value for one in self._sliders]))
+            self.steer(np.array([item.value for item in self._sliders]))
 
     def _show(self, frame: WalkFrame) -> None:
         moved = bool(np.any(frame.place != self._place))

@@ -26,8 +26,8 @@ def stage_at(endpoints: Endpoints, scenario: Scenario, end: str) -> Stage | str:
     """
     state = getattr(scenario.file.task, end)
     heading, habit = float(np.deg2rad(state.heading_deg or 0.0)), Habit(state.posture or "standing")
-    found = endpoints.find(np.array(state.at), heading, habit, state.height_m)
-    return found.stage or f"the {end}: {found.failure}"
+    result = endpoints.find(np.array(state.at), heading, habit, state.height_m)
+    return result.stage or f"the {end}: {result.failure}"
 
 
 GUIDE_POSES = 200
@@ -62,11 +62,11 @@ def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) ->
     checker = world.checker()
     fits = [nearest_fit(pose, checker) for pose in ends]
     ends = np.array([pose if fit is None else fit for pose, fit in zip(ends, fits, strict=True)])
-    found = plan_guide(world, GuideTask(*ends), rng)
-    samples = found.statistics.samples
-    if found.path is None:
-        return RootGuide(None, samples, clock.perf_counter() - began, found.failure or "no guide")
-    poses = found.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES))
+    result = plan_guide(world, GuideTask(*ends), rng)
+    samples = result.statistics.samples
+    if result.path is None:
+        return RootGuide(None, samples, clock.perf_counter() - began, result.failure or "no guide")
+    poses = result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES))
     line = GuideLine.through(relax(poses, LocalPlanner(checker, tuple(ends)), rng))
     return RootGuide(line, samples, clock.perf_counter() - began)
 

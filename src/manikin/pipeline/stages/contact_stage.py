@@ -104,20 +104,20 @@ class _FootSearch(_Search):
         if standing is not None and standing.stage is None:
             return self._tally.failed(standing.failure or "", "start")
         first = start if standing is None or standing.stage is None else standing.stage
-        found = self._tally.along_guides(
+        result = self._tally.along_guides(
             self._scenario.contacts.attempts,
             lambda: self._guide(first, goal),
             lambda line, number: self._follow(line, start, goal, again=number > 0),
         )
-        if found.plan is None:
-            return found
-        return replace(found, scenario=with_supports(self._scenario, found.plan))
+        if result.plan is None:
+            return result
+        return replace(result, scenario=with_supports(self._scenario, result.plan))
 
     def _follow(self, line: GuideLine, start: Stage, goal: Stage, *, again: bool) -> Extension:
         """Contacts along a guide, with the hands on the object where there is an act."""
         settings = self._settings(again=again)
-        found = follow_guide(self._body, self._scene, line, start, goal, settings, self._reference)
-        return found if found.plan is None else replace(found, plan=self._acting(found.plan))
+        result = follow_guide(self._body, self._scene, line, start, goal, settings, self._reference)
+        return result if result.plan is None else replace(result, plan=self._acting(result.plan))
 
     def _settings(self, *, again: bool) -> ExtendSettings:
         """How contacts are looked for; along another guide, which is much like the first, not as long."""
@@ -135,16 +135,16 @@ class _FootSearch(_Search):
             return stage_at(self._places, self._scenario, "goal")
         samples = sample_limbs(self._body, self._rng, natural=self._natural)
         friction, model = self._scenario.contacts.friction, self._scenario.contact_model.friction
-        found = find_braced_posture(
+        result = find_braced_posture(
             self._body, self._scene, samples, act, start.com[:2],
             level=min(contact.position[2] for contact in start.contacts.values()),
             settings=BraceSettings(friction=friction, friction_model=model), reference=self._reference,
         )  # fmt: skip
-        self._tally.summary["act_places"] = found.tried
-        if found.brace is None:
-            return found.failure or ""
-        self._brace = found.brace
-        return arrival(self._body, found.brace)
+        self._tally.summary["act_places"] = result.tried
+        if result.brace is None:
+            return result.failure or ""
+        self._brace = result.brace
+        return arrival(self._body, result.brace)
 
     def _acting(self, way: ContactPlan) -> ContactPlan:
         """The way, and the hands on the object where there is an act."""
@@ -270,20 +270,20 @@ class _LimbSearch(_Search):
         """Where the body is at the start, the best first, or why it cannot be there."""
         state = self._scenario.file.task.start
         if self._body.stature is not None and state.posture != CLIMBING:
-            found = stage_at(self._endpoints(), self._scenario, "start")
-            yield LimbStart(None, found) if isinstance(found, str) else LimbStart(found)
+            result = stage_at(self._endpoints(), self._scenario, "start")
+            yield LimbStart(None, result) if isinstance(result, str) else LimbStart(result)
             return
         at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
         q = self._standing(at, yaw, state.height_m)
-        for found in starts_on_limbs(self._poser, self._places, q, self._settings().shift_duration):
+        for result in starts_on_limbs(self._poser, self._places, q, self._settings().shift_duration):
             where = f"the start: no posture at {at.round(3).tolist()} m: "
-            yield found if found.stage is not None else LimbStart(None, where + found.reason)
+            yield result if result.stage is not None else LimbStart(None, where + result.reason)
 
     def _goal(self) -> FloatArray | str:
         """(7,) pose of the root at the goal, or why there is none."""
         if self._body.stature is not None and not self._climbs:
-            found = stage_at(self._endpoints(), self._scenario, "goal")
-            return found if isinstance(found, str) else found.q[:7]
+            result = stage_at(self._endpoints(), self._scenario, "goal")
+            return result if isinstance(result, str) else result.q[:7]
         state = self._scenario.file.task.goal
         yaw = float(np.deg2rad(state.heading_deg or 0.0))
         return self._standing(np.array(state.at), yaw, state.height_m)[:7]
@@ -357,15 +357,15 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
     if scenario.contact_limbs is not None and not scenario.refines:
         raise scenario.error(("wholebody", "method"), "is follow; valid: refine, for contacts of any limbs")
     report.progress("contacts", 0.0)
-    found = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
-    report.summary["contacts"] = dict(found.summary)
-    report.keep("contacts", found.to_dict(report.transform))
-    if found.plan is None:
-        report.fail("contacts", found.failure or "", where=found.where)
+    result = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
+    report.summary["contacts"] = dict(result.summary)
+    report.keep("contacts", result.to_dict(report.transform))
+    if result.plan is None:
+        report.fail("contacts", result.failure or "", where=result.where)
         return None
-    planned = replace(context, plan=found.plan)
-    if not scenario.refines and found.scenario is not None:
-        planned = planned.with_supports(found.scenario)
-        report.keep_scenario(found.scenario)
+    planned = replace(context, plan=result.plan)
+    if not scenario.refines and result.scenario is not None:
+        planned = planned.with_supports(result.scenario)
+        report.keep_scenario(result.scenario)
     report.progress("contacts", 1.0)
     return planned

@@ -184,17 +184,17 @@ def measured_act_failure(
     if act is None or acting is None:
         return None
     friction = context.scenario.explicit_supports().friction
-    found = measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
-    if found is None:
-        return StageFailure(
-            "execution", "the motion did not come to its act", acting.timing.end, act.obstacle
-        )
-    report.finish("act", report.summary["act"] | found.summary())
-    row = Requirement("mean_force_error_N", "error of the mean force", "N", abs(found.mean_force - act.force),
-                      "<=", FORCE_ERROR * act.force, acting.timing.end, act.obstacle)  # fmt: skip
+    result = measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
+    if result is None:
+        reason = "the motion did not come to its act"
+        return StageFailure("execution", reason, acting.timing.end, act.obstacle)
+    report.finish("act", report.summary["act"] | result.summary())
+    error, largest = abs(result.mean_force - act.force), FORCE_ERROR * act.force
+    row = Requirement("mean_force_error_N", "error of the mean force", "N", error, "<=", largest,
+                      acting.timing.end, act.obstacle)  # fmt: skip
     report.require("act execution", RequirementTable((row,)))
     if not row.held:
-        reason = f"the mean force was {found.mean_force:.0f} N; wanted {act.force:g} N"
+        reason = f"the mean force was {result.mean_force:.0f} N; wanted {act.force:g} N"
         return StageFailure("execution", reason, acting.timing.end, act.obstacle)
     return None
 

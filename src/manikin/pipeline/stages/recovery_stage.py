@@ -44,20 +44,20 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
     task, settings = _task(scenario, section, body), _settings(section)
     with scenario.refusing(("push",)):
-        one = push_near_com(
+        item = push_near_com(
             body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
         )
-    task = replace(task, pushes=(one,))
-    found = recover(
+    task = replace(task, pushes=(item,))
+    result = recover(
         body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
     )
-    report.finish(STAGE, found.summary() | _bound(body, task, settings, found))
-    report.require(STAGE, found.requirements)
-    report.planned, report.proved = None, found.recovered
-    if found.failure:
-        report.fail(STAGE, found.failure, float(found.trace.motion.time[-1]), f"feet {section.feet}")
-    report.keep_motions(_schedule(found), None, found.trace.motion)
-    return found
+    report.finish(STAGE, result.summary() | _bound(body, task, settings, result))
+    report.require(STAGE, result.requirements)
+    report.planned, report.proved = None, result.recovered
+    if result.failure:
+        report.fail(STAGE, result.failure, float(result.trace.motion.time[-1]), f"feet {section.feet}")
+    report.keep_motions(_schedule(result), None, result.trace.motion)
+    return result
 
 
 def push_trials(scenario: Scenario) -> PushTrials:

@@ -336,7 +336,8 @@ def path_block(plan: PlannedWalks) -> dict[str, Any]:
         "max_forward_mps": float(forward),
         "max_left_mps": float(left),
         "segments": [
-            {"kind": one.kind, "start_s": one.start, "end_s": one.end} for one in route.segments().segments
+            {"kind": item.kind, "start_s": item.start, "end_s": item.end}
+            for item in route.segments().segments
         ],
         "min_room_m": _room(plan),
         "others": {

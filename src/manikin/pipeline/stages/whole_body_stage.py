@@ -86,23 +86,23 @@ def with_stricter_key_postures(
     if planned.trajectory is None:
         return None
     failure = report.failure
-    found = _tested(context, report, planned, KEY_TOLERANCES[1])
-    if found.failure is not None or found.trajectory is None or found.replans <= before.replans:
+    result = _tested(context, report, planned, KEY_TOLERANCES[1])
+    if result.failure is not None or result.trajectory is None or result.replans <= before.replans:
         report.failure = failure
         return None
     report.failure = None
-    return _reported(report, found)
+    return _reported(report, result)
 
 
 def _tested(context: RunContext, report: Report, planned: CentroidalResult, tolerance: float) -> Eligibility:
     """The plan, or another one where a key posture fails."""
     # The fit keeps its distance from the ends of the ranges: the key postures leave room for that,
     # if they can.
-    found = _eligible(context, report, planned, KEY_ROOM * context.settings.fit.joint_buffer, tolerance)
-    if found.failure is not None or (found.trajectory is None and found.replans > 0):
+    result = _eligible(context, report, planned, KEY_ROOM * context.settings.fit.joint_buffer, tolerance)
+    if result.failure is not None or (result.trajectory is None and result.replans > 0):
         report.failure = None  # of a seated part that did not fit another plan
-        found = _eligible(context, report, planned, 0.0, tolerance)
-    return found
+        result = _eligible(context, report, planned, 0.0, tolerance)
+    return result
 
 
 def _eligible(

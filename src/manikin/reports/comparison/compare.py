@@ -287,14 +287,14 @@ def compare_runs(first: RunRecord, second: RunRecord) -> RunComparison:
 
 def tracks_of(record: RunRecord) -> dict[str, ComTrack]:
     """CoM of a run by stage, see :data:`STAGES`."""
-    found = {} if record.plan is None else {"point mass": record.plan}
-    return {**found, **(record.tracks if record.motions else {})}
+    result = {} if record.plan is None else {"point mass": record.plan}
+    return {**result, **(record.tracks if record.motions else {})}
 
 
 def shared_tracks(first: RunRecord, second: RunRecord) -> dict[str, tuple[ComTrack, ComTrack]]:
     """CoM of both runs for every stage that both reached."""
-    one, other = tracks_of(first), tracks_of(second)
-    return {stage: (one[stage], other[stage]) for stage in STAGES if stage in one and stage in other}
+    item, other = tracks_of(first), tracks_of(second)
+    return {stage: (item[stage], other[stage]) for stage in STAGES if stage in item and stage in other}
 
 
 def _stances(record: RunRecord) -> list[Stance]:
@@ -312,9 +312,9 @@ def _missing_stages(first: RunRecord, second: RunRecord) -> list[str]:
     if not tracks_of(first) and not tracks_of(second):
         lines.append("neither run has a centre of mass")
     shared = shared_tracks(first, second)
-    for stage, (one, two) in shared.items():
-        if one.margin_unit != two.margin_unit:
-            lines.append(f"margins of the {_words(stage)} are in {one.margin_unit} and in {two.margin_unit}")
+    for stage, (item, two) in shared.items():
+        if item.margin_unit != two.margin_unit:
+            lines.append(f"margins of the {_words(stage)} are in {item.margin_unit} and in {two.margin_unit}")
     return lines
 
 

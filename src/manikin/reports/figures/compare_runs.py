@@ -263,10 +263,10 @@ def compare_scene_figure(comparison: RunComparison) -> Figure:
 
 def _tracks(comparison: RunComparison) -> dict[str, ComTrack]:
     """The planned CoM of each run."""
-    found = {}
+    result = {}
     for name, run in zip(comparison.names, comparison.runs, strict=True):
-        found[name] = next(iter(need(run.tracks, "a centre of mass of both runs").values()))
-    return found
+        result[name] = next(iter(need(run.tracks, "a centre of mass of both runs").values()))
+    return result
 
 
 def _styles(comparison: RunComparison) -> dict[str, dict[str, Any]]:

@@ -159,7 +159,7 @@ def body_solids(body: BodyModel, q: FloatArray, marked: Iterable[str] = ()) -> l
     """
     data = body.pinocchio.createData()
     pin.framesForwardKinematics(body.pinocchio, data, q)
-    found, wanted = [], set(marked)
+    result, wanted = [], set(marked)
     for segment in body.segments:
         triangles = segment_triangles(segment, rounds=10)
         if triangles is None:
@@ -168,13 +168,13 @@ def body_solids(body: BodyModel, q: FloatArray, marked: Iterable[str] = ()) -> l
         place = data.oMf[body.segment_frame(segment.name)]
         world = vertices @ place.rotation.T + place.translation
         colour = COLOURS["executed"] if segment.name in wanted else "#7F8FA6"
-        found.append(Solid(world[faces], colour))
-    return found
+        result.append(Solid(world[faces], colour))
+    return result
 
 
 def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]:
     """Finite obstacles, those of them that are between two corners (3,) of a box [m]."""
-    found = []
+    result = []
     for obstacle in scene:
         if isinstance(obstacle.shape, (HalfSpace, Plane)):
             continue
@@ -185,8 +185,8 @@ def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]
         finer = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE)
         triangles = np.asarray(finer[0])[np.asarray(finer[1])]
         inside = ((triangles.max(axis=1) > low) & (triangles.min(axis=1) < high)).all(axis=1)
-        found.append(Solid(np.clip(triangles[inside], low, high), COLOURS["obstacle"], 0.55))
-    return found
+        result.append(Solid(np.clip(triangles[inside], low, high), COLOURS["obstacle"], 0.55))
+    return result
 
 
 def draw_solids(axes: Axes3D, solids: Iterable[Solid]) -> None:

@@ -51,11 +51,11 @@ def tracking_figure(record: RunRecord) -> Figure:
     shown.label(axes, "centre of mass [mm]")
     legend_above(axes)
     feet = shown.panel(2)
-    wanted, found = paths["planned"], paths["executed"]
-    colours = colours_of(found)
-    for name in found:
+    wanted, result = paths["planned"], paths["executed"]
+    colours = colours_of(result)
+    for name in result:
         plan = interpolated(executed.time, planned.time, wanted[name])
-        gap = 1000.0 * np.linalg.norm(found[name] - plan, axis=1)
+        gap = 1000.0 * np.linalg.norm(result[name] - plan, axis=1)
         label = f"{readable(name)} (largest {gap.max():.2g} mm)"
         feet.plot(executed.time, gap, color=colours[name], linewidth=1.2, label=label)
     shown.label(feet, "effectors [mm]")
@@ -125,12 +125,12 @@ def _add_executed(record: RunRecord, axes: Axes, schedule: ContactSchedule, swin
 def _methods(record: RunRecord, swings: list[Swing]) -> list[str]:
     """How each flight was planned, as far as the summary says; nothing of what just follows the body."""
     block = record.summary.get("wholebody") or {}
-    told: dict[str, list[str]] = {}
+    known: dict[str, list[str]] = {}
     for item in block.get("swings") or ():
         if isinstance(item, dict):
-            told.setdefault(str(item.get("effector")), []).append(str(item.get("method", "")))
+            known.setdefault(str(item.get("effector")), []).append(str(item.get("method", "")))
     counts = Counter(swing.effector for swing in swings)
-    left = {name: iter(told.get(name, ())) for name in counts if len(told.get(name, ())) == counts[name]}
+    left = {name: iter(known.get(name, ())) for name in counts if len(known.get(name, ())) == counts[name]}
     return [next(left.get(swing.effector, iter(())), "") for swing in swings]
 
 
@@ -166,8 +166,8 @@ def effectors_figure(record: RunRecord) -> Figure:
         shown.strip(column, _title(record, name), named=column == 0)
         for row, axis in enumerate("xyz"):
             axes = shown.panel(row + 1, column)
-            for kind, found in paths.items():
-                axes.plot(record.motions[kind].time, found[name][:, row], label=kind, **STYLES[kind])
+            for kind, result in paths.items():
+                axes.plot(record.motions[kind].time, result[name][:, row], label=kind, **STYLES[kind])
             shown.label(axes, f"{axis} [m]" if column == 0 else "")
             span_at_least(axes, LEAST_SPAN)
     legend_in_title(shown.figure, axes)

@@ -66,8 +66,8 @@ def zmp_figure(record: RunRecord) -> Figure:
     shown.strip(1)
     axes = shown.panel(1, 1)
     axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
-    for kind, one in paths.items():
-        _draw_distance(axes, kind, one)
+    for kind, item in paths.items():
+        _draw_distance(axes, kind, item)
     shown.label(axes, "distance to the edge of the support polygon [mm]")
     _frame_distance(axes, list(paths.values()))
     axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")

@@ -248,7 +248,7 @@ def legend_in_title(
 
     Its entries are what ``axes`` show, and then ``handles``.
     """
-    known = [handle for one in axes for handle in one.get_legend_handles_labels()[0]] + list(handles)
+    known = [handle for item in axes for handle in item.get_legend_handles_labels()[0]] + list(handles)
     look = {"loc": "upper right", "borderaxespad": 0.3, "handlelength": 1.6, "columnspacing": 1.2} | style
     figure.legend(handles=known, fontsize=8.5, frameon=False, ncols=min(len(known), most), **look)
 

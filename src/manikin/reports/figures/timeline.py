@@ -111,8 +111,8 @@ def _keys(schedule: ContactSchedule) -> list[Patch | Line2D]:
 def _width(schedule: ContactSchedule) -> float:
     """Width of the figure [inch] at which the names below neighbouring bars keep apart."""
     effectors = schedule.sequence.effectors
-    one = _NAME_SIZE / 72.0 * (0.5 * max((len(name) for name in effectors), default=0) + 1.0)
-    return max(11.0, label_room(effectors) + len(schedule.sequence) * one)
+    item = _NAME_SIZE / 72.0 * (0.5 * max((len(name) for name in effectors), default=0) + 1.0)
+    return max(11.0, label_room(effectors) + len(schedule.sequence) * item)
 
 
 def _bars(schedule: ContactSchedule, name: str, end: float) -> list[tuple[float, float]]:
@@ -183,11 +183,11 @@ def margin_curves(record: RunRecord) -> dict[str, ComTrack]:
 def phase_minima(curve: ComTrack, phases: PhaseTable) -> list[int | None]:
     """Sample with the smallest margin of each phase, None where the curve has no sample."""
     inside = phases.phase_at(curve.time)
-    found: list[int | None] = []
+    result: list[int | None] = []
     for phase in range(len(phases)):
         samples = np.flatnonzero(inside == phase)
-        found.append(int(samples[np.argmin(curve.margin[samples])]) if len(samples) else None)
-    return found
+        result.append(int(samples[np.argmin(curve.margin[samples])]) if len(samples) else None)
+    return result
 
 
 def _zoom_ceiling(curves: dict[str, ComTrack], phases: PhaseTable) -> float | None:
@@ -227,9 +227,9 @@ def _mark_minima(
     axes: Axes, labels: Labels, curve: ComTrack, phases: PhaseTable, name: str, top: float | None
 ) -> None:
     """Mark the least margin of each phase, numbered where there is room, and ring the least of all."""
-    found = [index for index in phase_minima(curve, phases) if index is not None]
+    result = [index for index in phase_minima(curve, phases) if index is not None]
     offset = (0.0, -11.0 if name == "executed" else 4.0)
-    for index in sorted(found, key=lambda index: curve.margin[index]):
+    for index in sorted(result, key=lambda index: curve.margin[index]):
         time, margin = float(curve.time[index]), float(curve.margin[index])
         if top is not None and margin > top:
             continue

@@ -97,15 +97,15 @@ def best_view(schedule: ContactSchedule) -> View:
 
 def distinct_contacts(schedule: ContactSchedule) -> list[Contact]:
     """Every contact once, in the order in which it is made; of a rolling foot the full sole."""
-    found: list[Contact] = []
+    result: list[Contact] = []
     for phase in schedule.sequence:
         for contact in phase.stance:
-            known = next((n for n, other in enumerate(found) if contact.same_place(other)), None)
+            known = next((n for n, other in enumerate(result) if contact.same_place(other)), None)
             if known is None:
-                found.append(contact)
-            elif found[known].part is not SolePart.FULL and contact.part is SolePart.FULL:
-                found[known] = contact
-    return found
+                result.append(contact)
+            elif result[known].part is not SolePart.FULL and contact.part is SolePart.FULL:
+                result[known] = contact
+    return result
 
 
 def draw_contact(axes: Axes, contact: Contact, view: View, colour: str, *, held: bool = True) -> None:

@@ -179,8 +179,8 @@ def holonomic_ends_figure(statistics: Mapping[str, CategoryStatistics]) -> Figur
     for row, (label, name) in enumerate(ends.items()):
         axes = figure.add_subplot(2, 1, row + 1)
         for number, (kind, colour) in enumerate(_BARS.items()):
-            spreads = [getattr(one, name) for one in statistics.values()]
-            heights = [getattr(one, kind.replace(" ", "_")) for one in spreads]
+            spreads = [getattr(item, name) for item in statistics.values()]
+            heights = [getattr(item, kind.replace(" ", "_")) for item in spreads]
             axes.bar(places + 0.27 * (number - 1), heights, 0.25, color=colour, label=kind)
         axes.set_xticks(places, list(statistics))
         dress(axes, label)

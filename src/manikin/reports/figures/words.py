@@ -39,13 +39,13 @@ def words_figure(slices: Sequence[WordSlice]) -> Figure:
         9.6, 0.9 + 5.6 * len(slices), "Words of the best paths, by final heading", len(slices), 2,
         width_ratios=[1.0, 1.25], top=0.8, between=0.75, across=0.7,
     )  # fmt: skip
-    shown = sorted({str(word) for one in slices for word in one.words.ravel()}, key=_order)
-    for row, one in enumerate(slices):
-        chosen = _representatives(one)
+    shown = sorted({str(word) for item in slices for word in item.words.ravel()}, key=_order)
+    for row, item in enumerate(slices):
+        chosen = _representatives(item)
         cells, ways = (figure.add_subplot(grid[row, column]) for column in range(2))
-        _draw_cells(cells, one, chosen)
+        _draw_cells(cells, item, chosen)
         for place in chosen:
-            _draw_path(ways, one.path(*place), _colour(str(one.words[place])))
+            _draw_path(ways, item.path(*place), _colour(str(item.words[place])))
         _dress_ways(ways, "A path to each cell")
     keys: list[Artist] = [Patch(facecolor=_colour(word), label=word) for word in shown]
     keys.append(Line2D([], [], color=COLOURS["ink"], linewidth=1.6, label="two best paths"))

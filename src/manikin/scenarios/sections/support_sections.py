@@ -153,8 +153,8 @@ class PhaseSection(Section):
 
     def entries(self) -> dict[str, "ContactSection | Literal['same']"]:
         """Contacts by effector, those in the air left out."""
-        found = {name: getattr(self, name) for name in (*EFFECTORS, *MASSLESS_FEET)}
-        return {name: entry for name, entry in found.items() if entry is not None}
+        result = {name: getattr(self, name) for name in (*EFFECTORS, *MASSLESS_FEET)}
+        return {name: entry for name, entry in result.items() if entry is not None}
 
 
 class SupportsSection(Section):

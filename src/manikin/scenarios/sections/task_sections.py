@@ -131,8 +131,8 @@ class ObstacleSection(Section):
     def _one_shape(self) -> Self:
         given = [name for name in OBSTACLE_SHAPES if getattr(self, name) is not None]
         if len(given) != 1:
-            found = f"has {' and '.join(given)}" if given else "has no shape"
-            raise refuse("", f"{found}; valid: exactly one of {', '.join(OBSTACLE_SHAPES)}")
+            result = f"has {' and '.join(given)}" if given else "has no shape"
+            raise refuse("", f"{result}; valid: exactly one of {', '.join(OBSTACLE_SHAPES)}")
         for key in ("scale", "unit", "convex"):
             if getattr(self, key) is not None and given[0] != "mesh":
                 raise refuse(key, f"is given for a {given[0]}; valid: only with mesh")
