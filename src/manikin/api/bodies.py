@@ -52,7 +52,7 @@ class Balance(Displayed):
         return self.report.limiting.description
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
+        """Labels and texts of the value."""
         return {
             "balanced": str(self.report.balanced), "margin": f"{self.margin:.1f} N.m",
             "force": f"{self.report.force_margin:.0f} N", "limiting": self.limiting,

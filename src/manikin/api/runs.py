@@ -40,7 +40,7 @@ class Run(Displayed):
     _kept: TemporaryDirectory[str] | None = field(default=None)
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
+        """Labels and texts of the value."""
         failure, motion = self.summary["failure"], self.motion
         duration = {} if motion is None else {"duration": f"{motion.duration:.2f} s"}
         reason = {} if failure is None else {"failure": f"{failure['stage']}: {failure['reason']}"}
@@ -148,7 +148,7 @@ class Comparison(Displayed):
     result: "RunComparison"
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
+        """Labels and texts of the value."""
         first, second = self.result.names
         matched = sum(pair.matched for pair in self.result.pairs)
         return {"first": first, "second": second, "matched phases": str(matched)}

@@ -78,7 +78,7 @@ class ComTrack:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunRecord(Displayed):
-    """Everything that a run left behind; what it does not have is None or empty.
+    """Everything that is known of a run; what it does not have is None or empty.
 
     Attributes:
         label: What to call the run in figures.
@@ -103,17 +103,17 @@ class RunRecord(Displayed):
 
     @property
     def body(self) -> BodyModel | None:
-        """Who moved."""
+        """Body that moved."""
         return self.content.body
 
     @property
     def scene(self) -> Scene | None:
-        """Where."""
+        """Obstacles and floor."""
         return self.content.scene
 
     @property
     def schedule(self) -> ContactSchedule | None:
-        """With which contacts, when."""
+        """Contacts in time."""
         return self.content.schedule
 
     @property
@@ -169,7 +169,7 @@ class RunRecord(Displayed):
 
 
 def read_run(directory: str | Path) -> RunRecord:
-    """Read a run directory, however far the run got.
+    """Read a run directory, also of a run that stopped early.
 
     Args:
         directory: Written by ``manikin run``.
@@ -228,7 +228,7 @@ def _check_is_run(folder: Path) -> None:
 
 
 def _read_walks(folder: Path) -> dict[str, FloatArray]:
-    """Ways over the floor, (n, 4) each; none where nobody walks."""
+    """Routes over the floor, (n, 4) each; none where nobody walks."""
     path = folder / STAGES / f"{WALK_PATHS}.json"
     with _undamaged(path):
         return {
@@ -265,16 +265,16 @@ MOTION = "motion.h5"
 BVH = "motion.bvh"
 OTHERS = "motion-*.h5"
 WALK_PATHS = "walk_paths"
-"""What the walking stage keeps of the ways over the floor, by the name of who walks."""
+"""Stage result with the routes over the floor, by the name of the walker."""
 BODY = "the body"
-"""In it, the body that the scenario is about."""
+"""Name of the scenario's body in it."""
 SUMMARY = "summary.json"
 REPORT = "report.html"
 STAGES = "stages"
 
 
 def other_motion(name: str) -> str:
-    """File of the motion of somebody else who walks there."""
+    """File of the motion of another walker."""
     return OTHERS.replace("*", name)
 
 
@@ -304,7 +304,7 @@ class RunDirectory(ResultDirectory):
         return self.write(SCENARIO, yaml_text)
 
     def write_stage(self, name: str, result: Mapping[str, Any]) -> Path:
-        """Keep what a stage found, as soon as it is known.
+        """Keep the result of a stage, as soon as it is known.
 
         Args:
             name: Of the stage, such as ``"centroidal"``.

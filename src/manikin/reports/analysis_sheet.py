@@ -18,7 +18,7 @@ from manikin.numerics.spatial import FloatArray
 from manikin.runtime.palette import COLOURS, colours_of, readable, side_colour
 
 TENTHS = 10.0
-"""Of a pixel: what coordinates are rounded to."""
+"""Coordinates are rounded to the inverse of this [1/px]."""
 
 INK = "#222222"
 

@@ -66,7 +66,7 @@ def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def result(run: Mapping[str, Any]) -> str:
-    """How a run ended, in words."""
+    """Outcome of a run in words."""
     if run["failure"] is None:
         return f"{run['verdict']}{'' if run['as_expected'] else ' although a failure was expected'}"
     word = "failed as expected" if run["as_expected"] else "FAILED"
@@ -91,14 +91,14 @@ HEADINGS = {
     "act": "planned act", "execution": "executed in the physics engine", "act execution": "executed act",
     "push": "executed in the physics engine",
 }  # fmt: skip
-"""What the requirements of each stage are about."""
+"""Headings of the requirements of each stage."""
 
 YES_OR_NO = {"fell": ("no", "yes"), "at_rest": ("no", "yes")}
 """Words of 0 and 1 for requirements that are no quantity."""
 
 
 def verdict_lines(summary: Mapping[str, Any]) -> Iterator[str]:
-    """How a run ended, in one line, then every requirement; those that do not hold are marked."""
+    """Verdict of a run in one line, then every requirement; broken ones are marked."""
     yield verdict_line(summary)
     yield about_line(summary)
     rows: Sequence[Mapping[str, Any]] = summary["requirements"]
@@ -116,7 +116,7 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def about_line(summary: Mapping[str, Any]) -> str:
-    """Whose motion it is, how long it lasts and how long it took to compute."""
+    """Body, duration of the motion, and computing time."""
     stature, mass = summary["stature_m"], summary["mass_kg"]
     who = f"body of {mass:g} kg" if stature is None else f"person of {stature:g} m and {mass:g} kg"
     known = [summary[stage] or {} for stage in ("wholebody", "centroidal", "walk")]
@@ -141,7 +141,7 @@ def requirement_values(row: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def counts_line(report: Mapping[str, Any]) -> str:
-    """How many of many runs were planned, proved and fell, and ended as their scenarios say."""
+    """Numbers of runs that were planned, proved, fell, and ended as their scenarios say."""
     words = (
         f"{len(report['runs'])} runs: {report['planned']} planned, {report['proved']} proved",
         f"{report['succeeded']} succeeded, {report['failed']} failed ({report['fell']} fell)",

@@ -20,16 +20,16 @@ from manikin.scenarios.values import ScenarioValues
 from manikin.walking.footsteps.footprints import FEET, Footprint, Footprints
 
 STATURE = 1.75
-"""Of the body that the lengths here are for [m]."""
+"""Stature of the body that the lengths here are for [m]."""
 
 COM_HEIGHT = 0.96
 """Centre of mass of a person who stands before and after a walk, above the floor ([Qiu2012]_ 5.4.4) [m]."""
 
 COM_BAND = (0.92, 0.97)
-"""Its heights during the walk: knees neither locked nor deeply bent; our choice, as the next ones [m]."""
+"""Heights of the CoM in a walk, knees neither locked nor deeply bent; our choice, as the next ones [m]."""
 
 WALKED_MAX_SUPPORT_DISTANCE = 0.985
-"""Its largest distance from the middle of a sole that stands [m]."""
+"""Largest distance of the CoM from the middle of a sole that stands [m]."""
 
 LEAST = {1: 0.4, 2: 0.15}
 """Least durations of supports on one and two feet; a support that lasts longer in the walk lasts as long in
@@ -277,10 +277,10 @@ MAX_SUPPORT_DISTANCE = 1.08
 """Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
 
 ABOVE = 0.01
-"""How far above that of its posture the centre of mass of a rising body may be [m]; our choice."""
+"""Height that the CoM of a rising body may be above that of its posture [m]; our choice."""
 
 LOWEST = 0.1
-"""How far below those of its postures the centre of mass may go on the way to an act [m]; our choice."""
+"""Depth that the CoM may be below those of its postures on the way to an act [m]; our choice."""
 
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""

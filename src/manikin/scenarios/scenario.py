@@ -105,7 +105,7 @@ class Scenario(Displayed, ScenarioValues):
     """One job for the pipeline: the values of a scenario file and what is built from them."""
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
+        """Labels and texts of the value."""
         model, mass = self.file.body.model, f"{self.mass:.1f} kg"
         return {"name": self.name, "body": model, "mass": mass, "seed": str(self.seed)}
 

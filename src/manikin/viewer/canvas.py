@@ -46,7 +46,7 @@ class Page(ABC):
 
     @abstractmethod
     def advance(self, seconds: float) -> None:
-        """Show what has come of ``seconds`` of real time [s]."""
+        """Show the state after ``seconds`` more of real time [s]."""
 
     def run(self) -> None:
         """Serve until :meth:`close` is called or Ctrl-C is pressed."""
@@ -84,13 +84,13 @@ COLOURS = {
 }
 
 VIEW = np.array([-1.7, -1.9, 0.5])
-"""Where new visitors look from, seen from what they look at [m]."""
+"""Position of a new visitor's camera relative to what it looks at [m]."""
 
 WHOLE = 2.0
-"""Size of what is seen whole from there, a body aside [m]."""
+"""Size of what that camera sees as a whole, without a body [m]."""
 
 ABOVE = 0.35
-"""From the origin of the head to a name above it [m]."""
+"""Height of a name above the origin of the head [m]."""
 
 
 def start_server(port: int) -> viser.ViserServer:
@@ -107,7 +107,7 @@ def start_server(port: int) -> viser.ViserServer:
 
 
 def stop_server(server: viser.ViserServer) -> None:
-    """Stop a server without a word."""
+    """Stop a server, without its message."""
     with redirect_stdout(StringIO()):
         server.stop()
 

@@ -23,7 +23,7 @@ PLOT_POINTS = 400
 MOST_PLACES = 1000
 """Places of the centre of mass that are drawn, about."""
 BESIDE = 1.2
-"""From the motion shown to the one beside it [m]."""
+"""Distance of the motion beside from the motion shown [m]."""
 NOTHING = "nothing"
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
 

@@ -17,7 +17,7 @@ from manikin.scenarios import Scenario
 
 
 def stage_at(endpoints: Endpoints, scenario: Scenario, end: str) -> Stage | str:
-    """Contacts and posture at the start or the goal of a scenario, or why there are none.
+    """Contacts and posture at the start or the goal of a scenario, or the reason why there are none.
 
     Args:
         endpoints: Finds them.
@@ -36,7 +36,7 @@ GUIDE_POSES = 200
 
 @dataclass(frozen=True, eq=False)
 class RootGuide:
-    """A way of the root, or why there is none.
+    """A guide of the root, or the reason why there is none.
 
     Attributes:
         line: The way, or None.
@@ -52,7 +52,7 @@ class RootGuide:
 
 
 def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) -> RootGuide:
-    """Find a comfortable way between two poses of the root.
+    """Find a guide between two poses of the root.
 
     Args:
         world: Scene, abstraction of the body, region and condition of the way.
@@ -73,7 +73,7 @@ def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) ->
 
 @dataclass(frozen=True, eq=False)
 class ContactSearch:
-    """Supports for a scenario, or why there are none.
+    """Supports for a scenario, or the reason why there are none.
 
     Attributes:
         scenario: The scenario with supports; None without a plan, and where a file cannot list such contacts.

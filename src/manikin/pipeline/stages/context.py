@@ -203,12 +203,12 @@ class RunContext:
         return replace(self, scenario=scenario, problem=problem)
 
     def passage(self, schedule: ContactSchedule, motion: Motion) -> Passage:
-        """How low the body comes, and how near its head to the scene."""
+        """Lowest height of the body, and least distance of its head from the scene."""
         return measure_passage(self.body, self.scene, schedule, motion, self.padded)
 
 
 Progress = Callable[[str, float], None]
-"""Told the stage and the share of it that is done, in [0, 1]."""
+"""Callback with the stage and the share of it that is done, in [0, 1]."""
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ class Report:
 
     @property
     def transform(self) -> PlanarTransform:
-        """From the frame of the task to the world, where everything is that is kept."""
+        """Transform from the frame of the task to the world; results are kept in the world."""
         return self._context.transform_task_to_world
 
     @property
@@ -376,12 +376,12 @@ class Report:
 
 
 def place(phase: int | None, where: str) -> str:
-    """Where something failed, in words: a phase with its contacts, or what there is of both."""
+    """Place of a failure in words: a phase with its contacts, or what is known of both."""
     return where if phase is None else f"phase {phase}" + (f" on {where}" if where else "")
 
 
 def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
+    """Take a progress report and do nothing."""
 
 
 @dataclass(frozen=True, eq=False)

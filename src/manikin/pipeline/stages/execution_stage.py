@@ -62,7 +62,7 @@ class ExecutionRequirements:
         return requirement_table([*_kept_standing(execution), *rest])
 
     def _followed(self, execution: Execution, seated: bool) -> list[Requirement | None]:
-        """Of a body that nothing disturbs."""
+        """Requirements of a body that nothing disturbs."""
         deepest = self.padding_compression if seated else self.penetration
         thinnest = float(execution.motion.time[int(np.argmin(execution.motion.margin))])
         pressed = execution.max_padding_compression_m > 0.0
@@ -81,7 +81,7 @@ class ExecutionRequirements:
         ]  # fmt: skip
 
     def _returned(self, execution: Execution) -> list[Requirement | None]:
-        """Of a body that was pushed: what it has to come back to."""
+        """Requirements of a body that was pushed: it has to come back to its plan."""
         push, end = execution.push, float(execution.motion.time[-1])
         if push is None:
             return []
@@ -94,7 +94,7 @@ class ExecutionRequirements:
 
 
 def _kept_standing(execution: Execution) -> list[Requirement]:
-    """The body does not fall, and nothing touches that should not."""
+    """Requirements of every execution: no fall, no unplanned touch."""
     touches = execution.counted_touches
     first = touches[0] if touches else None
     return [

@@ -53,7 +53,7 @@ from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_path import TOLERANCE
 
 FRICTION = 0.8
-"""Of the soles of one who walks."""
+"""Coefficient of friction of the soles of a walker."""
 
 
 def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
@@ -135,7 +135,7 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
 
 
 def _along(path: WalkingPath, rule: StepRule, height: float, context: RunContext) -> Footprints:
-    """By the rule, or where the feet of the library's walk stand."""
+    """Footprints along a path by the rule, or where the feet of the library's walk stand."""
     section = context.scenario.walking
     if section is None or section.footprints == "stepper":
         return place_footprints(path, rule, height=height)
@@ -198,7 +198,7 @@ OBJECTIVES = {
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalks:
-    """Ways of all who walk in a scenario.
+    """Routes of all walkers of a scenario.
 
     Attributes:
         route: Of the scenario's body.
@@ -214,7 +214,7 @@ class PlannedWalks:
 
 
 def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
-    """Find the ways of all who walk in a scenario, and walk them; None where there is no way.
+    """Find the routes of all walkers of a scenario, and walk them; None where there is none.
 
     Args:
         context: Of a scenario with a ``walking`` section.
@@ -250,7 +250,7 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
 def plan_walks(
     context: RunContext, start: FloatArray | None = None, goal: FloatArray | None = None
 ) -> PlannedWalks:
-    """Find a way for everyone, each around those before.
+    """Find a route for every walker, each around those before.
 
     Args:
         context: Of a scenario with a ``walking`` section.
@@ -295,7 +295,7 @@ def _section(scenario: Scenario) -> WalkingSection:
 
 
 def keep_paths(report: Report, plan: PlannedWalks) -> None:
-    """Keep the ways of all who walk among the files of the run: instants [s], x, y [m], headings [rad]."""
+    """Keep the routes of all walkers among the files of the run: instants [s], x, y [m], headings [rad]."""
     routes = {BODY: plan.route, **plan.others}
     report.keep(WALK_PATHS, {
         name: {
@@ -327,7 +327,7 @@ def _waypoint(section: WaypointSection) -> Waypoint:
 
 
 def path_block(plan: PlannedWalks) -> dict[str, Any]:
-    """What the summary says of the way itself."""
+    """Block of the summary about the route itself."""
     route, forward, left = plan.route, *np.abs(plan.route.velocity[:, :2]).max(axis=0)
     return {
         "duration_s": route.duration,
@@ -363,7 +363,7 @@ def _room(plan: PlannedWalks) -> float | None:
 
 
 def _requirements(context: RunContext, plan: PlannedWalks, walk: Walk) -> RequirementTable:
-    """What a walk that is not executed keeps: its ends, its speed, its room, and feet that stand still."""
+    """Requirements of a walk that is not executed: its ends, speed, clearance, and feet that stand still."""
     section, route = _section(context.scenario), plan.route
     ends = np.abs(route.place[[0, -1]] - [end_of(context.scenario, end) for end in ("start", "goal")])
     ends[:, 2] = np.abs(np.angle(np.exp(1j * ends[:, 2])))

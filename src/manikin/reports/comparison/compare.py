@@ -32,7 +32,7 @@ def matched_times(rows: Sequence[TimingRow]) -> tuple[FloatArray, FloatArray]:
 
 
 def com_difference(rows: Sequence[TimingRow], first: ComTrack, second: ComTrack) -> dict[str, Any] | None:
-    """How two centres of mass differ; second less first, at equal shares of the matched phases.
+    """Difference of two centres of mass, second less first, at equal shares of the matched phases.
 
     Returns:
         The ``com`` block of the JSON; None when no phase matches.
@@ -241,7 +241,7 @@ class RunComparison(Displayed):
 
     @property
     def durations(self) -> tuple[float | None, float | None]:
-        """From the first to the last key instant of each run [s]."""
+        """Time from the first to the last key instant of each run [s]."""
         return _duration(self.first), _duration(self.second)
 
     def as_dict(self) -> dict[str, Any]:

@@ -123,7 +123,7 @@ class LowestPoints:
 
     @classmethod
     def of(cls, group: GroupStatistics, overhead: float | None = None) -> "LowestPoints":
-        """Those of the passages of a group, or of its whole motions where none are known."""
+        """Lowest points of the passages of a group, or of its whole motions where none are known."""
         if not group.under:
             return cls(group.group, tuple(item.com_lowest for item in group.whole.values()))
         rooms = tuple(item.room for _, item in group.under if item.room is not None)
@@ -131,7 +131,7 @@ class LowestPoints:
 
 
 def published_lowest() -> tuple[LowestPoints, ...]:
-    """Those quoted for each beam in the thesis."""
+    """Lowest points quoted for each beam in the thesis."""
     known = published_heights()
     return tuple(LowestPoints(beam, (low,), known.beams[beam]) for beam, low in known.lowest.items())
 

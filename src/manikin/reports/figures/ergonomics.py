@@ -13,7 +13,7 @@ from manikin.reports.figures.style import dress, legend_above, new_grid
 from manikin.runtime.palette import COLOURS, CYCLE, readable
 
 LEVEL_COLOURS = ("#DDEBDD", "#EFF3D2", "#FBEBC3", "#F6D2BB", "#EDB4B1")
-"""From nothing to do to change at once; RULA's four action levels begin at the second."""
+"""Colours of the action levels, the least urgent first; RULA's four levels begin at the second."""
 
 LEVELS = {
     "RULA": ("acceptable", "investigate", "change soon", "change now"),

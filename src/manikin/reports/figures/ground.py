@@ -30,10 +30,10 @@ from manikin.runtime.palette import COLOURS, colours_of, readable
 from manikin.scene import HalfSpace, Plane, Scene
 
 PLAN_HEIGHT = 5.1
-"""Of the view from above [inch]."""
+"""Height of the view from above [inch]."""
 
 DISTANCE_WIDTH = 7.4
-"""Of the panel over time [inch]."""
+"""Width of the panel over time [inch]."""
 
 EDGE = "#AEB4BE"
 """Colour of support polygons."""

@@ -27,7 +27,7 @@ from manikin.reports.figures.style import (
 from manikin.runtime.palette import COLOURS, colours_of, readable
 
 SHARE = 0.5
-"""Of the places in an ellipse, were they normal."""
+"""Share of the places inside an ellipse, for a normal distribution."""
 
 FEWEST = 3
 """Places of which an ellipse is drawn: two make a line."""
@@ -84,7 +84,7 @@ def _draw(axes: Axes, found: Sequence[SupportPlacement], colours: Mapping[str, s
 
 
 WIDTH = 0.8
-"""Of all bars of one phase, of the distance between two."""
+"""Width of all bars of one phase over the distance between phases."""
 
 BEYOND = 2.5
 """Height of the axes per largest mean, beyond which whiskers are cut off."""

@@ -33,10 +33,10 @@ from manikin.runtime.palette import COLOURS, colours_of, side_colour
 from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
 
 MOST = 9
-"""With more key instants than this some are left out, evenly."""
+"""Largest number of key instants drawn; of more some are left out, evenly."""
 
 GAP = 0.12
-"""Between two panels [m]."""
+"""Gap between two panels [m]."""
 
 
 def postures_figure(record: RunRecord) -> Figure:

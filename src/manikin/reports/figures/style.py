@@ -83,7 +83,7 @@ class Labels:
 COLOURS_OF_GROUPS = (
     "#6A51A3", "#D55E00", "#56B4E9", "#B59B00", "#8C564B", "#4D4D4D", "#E7298A", "#66A61E",
 )  # fmt: skip
-"""None is that of a foot; where there are more groups, colours come again."""
+"""Colours of groups, none of them that of a foot; they are repeated for more groups."""
 
 FITTING = 6.0
 """Characters of tick labels that stand side by side on an inch."""

@@ -131,7 +131,7 @@ def _dress_ways(axes: Axes, title: str) -> None:
 
 
 def _representatives(one: WordSlice) -> list[tuple[int, int]]:
-    """For each word the place farthest from all places of other words, and from the edge of the grid."""
+    """Place of each word that is farthest from places of other words and from the edge of the grid."""
     rows, columns = np.indices(one.grid.shape)
     places = np.column_stack([rows.ravel(), columns.ravel()])
     labels = one.words.ravel()

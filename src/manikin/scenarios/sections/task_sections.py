@@ -25,10 +25,10 @@ from manikin.scenarios.validation import (
 )
 
 LARGEST_FORCE = 5000.0
-"""Some seven body weights, far beyond what can be held [N]; ``manikin.simulation.recover`` has the same."""
+"""Largest force of a push [N], some seven body weights; ``manikin.simulation.recover`` has the same."""
 
 LARGEST_FREQUENCY = 100.0
-"""Of a sine: ten of the physics' steps are left for each period [Hz]."""
+"""Largest frequency of a sine [Hz]: ten steps of the physics for each period."""
 
 Force = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST_FORCE)]
 
