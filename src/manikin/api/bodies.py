@@ -29,7 +29,7 @@ __all__ = ["Balance", "balance", "creature", "grasp", "human", "point", "scene",
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance(Displayed):
-    """How far a stance is from losing its balance, and what gives way first.
+    """Balance of a stance: its margins, and what gives way first.
 
     Attributes:
         stance: The contacts.

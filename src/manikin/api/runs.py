@@ -26,7 +26,7 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run(Displayed):
-    """What a run found: its verdict, motions and figures.
+    """Result of a run: its verdict, motions and figures.
 
     Attributes:
         summary: As printed by ``manikin run --json``.
@@ -78,7 +78,7 @@ class Run(Displayed):
 
     @property
     def requirements(self) -> "Requirements":
-        """What the run had to keep, measured and allowed."""
+        """Requirements of the run, measured and allowed."""
         return Requirements(tuple(self.summary["requirements"]))
 
     @property
@@ -123,7 +123,7 @@ class Requirements(Displayed):
     rows: tuple[Mapping[str, Any], ...]
 
     def facts(self) -> dict[str, str]:
-        """How many there are, and which are broken."""
+        """Number of requirements, and the broken ones."""
         broken = [str(row["name"]) for row in self.rows if not row["held"]]
         return {"requirements": str(len(self.rows)), "broken": ", ".join(broken) or "none"}
 

@@ -1,4 +1,4 @@
-"""What the commands share: options, output, exit status, and one job of the pipeline."""
+"""Options, output and exit status of the commands, and one job of the pipeline."""
 
 import ctypes
 import os
@@ -45,7 +45,7 @@ def directory_of(out: Path | None, name: str, *, json: bool) -> Path | None:
 
 @dataclass(frozen=True, eq=False)
 class JobOutcome:
-    """What a job left behind.
+    """Summary and files of a job.
 
     Attributes:
         summary: Of the run.

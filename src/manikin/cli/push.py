@@ -43,7 +43,7 @@ _OPTIONS: dict[tuple[str | int, ...], str] = {
     ("body", "mass_kg"): "--mass",
     ("body", "sex"): "--sex",
 }
-"""Where the values of the scenario come from, for messages."""
+"""Options that give the values of the scenario, for messages."""
 
 _COMPARED: dict[str, tuple[str, Callable[[str], Any]]] = {
     "feet": ("feet", str),

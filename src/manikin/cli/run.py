@@ -25,7 +25,7 @@ ALL = "all"
 """In place of a scenario: every built-in one with its variants."""
 
 RESULTS = "results.json"
-"""What ``manikin run all --out DIR`` found, in DIR."""
+"""Results of ``manikin run all --out DIR``, in DIR."""
 
 
 def run(

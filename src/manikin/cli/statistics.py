@@ -152,7 +152,7 @@ def _settings(
     bar: float | None, box: Box | None, limit: float | None, effectors: str, phases: int | None,
     start: str | None, origin: str,
 ) -> "StatisticsSettings":  # fmt: skip
-    """What is measured.
+    """Settings of the statistics.
 
     Raises:
         InputError: If a word is unknown, a number does not fit, or both a bar and a box are given.

@@ -64,7 +64,7 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class RunOptions:
-    """What is passed on to every run.
+    """Options of every run.
 
     Attributes:
         out: Directory of the run directories, or None to write none.

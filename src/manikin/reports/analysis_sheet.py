@@ -177,7 +177,7 @@ def recording_sheet(analysis: Analysis, words: str) -> str:
 
 
 class _Clock:
-    """Where instants are on the sheet."""
+    """Positions of instants on the sheet."""
 
     def __init__(self, first: float, last: float) -> None:
         self.first, self.last = first, last
@@ -332,7 +332,7 @@ def _bones(body: BodyModel, q: FloatArray) -> FloatArray:
 
 
 def _heading(analysis: Analysis) -> float:
-    """Where the pelvis goes, or faces in the middle of the recording where it stays [rad]."""
+    """Heading of the way of the pelvis, or of the pelvis in the middle of the recording if it stays [rad]."""
     q = analysis.motion.q
     way = q[-1, :2] - q[0, :2]
     if float(np.linalg.norm(way)) > 0.5:

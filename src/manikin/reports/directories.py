@@ -137,7 +137,7 @@ class MapDirectory(ResultDirectory):
 
 
 def _asked(data: Mapping[str, Any]) -> dict[str, Any]:
-    """What a file of maps is about, without what was found; as JSON holds it."""
+    """Conditions of a file of maps, without its results; as JSON holds them."""
     asked = {key: value for key, value in data.items() if key not in (*RESULTS, "complete", "compared")}
     others = data.get("compared")
     if isinstance(others, list):
@@ -244,7 +244,7 @@ SHOWN_SLICES = (340, 150)
 
 _ARRAYS = ("turns", "shapes", "lengths", "costs")
 _REACHED = 1e-6
-"""How far from its goal a path of a file may end [m]: what a changed byte exceeds."""
+"""Largest distance of a path's end from its goal [m]; a changed byte exceeds it."""
 
 
 def partition_as_dict(

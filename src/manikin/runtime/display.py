@@ -43,7 +43,7 @@ class Displayed:
     """
 
     def facts(self) -> dict[str, str]:
-        """What the value is, as labels and short texts in order."""
+        """Description of the value as labels and short texts in order."""
         if not is_dataclass(self):
             return {}
         return {field.name: _short(getattr(self, field.name)) for field in fields(self)}

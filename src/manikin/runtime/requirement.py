@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 Sense = Literal["<=", ">=", ">"]
-"""How a measured value compares with its limit."""
+"""Comparison of a measured value with its limit."""
 
 
 @dataclass(frozen=True)

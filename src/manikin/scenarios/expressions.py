@@ -218,7 +218,7 @@ class HeightBand:
         return self._scaled(self.upper_expression, x, y, z)
 
     def violation(self, com: FloatArray) -> FloatArray:
-        """How far each CoM is outside the band; negative inside.
+        """Distance of each CoM outside the band; negative inside.
 
         Args:
             com: (..., 3) [m].

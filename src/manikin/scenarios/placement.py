@@ -1,4 +1,4 @@
-"""Where a scenario stands: the same file at another place, and the frame of its task.
+"""Frame of a scenario's task, and the same file at another place.
 
 Planning, control and simulation happen in the *task frame*: its origin is below the body at the start,
 its x axis points where the body faces there, its heights are those of the file.  Coordinates in it are
@@ -92,7 +92,7 @@ def moved_data(
 
 
 def _moved_inside(value: Any, data: Any, transform: PlanarTransform, decimals: int) -> Any:
-    """What holds sections, with the coordinates in them moved."""
+    """A value with the coordinates of the sections in it moved."""
     if isinstance(value, Section):
         return moved_data(value, data, transform, decimals)
     if isinstance(value, (list, tuple)):

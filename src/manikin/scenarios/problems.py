@@ -30,7 +30,7 @@ from manikin.scenarios.world import build_scene
 from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
 
 HOVERING = 0.3
-"""What leaves at least this above the supports is overhead, what leaves less is stepped over [m]."""
+"""Least height above the supports of an obstacle that is overhead [m]; a lower one is stepped over."""
 
 ONSET = 0.10
 """Distance within which the body comes down before an obstacle, for a stature of 1.75 m [m]."""

@@ -1,4 +1,4 @@
-"""What a scenario file may hold: its sections and the rules between them.
+"""Schema of a scenario file: its sections and the rules between them.
 
 Lengths are metres and angles degrees, as the keys say; the builders of
 :class:`~manikin.scenarios.scenario.Scenario` turn them into the library's own values.
@@ -116,7 +116,7 @@ class ScenarioFile(Section):
     @model_validator(mode="before")
     @classmethod
     def _only_planned(cls, data: Any) -> Any:
-        """What cannot be executed is planned only, where the file says nothing else."""
+        """Plan only what cannot be executed, where the file says nothing else."""
         if isinstance(data, dict) and "execution" not in data and _cannot_be_executed(data):
             return {**data, "execution": "none"}
         return data

@@ -108,7 +108,7 @@ def friction_of(values: ScenarioValues) -> float:
 
 
 def _toe_hinge(body: BodyModel) -> float:
-    """Where the hinge of the toes crosses the sole's x axis; its tip without such a hinge [m]."""
+    """Place of the hinge of the toes on the sole's x axis; its tip without such a hinge [m]."""
     foot = body.effector("left_foot")
     toes = [segment for segment in body.segments if segment.parent == foot.segment and segment.hinges]
     own = foot.rotation.T @ (toes[0].origin - foot.translation) if toes else None

@@ -23,7 +23,7 @@ Path = tuple[str | int, ...]
 
 
 class FrameMoves(Enum):
-    """How a value of a file changes with the frame of the world, as a mark in the annotation of its field."""
+    """Change of a value with the frame of the world, as a mark in the annotation of its field."""
 
     POINT = "point"
     """Position in the world, x and y, or x, y and z [m]."""
@@ -217,7 +217,7 @@ def _describe(problem: ErrorDetails, data: Any, model: type[Section]) -> tuple[P
 
 
 def _meaning(model: type[Section], location: tuple[str | int, ...]) -> str:
-    """What a missing key should hold: the description of its field."""
+    """Description of the field of a missing key."""
     for part in location[:-1]:
         if part in model.model_fields:
             model = _section_of(model.model_fields[str(part)].annotation) or model

@@ -1,4 +1,4 @@
-"""What a scenario file says, scaled to its body, and where it says it."""
+"""Values of a scenario file, scaled to its body, with their places in the file."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class ScenarioValues:
 
     @property
     def manner(self) -> str:
-        """How the body carries itself where the task leaves freedom."""
+        """Style of the postures where the task leaves freedom."""
         return self.file.manner
 
     @property
@@ -126,17 +126,17 @@ class ScenarioValues:
 
     @property
     def recovery(self) -> RecoverySection | None:
-        """How a standing body recovers from its push, or None."""
+        """Recovery of a standing body from its push, or None."""
         return self.file.recovery
 
     @property
     def walking(self) -> WalkingSection | None:
-        """How the body walks from start to goal, or None."""
+        """Walk from start to goal, or None."""
         return self.file.walking
 
     @property
     def act(self) -> ActSection | None:
-        """What the hands do to an object at the end, or None."""
+        """Act of the hands on an object at the end, or None."""
         return self.file.task.act
 
     @property
@@ -193,7 +193,7 @@ class ScenarioValues:
 
     @property
     def contacts(self) -> ContactsSection:
-        """How contacts are planned where no supports are given."""
+        """Options of planned contacts, where no supports are given."""
         return self.file.contacts or ContactsSection()
 
     @property

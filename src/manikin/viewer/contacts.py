@@ -147,7 +147,7 @@ class ContactViewer(Page):
 
 
 def _lines(answer: LiveAnswer) -> list[str]:
-    """What each limb found, in one line each."""
+    """Result of each limb, in one line each."""
     lines = []
     for name, result in answer.answers.items():
         words = f"{result.obstacle}, EFORT {answer.efforts[name]:.2f}" if result.found else result.message

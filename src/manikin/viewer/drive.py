@@ -29,7 +29,7 @@ TRAIL = 600
 
 @dataclass(frozen=True)
 class Key:
-    """What one key does to the directive.
+    """Effect of one key on the directive.
 
     Attributes:
         hotkey: The page's name of the key.

@@ -60,10 +60,10 @@ AROUND = 1.2
 
 PITCH = (-0.2, 1.0)
 ROLL = (-0.1, 0.1)
-"""How the root may lean [rad]; our choice for a body on its feet."""
+"""Ranges of the lean of the root [rad]; our choice for a body on its feet."""
 
 TURN = float(np.deg2rad(75.0))
-"""How far the root may turn from the headings of start and goal, where these are that close [rad]."""
+"""Largest turn of the root from the headings of start and goal, where these are that close [rad]."""
 
 SEARCHES_AGAIN = 60
 """Postures that are looked for along every guide after the first."""
@@ -120,7 +120,7 @@ class _FootSearch(_Search):
         return result if result.plan is None else replace(result, plan=self._acting(result.plan))
 
     def _settings(self, *, again: bool) -> ExtendSettings:
-        """How contacts are looked for; along another guide, which is much like the first, not as long."""
+        """Settings of the search; along another guide, much like the first, it is shorter."""
         options = self._scenario.contacts
         settings = ExtendSettings(
             stride=options.stride_m, friction=options.friction, natural=self._natural,
@@ -129,7 +129,7 @@ class _FootSearch(_Search):
         return replace(settings, searches=SEARCHES_AGAIN) if again else settings
 
     def _goal(self, start: Stage) -> Stage | str:
-        """Where to go, or why there is no such place; for an act, on the level of the start."""
+        """Goal, or the reason why there is none; for an act, on the level of the start."""
         act = act_of(self._scenario)
         if act is None:
             return stage_at(self._places, self._scenario, "goal")
@@ -195,7 +195,7 @@ STEEPEST = float(np.deg2rad(50.0))
 """Largest slope on which a limb that cannot hold on counts as within reach; our choice."""
 
 LEAN = 0.35
-"""How far the root may lean in any direction [rad]; our choice."""
+"""Largest lean of the root in any direction [rad]; our choice."""
 
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
@@ -267,7 +267,7 @@ class _LimbSearch(_Search):
         )
 
     def _starts(self) -> Iterator[LimbStart]:
-        """Where the body is at the start, the best first, or why it cannot be there."""
+        """Postures at the start, the best first, or the reason why there is none."""
         state = self._scenario.file.task.start
         if self._body.stature is not None and state.posture != CLIMBING:
             result = stage_at(self._endpoints(), self._scenario, "start")
@@ -309,7 +309,7 @@ class _LimbSearch(_Search):
         )
 
     def _condition(self) -> Condition:
-        """What cannot hold on reaches something to stand on: all but two of more than four such limbs."""
+        """Limbs that cannot hold on reach something to stand on: all but two of more than four of them."""
         bearing = [
             limb.name for limb in self._limbs
             if self._kinds[limb.name] is not ContactKind.GRASP and not is_further(self._body, limb)

@@ -166,7 +166,7 @@ class RunContext:
         return self._posed(scenario)
 
     def posed_problem(self) -> CentroidalProblem | KeyframeProblem:
-        """What the centre of mass is planned for.
+        """Problem of the centre of mass.
 
         Raises:
             ScenarioError: If there are no supports yet.
@@ -213,7 +213,7 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class StageFailure:
-    """Why a run ended without success.
+    """Reason why a run ended without success.
 
     Attributes:
         stage: ``"contacts"``, ``"centroidal"``, ``"wholebody"``, ``"execution"`` or ``"push"``.

@@ -31,7 +31,7 @@ from manikin.simulation.execution import BACK
 
 @dataclass(frozen=True)
 class ExecutionRequirements:
-    """What an executed motion must keep to count as a success.
+    """Limits that an executed motion must keep to count as a success.
 
     Attributes:
         com_rms_error: Root mean square distance of the CoM from its plan [m].
@@ -108,7 +108,7 @@ def _kept_standing(execution: Execution) -> list[Requirement]:
 
 @dataclass(frozen=True, eq=False)
 class PlannedMotion:
-    """What is to be executed.
+    """Motion that is to be executed.
 
     Attributes:
         schedule: Contacts in time.
@@ -276,7 +276,7 @@ def _summary_in_world(result: Execution, report: Report) -> dict[str, Any]:
 
 
 def _failure(schedule: ContactSchedule, result: Execution, table: RequirementTable) -> StageFailure | None:
-    """What the execution itself did not keep, or None."""
+    """Requirement that the execution itself broke, or None."""
     broken = table.first_broken
     if result.failure:
         reason, time = result.failure, float(result.failure_time_s or 0.0)

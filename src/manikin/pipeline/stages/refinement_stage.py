@@ -20,7 +20,7 @@ from manikin.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class KeyedContacts:
-    """What the refinement begins with.
+    """Initial guess of the refinement.
 
     Attributes:
         schedule: Contacts in time.
@@ -120,5 +120,5 @@ def refined_summary(result: RefineResult) -> dict[str, Any]:
 
 
 def _fall(before: float, after: float) -> float | None:
-    """How many times less there is after; None where nothing is left."""
+    """Ratio of the values before and after; None if nothing is left."""
     return before / after if after > 0.0 else None

@@ -38,7 +38,7 @@ KEY_ROOM = 0.5
 """Share of the fit's distance from the ends of the joint ranges that key postures keep."""
 
 KEY_TOLERANCES = (1.0e-3, 2.0e-4)
-"""How exact key postures are [m]: as exact as the finished motion has to be; and more, where no motion is
+"""Tolerances of key postures [m]: as exact as the finished motion has to be; and more, where no motion is
 found although each posture was just within reach."""
 
 
@@ -319,7 +319,7 @@ def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | No
 
 
 def certificate_summary(certificate: Any) -> dict[str, Any]:
-    """What the summary says of a certificate of either method."""
+    """Entries of the summary from a certificate of either method."""
     same = (
         "max_support_error_m", "min_clearance_m", "max_joint_limit_violation_rad", "max_velocity_share",
         "max_torque_share", "min_force_at_com_N", "min_zmp_distance_m",

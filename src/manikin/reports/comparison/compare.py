@@ -203,7 +203,7 @@ def _postures_difference(
 
 
 STAGES = ("point mass", "planned", "executed")
-"""What may be compared of each run: the CoM plan, the planned and the executed motion."""
+"""Stages that are compared: the CoM plan, the planned and the executed motion."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -234,7 +234,7 @@ class RunComparison(Displayed):
 
     @property
     def names(self) -> tuple[str, str]:
-        """What to call the runs; numbered when their directories have the same name."""
+        """Names of the runs; numbered when their directories have the same name."""
         if self.first.label != self.second.label:
             return self.first.label, self.second.label
         return f"{self.first.label} (1)", f"{self.second.label} (2)"

@@ -123,7 +123,7 @@ def _add_executed(record: RunRecord, axes: Axes, schedule: ContactSchedule, swin
 
 
 def _methods(record: RunRecord, swings: list[Swing]) -> list[str]:
-    """How each flight was planned, as far as the summary says; nothing of what just follows the body."""
+    """Method that planned each flight, as far as the summary says; empty if it just follows the body."""
     block = record.summary.get("wholebody") or {}
     known: dict[str, list[str]] = {}
     for item in block.get("swings") or ():

@@ -61,7 +61,7 @@ class View:
 
     @property
     def words(self) -> str:
-        """Where the eye is."""
+        """Direction of the view, in words."""
         return {"xy": "from above", "xz": "along y", "yz": "along x"}[self.name]
 
 
