@@ -91,7 +91,7 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         if on_footprints is None:
             return RunResult.of(report)
         context = on_footprints
-    with_contacts = context if context.has_supports else plan_contacts(context, report)
+    with_contacts = context if context.scenario.file.supports is not None else plan_contacts(context, report)
     if with_contacts is None:
         return RunResult.of(report)
     if context.scenario.refines:

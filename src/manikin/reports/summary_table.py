@@ -102,7 +102,7 @@ def verdict_lines(summary: Mapping[str, Any]) -> Iterator[str]:
     yield verdict_line(summary)
     yield about_line(summary)
     rows: Sequence[Mapping[str, Any]] = summary["requirements"]
-    names = [requirement_name(row) for row in rows]
+    names = [f"{row['name']} ({row['where']})" if row["where"] else str(row["name"]) for row in rows]
     width = max(map(len, names), default=0)
     heading = ""
     for name, row in zip(names, rows, strict=True):
@@ -123,11 +123,6 @@ def about_line(summary: Mapping[str, Any]) -> str:
     duration = next((block["duration_s"] for block in known if block.get("duration_s")), None)
     lasts = "" if duration is None else f", motion of {duration:.2f} s"
     return f"{who}{lasts}, computed in {summary['wall_s']:.1f} s, seed {summary['seed']}"
-
-
-def requirement_name(row: Mapping[str, Any]) -> str:
-    """Name of a requirement with what it was measured on."""
-    return f"{row['name']} ({row['where']})" if row["where"] else str(row["name"])
 
 
 def requirement_values(row: Mapping[str, Any]) -> tuple[str, str]:

@@ -37,7 +37,10 @@ class Page(ABC):
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._frame_rate = frame_rate
-        self.server = start_server(port)
+        with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
+            self.server = viser.ViserServer(host=HOST, port=_checked_port(port), verbose=False)
+        self.server.scene.set_up_direction("+z")
+        self.server.gui.configure_theme(show_logo=False, show_share_button=False)
 
     @property
     def url(self) -> str:
@@ -65,7 +68,8 @@ class Page(ABC):
         """Stop the server; a second call does nothing."""
         if not self._closed.is_set():
             self._closed.set()
-            stop_server(self.server)
+            with redirect_stdout(StringIO()):
+                self.server.stop()
 
 
 HOST = "127.0.0.1"
@@ -91,25 +95,6 @@ WHOLE = 2.0
 
 ABOVE = 0.35
 """Height of a name above the origin of the head [m]."""
-
-
-def start_server(port: int) -> viser.ViserServer:
-    """Start a server on this computer.
-
-    Raises:
-        InputError: If the port is taken.
-    """
-    with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
-        server = viser.ViserServer(host=HOST, port=_checked_port(port), verbose=False)
-    server.scene.set_up_direction("+z")
-    server.gui.configure_theme(show_logo=False, show_share_button=False)
-    return server
-
-
-def stop_server(server: viser.ViserServer) -> None:
-    """Stop a server, without its message."""
-    with redirect_stdout(StringIO()):
-        server.stop()
 
 
 def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: bool = False) -> None:

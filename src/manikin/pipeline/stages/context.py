@@ -176,16 +176,6 @@ class RunContext:
         return self.problem
 
     @property
-    def has_supports(self) -> bool:
-        """Whether the scenario lists supports."""
-        return self.scenario.file.supports is not None
-
-    @property
-    def is_recorded(self) -> bool:
-        """Whether the centre of mass follows the key frames of a recording."""
-        return isinstance(self.problem, KeyframeProblem)
-
-    @property
     def padded(self) -> tuple[str, ...]:
         """Names of the obstacles that any part of the body may lean on."""
         return self.scenario.padded

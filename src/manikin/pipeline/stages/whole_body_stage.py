@@ -121,7 +121,7 @@ def _eligible(
             padded=() if context.plan is None else context.padded,
         )  # fmt: skip
 
-    return find_eligible_plan(planned, realise, look, replan=not context.is_recorded)
+    return find_eligible_plan(planned, realise, look, replan=not isinstance(context.problem, KeyframeProblem))
 
 
 def _on_real_supports(
@@ -216,7 +216,7 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
         "margin_unit": result.problem.margin_unit,
         "friction": None if trajectory is None else _friction(trajectory),
         "limiting_phase": result.limiting_phase,
-        "limiting_contact": limiting_contact(result),
+        "limiting_contact": None if result.limiting is None else result.limiting.description,
         "min_force_at_com_N": least_force_at_com(result),
         "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
         "feasibility_radius": result.feasibility_radius,
@@ -239,12 +239,6 @@ def least_force_at_com(result: CentroidalResult) -> float | None:
         trajectory.pseudo_wrench(instants), trajectory.position(instants), polytopes=result.polytopes,
     )  # fmt: skip
     return found.min_force
-
-
-def limiting_contact(result: CentroidalResult) -> str | None:
-    """Contact and limit behind the smallest margin, such as ``"left_foot: tipping over ..."``."""
-    limiting = result.limiting
-    return None if limiting is None else limiting.description
 
 
 FORCE_STEP = 0.02

@@ -183,11 +183,6 @@ def posture_differences(
     )
 
 
-def uncommon_joints(first: Motion, second: Motion) -> tuple[str, ...]:
-    """Joints that only one of the two bodies has."""
-    return tuple(sorted(set(first.joint_names) ^ set(second.joint_names)))
-
-
 def _angles(motion: Motion, places: list[int], time: float) -> FloatArray:
     """(joints,) angles at the sample nearest to ``time`` [deg]."""
     return np.rad2deg(motion.q[int(np.argmin(np.abs(motion.time - time)))][places])
@@ -333,7 +328,7 @@ def _missing_phases(first: RunRecord, second: RunRecord, rows: tuple[TimingRow, 
 
 
 def _missing_joints(first: RunRecord, second: RunRecord, which: str) -> list[str]:
-    names = uncommon_joints(first.motions[which], second.motions[which])
+    names = sorted(set(first.motions[which].joint_names) ^ set(second.motions[which].joint_names))
     return [f"joints of one body only: {', '.join(names)}"] if names else []
 
 
