@@ -19,7 +19,7 @@ from manikin.motion.file import MotionFile, write_motions
 from manikin.motion.passage import Passage
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
-from manikin.pipeline.run_directory import MOTION, RunDirectory, other_motion
+from manikin.pipeline.run_directory import MOTION, RunDirectory
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
 from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings, measure_passage
@@ -254,7 +254,8 @@ class Report:
         self._tables: dict[str, RequirementTable] = {}
         self._directory = None if out is None else RunDirectory(out)
         scenario = context.given
-        self._keep_scenario(scenario)
+        if self._directory is not None:
+            self._directory.write_scenario(scenario.to_yaml())
         stature = None if scenario.is_point_mass else context.body.stature
         self.summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
@@ -306,17 +307,25 @@ class Report:
 
     def keep_scenario(self, scenario: Scenario) -> None:
         """Keep a scenario of the task frame with the supports that were found, in the world."""
-        self._keep_scenario(scenario.from_task_frame(self.transform))
+        if self._directory is not None:
+            self._directory.write_scenario(scenario.from_task_frame(self.transform).to_yaml())
 
     def keep_motions(
-        self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None
-    ) -> None:
-        """Keep the motions that there are so far, moved to the world."""
-        self._keep_motions(MOTION, schedule, planned, executed)
-
-    def keep_other(self, name: str, schedule: ContactSchedule, planned: Motion) -> None:
-        """Keep the motion of somebody else, who has the same body, moved to the world."""
-        self._keep_motions(other_motion(name), schedule, planned)
+        self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None,
+        file: str = MOTION,
+    ) -> None:  # fmt: skip
+        """Keep the motions that there are so far, moved to the world, in a file of the run directory."""
+        if self._directory is None:
+            return
+        transform = self.transform
+        content = MotionFile(
+            None if planned is None else motion_in_world(planned, transform),
+            None if executed is None else motion_in_world(executed, transform),
+            self._context.body,
+            self._context.scene_in_world,
+            schedule_in_world(schedule, transform),
+        )
+        write_motions(self._directory.path / file, content)
 
     def close(self) -> dict[str, Any]:
         """Complete the summary, write it and return it."""
@@ -344,25 +353,6 @@ class Report:
         if self.failure is None and not (self.proved if required else self.planned):
             stage = "execution" if required else "wholebody"
             self.fail(stage, "the motion was not executed" if required else "there is no plan")
-
-    def _keep_scenario(self, scenario: Scenario) -> None:
-        if self._directory is not None:
-            self._directory.write_scenario(scenario.to_yaml())
-
-    def _keep_motions(
-        self, name: str, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None
-    ) -> None:
-        if self._directory is None:
-            return
-        transform = self.transform
-        content = MotionFile(
-            None if planned is None else motion_in_world(planned, transform),
-            None if executed is None else motion_in_world(executed, transform),
-            self._context.body,
-            self._context.scene_in_world,
-            schedule_in_world(schedule, transform),
-        )
-        write_motions(self._directory.path / name, content)
 
 
 def place(phase: int | None, where: str) -> str:

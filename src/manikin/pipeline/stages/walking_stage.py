@@ -19,7 +19,7 @@ from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
 from manikin.numerics.signals import low_passed
 from manikin.numerics.spatial import FloatArray, PlanarTransform
-from manikin.pipeline.run_directory import BODY, WALK_PATHS
+from manikin.pipeline.run_directory import BODY, WALK_PATHS, other_motion
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
@@ -241,7 +241,8 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
     report.planned = True
     report.keep_motions(schedule, motion)
     for number, (name, route) in enumerate(plan.others.items()):
-        report.keep_other(name, *walked_motion(walk_along(route, context.body, height=height), height))
+        schedule, other = walked_motion(walk_along(route, context.body, height=height), height)
+        report.keep_motions(schedule, other, file=other_motion(name))
         report.progress(STAGE, 0.6 + 0.4 * (number + 1) / len(plan.others))
     report.progress(STAGE, 1.0)
     return motion

@@ -26,10 +26,11 @@ from manikin.reports.figures.views import (
     distinct_contacts,
     draw_contact,
     draw_obstacles,
+    finite_obstacles,
     panel_ticks,
 )
 from manikin.runtime.palette import COLOURS, colours_of, readable
-from manikin.scene import HalfSpace, Plane, Scene
+from manikin.scene import Scene
 
 MARGIN = 0.3
 """Room around the bodies [m]."""
@@ -175,12 +176,7 @@ def body_solids(body: BodyModel, q: FloatArray, marked: Iterable[str] = ()) -> l
 def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]:
     """Finite obstacles, those of them that are between two corners (3,) of a box [m]."""
     result = []
-    for obstacle in scene:
-        if isinstance(obstacle.shape, (HalfSpace, Plane)):
-            continue
-        bounds = obstacle.bounds
-        if (bounds[1] < low).any() or (bounds[0] > high).any():
-            continue
+    for obstacle in finite_obstacles(scene, low, high):
         mesh = obstacle.to_trimesh()
         finer = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE)
         triangles = np.asarray(finer[0])[np.asarray(finer[1])]

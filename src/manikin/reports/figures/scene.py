@@ -27,10 +27,11 @@ from manikin.reports.figures.views import (
     draw_body,
     draw_contact,
     draw_obstacles,
+    finite_obstacles,
     panel_ticks,
 )
 from manikin.runtime.palette import COLOURS, colours_of, side_colour
-from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
+from manikin.scene import Box, Obstacle, Scene
 
 MOST = 9
 """Largest number of key instants drawn; of more some are left out, evenly."""
@@ -267,9 +268,7 @@ def _stick_colour(start: str, end: str) -> str:
 def draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
     """Draw every finite obstacle; return the corners of their bounds."""
     corners = [np.zeros((0, 3))]
-    for obstacle in scene:
-        if isinstance(obstacle.shape, (HalfSpace, Plane)):
-            continue
+    for obstacle in finite_obstacles(scene):
         is_box = isinstance(obstacle.shape, Box)
         faces = _box_faces(obstacle) if is_box else np.asarray(obstacle.to_trimesh().triangles)
         low, high = obstacle.bounds

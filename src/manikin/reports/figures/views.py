@@ -1,6 +1,6 @@
 """Views of a scene along a world axis: projected contacts, obstacles and bodies."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
@@ -15,7 +15,7 @@ from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.numerics.polygon import convex_polygon
 from manikin.numerics.spatial import FloatArray
 from manikin.runtime.palette import COLOURS, side_colour
-from manikin.scene import Box, HalfSpace, Mesh, Plane, Scene
+from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
 
 _LINE = 1e-4
 """Projected areas below this are lines [m^2]."""
@@ -125,6 +125,17 @@ def draw_contact(axes: Axes, contact: Contact, view: View, colour: str, *, held:
         axes.plot(*place, "s", color=colour, markerfacecolor=face, markersize=6, zorder=2)
 
 
+def finite_obstacles(
+    scene: Scene, low: FloatArray | None = None, high: FloatArray | None = None
+) -> Iterator[Obstacle]:
+    """Obstacles that end somewhere; only those near the box between two corners (3,) [m] if it is given."""
+    for obstacle in scene:
+        if not isinstance(obstacle.shape, (HalfSpace, Plane)):
+            below, above = obstacle.bounds
+            if low is None or high is None or not (np.any(below > high) or np.any(above < low)):
+                yield obstacle
+
+
 def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: FloatArray) -> None:
     """Draw the outlines of the finite obstacles near the box from ``low`` to ``high``, and the floor.
 
@@ -134,12 +145,7 @@ def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: 
         high: (3,) upper corner [m].
     """
     outlines = []
-    for obstacle in scene:
-        if isinstance(obstacle.shape, (HalfSpace, Plane)):
-            continue
-        below, above = obstacle.bounds
-        if np.any(below > high) or np.any(above < low):
-            continue
+    for obstacle in finite_obstacles(scene, low, high):
         shape = obstacle.shape
         if isinstance(shape, Box):
             points = obstacle.to_world(BOX_CORNERS * shape.size / 2)
