@@ -68,7 +68,7 @@ def moved_data(
 ) -> dict[str, Any]:
     """The values of a section and all in it, with coordinates in another frame.
 
-    Which values are coordinates, and of which kind, the sections' fields say (:class:`Moves`).
+    Which values are coordinates, and of which kind, the sections' fields say (:class:`FrameMoves`).
 
     Args:
         section: Checked.
