@@ -92,8 +92,11 @@ def ergonomics(
         if content.schedule is None:
             raise InputError(f"{source}: holds no contacts for --load-kg; valid: a motion of manikin run")
         body, motion = carried_motion(body, motion, content.schedule, load_kg, load_hand or "both")
+    phases = () if content.schedule is None else content.schedule.sequence
+    carried = sum(body.loads.values())
+    carried += max((phase.load.mass for phase in phases if phase.load is not None), default=0.0)
     given = Circumstances(
-        sum(body.loads.values()), load_pattern, coupling, static, repeated, rapid, raised, supported,
+        carried, load_pattern, coupling, static, repeated, rapid, raised, supported,
         neck_upright_deg=neck,
     )  # fmt: skip
     with stdout_kept_clean():

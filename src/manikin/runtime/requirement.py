@@ -87,6 +87,10 @@ class RequirementTable:
                 return row
         raise KeyError(f"no requirement {key!r}; valid: {[row.key for row in self.rows]}")
 
+    def value(self, key: str) -> float:
+        """Measured value of a requirement [its unit]."""
+        return self[key].measured
+
     @property
     def held(self) -> bool:
         """Whether every requirement holds."""

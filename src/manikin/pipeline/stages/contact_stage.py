@@ -20,13 +20,13 @@ from manikin.pipeline.stages.context import Report, RunContext
 from manikin.pipeline.stages.execution_stage import act_of
 from manikin.planning.contacts import (
     ContactPlan,
+    Endpoint,
     Endpoints,
     ExtendSettings,
     Extension,
     GuideLine,
     LimbExtendSettings,
     LimbPlaces,
-    LimbStart,
     PostureFinder,
     PostureFinderSettings,
     Stage,
@@ -66,7 +66,7 @@ TURN = float(np.deg2rad(75.0))
 """Largest turn of the root from the headings of start and goal, where these are that close [rad]."""
 
 SEARCHES_AGAIN = 60
-"""Postures that are looked for along every guide after the first."""
+"""Postures that are looked for along every guide after the first, which the others are much like."""
 
 
 class _Search:
@@ -107,26 +107,24 @@ class _FootSearch(_Search):
         result = self._tally.along_guides(
             self._scenario.contacts.attempts,
             lambda: self._guide(first, goal),
-            lambda line, number: self._follow(line, start, goal, again=number > 0),
+            lambda line, number: self._follow(line, start, goal, number),
         )
         if result.plan is None:
             return result
         return replace(result, scenario=with_supports(self._scenario, result.plan))
 
-    def _follow(self, line: GuideLine, start: Stage, goal: Stage, *, again: bool) -> Extension:
-        """Contacts along a guide, with the hands on the object where there is an act."""
-        settings = self._settings(again=again)
-        result = follow_guide(self._body, self._scene, line, start, goal, settings, self._reference)
-        return result if result.plan is None else replace(result, plan=self._acting(result.plan))
-
-    def _settings(self, *, again: bool) -> ExtendSettings:
-        """Settings of the search; along another guide, much like the first, it is shorter."""
+    def _follow(self, line: GuideLine, start: Stage, goal: Stage, before: int) -> Extension:
+        """Contacts along a guide after others, with the hands on the object where there is an act."""
         options = self._scenario.contacts
-        settings = ExtendSettings(
-            stride=options.stride_m, friction=options.friction, natural=self._natural,
-            friction_model=self._scenario.contact_model.friction,
-        )  # fmt: skip
-        return replace(settings, searches=SEARCHES_AGAIN) if again else settings
+        settings = ExtendSettings(stride=options.stride_m)
+        if before:
+            settings = replace(settings, searches=SEARCHES_AGAIN)
+        asked = PostureFinderSettings(
+            natural=self._natural, friction_model=self._scenario.contact_model.friction
+        )
+        poser = PostureFinder(self._body, self._scene, self._reference, asked)
+        found = follow_guide(poser, line, start, goal, settings, friction=options.friction)
+        return found if found.plan is None else replace(found, plan=self._acting(found.plan))
 
     def _goal(self, start: Stage) -> Stage | str:
         """Goal, or the reason why there is none; for an act, on the level of the start."""
@@ -229,7 +227,7 @@ class _LimbSearch(_Search):
             return self._tally.failed(goal, "goal")
         first = next(starts)
         if first.stage is None:
-            return self._tally.failed(first.reason, "start")
+            return self._tally.failed(first.failure or "", "start")
         # Another guide begins at another start, as long as there are some.
         stages = [first.stage]
         others = (item.stage for item in starts if item.stage is not None)
@@ -266,18 +264,18 @@ class _LimbSearch(_Search):
             goal_distance=plain.goal_distance * max(size, SMALLEST) if not self._climbs else NEAR_GOAL,
         )
 
-    def _starts(self) -> Iterator[LimbStart]:
+    def _starts(self) -> Iterator[Endpoint]:
         """Postures at the start, the best first, or the reason why there is none."""
         state = self._scenario.file.task.start
         if self._body.stature is not None and state.posture != CLIMBING:
             result = stage_at(self._endpoints(), self._scenario, "start")
-            yield LimbStart(None, result) if isinstance(result, str) else LimbStart(result)
+            yield Endpoint(None, result) if isinstance(result, str) else Endpoint(result)
             return
         at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
         q = self._standing(at, yaw, state.height_m)
         for result in starts_on_limbs(self._poser, self._places, q, self._settings().shift_duration):
             where = f"the start: no posture at {at.round(3).tolist()} m: "
-            yield result if result.stage is not None else LimbStart(None, where + result.reason)
+            yield result if result.stage is not None else Endpoint(None, f"{where}{result.failure}")
 
     def _goal(self) -> FloatArray | str:
         """(7,) pose of the root at the goal, or why there is none."""

@@ -92,13 +92,13 @@ def refined_summary(result: RefineResult) -> dict[str, Any]:
         **certificate_summary(certificate),
         "max_meeting_error_m": None,
         "max_com_error_m": None,
-        "max_scuff_m": certificate.max_penetration_m,
+        "max_scuff_m": certificate.value("max_penetration_m"),
         "impacts": [],
-        "min_margin": certificate.min_margin,
+        "min_margin": certificate.value("min_margin"),
         "swings": None,
         "refinement": {
             "min_contact_slack": result.contact_slack,
-            "max_physics_violation_N": certificate.max_physics_violation,
+            "max_physics_violation_N": certificate.value("max_physics_violation"),
             "physics_violation_falls": _fall(
                 result.before.physics_violation, result.after.physics_violation
             ),

@@ -32,6 +32,7 @@ from manikin.planning.whole_body import (
     find_key_postures,
     plan_whole_body,
 )
+from manikin.planning.whole_body.certificate import MotionCertificate
 from manikin.planning.whole_body.point_mass_motion import point_mass_forces, point_mass_motion
 
 KEY_ROOM = 0.5
@@ -312,16 +313,18 @@ def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | No
     return motion
 
 
-def certificate_summary(certificate: Any) -> dict[str, Any]:
+def certificate_summary(certificate: MotionCertificate) -> dict[str, Any]:
     """Entries of the summary from a certificate of either method."""
     same = (
         "max_support_error_m", "min_clearance_m", "max_joint_limit_violation_rad", "max_velocity_share",
-        "max_torque_share", "min_force_at_com_N", "min_zmp_distance_m",
+        "max_torque_share",
     )  # fmt: skip
-    return {name: getattr(certificate, name) for name in same} | {
+    return {key: certificate.value(key) for key in same} | {
         "closest_pair": list(certificate.closest_pair),
-        "max_torque_joint": certificate.tightest_joint,
-        "max_torque_at_s": certificate.worst_times_s["max_torque_share"],
+        "max_torque_joint": certificate["max_torque_share"].where,
+        "max_torque_at_s": certificate["max_torque_share"].time_s,
+        "min_force_at_com_N": certificate.min_force_at_com_N,
+        "min_zmp_distance_m": certificate.min_zmp_distance_m,
     }
 
 
@@ -331,9 +334,7 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
     return {
         "method": "follow",
         **certificate_summary(certificate),
-        "max_meeting_error_m": certificate.max_meeting_error_m,
-        "max_com_error_m": certificate.max_com_error_m,
-        "max_scuff_m": certificate.max_scuff_m,
+        **{key: certificate.value(key) for key in ("max_meeting_error_m", "max_com_error_m", "max_scuff_m")},
         "impacts": [asdict(impact) for impact in certificate.impacts],
         "min_margin": float(result.motion.margin.min()),
         "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],

@@ -48,8 +48,6 @@ def plan_guide_with_restarts(
     """Plan a path with several independent searches.
 
     Args:
-        world: Scene, creature and condition.
-        task: Start, goal and speed limits.
         seed: Each restart draws from its own stream of this seed.
         restarts: Searches at most.
         workers: Processes, this one included; with 1 the searches run one after the other, with
