@@ -43,7 +43,7 @@ from manikin.control.tasks import (
     swing_task,
 )
 from manikin.motion import Motion
-from manikin.numerics.qp import QPSolution, make_solver
+from manikin.numerics.qp import QPSolution, WarmQPSolver
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
 
 YIELDING = 0.2
@@ -140,8 +140,7 @@ class Controller:
         }
         self._dynamics = Dynamics(body, {**segments, **frames})
         self.reference = Reference(body, motion, frames, self.settings.period)
-        self._solver = make_solver(self.settings.solver)
-        self._spare_solver = make_solver(self.settings.solver)
+        self._solver, self._spare_solver = WarmQPSolver(), WarmQPSolver()
         self.clock = PlanClock(self.settings.period, self.settings.returning)
         self._previous = np.zeros(joints)
         self._carried: dict[str, float] = {}
@@ -366,10 +365,10 @@ class Controller:
 
     def _solve(self, problem: ControlProblem) -> tuple[QPSolution | None, str]:
         solution = self._solver.solve(problem.program)
-        if solution.found:
+        if solution.solved:
             return solution, ""
         relaxed = self._spare_solver.solve(problem.program.without_bounds(6, self.body.nv))
-        if relaxed.found:
+        if relaxed.solved:
             return relaxed, f"without joint bounds: {solution.status}"
         return None, f"previous torques: {solution.status}, then {relaxed.status}"
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 
 from manikin.contact import BODY_WEIGHTS_CAP, Contact, SolePart
-from manikin.errors import InputError
 from manikin.numerics.spatial import finite_number
 
 
@@ -201,7 +200,6 @@ class ControlSettings:
         supports: How supports are switched.
         joint_limit_horizon: Joint angles and speeds must stay admissible over this time [s].
         max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
-        solver: ``"daqp"``, ``"proxqp"`` or ``"piqp"``.
         returning: What to do when the body is off its plan; None follows the plan as ever.
     """
 
@@ -211,11 +209,8 @@ class ControlSettings:
     supports: SupportSettings = field(default_factory=SupportSettings)
     joint_limit_horizon: float = 0.05
     max_joint_acceleration: float = 500.0
-    solver: str = "daqp"
     returning: ReturnSettings | None = None
 
     def __post_init__(self) -> None:
         for name in ("period", "joint_limit_horizon", "max_joint_acceleration"):
             finite_number(getattr(self, name), f"control setting {name!r}", above=0.0)
-        if self.solver not in ("daqp", "proxqp", "piqp"):
-            raise InputError(f"control solver is {self.solver!r}; valid: 'daqp', 'proxqp', 'piqp'")

@@ -49,7 +49,7 @@ from manikin.control.recovery.strategy import (
 )
 from manikin.control.reference import EffectorReference
 from manikin.errors import InputError
-from manikin.numerics.qp import QPSolution, make_solver
+from manikin.numerics.qp import QPSolution, WarmQPSolver
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array
 
 LEG_STIFFNESS = 3.0
@@ -167,7 +167,7 @@ class BalanceRecovery:
             if name not in self.groups.feet:
                 raise InputError(f"support has {name!r}; valid: {', '.join(self.groups.feet)}")
         self._dynamics = Dynamics(body, _frames(body, self.groups.feet))
-        self._solvers = {name: make_solver(self.settings.solver) for name in ("full", "relaxed", "loose")}
+        self._solvers = {name: WarmQPSolver() for name in ("full", "relaxed", "loose")}
         self._previous = self._resting = np.zeros(joints)
         self._arms = ArmSwing(body, self.groups)
         self.stand(Standing.of(body, q, feet, friction))
@@ -355,13 +355,13 @@ class BalanceRecovery:
 
     def _solve(self, problem: RecoveryProblem) -> tuple[QPSolution | None, str]:
         solution = self._solvers["full"].solve(problem.program)
-        if solution.found:
+        if solution.solved:
             return solution, ""
         relaxed = self._solvers["relaxed"].solve(problem.relaxed())
-        if relaxed.found:
+        if relaxed.solved:
             return relaxed, f"without stops: {solution.status}"
         loose = self._solvers["loose"].solve(problem.loose())
-        if loose.found:
+        if loose.solved:
             return loose, f"as on any ground: {solution.status}, then {relaxed.status}"
         return None, f"previous torques: {solution.status}, {relaxed.status}, {loose.status}"
 

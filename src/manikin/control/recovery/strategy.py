@@ -167,7 +167,6 @@ class RecoverySettings:
         strength: Torque and speed limits relative to the body's own.
         joint_limit_horizon: Joint angles and speeds must stay admissible over this time [s].
         max_joint_acceleration: No joint is accelerated faster than this [rad/s^2].
-        solver: ``"daqp"``, ``"proxqp"`` or ``"piqp"``.
     """
 
     period: float = 0.005
@@ -201,7 +200,6 @@ class RecoverySettings:
     strength: float = 1.0
     joint_limit_horizon: float = 0.1
     max_joint_acceleration: float = 500.0
-    solver: str = "daqp"
 
     def __post_init__(self) -> None:
         positive = (
