@@ -1,12 +1,7 @@
-"""``manikin analyze``: what a recorded person did, measured with the yardsticks of the plans.
+"""``manikin analyze``: what a recorded person did, measured with the yardsticks of the plans."""
 
-Also here. Processes that are ready by the time this one knows what they shall do.
-"""
-
-import multiprocessing
 import time as clock
 from collections.abc import Sequence
-from multiprocessing import forkserver
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,17 +23,6 @@ from manikin.runtime.progress import Interruption
 
 if TYPE_CHECKING:
     from manikin.analysis.adaptation import Method
-
-
-def preload(module: str) -> None:
-    """Let a server of processes import a module while this process goes on.
-
-    Importing takes seconds, and the processes that the server starts have it done already. Nothing happens on
-    systems without such servers.
-    """
-    if "forkserver" in multiprocessing.get_all_start_methods():
-        forkserver.set_forkserver_preload([module])
-        forkserver.ensure_running()
 
 
 def analyze(
@@ -90,8 +74,6 @@ def analyze(
     if not single:
         refuse(plan is not None or execute, "--plan", "there are several files")
         refuse(frames is not None, "--frames", "there are several files")
-        if jobs != 1:
-            preload("manikin.reports.analysis_directory")
     from manikin.analysis import AnalysisOptions, recordings_in
 
     options = AnalysisOptions(

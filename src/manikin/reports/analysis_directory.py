@@ -16,7 +16,6 @@ A plan against the recording on whose stances it was made ([Qiu2012]_ Table 7.7,
 """
 
 import csv
-import gc
 import io
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -39,7 +38,7 @@ from manikin.reports.analysis_report import overview_page, report_page
 from manikin.reports.analysis_sheet import recording_sheet
 from manikin.reports.comparison.compare import RunComparison, compare_runs
 from manikin.runtime.files import ResultDirectory, make_directory, write_result
-from manikin.runtime.parallel import SERVED, prepare_worker, side_by_side
+from manikin.runtime.parallel import side_by_side
 
 
 def analyze_files(
@@ -64,13 +63,8 @@ def analyze_files(
     # Longest first, so that all processes end together.
     ordered = sorted(jobs, key=lambda job: -job.path.stat().st_size)
     one = partial(analyze_one, options=options)
-    for _, entry in side_by_side(one, ordered, workers, "analysis", prepare=_prepare, method=SERVED):
+    for _, entry in side_by_side(one, ordered, workers, "analysis"):
         yield entry
-
-
-def _prepare() -> None:
-    prepare_worker()
-    gc.freeze()  # what the libraries brought along is not looked through again with every collection
 
 
 def analyze_one(job: AnalysisJob, options: AnalysisOptions) -> AnalysisEntry:

@@ -303,8 +303,7 @@ def walking_paths(
         start: (3,) x, y [m], heading [rad].
         goals: (k, 3) of the same.
         objective: The cost.
-        workers: Processes. They are started afresh, which takes longer than a hundred goals without obstacles
-            do; and a script must ask for more than one under ``if __name__ == "__main__"``.
+        workers: Processes. They are started afresh, which takes longer than 100 goals without obstacles.
         options: Of :func:`walking_path`.
 
     Raises:
