@@ -27,12 +27,12 @@ def force_per_point(problem, solution, controller):
         start += basis.normal.size
         geometry = controller._geometry[basis.contact.effector, basis.contact.part]
         number = 0
-        for patch in geometry.patches:
-            frame = problem.state.frames[f"segment/{patch.segment}"]
-            for point in patch.points:
+        for segment, points in geometry.patches:
+            frame = problem.state.frames[f"segment/{segment}"]
+            for point in points:
                 # Rows of the edge map's force part are the same for every point.
                 force = basis.wrench[:3, 4 * number : 4 * number + 4] @ edges[number]
-                yield patch.segment, frame.position + frame.rotation @ point, force, basis.contact
+                yield segment, frame.position + frame.rotation @ point, force, basis.contact
                 number += 1
 
 

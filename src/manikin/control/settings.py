@@ -109,17 +109,11 @@ class SupportSettings:
     friction_share: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in (
-            "unload_time",
-            "follow_time",
-            "load_time",
-            "rolling_load_time",
-            "press_speed",
-            "press_time",
-            "rolling_press_speed",
-            "default_cap",
-            "friction_share",
-        ):
+        positive = (
+            "unload_time", "follow_time", "load_time", "rolling_load_time", "press_speed", "press_time",
+            "rolling_press_speed", "default_cap", "friction_share",
+        )  # fmt: skip
+        for name in positive:
             finite_number(getattr(self, name), f"support setting {name!r}", above=0.0)
         for name in ("early_window", "release_time", "hover", "press_depth", "sole_inset"):
             finite_number(getattr(self, name), f"support setting {name!r}", at_least=0.0)
@@ -179,12 +173,7 @@ class ReturnSettings:
         finite_number(self.brisk, "return setting 'brisk'", above=self.slow)
 
     def share(self, deviation: float, speed: float) -> float:
-        """Share of the law of the return, in [0, 1].
-
-        Args:
-            deviation: Of the capture point [m].
-            speed: Of the planned centre of mass [m/s].
-        """
+        """Share in [0, 1] of the law of the return, by the deviation [m] and the planned speed [m/s]."""
         off = min(max((deviation - self.small) / (self.large - self.small), 0.0), 1.0)
         return off * min(max((self.brisk - speed) / (self.brisk - self.slow), 0.0), 1.0)
 

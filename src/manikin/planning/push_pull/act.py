@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 
-from manikin.balance.friction import pyramid_edges
+from manikin.balance.friction import edges_in_world
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import carrying_segment
 from manikin.contact import Contact, ContactKind, FrictionModel
@@ -253,7 +253,7 @@ def _generators(
     hand = contact.effector in HANDS
     free = contact.kind is ContactKind.GRASP and not (hand and act.kind is ActKind.PUSH)
     rubbing = replace(contact, friction=friction) if hand else contact
-    edges = pyramid_edges(rubbing, model) @ contact.rotation_contact_to_world.T
+    edges = edges_in_world(rubbing, model)
     directions = np.eye(3) if free else edges.T
     limit = contact.max_force if contact.kind is ContactKind.GRASP else None
     maps, wrenches = [], []
