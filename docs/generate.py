@@ -16,13 +16,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import result_tables
 
 from manikin.body import human
 from manikin.body.human_parts import HUMAN_HINGES
 from manikin.body.strength import HUMAN_STRENGTH, DirectionStrength, LegStrength, hinge_strength
 from manikin.motion.file import DATASETS
-from manikin.reports import summary_table
-from manikin.reports.summary_table import counts_line, markdown_table
+from manikin.reports.summary_table import counts_line
 from manikin.scenarios import json_schema
 from manikin.scenarios.stance_file import StanceFile
 
@@ -193,7 +193,7 @@ def take_over_results(arguments: Sequence[str]) -> None:
                 raise SystemExit(f"{word} has no number after it; valid: {word} NUMBER REPORT.json") from None
             continue
         report = {"stature_m": None, "seed": None, **json.loads(Path(word).read_text(encoding="utf-8"))}
-        kept, told = summary_table.filed(kept, report | told), {}
+        kept, told = result_tables.filed(kept, report | told), {}
     if told:
         raise SystemExit(f"{told} has no report after it; valid: [--stature M] [--seed N] REPORT.json")
     RESULTS.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
@@ -206,7 +206,7 @@ OPTIONS: dict[str, tuple[str, Callable[[str], Any]]] = {
 
 
 def kept_results() -> dict[str, Any]:
-    """What was taken over so far; see :func:`manikin.reports.summary_table.filed`."""
+    """What was taken over so far; see :func:`result_tables.filed`."""
     return json.loads(RESULTS.read_text(encoding="utf-8"))
 
 
@@ -214,13 +214,13 @@ def results_table() -> str:
     """The kept results, with their summary."""
     report = kept_results()["main"]
     total = f"{counts_line(report)}."
-    return f"{markdown_table(report)}\n{total}\n"
+    return f"{result_tables.markdown_table(report)}\n{total}\n"
 
 
 def beams_table() -> str:
     """Lowest centre of mass and head clearance under the beams beside the published heights."""
     published = json.loads((DOCS / "published.json").read_text(encoding="utf-8"))
-    table = summary_table.beam_table(kept_results()["main"], published)
+    table = result_tables.beam_table(kept_results()["main"], published)
     people, beams = published["source"], published["beam_height_source"]
     return f"{table}\nPeople: {people}. Heights of the beams: {beams}.\n"
 
@@ -228,7 +228,7 @@ def beams_table() -> str:
 def statures_table() -> str:
     """Every kept report of another stature."""
     found = kept_results()["statures"]
-    return summary_table.stature_table(found.values()) if found else NOT_YET
+    return result_tables.stature_table(found.values()) if found else NOT_YET
 
 
 def seeds_table() -> str:
@@ -236,7 +236,7 @@ def seeds_table() -> str:
     found = kept_results()["seeds"]
     if not found:
         return NOT_YET
-    return f"{summary_table.seed_table(found)}\nSeeds: {', '.join(found)}.\n"
+    return f"{result_tables.seed_table(found)}\nSeeds: {', '.join(found)}.\n"
 
 
 NOT_YET = "No report has been taken over yet.\n"

@@ -137,7 +137,8 @@ def force_of(body: BodyModel, answer: GeneratedContact, task: Task) -> float:
     jacobian = chain.place(answer.q[None, chain.slots]).jacobians[0]
     turn, _ = Configuration(body, answer.q).segment_placement(parent_segment(body, limb))
     return limb_strength(
-        jacobian, chain.torque_lower, chain.torque_upper, task.reaction_on(answer.limb) @ turn, answer.contact.normal @ turn,
+        jacobian, chain.torque_lower, chain.torque_upper, task.reaction_on(answer.limb) @ turn,
+        answer.contact.normal @ turn,
         ContactRules().friction,
     )  # fmt: skip
 

@@ -103,10 +103,10 @@ is fitted to the plates but the mass of the person; the cutoff at touch-downs wa
 `manikin analyze` measures the motion as recorded. *Shifted* is the whole body moved by the smooth path
 that is least and leaves the centre of pressure {1e2 * INSIDE:.0f} cm inside of the edges of the soles, if
 none longer than {1e2 * LARGEST_SHIFT:.0f} cm along an axis is needed, and rather near the axis of a foot that
-carries alone
-(`manikin.recordings.least_shift`). Markers tell the place of a body to a centimetre; a millimetre at 4 Hz moves
-the centre of pressure by 6 cm. The plates have no part in a shift, but the weight of a foot's axis
-({1e2 * ASIDE:.0f} cm count as much as {1e3 * PLACE_ERROR:.0f} mm of shift) was chosen with them.
+carries alone (`manikin.recordings.least_shift`). Markers tell the place of a body to a centimetre; a
+millimetre at 4 Hz moves the centre of pressure by 6 cm. The plates have no part in a shift, but the weight
+of a foot's axis ({1e2 * ASIDE:.0f} cm count as much as {1e3 * PLACE_ERROR:.0f} mm of shift)
+was chosen with them.
 """
 PLATES = f"""
 ## Beside force plates
@@ -139,8 +139,8 @@ Torques of the legs by inverse dynamics from the motion alone, beside those with
 feet, both sides, while a foot is on a plate of its own: root mean square of the difference (*least, smooth,
 shifted*), and the largest magnitudes of the shifted motion and by plates [N.m]. Two feet that carry together
 can share the wrench in many ways. *Least*: forces of least squares; *smooth*: each foot is loaded and
-unloaded bit by bit (`manikin.recordings.dynamics.recorded_forces`), as `manikin analyze` measures; *shifted*: the same of
-the shifted motion.
+unloaded bit by bit (`manikin.recordings.dynamics.recorded_forces`), as `manikin analyze` measures;
+*shifted*: the same of the shifted motion.
 
 """
 SHARES = """

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -47,9 +48,10 @@ def keys_of(value):
 @pytest.fixture(scope="module")
 def generator():
     """The script ``docs/generate.py``."""
-    spec = importlib.util.spec_from_file_location("generate_docs", DOCS / "generate.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    for name in ("result_tables", "generate"):  # the second imports the first
+        spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+        module = sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
     return module
 
 

@@ -22,7 +22,7 @@ def test_another_body_runs_the_same_scenario():
 
 
 def test_an_infeasible_balance_is_explained_and_nothing_computed_is_lost(tmp_path):
-    text = load_scenario("platform").to_yaml().replace("min_margin: 14.7", "min_margin: 60.0")
+    text = load_scenario("platform").to_yaml().replace("min_margin: 16.7", "min_margin: 60.0")
     file = tmp_path / "greedy.yaml"
     file.write_text(text)
     result = run(file, out=tmp_path / "out")

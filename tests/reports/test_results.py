@@ -1,15 +1,9 @@
-"""The table of many runs: one row each, the same from the full and from the reduced report."""
-
-from hypothesis import given
-from hypothesis import strategies as st
+"""The table of many runs, and the verdict of each."""
 
 from manikin.pipeline.batch import counts
 from manikin.reports.summary_table import (
     HEADER,
-    _rounded,
     counts_line,
-    markdown_table,
-    reduced,
     result_rows,
     text_table,
     verdict_line,
@@ -95,27 +89,7 @@ def test_the_verdict_says_first_what_failed():
     assert verdict_line(BAD).startswith("failed: no | margin")
 
 
-def test_markdown_rows_have_as_many_cells_as_the_header():
-    lines = markdown_table(REPORT).splitlines()
-    assert len(lines) == 2 + 3
-    assert {line.replace("\\|", "").count("|") for line in lines} == {len(HEADER) + 1}
-
-
 def test_text_columns_are_aligned():
     lines = text_table(REPORT).splitlines()
     column = lines[0].index("variant")
     assert lines[3][column:].startswith("trial-4")
-
-
-def test_the_reduced_report_gives_the_same_table_but_for_rounding():
-    small = reduced(REPORT)
-    assert small["runs"][0]["centroidal"]["min_margin"] == 24.33
-    assert "closest_pair" not in small["runs"][0]["wholebody"]
-    assert result_rows(small) == result_rows(REPORT)
-    assert reduced({**small}) == small
-
-
-@given(st.floats(allow_nan=False, allow_infinity=False, min_value=1e-30, max_value=1e30))
-def test_rounding_keeps_four_digits(value):
-    assert abs(_rounded(value) - value) <= 0.5001e-3 * value
-    assert _rounded(_rounded(value)) == _rounded(value)

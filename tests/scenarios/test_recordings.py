@@ -36,7 +36,7 @@ def test_timing_and_positions_are_the_executed_ones(write, finished_run):
         asked.recording.com[asked.recording.key_frames], finished_run.executed.com[frames]
     )
     assert asked.control_points == 8 + 7
-    assert asked.requirements.required_margin == load_scenario("platform").required_margin == 14.7
+    assert asked.requirements.required_margin == load_scenario("platform").required_margin == 16.7
 
 
 def test_a_planned_motion_will_do(write, finished_run):

@@ -13,20 +13,10 @@ import numpy as np
 from manikin.balance import BalanceReport, evaluate_balance
 from manikin.body import BodyModel, creature_from_urdf, insect
 from manikin.body.human import human
-from manikin.contact import (
-    Contact,
-    FrictionModel,
-    Stance,
-)
-from manikin.contact import (
-    grasp as contact_grasp,
-)
-from manikin.contact import (
-    point as contact_point,
-)
-from manikin.contact import (
-    sole as contact_sole,
-)
+from manikin.contact import Contact, FrictionModel, Stance
+from manikin.contact import grasp as contact_grasp
+from manikin.contact import point as contact_point
+from manikin.contact import sole as contact_sole
 from manikin.errors import ContactError, InputError
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.runtime.display import Displayed
@@ -37,17 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-__all__ = [
-    "Balance",
-    "balance",
-    "creature",
-    "grasp",
-    "human",
-    "point",
-    "scene",
-    "sole",
-    "stance",
-]
+__all__ = ["Balance", "balance", "creature", "grasp", "human", "point", "scene", "sole", "stance"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -102,11 +82,7 @@ class Balance(Displayed):
 
 
 def balance(
-    stance: Stance,
-    com: Sequence[float],
-    mass: float,
-    *,
-    acceleration: Sequence[float] = (0.0, 0.0, 0.0),
+    stance: Stance, com: Sequence[float], mass: float, *, acceleration: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> Balance:
     """Judge a stance: how far it is from losing its balance, and what gives way first.
 

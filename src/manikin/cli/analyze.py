@@ -60,8 +60,7 @@ def analyze(
         typer.Option(metavar="keyframes|timing-free", help="Plan the recording anew on its own stances."),
     ] = None,
     execute: Annotated[
-        bool,
-        typer.Option("--execute", help="With --plan: the whole body, executed in the physics engine."),
+        bool, typer.Option("--execute", help="With --plan: the whole body, executed in the physics engine.")
     ] = False,
     jobs: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="Files at a time; default: one per core.")

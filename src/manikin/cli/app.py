@@ -122,8 +122,7 @@ def run(
     context: typer.Context,
     scenario: ScenarioArgument,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Run directory. Default: runs/NAME; none with --json."),
+        Path | None, typer.Option(metavar="DIR", help="Run directory. Default: runs/NAME; none with --json.")
     ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Seed; default: the scenario's.")] = None,
     json: JsonOption = False,
@@ -381,8 +380,7 @@ def export(
         str | None, typer.Option(metavar="planned|executed", help="Default: executed if there is one.")
     ] = None,
     rate: Annotated[
-        float | None,
-        typer.Option(metavar="HZ", help="Samples per second; default: 100 (bvh), all (csv)."),
+        float | None, typer.Option(metavar="HZ", help="Samples per second; default: 100 (bvh), all (csv).")
     ] = None,
 ) -> None:
     """Write a motion for other programs."""

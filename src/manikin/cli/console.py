@@ -79,7 +79,7 @@ def run_job(job: "Scenario", directory: Path | None, interruption: Interruption,
         interruption.check()
         if directory is None:
             return JobOutcome(dict(result.summary), None, None)
-        from manikin.reports.report_page import write_run_page
+        from manikin.reports.pages import write_run_page
         from manikin.reports.write_outputs import write_outputs as write_products
 
         if draw:

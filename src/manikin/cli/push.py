@@ -326,8 +326,7 @@ def push(
         typer.Option(metavar="X", help="Before the body reacts [m g h per radian]. Default: 0.64."),
     ] = None,
     locked: Annotated[
-        list[str] | None,
-        typer.Option(metavar="arms|hips", help="Joints that hold the posture; repeatable."),
+        list[str] | None, typer.Option(metavar="arms|hips", help="Joints that hold the posture; repeatable.")
     ] = None,
     posture_control_only: Annotated[
         bool, typer.Option("--posture-control-only", help="Leave the quadratic program out.")
@@ -360,8 +359,7 @@ def push(
         int | None, typer.Option(metavar="N", min=1, help="With --map: processes; default: one per core.")
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Directory. Default: one in runs; none with --json."),
+        Path | None, typer.Option(metavar="DIR", help="Directory. Default: one in runs; none with --json.")
     ] = None,
     figures: Annotated[bool, typer.Option(help="Draw the figures into the directory.")] = True,
     json: JsonOption = False,

@@ -15,7 +15,8 @@ from manikin.balance.wrench import LimitingConstraint
 from manikin.balance.zmp import contact_wrench
 from manikin.body import BodyModel, Configuration
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.contact import Contact, ContactSchedule, Stance, default_normal_force_cap, point, sole
+from manikin.contact import ContactSchedule, Stance, default_normal_force_cap
+from manikin.contact.from_motion import stance_at
 from manikin.ergonomics.assessment import PosturalAssessment, assess_posture
 from manikin.ergonomics.body_parts import parts_of
 from manikin.ergonomics.scoring import Circumstances
@@ -122,25 +123,18 @@ def rebuilt_stance(body: BodyModel, motion: Motion, row: int, friction: float = 
         row: The frame.
         friction: Of every contact.
     """
-    configuration = Configuration(body, motion.q[row])
-    contacts = []
-    for name, held in zip(motion.contact_names, motion.support[row], strict=True):
-        if held and name in body.effectors:
-            contacts.append(_contact(body, configuration, name, friction))
-    return Stance(contacts, default_normal_force_cap(body.mass))
-
-
-def _contact(body: BodyModel, configuration: Configuration, name: str, friction: float) -> Contact:
-    """A sole of a foot, the patch of the buttocks, else a point."""
-    rotation, place = configuration.effector_placement(name)
-    size = None
-    if name.endswith("foot") and body.sole_length is not None and body.sole_width is not None:
-        size = body.sole_length, body.sole_width
-    if name == "buttocks" and body.stature is not None:
-        size = SEAT_LENGTH * body.stature, SEAT_WIDTH * body.stature
-    if size is None:
-        return point(name, place, rotation=rotation, friction=friction)
-    return sole(name, place, rotation=rotation, length=size[0], width=size[1], friction=friction)
+    configuration, sizes = Configuration(body, motion.q[row]), {}
+    if body.stature is not None:
+        sizes["buttocks"] = SEAT_LENGTH * body.stature, SEAT_WIDTH * body.stature
+    if body.sole_length is not None and body.sole_width is not None:
+        sole_size = body.sole_length, body.sole_width
+        sizes |= {name: sole_size for name in motion.contact_names if name.endswith("foot")}
+    placements = {
+        name: configuration.effector_placement(name)
+        for name, held in zip(motion.contact_names, motion.support[row], strict=True)
+        if held and name in body.effectors
+    }
+    return stance_at(placements, sizes, friction, default_normal_force_cap(body.mass))
 
 
 def _of_schedule(

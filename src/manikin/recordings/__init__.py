@@ -4,6 +4,7 @@ Skeletons are read from BVH and from ASF with AMC, markers from C3D and TRC, for
 :func:`reconstruct` makes a motion of our human of any of them, :func:`statistics_of` measures many.
 """
 
+from manikin.motion.passage import Passage
 from manikin.recordings.dynamics.plate_forces import (
     PlateComparison,
     PlateForces,
@@ -50,7 +51,6 @@ from manikin.recordings.statistics.clips import RecordedClip, clip_of
 from manikin.recordings.statistics.passages import (
     Origin,
     Overhead,
-    Passage,
     SupportDistance,
     SupportPlacement,
     com_extreme,

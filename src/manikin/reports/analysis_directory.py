@@ -1,23 +1,21 @@
-"""The directory of a measured recording, and the overview of several.
+"""Result directories of measured recordings, and the overview of several.
 
 ::
 
     DIR/summary.json     what was measured
     DIR/series.csv       what was measured at every frame, units in the header
     DIR/motion.h5        the motion as recorded, and shifted, with supports, forces and margins
-    DIR/report.html      all of it for people, in one file
+    DIR/report.html      all of it in one page
 
     DIR/index.html, DIR/analyses.csv, DIR/analyses.json    of several recordings
 
-Each file is written atomically.
-
-Also here. Recordings measured side by side in processes beside this one; a bad file stops none of the others.
-A plan against the recording on whose stances it was made ([Qiu2012]_ Table 7.7, Fig. 7.16 to 7.18).
+Each file is written atomically. A plan made on the stances of a recording is compared with it as two runs are
+([Qiu2012]_ Table 7.7, Fig. 7.16 to 7.18).
 """
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from os.path import commonpath
@@ -34,9 +32,9 @@ from manikin.motion.file import MotionFile, write_motions
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import MOTION, SUMMARY, ComTrack, RunRecord
 from manikin.planning.com.com_certificate import phase_margins, phase_times
-from manikin.reports.analysis_report import overview_page, report_page
 from manikin.reports.analysis_sheet import recording_sheet
 from manikin.reports.comparison.compare import RunComparison, compare_runs
+from manikin.reports.pages import analysis_page, render
 from manikin.runtime.files import ResultDirectory, make_directory, write_result
 from manikin.runtime.parallel import side_by_side
 
@@ -142,12 +140,44 @@ def _planned_track(found: Replan) -> ComTrack | None:
 
 
 SHEET = "Postures, supports, forces, margins, height and scores over time"
-"""What the drawing of a report shows."""
+"""Alternative text of the drawing of a report."""
 REPORT = "report.html"
 SERIES = "series.csv"
 OVERVIEW = "index.html"
 TABLE = "analyses.csv"
 ANALYSES = "analyses.json"
+
+COLUMNS: tuple[tuple[str, str, str, float, int], ...] = (
+    ("duration_s", "duration_s", "duration [s]", 1.0, 2),
+    ("frames", "frames", "frames", 1, 0),
+    ("stature_m", "stature_m", "stature [m]", 1.0, 2),
+    ("mass_kg", "mass_kg", "mass [kg]", 1.0, 1),
+    ("residual_median_m", "reconstruction_residual_m.median", "residual, median [mm]", 1e3, 1),
+    ("supports", "supports", "supports", 1, 0),
+    ("phases", "phase_durations_s", "phases", 1, 0),
+    ("com_height_min_m", "com_height_min_m", "lowest CoM [m]", 1.0, 3),
+    ("margin_min_Nm", "margin.min", "lowest margin as recorded [N.m]", 1.0, 1),
+    ("margin_share_positive", "margin.share_positive", "", 1.0, 0),
+    ("share_positive_in_contact", "margin.share_positive_in_contact",
+     "positive as recorded [% of frames in contact]", 100.0, 1),
+    ("recorded_share_positive_in_contact", "margin.recorded.share_positive_in_contact", "", 1.0, 0),
+    ("shift_rms_m", "margin.shifted.rms_m", "shift, RMS [mm]", 1e3, 1),
+    ("shift_believed", "margin.shifted.believed", "", 1.0, 0),
+    ("shifted_share_positive_in_contact", "margin.shifted.share_positive_in_contact",
+     "positive once shifted [%]", 100.0, 1),
+    ("shifted_share_at_floor_in_contact", "margin.shifted.share_at_floor_in_contact",
+     "at the imposed floor [% of frames in contact]", 100.0, 1),
+    ("floor_m", "margin.shifted.floor_m", "", 1.0, 0),
+    ("floor_Nm", "margin.shifted.floor_Nm", "", 1.0, 0),
+    ("timing_median_s", "force_plates.timing_median_s", "instants against plates [ms]", 1e3, 0),
+    ("vertical_rms_body_weight", "force_plates.vertical_rms_body_weight",
+     "force against plates [% of weight]", 100.0, 1),
+    ("cop_rms_m", "force_plates.cop_rms_m", "CoP against plates [mm]", 1e3, 0),
+    ("rula_max", "ergonomics.rula.max", "highest RULA", 1, 0),
+    ("reba_max", "ergonomics.reba.max", "highest REBA", 1, 0),
+)  # fmt: skip
+"""Columns of the table of recordings: key, place in the summary, then heading on the page (empty: not shown),
+factor and decimals."""
 
 
 class AnalysisDirectory(ResultDirectory):
@@ -156,46 +186,38 @@ class AnalysisDirectory(ResultDirectory):
     kind, marks = "analysis", (REPORT, OVERVIEW, SUMMARY)
 
 
-def summary_of(found: Analysis, plan: "Replan | None" = None) -> dict[str, Any]:
+def summary_of(analysis: Analysis, plan: Replan | None = None) -> dict[str, Any]:
     """Content of ``summary.json``: the analysis, and ``plan`` where one was made."""
-    return found.as_dict() | {"plan": None if plan is None else plan.as_dict()}
+    return analysis.as_dict() | {"plan": None if plan is None else plan.as_dict()}
 
 
 def write_analysis(
-    found: Analysis, directory: Path, *, draw: bool = True, plan: "Replan | None" = None
+    analysis: Analysis, directory: Path, *, draw: bool = True, plan: Replan | None = None
 ) -> None:
     """Write the files of one recording; the summary comes last.
 
     Args:
-        found: What was measured.
+        analysis: What was measured.
         directory: Created if it is not there.
         draw: Whether the report has its figures.
-        plan: The recording planned anew.
+        plan: The recording re-planned.
 
     Raises:
         MotionFileError: If they cannot be written.
     """
     make_directory(directory)
-    summary = summary_of(found, plan)
-    sheet = recording_sheet(found, SHEET) if draw else ""
-    pictures = _plan_pictures(plan) if draw and plan is not None else {}
-    content = MotionFile(body=found.body) if plan is None else plan.content
-    content = replace(content, recorded=found.motion, shifted=found.shifted_motion)
+    summary = summary_of(analysis, plan)
+    sheet, pictures = recording_sheet(analysis, SHEET) if draw else "", {}
+    if draw and plan is not None and plan.com.trajectory is not None:
+        from manikin.reports.figures.write_figures import comparison_pictures
+
+        pictures = comparison_pictures(compare_with_recording(plan))
+    content = MotionFile(body=analysis.body) if plan is None else plan.content
+    content = replace(content, recorded=analysis.motion, shifted=analysis.shifted_motion)
     write_motions(directory / MOTION, content)
-    write_result(directory / SERIES, _series_text(found))
-    write_result(directory / REPORT, report_page(found, summary, sheet, pictures))
+    write_result(directory / SERIES, _series_text(analysis))
+    write_result(directory / REPORT, analysis_page(analysis, summary, sheet, pictures))
     write_result(directory / SUMMARY, summary)
-
-
-def _plan_pictures(plan: "Replan") -> dict[str, bytes]:
-    """Contents of PNG files that compare a plan with its recording, by what they show."""
-    if plan.com.trajectory is None:
-        return {}
-    from manikin.reports.figures.write_figures import comparison_pictures
-
-    against_recording = compare_with_recording
-
-    return comparison_pictures(against_recording(plan))
 
 
 def write_overview(entries: Sequence[AnalysisEntry], overview: dict[str, Any], directory: Path) -> None:
@@ -215,48 +237,41 @@ def write_overview(entries: Sequence[AnalysisEntry], overview: dict[str, Any], d
     writer.writeheader()
     writer.writerows(rows)
     write_result(directory / TABLE, text.getvalue())
-    links = {
-        str(entry.job.path): f"{entry.job.directory.relative_to(directory).as_posix()}/{REPORT}"
-        for entry in entries
-        if entry.job.directory is not None and entry.summary is not None
-    }
-    write_result(directory / OVERVIEW, overview_page(rows, overview, links))
+    write_result(directory / OVERVIEW, _overview_page(entries, rows, overview, directory))
     write_result(directory / ANALYSES, overview)
+
+
+def _overview_page(
+    entries: Sequence[AnalysisEntry], rows: Sequence[dict[str, Any]], overview: dict[str, Any], folder: Path
+) -> str:
+    """HTML of several recordings; columns without any value are left out."""
+    files = [entry.job.path.resolve() for entry in entries]
+    shared = Path(commonpath([file.parent for file in files]))
+    known = [one for one in COLUMNS if one[2] and any(row[one[0]] is not None for row in rows)]
+    shown = []
+    for entry, file, row in zip(entries, files, rows, strict=True):
+        written = entry.job.directory is not None and entry.summary is not None
+        shown.append({
+            "name": file.relative_to(shared).as_posix(),
+            "link": f"{entry.job.directory.relative_to(folder).as_posix()}/{REPORT}" if written else None,
+            **{key: None if row[key] is None else factor * row[key] for key, _, _, factor, _ in known},
+        })  # fmt: skip
+    columns = [{"key": key, "heading": heading, "decimals": digits} for key, _, heading, _, digits in known]
+    return render("overview", **overview, folder=shared, columns=columns, rows=shown)
 
 
 def _row(entry: AnalysisEntry) -> dict[str, Any]:
     """A recording in one line; empty where it was refused."""
-    found = entry.summary or {}
-    margin, residual = found.get("margin") or {}, found.get("reconstruction_residual_m") or {}
-    recorded, shifted = margin.get("recorded") or {}, margin.get("shifted") or {}
-    plates, effort = found.get("force_plates") or {}, found.get("ergonomics") or {}
-    return {
-        "file": str(entry.job.path),
-        "duration_s": found.get("duration_s"),
-        "frames": found.get("frames"),
-        "stature_m": found.get("stature_m"),
-        "mass_kg": found.get("mass_kg"),
-        "residual_median_m": residual.get("median"),
-        "supports": len(found["supports"]) if found else None,
-        "phases": len(found["phase_durations_s"]) if found else None,
-        "com_height_min_m": found.get("com_height_min_m"),
-        "margin_min_Nm": margin.get("min"),
-        "margin_share_positive": margin.get("share_positive"),
-        "share_positive_in_contact": margin.get("share_positive_in_contact"),
-        "recorded_share_positive_in_contact": recorded.get("share_positive_in_contact"),
-        "shift_rms_m": shifted.get("rms_m"),
-        "shift_believed": shifted.get("believed"),
-        "shifted_share_positive_in_contact": shifted.get("share_positive_in_contact"),
-        "shifted_share_at_floor_in_contact": shifted.get("share_at_floor_in_contact"),
-        "floor_m": shifted.get("floor_m"),
-        "floor_Nm": shifted.get("floor_Nm"),
-        "timing_median_s": plates.get("timing_median_s"),
-        "vertical_rms_body_weight": plates.get("vertical_rms_body_weight"),
-        "cop_rms_m": plates.get("cop_rms_m"),
-        "rula_max": (effort.get("rula") or {}).get("max"),
-        "reba_max": (effort.get("reba") or {}).get("max"),
-        "refused": entry.refusal,
-    }
+    values = {key: _value(entry.summary, path) for key, path, *_ in COLUMNS}
+    return {"file": str(entry.job.path), **values, "refused": entry.refusal}
+
+
+def _value(summary: Mapping[str, Any] | None, path: str) -> Any:
+    """Value at a dotted path, None if it is not there; of a list its length."""
+    value: Any = summary
+    for key in path.split("."):
+        value = None if value is None else value.get(key)
+    return len(value) if isinstance(value, list) else value
 
 
 def _series_text(found: Analysis) -> str:

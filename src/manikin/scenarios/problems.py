@@ -304,10 +304,6 @@ def _height_constraints(values: ScenarioValues) -> tuple[GeometricConstraint, ..
         return found
     names = None if entry.overhead == "automatic" else tuple(entry.overhead)
     overhead = overhead_constraints(
-        build_body(values),
-        build_scene(values),
-        _standing(values),
-        (values.start_com, values.goal_com),
-        names,
+        build_body(values), build_scene(values), _standing(values), (values.start_com, values.goal_com), names
     )
     return (*found, *overhead)

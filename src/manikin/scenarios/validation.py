@@ -127,8 +127,7 @@ Size3 = Annotated[
 ]
 
 Weights3 = Annotated[
-    tuple[NonNegative, NonNegative, NonNegative],
-    BeforeValidator(_vector(3, "three numbers >= 0 [x, y, z]")),
+    tuple[NonNegative, NonNegative, NonNegative], BeforeValidator(_vector(3, "three numbers >= 0 [x, y, z]"))
 ]
 
 

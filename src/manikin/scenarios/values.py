@@ -287,10 +287,7 @@ class ScenarioValues:
             ScenarioError: If it lists none.
         """
         if self.file.supports is None:
-            raise self.error(
-                ("supports",),
-                "is missing; valid: an explicit sequence of phases",
-            )
+            raise self.error(("supports",), "is missing; valid: an explicit sequence of phases")
         return self.file.supports
 
     def constraint(self, key: str) -> ComConstraintSection | None:

@@ -39,7 +39,7 @@ def slab(height, name="slab"):
 
 
 def clearance(body, q, *obstacles, padded=()):
-    return measure_passage(body, Scene(obstacles), schedule([LEFT]), motion(body, q), padded).head_clearance_m
+    return measure_passage(body, Scene(obstacles), schedule([LEFT]), motion(body, q), padded).room
 
 
 def test_the_head_is_what_lies_above_the_shoulders(person):
@@ -71,4 +71,10 @@ def test_the_lowest_com_is_measured_above_the_lowest_foot_and_before_sitting_dow
     heights = {(1.1, 1.2, 1.0, 0.6): 0.7, (1.0, 1.4, 1.1, 0.6): 0.8, (1.5, 1.2, 1.5, 1.3): 0.7}
     for com, lowest in heights.items():
         found = measure_passage(person, Scene(), plan, motion(person, q, times, np.array(com)))
-        assert found.lowest_com_m == pytest.approx(lowest)
+        assert found.com_lowest == pytest.approx(lowest)
+
+
+def test_without_a_limb_in_contact_there_is_no_lowest_com(person):
+    q = person.standing_posture()
+    hanging = measure_passage(person, Scene(), schedule([HAND]), motion(person, q))
+    assert hanging.summary() == {"lowest_com_m": None, "head_clearance_m": None}

@@ -22,13 +22,13 @@ from manikin.contact import Contact, ContactSchedule, Stance, StanceSequence
 from manikin.errors import ScenarioError
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile, write_motions
+from manikin.motion.passage import Passage
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
 from manikin.pipeline.run_directory import MOTION, RunDirectory, other_motion
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
 from manikin.planning.whole_body import (
-    HeadClearance,
     RefineResult,
     WholeBodyResult,
     WholeBodySettings,
@@ -213,7 +213,7 @@ class RunContext:
             raise ScenarioError(reason_in_world(str(error), self.transform_task_to_world)) from None
         return replace(self, scenario=scenario, problem=problem)
 
-    def passage(self, schedule: ContactSchedule, motion: Motion) -> HeadClearance:
+    def passage(self, schedule: ContactSchedule, motion: Motion) -> Passage:
         """How low the body comes, and how near its head to the scene."""
         return measure_passage(self.body, self.scene, schedule, motion, self.padded)
 

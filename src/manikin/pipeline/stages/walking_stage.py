@@ -4,26 +4,17 @@ Also here. A walk as a motion with its supports, forces and margins. A walk on f
 floor first, then supports along it, for the stages that follow.
 """
 
-import itertools
 import math
 import time as clock
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from manikin.balance import wrench_polytopes
 from manikin.balance.motion_forces import full_motion
-from manikin.contact import (
-    Contact,
-    ContactSchedule,
-    Phase,
-    Stance,
-    StanceSequence,
-    default_normal_force_cap,
-    sole,
-)
+from manikin.contact import Contact, ContactSchedule, default_normal_force_cap, sole
+from manikin.contact.from_motion import schedule_of_support
 from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
 from manikin.numerics.signals import low_passed
@@ -58,6 +49,7 @@ from manikin.walking import (
     walking_route,
 )
 from manikin.walking.footsteps.footprints import FEET
+from manikin.walking.footsteps.stepper import walked_supports
 from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_path import TOLERANCE
 
@@ -87,34 +79,19 @@ def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
 
 def walked_schedule(walk: Walk, height: float) -> ContactSchedule:
     """Whole soles where the feet are in the middle of each support, level on a floor of a height [m]."""
-    held = [_contacts(walk, foot, height) for foot in range(walk.support.shape[1])]
-    cap = default_normal_force_cap(walk.body.mass)
-    changes = 1 + np.flatnonzero(np.any(np.diff(walk.support[:-1], axis=0), axis=1))
-    rows = [0, *changes.tolist(), len(walk.time) - 1]
-    phases = [
-        Phase(Stance([contacts[row] for contacts in held if row in contacts], cap), end - start, end - start)
-        for row, (start, end) in zip(rows, itertools.pairwise(walk.time[rows].tolist()), strict=False)
-    ]
-    return ContactSchedule(StanceSequence(phases), walk.time[rows])
-
-
-def _contacts(walk: Walk, foot: int, height: float) -> dict[int, Contact]:
-    """The contact of a foot by the frames in which it stands; one and the same in each support."""
-    body, name = walk.body, walk.feet[foot]
+    body = walk.body
     if body.sole_length is None or body.sole_width is None:
         raise BodyError(f"body {body.name!r} has no soles; valid: a human")
-    data, frame = body.pinocchio.createData(), body.effector_frame(name)
-    standing = np.flatnonzero(walk.support[:, foot])
-    contacts: dict[int, Contact] = {}
-    for rows in np.split(standing, 1 + np.flatnonzero(np.diff(standing) > 1)):
-        pin.forwardKinematics(body.pinocchio, data, walk.q[rows[len(rows) // 2]])
-        place = pin.updateFramePlacement(body.pinocchio, data, frame)
-        made = sole(
-            name, [*place.translation[:2], height], math.atan2(place.rotation[1, 0], place.rotation[0, 0]),
-            length=body.sole_length, width=body.sole_width, friction=FRICTION,
-        )  # fmt: skip
-        contacts |= dict.fromkeys(rows.tolist(), made)
-    return contacts
+    contacts: dict[tuple[int, int], Contact] = {}
+    for foot, name in enumerate(walk.feet):
+        for item in walked_supports(walk, foot):
+            made = sole(
+                name, (item.x, item.y, height), item.yaw, length=body.sole_length, width=body.sole_width,
+                friction=FRICTION,
+            )  # fmt: skip
+            contacts |= {(foot, row): made for row in range(item.first, item.stop)}
+    cap = default_normal_force_cap(body.mass)
+    return schedule_of_support(walk.time, walk.support, lambda *touching: contacts[touching], cap)
 
 
 def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None:

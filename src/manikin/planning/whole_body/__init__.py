@@ -20,7 +20,6 @@ from manikin.planning.whole_body.refine_measures import RefineMeasures
 from manikin.planning.whole_body.seated import SeatedContinuation, continue_seated
 from manikin.planning.whole_body.swing_planner import PlannedSwing
 from manikin.planning.whole_body.whole_body_certificate import (
-    HeadClearance,
     WholeBodyFailure,
     WholeBodyRequirements,
     WholeBodyResiduals,
@@ -31,7 +30,6 @@ from manikin.planning.whole_body.whole_body_certificate import (
 __all__ = [
     "Eligibility",
     "FitScales",
-    "HeadClearance",
     "KeyPosture",
     "KeyPostures",
     "PlannedSwing",

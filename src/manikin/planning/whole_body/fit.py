@@ -56,7 +56,7 @@ _SCALES = MappingProxyType(
         "max_joint_limit_violation_rad": ("joint_limit",),
         "max_velocity_share": ("joint_velocity",),
         "max_missing_wrench": ("force", "moment_share"),
-        "max_torque_share": ("force", "moment_share"),
+        "max_torque_share": ("force", "moment_share", "torque_share"),
     }
 )
 """Scales that decide each field of the certificate.  Contacts and the centre of mass have multipliers, which

@@ -18,6 +18,7 @@ from manikin.motion.dynamics import MomentumRate, MotionSampler, MotionSamples
 from manikin.numerics.banded import BlockBandedSystem, SampledBasis
 from manikin.numerics.spatial import FloatArray, rotation_vector, rotation_vector_jacobian
 from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
+from manikin.planning.whole_body.fit_strength import HeldForces, excess_torque
 from manikin.planning.whole_body.fit_targets import EffectorTarget, FitTargets
 from manikin.scene import Proximity
 from manikin.scene.distance import ProximitySamples
@@ -284,7 +285,26 @@ class MotionObjective:
             residual[:, 3:] -= targets.turning
         first, second, third = (jacobian / scale[:, :, None] for jacobian in momentum.jacobians)
         out.momentum = MomentumRate(residual / scale, (first, second, third))
+        if targets.forces is not None:
+            out.momentum = self._with_strength(out.momentum, motion, targets.forces, scales)
         out.sample_cost += 0.5 * np.sum(out.momentum.value**2, axis=1)
+
+    def _with_strength(
+        self, momentum: MomentumRate, motion: MotionSamples, forces: HeldForces, scales: FitScales
+    ) -> MomentumRate:
+        """The momentum's rate with a row for each joint torque beyond the strength."""
+        excess = excess_torque(self._body, motion.states, forces, scales.strength_share)
+        first, second, third = momentum.jacobians
+        by_posture = to_raw(excess.by_posture, motion.tangent) / scales.torque_share
+        by_acceleration = to_raw(excess.by_acceleration, motion.tangent) / scales.torque_share
+        return MomentumRate(
+            np.hstack([momentum.value, excess.value / scales.torque_share]),
+            (
+                np.concatenate([first, by_posture], axis=1),
+                np.concatenate([second, np.zeros_like(by_posture)], axis=1),
+                np.concatenate([third, by_acceleration], axis=1),
+            ),
+        )
 
 
 def _effector_rows(

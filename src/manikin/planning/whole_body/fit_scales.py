@@ -84,11 +84,15 @@ class FitScales(MotionScales):
         force: Rate of linear momentum, against the planned one [N].
         moment_share: Rate of angular momentum about the centre of mass that costs one unit, as
             a share of the planned margin: where balance is scarce, the body turns less.
+        torque_share: Share of a joint's strength beyond ``strength_share``.
+        strength_share: Share of the strength that may be used.
     """
 
     com: float = 3.0e-3
     force: float = 20.0
     moment_share: float = 0.15
+    torque_share: float = 0.02
+    strength_share: float = 0.93
 
     def loosened(self, factor: float) -> Self:
         """Return the same scales with contacts and centre of mass ``factor`` times looser."""

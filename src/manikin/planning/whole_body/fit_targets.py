@@ -13,6 +13,7 @@ from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.numerics.spatial import FloatArray
+from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown
 from manikin.planning.whole_body.swing_planner import PlannedSwing, hangs, touch_pairs
 from manikin.scene import Scene
@@ -126,6 +127,7 @@ class FitTargets:
             mass, zero.
         reference_second: (n, nq) second derivatives of the reference, from which accelerations count; None
             where any acceleration costs.
+        forces: Contact forces at which joint torques beyond the strength cost; None where no torque costs.
     """
 
     time: FloatArray
@@ -140,6 +142,7 @@ class FitTargets:
     meeting: SlidingTouchdown | None = None
     turning: FloatArray | None = None
     reference_second: FloatArray | None = None
+    forces: HeldForces | None = None
 
 
 def effector_targets(

@@ -27,6 +27,7 @@ from manikin.planning.whole_body.fit import (
     with_updated_penalties,
 )
 from manikin.planning.whole_body.fit_scales import FitScales
+from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.fit_targets import (
     FitTargets,
     effector_targets,
@@ -275,7 +276,7 @@ class _Planner:
         """Fit a motion to the swings; where it misses a little, fit on with more weight on that."""
         first = self._first_fit(swings, began)
         guide, fit, found = first.guide, first.fit, first.found
-        scales = self._scales()
+        scales, fine, forces = self._scales(), False, None
         result = last = first.result
         for number in range(REPAIRS):
             if result.succeeded:
@@ -285,14 +286,17 @@ class _Planner:
                 scales = with_updated_penalties(scales, broken & {"min_clearance_m"})
                 fit, start = self._prepare(swings, guide, self._knots(), scales)
                 found = fit.solve(start)
-            elif number == 0 and broken & INEXACT:
-                scales = with_updated_penalties(scales, broken)
-                fit, start = self._prepare(swings, guide, self._knots(fine=True), scales, found.spline)
-                found = fit.improve(start, scales)
             else:
-                decrease = FIRST_DECREASE if number == 0 else LATER_DECREASE
-                scales = with_updated_penalties(scales, broken, narrow=number > 0, decrease=decrease)
-                found = fit.improve(found.spline, scales)
+                inexact, strong = number == 0 and bool(broken & INEXACT), "max_torque_share" in broken
+                patient = inexact or strong or number > 0
+                scales = with_updated_penalties(
+                    scales, broken, narrow=number > 0, decrease=LATER_DECREASE if patient else FIRST_DECREASE
+                )
+                start = found.spline
+                if inexact or strong:
+                    fine, forces = fine or inexact, last.motion if strong else forces
+                    fit, start = self._prepare(swings, guide, self._knots(fine), scales, start, forces)
+                found = fit.improve(start, scales)
             last = self._judged(found, swings, guide, began)
             result = _better(result, last)
         return result
@@ -323,9 +327,13 @@ class _Planner:
         knots: FloatArray,
         scales: FitScales,
         near: ConfigurationSpline | None = None,
+        forces: Motion | None = None,
     ) -> tuple[MotionFit, ConfigurationSpline]:
         """A fit and where it begins: near the guide, or an earlier spline."""
         targets = self._targets(swings, guide, knots)
+        if forces is not None:
+            held = HeldForces.of(self.body, self.trajectory.schedule, forces, targets.time)
+            targets = replace(targets, forces=held)
         fit = MotionFit(self.body, self.proximity, targets, knots, DEGREE, scales)
         return fit, fit.initial_spline(targets.reference if near is None else near.evaluate(targets.time)[0])
 

@@ -14,7 +14,7 @@ centre of mass; the clearance of the head is our own addition.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -22,8 +22,9 @@ import pinocchio as pin
 from manikin.balance import WrenchPolytope, motion_margin
 from manikin.body import BodyModel
 from manikin.body.limbs import end_segments, hanging_segment
-from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
 from manikin.motion import Motion
+from manikin.motion.passage import Passage
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory
 from manikin.planning.whole_body.sliding_touchdown import Ignored, SlidingTouchdown, sliding_touchdown_errors
@@ -106,56 +107,29 @@ HEAD = "head"
 """Effector on top of the body."""
 
 
-@dataclass(frozen=True)
-class HeadClearance:
-    """What a motion shows of how the body made itself small.
-
-    Attributes:
-        lowest_com_m: Least height of the centre of mass above the lowest limb in contact, before the
-            body sits down where it does [m]; None without a limb in contact.
-        head_clearance_m: Least signed distance of the head and neck to the scene, except its floor and
-            what may be leaned on, over the whole motion [m]; None without obstacles or a head.
-    """
-
-    lowest_com_m: float | None
-    head_clearance_m: float | None
-
-    def summary(self) -> dict[str, float | None]:
-        """Its part of the blocks ``wholebody`` and ``execution`` of the summary."""
-        return asdict(self)
-
-
 def measure_passage(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, motion: Motion, padded: Sequence[str] = ()
-) -> HeadClearance:
-    """Measure a planned or an executed motion.
+) -> Passage:
+    """Least height of the CoM above the lowest limb in contact, and clearance of head and neck.
+
+    Heights count until the body sits down, where it does; the clearance counts over the whole motion, to the
+    scene without its floor and what may be leaned on.
 
     Args:
         body: The body.
         scene: The obstacles.
         schedule: The planned contacts.
-        motion: The motion; what lies beyond the schedule counts as its last phase.
+        motion: Planned or executed; what lies beyond the schedule counts as its last phase.
         padded: Obstacles that any part of the body may lean on.
     """
-    return HeadClearance(_lowest_com(body, schedule, motion), _head_clearance(body, scene, motion, padded))
-
-
-def _lowest_com(body: BodyModel, schedule: ContactSchedule, motion: Motion) -> float | None:
-    phases = schedule.phase_at(motion.time)
-    heights = []
+    levels = np.full(len(schedule.sequence), np.nan)
     for index, phase in enumerate(schedule.sequence):
         if any(not hangs(body, name) for name in phase.stance.effectors):
             break
-        level, rows = _level(phase.stance), phases == index
-        if level is not None and np.any(rows):
-            heights.append(float(motion.com[rows, 2].min()) - level)
-    return min(heights, default=None)
-
-
-def _level(stance: Stance) -> float | None:
-    """Height of the lowest contact that is no grasp [m]."""
-    places = [float(item.position[2]) for item in stance if item.kind is not ContactKind.GRASP]
-    return min(places, default=None)
+        heights = [float(item.position[2]) for item in phase.stance if item.kind is not ContactKind.GRASP]
+        levels[index] = min(heights, default=np.nan)
+    floor, room = levels[schedule.phase_at(motion.time)], _head_clearance(body, scene, motion, padded)
+    return Passage.of(motion.time, motion.com, floor, room=room)
 
 
 def _head_clearance(body: BodyModel, scene: Scene, motion: Motion, padded: Sequence[str]) -> float | None:

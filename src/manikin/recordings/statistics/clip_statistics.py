@@ -6,13 +6,13 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from manikin.errors import InputError
+from manikin.motion.passage import Passage
 from manikin.numerics.signals import Spread
 from manikin.recordings.statistics.clips import RecordedClip
 from manikin.recordings.statistics.passages import (
     LIMIT,
     Origin,
     Overhead,
-    Passage,
     SupportPlacement,
     com_extreme,
     first_stance,
@@ -139,7 +139,7 @@ class GroupStatistics:
             "largest_com_distance": {name: one.as_dict("m") for name, one in self.distances.items()},
             "share_within_limit": dict(self.within),
             "com_lowest": self._com_lowest(),
-            "passages": [{"motion": name, **passage_as_dict(one)} for name, one in self.under],
+            "passages": [{"motion": name, **one.as_dict()} for name, one in self.under],
             "placements": [
                 {
                     "effector": one.effector, "number": one.number, "count": len(one.places),
@@ -237,8 +237,8 @@ def clip_as_dict(clip: RecordedClip, settings: StatisticsSettings | None = None)
              "whole": whole}
             for label, one, whole in zip(phases.labels, phases.phases, phases.whole, strict=True)
         ],
-        "whole": passage_as_dict(whole_passage(clip)),
-        "passages": [passage_as_dict(one) for one in passages(clip, how.overhead)] if how.overhead else [],
+        "whole": whole_passage(clip).as_dict(),
+        "passages": [one.as_dict() for one in passages(clip, how.overhead)] if how.overhead else [],
         "supports": [
             {
                 "effector": one.effector, "start_s": one.time[0], "end_s": one.time[-1],
@@ -247,16 +247,6 @@ def clip_as_dict(clip: RecordedClip, settings: StatisticsSettings | None = None)
             }
             for one in support_distances(clip)
         ],
-    }  # fmt: skip
-
-
-def passage_as_dict(one: Passage) -> dict[str, Any]:
-    """A passage for JSON, with units in the keys."""
-    return {
-        "start_s": one.start, "end_s": one.end, "com_lowest_m": one.com_lowest,
-        "com_lowest_at_s": one.com_lowest_at, "com_place_m": list(one.com_place),
-        "com_highest_m": one.com_highest, "travelled_m": one.travelled,
-        "tops_m": dict(one.tops), "room_m": one.room, "com_below_m": one.below,
     }  # fmt: skip
 
 

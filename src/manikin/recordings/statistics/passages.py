@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manikin.errors import InputError
+from manikin.motion.passage import Passage
 from manikin.numerics.signals import Spread, mask_runs
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.recordings.statistics.clips import RecordedClip
@@ -307,35 +308,6 @@ class Overhead:
         return inside
 
 
-@dataclass(frozen=True)
-class Passage:
-    """One time below something, or a whole recording.
-
-    Attributes:
-        start: [s].
-        end: [s].
-        com_lowest: Least height of the centre of mass above the floor [m].
-        com_lowest_at: When [s].
-        com_place: (x, y) where [m].
-        com_highest: Largest height of the centre of mass above the floor [m].
-        travelled: Level distance between where the centre of mass was at the start and at the end [m].
-        tops: Height that counts of each part of the body: the least one, the largest one below a box [m].
-        room: From the highest of these to what is passed; None for a whole recording [m].
-        below: From the lowest centre of mass to what is passed ([Qiu2012]_ Fig. 3.14) [m].
-    """
-
-    start: float
-    end: float
-    com_lowest: float
-    com_lowest_at: float
-    com_place: tuple[float, float]
-    com_highest: float
-    travelled: float
-    tops: Mapping[str, float]
-    room: float | None = None
-    below: float | None = None
-
-
 def whole_passage(clip: RecordedClip) -> Passage:
     """Lowest centre of mass and lowest tops of a whole recording."""
     return _passage(clip, 0, len(clip.time), None)
@@ -367,19 +339,12 @@ def passages(clip: RecordedClip, overhead: Overhead) -> tuple[Passage, ...]:
 
 
 def _passage(clip: RecordedClip, first: int, stop: int, overhead: Overhead | None) -> Passage:
-    part = slice(first, stop)
-    com, floor = clip.com[part], clip.floor
-    lowest = int(np.argmin(com[:, 2]))
-    height = float(com[lowest, 2]) - floor
+    part, floor = slice(first, stop), clip.floor
     if overhead is None or overhead.x is None:
         tops = {name: float(top[part, 2].min()) - floor for name, top in clip.tops.items()}
     else:
         inside = {name: top[part][overhead.above(top[part])] for name, top in clip.tops.items()}
         tops = {name: float(top[:, 2].max()) - floor for name, top in inside.items() if len(top)}
     room = overhead.height - max(tops.values()) if overhead is not None and tops else None
-    return Passage(
-        float(clip.time[first]), float(clip.time[stop - 1]), height, float(clip.time[part][lowest]),
-        (float(com[lowest, 0]), float(com[lowest, 1])), float(com[:, 2].max()) - floor,
-        float(np.hypot(*(com[-1] - com[0])[:2])), tops, room,
-        None if overhead is None else overhead.height - height,
-    )  # fmt: skip
+    height = None if overhead is None else overhead.height
+    return Passage.of(clip.time[part], clip.com[part], floor, tops=tops, room=room, overhead=height)

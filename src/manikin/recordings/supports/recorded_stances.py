@@ -19,18 +19,8 @@ from scipy.spatial.transform import Rotation
 
 from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
-from manikin.contact import (
-    Contact,
-    ContactSchedule,
-    Phase,
-    SolePart,
-    Stance,
-    StanceSequence,
-    grasp,
-    point,
-    sole,
-    sole_part,
-)
+from manikin.contact import Contact, ContactSchedule, SolePart, grasp, point, sole, sole_part
+from manikin.contact.from_motion import schedule_of_support
 from manikin.errors import InputError
 from manikin.numerics.signals import mask_runs
 from manikin.numerics.spatial import GRAVITY, FloatArray, frozen_array, rotation_from_yaw
@@ -113,19 +103,13 @@ def recorded_schedule(
                 table[frames, column] = ends.parts()
         else:
             contacts.append(_other_contact(found, support, frames, friction, supports.surfaces))
-    firsts = np.concatenate([[0], np.flatnonzero(np.any(np.diff(table[:-1], axis=0), axis=1)) + 1])
-    instants = supports.start + np.append(found.time[firsts], found.time[-1])
-    cap = STRONGEST * found.body.mass * GRAVITY
     hinge = (TOE_HINGE_FROM_HEEL - 0.5) * (found.body.sole_length or 0.0)
-    phases = []
-    for frame, duration in zip(firsts, np.diff(instants), strict=True):
-        held = [
-            _part(contact, _Part(part), hinge)
-            for contact, part in zip(contacts, table[frame], strict=True)
-            if part
-        ]
-        phases.append(Phase(Stance(held, cap), float(duration), float(duration)))
-    return ContactSchedule(StanceSequence(phases), instants)
+    return schedule_of_support(
+        supports.start + found.time,
+        table,
+        lambda column, row: _part(contacts[column], _Part(table[row, column]), hinge),
+        STRONGEST * found.body.mass * GRAVITY,
+    )
 
 
 class _SoleEnds:

@@ -187,10 +187,7 @@ def _dots(axes: Axes, number: int, values: Sequence[float], colour: str) -> None
 
 
 def com_distances_figure(
-    clips: Sequence[RecordedClip],
-    *,
-    limit: float = LIMIT,
-    published: Mapping[str, Spread] | None = None,
+    clips: Sequence[RecordedClip], *, limit: float = LIMIT, published: Mapping[str, Spread] | None = None
 ) -> Figure:
     """Draw the distance from the centre of mass to each support against time ([Qiu2012]_ 3.2.3, Table 3.5).
 

@@ -4,14 +4,14 @@ Also here. Footprints of a whole-body walk: where its feet stand, and when.
 """
 
 import itertools
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from scipy.integrate import cumulative_trapezoid
 
+from manikin.body import Configuration
+from manikin.contact.from_motion import LevelSupport, level_supports
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.walking.footsteps.footprints import FEET, Footprint, Footprints
@@ -296,26 +296,24 @@ def walked_footprints(walk: Walk, rule: StepRule | None = None, *, height: float
     return Footprints(list(_reachable(_overlapping(held, walk), rule, height)))
 
 
+def walked_supports(walk: Walk, foot: int) -> Iterator[LevelSupport]:
+    """Supports of one foot of a walk, in order."""
+    return level_supports(
+        walk.support[:, foot],
+        lambda row: Configuration(walk.body, walk.q[row]).effector_placement(walk.feet[foot]),
+    )
+
+
 def _walked_footprints_supports(walk: Walk, foot: int) -> Iterator[Footprint]:
     """Of one foot, as the walk has them, shifted so that the walk begins with its feet about its path."""
-    behind = np.mean([_sole(walk, each, 0)[:2] for each in range(len(walk.feet))], axis=0) - walk.place[0, :2]
-    standing = np.flatnonzero(walk.support[:, foot])
-    for rows in np.split(standing, 1 + np.flatnonzero(np.diff(standing) > 1)):
-        middle = int(rows[len(rows) // 2])
-        x, y, yaw = _sole(walk, foot, middle)
-        turn = np.exp(1j * (walk.place[middle, 2] - walk.place[0, 2])) * complex(*behind)
-        lands, leaves = walk.time[[rows[0], min(rows[-1] + 1, len(walk.time) - 1)]].tolist()
-        yield Footprint(walk.feet[foot], [x - turn.real, y - turn.imag, 0.0], yaw, lands, leaves)
-
-
-def _sole(walk: Walk, foot: int, row: int) -> tuple[float, float, float]:
-    """Middle of a sole, x, y [m], and its yaw [rad] in a frame of the walk."""
-    body, name = walk.body, walk.feet[foot]
-    data, frame = body.pinocchio.createData(), body.effector_frame(name)
-    pin.forwardKinematics(body.pinocchio, data, walk.q[row])
-    there = pin.updateFramePlacement(body.pinocchio, data, frame)
-    x, y = there.translation[:2].tolist()
-    return x, y, math.atan2(there.rotation[1, 0], there.rotation[0, 0])
+    start = Configuration(walk.body, walk.q[0])
+    feet = [start.effector_placement(name)[1][:2] for name in walk.feet]
+    behind = np.mean(feet, axis=0) - walk.place[0, :2]
+    for item in walked_supports(walk, foot):
+        turn = np.exp(1j * (walk.place[item.middle, 2] - walk.place[0, 2])) * complex(*behind)
+        lands, leaves = walk.time[[item.first, min(item.stop, len(walk.time) - 1)]].tolist()
+        position = (item.x - turn.real, item.y - turn.imag, 0.0)
+        yield Footprint(walk.feet[foot], position, item.yaw, lands, leaves)
 
 
 def _overlapping(held: Sequence[Footprint], walk: Walk) -> Iterator[Footprint]:

@@ -1,11 +1,21 @@
-"""Tables of several reports: beams beside people, other statures, seeds."""
+"""Tables of the documentation: results, beams beside people, other statures, seeds."""
 
 import copy
+import importlib.util
+from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from manikin.pipeline.batch import counts
-from manikin.reports.summary_table import beam_table, filed, seed_record, seed_table, stature_table
+from manikin.reports.summary_table import HEADER, result_rows
+
+spec = importlib.util.spec_from_file_location(
+    "result_tables", Path(__file__).resolve().parents[2] / "docs/result_tables.py"
+)
+tables = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(tables)
 
 PUBLISHED = {"lowest_com_m": {"H1": 0.85, "H2": 0.80}, "beam_height_m": {"H1": 1.45, "H2": 1.30}}
 
@@ -49,19 +59,19 @@ POINT_MASS = a_run("walls", stature_m=None, wholebody=None, execution=None)
 
 def test_beams_stand_beside_people_and_infeasible_variants_are_left_out():
     low = a_run("beam-H1C1", "knee-high", expected="failure")
-    table = cells(beam_table(a_report(a_run("beam-H2C1", "S2"), low, a_run("platform")), PUBLISHED))
+    table = cells(tables.beam_table(a_report(a_run("beam-H2C1", "S2"), low, a_run("platform")), PUBLISHED))
     assert table == [["beam-H2C1", "S2", "1.30", "0.80", "0.74", "0.74", "31.2", "31.0"]]
 
 
 def test_what_was_not_measured_is_left_blank():
-    assert cells(beam_table(a_report(STOPPED), PUBLISHED))[0][-3:] == ["-", "31.2", "-"]
+    assert cells(tables.beam_table(a_report(STOPPED), PUBLISHED))[0][-3:] == ["-", "31.2", "-"]
     old = a_run("beam-H1C1", execution={"min_margin": 1.0})
-    assert cells(beam_table(a_report(old), PUBLISHED))[0][-1] == "-"
+    assert cells(tables.beam_table(a_report(old), PUBLISHED))[0][-1] == "-"
 
 
 def test_statures_are_side_by_side_and_a_point_mass_has_none():
     reports = [a_report(a_run("platform"), STOPPED, POINT_MASS, stature_m=s) for s in (1.85, 1.65)]
-    table = cells(stature_table(reports))
+    table = cells(tables.stature_table(reports))
     assert [(row[0], row[2]) for row in table] == [
         ("beam-H1C1", "1.65"), ("beam-H1C1", "1.85"), ("platform", "1.65"), ("platform", "1.85"),
     ]  # fmt: skip
@@ -73,27 +83,29 @@ def test_seeds_with_the_same_bits_are_one_result():
     other = copy.deepcopy(a_run("platform"))
     other["execution"]["min_margin"] += 1e-12
     other["wholebody"]["seed_matters"] = True
-    records = {"0": seed_record(a_report(a_run("platform"), a_run("walk", "slippery")))}
+    records = {"0": tables.seed_record(a_report(a_run("platform"), a_run("walk", "slippery")))}
     same = {**records, "1": records["0"]}
-    assert [row[2:] for row in cells(seed_table(same))] == [["2 of 2 seeds", "no", "1", "17.1"]] * 2
-    records["1"] = seed_record(
+    assert [row[2:] for row in cells(tables.seed_table(same))] == [["2 of 2 seeds", "no", "1", "17.1"]] * 2
+    records["1"] = tables.seed_record(
         a_report(other, {**STOPPED, "scenario": "walk@slippery", "variant": "slippery"})
     )
-    first, second = cells(seed_table(records))
+    first, second = cells(tables.seed_table(records))
     assert first == ["platform", "-", "2 of 2 seeds", "yes", "2", "17.1"]
     assert second == ["walk", "slippery", "1 of 2 seeds", "no", "2", "17.1"]
 
 
 def test_a_spread_of_margins_is_shown():
     worse = a_run("platform", execution={"min_margin": 8.5})
-    records = {seed: seed_record(a_report(run)) for seed, run in {"0": a_run("platform"), "1": worse}.items()}
-    assert cells(seed_table(records))[0][5] == "8.5 to 17.1"
+    records = {
+        seed: tables.seed_record(a_report(run)) for seed, run in {"0": a_run("platform"), "1": worse}.items()
+    }
+    assert cells(tables.seed_table(records))[0][5] == "8.5 to 17.1"
 
 
 def test_each_report_is_filed_in_its_place_and_replaces_the_old_one_there():
     kept = {}
     for asked in ({}, {"stature_m": 1.65}, {"seed": 10}, {"seed": 9}, {"stature_m": 1.65}):
-        kept = filed(kept, a_report(a_run("platform"), **asked))
+        kept = tables.filed(kept, a_report(a_run("platform"), **asked))
     assert [*kept] == ["main", "statures", "seeds"]
     assert [*kept["statures"]] == ["1.65"]
     assert [*kept["seeds"]] == ["0", "9", "10"]
@@ -102,6 +114,31 @@ def test_each_report_is_filed_in_its_place_and_replaces_the_old_one_there():
 
 
 def test_a_main_report_of_several_seeds_is_none_of_the_ten():
-    assert filed({}, a_report(a_run("platform"), a_run("walk", seed=4)))["seeds"] == {}
+    assert tables.filed({}, a_report(a_run("platform"), a_run("walk", seed=4)))["seeds"] == {}
     unknown = a_report(a_run("platform", seed=None))
-    assert filed({}, unknown)["seeds"] == {}
+    assert tables.filed({}, unknown)["seeds"] == {}
+
+
+def test_markdown_rows_have_as_many_cells_as_the_header():
+    report = a_report(
+        a_run("platform"), {**STOPPED, "failure": {"stage": "centroidal", "reason": "no | margin\nat all"}}
+    )
+    lines = tables.markdown_table(report).splitlines()
+    assert len(lines) == 2 + 2
+    assert {line.replace("\\|", "").count("|") for line in lines} == {len(HEADER) + 1}
+
+
+def test_the_reduced_report_gives_the_same_table_but_for_rounding():
+    full = a_report(a_run("platform"), a_run("walk", "slippery"))
+    full["runs"][0]["wholebody"]["closest_pair"] = ["a", "b"]
+    small = tables.reduced(full)
+    assert small["runs"][0]["centroidal"]["min_margin"] == 30.12
+    assert "closest_pair" not in small["runs"][0]["wholebody"]
+    assert result_rows(small) == result_rows(full)
+    assert tables.reduced({**small}) == small
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False, min_value=1e-30, max_value=1e30))
+def test_rounding_keeps_four_digits(value):
+    assert abs(tables._rounded(value) - value) <= 0.5001e-3 * value
+    assert tables._rounded(tables._rounded(value)) == tables._rounded(value)

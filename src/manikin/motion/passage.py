@@ -1,0 +1,86 @@
+"""How low a motion takes the centre of mass, and the room it leaves below something ([Qiu2012]_ 3.2.3)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from manikin.numerics.spatial import FloatArray
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A motion, recorded, planned or executed, or its part below one thing that is passed.
+
+    Heights of the centre of mass are above the floor: of a recording the lowest surface on which feet stood,
+    of a planned motion the lowest limb in contact. They are NaN where the floor is not known.
+
+    Attributes:
+        start: [s].
+        end: [s].
+        com_lowest: Least height of the centre of mass [m].
+        com_lowest_at: When [s].
+        com_place: (x, y) where, in the world [m].
+        com_highest: Largest height of the centre of mass [m].
+        travelled: Level distance between the centre of mass at the start and at the end [m].
+        tops: Height that counts of each part of the body: the least one, the largest one below a box [m].
+        room: Least distance from the body to what is passed [m]; of a planned motion that of head and neck
+            to the scene, our own addition; None if nothing is passed.
+        below: From the lowest centre of mass to what is passed ([Qiu2012]_ Fig. 3.14) [m].
+    """
+
+    start: float
+    end: float
+    com_lowest: float
+    com_lowest_at: float
+    com_place: tuple[float, float]
+    com_highest: float
+    travelled: float
+    tops: Mapping[str, float] = field(default_factory=dict)
+    room: float | None = None
+    below: float | None = None
+
+    @classmethod
+    def of(
+        cls,
+        time: FloatArray,
+        com: FloatArray,
+        floor: FloatArray | float,
+        *,
+        tops: Mapping[str, float] | None = None,
+        room: float | None = None,
+        overhead: float | None = None,
+    ) -> "Passage":
+        """Measure the path of a centre of mass.
+
+        Args:
+            time: (n,) [s].
+            com: (n, 3) in the world [m].
+            floor: (n,) or one height of the floor in the world [m]; NaN where it is not known.
+            tops: See :class:`Passage`.
+            room: See :class:`Passage`.
+            overhead: Height above the floor of what is passed [m]; None if nothing is.
+        """
+        height = com[:, 2] - floor
+        lowest = int(np.argmin(np.where(np.isnan(height), np.inf, height)))
+        x, y = com[lowest, :2].tolist()
+        return cls(
+            float(time[0]), float(time[-1]), float(height[lowest]), float(time[lowest]), (x, y),
+            float(np.fmax.reduce(height)), float(np.hypot(*(com[-1] - com[0])[:2])), tops or {}, room,
+            None if overhead is None else overhead - float(height[lowest]),
+        )  # fmt: skip
+
+    def summary(self) -> dict[str, float | None]:
+        """Its part of the blocks ``wholebody`` and ``execution`` of a run's summary [m]."""
+        lowest = None if np.isnan(self.com_lowest) else self.com_lowest
+        return {"lowest_com_m": lowest, "head_clearance_m": self.room}
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready values of a passage of a recording, with units in the keys."""
+        return {
+            "start_s": self.start, "end_s": self.end, "com_lowest_m": self.com_lowest,
+            "com_lowest_at_s": self.com_lowest_at, "com_place_m": list(self.com_place),
+            "com_highest_m": self.com_highest, "travelled_m": self.travelled,
+            "tops_m": dict(self.tops), "room_m": self.room, "com_below_m": self.below,
+        }  # fmt: skip

@@ -1,0 +1,135 @@
+"""Report pages in HTML that need no other file: of a run and of a measured recording.
+
+Their text and layout are the Jinja templates in the folder ``templates``.
+"""
+
+import base64
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from manikin.analysis import Analysis
+from manikin.pipeline.run_directory import REPORT, read_summary
+from manikin.reports.summary_table import verdict_line
+from manikin.runtime.files import FIGURES, write_result
+from manikin.runtime.palette import readable
+from manikin.runtime.version import __version__
+
+FIRST = ("scene", "postures", "margin", "com", "contacts")
+"""Figures that come first, in this order; the others follow by name."""
+
+LEFT_OUT = ("requirements", "failure", "verdict", "planned", "proved", "succeeded")
+"""Keys of the summary that the page says in other words."""
+
+
+def render(template: str, **values: Any) -> str:
+    """Fill in a page; every text in it is escaped.
+
+    Args:
+        template: Name of a page in ``templates``, such as ``"run"``.
+        values: What the template uses.
+    """
+    return _environment().get_template(f"{template}.html.jinja").render(**values)
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("manikin.reports"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    environment.globals["version"] = __version__
+    environment.filters |= {
+        "readable": readable, "shown": _shown, "fixed": _fixed, "mm": _millimetres, "share": _share,
+        "width": _width, "base64": lambda png: base64.b64encode(png).decode("ascii"),
+    }  # fmt: skip
+    return environment
+
+
+def _shown(value: Any, decimals: int | None = None) -> str:
+    """Text of a value; of a float with four digits in all unless ``decimals`` are given."""
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.4g}" if decimals is None else f"{value:.{decimals}f}"
+    if isinstance(value, str | int):
+        return str(value)
+    return ", ".join(_shown(item, decimals) for item in value)
+
+
+def _fixed(value: float | None, unit: str, factor: float = 1.0) -> str | None:
+    return None if value is None else f"{factor * value:.1f} {unit}"
+
+
+def _share(value: float | None) -> str | None:
+    return _fixed(value, "%", 100.0)
+
+
+def _millimetres(value: float | None, decimals: int = 1) -> str:
+    return "-" if value is None else f"{1e3 * value:.{decimals}f}"
+
+
+def _width(png: bytes) -> int:
+    """Half the pixels across a PNG file; 0 if it does not say."""
+    return int.from_bytes(png[16:20], "big") // 2 if png[12:16] == b"IHDR" else 0
+
+
+def write_run_page(directory: str | Path) -> Path:
+    """Write ``report.html`` of a finished run, with every figure that is in its directory.
+
+    Args:
+        directory: Written by ``manikin run``.
+
+    Returns:
+        The file.
+
+    Raises:
+        MotionFileError: If the summary cannot be read or the page cannot be written.
+    """
+    folder = Path(directory)
+    return write_result(folder / REPORT, run_page(folder, read_summary(folder)))
+
+
+def run_page(folder: Path, summary: Mapping[str, Any]) -> str:
+    """HTML of a run: verdict, requirements, figures and all numbers.
+
+    Args:
+        folder: Run directory, whose figures are put in.
+        summary: Of the run.
+    """
+    files = {file.stem: file for file in sorted((folder / FIGURES).glob("*.png"))}
+    names = [*(name for name in FIRST if name in files), *(name for name in files if name not in FIRST)]
+    pictures = {readable(name): files[name].read_bytes() for name in names}
+    values = dict(_flat({key: value for key, value in summary.items() if key not in LEFT_OUT}))
+    return render("run", summary=summary, verdict=verdict_line(summary), pictures=pictures, values=values)
+
+
+def analysis_page(
+    analysis: Analysis, summary: Mapping[str, Any], sheet: str, pictures: Mapping[str, bytes]
+) -> str:
+    """HTML of a measured recording.
+
+    Args:
+        analysis: What was measured.
+        summary: Its numbers.
+        sheet: SVG of :func:`manikin.reports.analysis_sheet.recording_sheet`; empty for none.
+        pictures: PNG files of the plan by what they show.
+    """
+    missing = [f"{part}: {reason}" for part, reason in summary["ergonomics"]["missing"].items()]
+    return render(
+        "analysis", name=analysis.name, summary=summary, sheet=sheet, pictures=pictures, missing=missing
+    )
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys and their values; of a list of mappings, one entry each."""
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        elif isinstance(value, list) and value and all(isinstance(item, Mapping) for item in value):
+            yield from _flat({str(number): item for number, item in enumerate(value)}, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
