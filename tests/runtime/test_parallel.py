@@ -47,7 +47,7 @@ def test_no_worker_outlives_a_parent_that_is_killed(tmp_path):
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes are killed by signals here")
 def test_ctrl_c_ends_parent_and_workers(tmp_path):
-    """The signal reaches all of them; only the parent answers."""
+    """The signal reaches all of them; work is deaf to it, and its process is ended by the parent."""
     file = tmp_path / "parent.py"
     file.write_text(SCRIPT)
     parent = subprocess.Popen(
@@ -58,8 +58,9 @@ def test_ctrl_c_ends_parent_and_workers(tmp_path):
     worker = int(parent.stdout.readline())
     os.killpg(parent.pid, signal.SIGINT)
     _, errors = parent.communicate(timeout=60.0)
-    assert errors.count("Traceback") == 1
-    assert errors.strip().endswith("KeyboardInterrupt")
+    assert parent.returncode != 0
+    assert "KeyboardInterrupt" in errors
+    assert "in nap" not in errors
     assert ends(worker)
 
 
