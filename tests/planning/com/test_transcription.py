@@ -64,7 +64,7 @@ def programme_values(problem, bezier, durations, margin):
     unknowns = programme.pack_unknowns(
         bezier - problem.reference, durations, float(durations.sum()), margin, 0.0
     )
-    values = programme.pack_parameters(_parameters(problem, polytopes, facets, MarginTargets.of(problem)))
+    values = programme.pack_parameters(_parameters(problem, polytopes, facets))
     oracle = programme.solver.get_function("nlp_f"), programme.solver.get_function("nlp_g")
     objective, rows = (np.asarray(function(unknowns, values)).ravel() for function in oracle)
     return programme, polytopes, float(objective[0]), rows

@@ -1,5 +1,9 @@
 """EFORT against unit balls of torque, its signs, and what joint torques really allow."""
 
+import importlib.util
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,12 +19,22 @@ from manikin.planning.contacts import (
     efort,
     force_ellipsoid,
     force_transmission_ratio,
-    limb_strength,
     pulling_efort,
     velocity_ellipsoid,
 )
 
 SEEDS = st.integers(0, 10_000)
+SCRIPT = Path(__file__).parents[3] / "docs/heuristics.py"
+
+
+@pytest.fixture(scope="module")
+def limb_strength():
+    """The yardstick of the comparison in the docs."""
+    spec = importlib.util.spec_from_file_location("heuristics_script", SCRIPT)
+    script = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = script
+    spec.loader.exec_module(script)
+    return script.limb_strength
 
 
 def jacobian_and_direction(seed, joints=7):
@@ -105,7 +119,7 @@ def test_signs_of_a_hand_that_pulls():
 
 
 @given(SEEDS, st.floats(0.1, 1.0))
-def test_the_exertable_force_keeps_every_limit_and_is_the_largest(seed, friction):
+def test_the_exertable_force_keeps_every_limit_and_is_the_largest(limb_strength, seed, friction):
     """Against random forces scaled to the limits; a grasp can do at least what friction can."""
     jacobian, v = jacobian_and_direction(seed)
     rng = np.random.default_rng(seed)
@@ -126,7 +140,7 @@ def test_the_exertable_force_keeps_every_limit_and_is_the_largest(seed, friction
     assert (scale * (forces @ v))[inner].max(initial=0.0) <= best + 1e-6
 
 
-def test_the_exertable_force_of_a_lever_is_its_torque_over_its_arm():
+def test_the_exertable_force_of_a_lever_is_its_torque_over_its_arm(limb_strength):
     """One hinge about z, the effector 0.5 m along x: -20 N.m bear 40 N along y, 30 N.m 60 N against it."""
     jacobian, y = np.array([[0.0], [0.5], [0.0]]), np.array([0.0, 1.0, 0.0])
     limits = np.array([-20.0]), np.array([30.0])
@@ -136,7 +150,7 @@ def test_the_exertable_force_of_a_lever_is_its_torque_over_its_arm():
     assert limb_strength(jacobian, *limits, np.array([1.0, 0.0, 0.0]), None) == np.inf
 
 
-def test_efort_with_strengths_is_a_force_within_them(person, person_samples):
+def test_efort_with_strengths_is_a_force_within_them(person, person_samples, limb_strength):
     """The force along ``v`` alone is between the ratio, where all shares have unit norm, and its sqrt(k)."""
     samples = person_samples["left_arm"]
     chain = LimbKinematics(person, samples.limb)
@@ -155,7 +169,7 @@ def test_efort_with_strengths_is_a_force_within_them(person, person_samples):
 
 
 @pytest.mark.parametrize("name", ["left_arm", "left_leg"])
-def test_efort_orders_postures_like_the_force_they_can_exert(person, person_samples, name):
+def test_efort_orders_postures_like_the_force_they_can_exert(person, person_samples, limb_strength, name):
     """Under joint torque limits and friction, against a face square to the task.
 
     EFORT weighs all joints alike and bounds the norm of the torques, so the order is not the same but
@@ -175,7 +189,7 @@ def test_efort_orders_postures_like_the_force_they_can_exert(person, person_samp
     assert force[best].mean() > 1.5 * force.mean()
 
 
-def test_efort_prefers_the_face_that_can_carry_the_force(person, person_samples):
+def test_efort_prefers_the_face_that_can_carry_the_force(person, person_samples, limb_strength):
     """One posture, faces turned away from the task step by step: less EFORT, and less force."""
     samples = person_samples["left_arm"]
     chain = LimbKinematics(person, samples.limb)

@@ -9,7 +9,15 @@ from manikin.balance import StaticRegion
 from manikin.body import Configuration, human
 from manikin.contact import Stance, sole, soles_overlap
 from manikin.numerics.spatial import rotation_from_yaw
-from manikin.planning.contacts import Endpoints, ExtendSettings, Footholds, GuideLine, Habit, follow_guide
+from manikin.planning.contacts import (
+    Endpoints,
+    ExtendSettings,
+    Footholds,
+    GuideLine,
+    Habit,
+    PostureFinder,
+    follow_guide,
+)
 from manikin.scene import Box, Obstacle, Scene
 
 BODY = human(1.75, 75.0, "male")
@@ -35,7 +43,8 @@ def planned(scene, at, heading=0.0, **options):
     assert start is not None
     assert goal is not None
     settings = ExtendSettings(**options)
-    return follow_guide(BODY, scene, straight(start, goal), start, goal, settings), start, goal
+    poser = PostureFinder(BODY, scene)
+    return follow_guide(poser, straight(start, goal), start, goal, settings), start, goal
 
 
 @pytest.fixture(scope="module")
@@ -123,11 +132,13 @@ def test_a_step_that_no_leg_can_make_is_explained():
 @given(x=st.floats(-0.2, 1.8), y=st.floats(-0.3, 0.3), yaw=st.floats(-3.1, 3.1), height=st.floats(0.0, 0.3))
 def test_footholds_carry_the_whole_sole_and_leave_the_foot_free(x, y, yaw, height):
     holds = Footholds(BODY, STEPS)
-    found = holds.near(np.array([x, y, height]), yaw)
-    assert [hold.cost for hold in found] == sorted(hold.cost for hold in found)
-    for hold in found:
-        contact = hold.contact("left_foot", holds.length, holds.width, 0.7)
-        assert STEPS.supporting_surface(contact, 1e-9).obstacle == hold.obstacle
+    wanted = np.array([x, y, height])
+    found = holds.near("left_foot", wanted, yaw, 0.7)
+    away = [(contact.position - wanted) * [1.0, 1.0, holds.settings.height_weight] for contact in found]
+    costs = np.linalg.norm(away, axis=1).tolist() if away else []
+    assert costs == pytest.approx(sorted(costs))
+    for contact in found:
+        STEPS.supporting_surface(contact, 1e-9)  # refuses a sole that is not on one
         corners = contact.points_in_world + np.array([0.0, 0.0, 0.05])
         assert all(STEPS.nearest(corner)[1] > 0.01 for corner in corners)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manikin.planning.contacts.follow_guide_with_limbs import best_first
+from manikin.planning.contacts.endpoint import best_first
 
 COSTS = st.dictionaries(
     st.sampled_from("abcdef"), st.lists(st.floats(0.0, 5.0), min_size=1, max_size=4).map(sorted), min_size=1,

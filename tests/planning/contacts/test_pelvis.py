@@ -23,10 +23,7 @@ from manikin.planning.contacts import (
     Task,
     efort,
     find_candidates,
-    load_samples,
     sample_limbs,
-    samples_for,
-    save_samples,
 )
 from manikin.planning.contacts.contact_plan import footprint
 from manikin.planning.contacts.efort import MOST_RATIO
@@ -91,16 +88,12 @@ def test_why_a_pelvis_has_no_contact(generator, q, hindrance):
     assert answer.failure is hindrance, answer.message
 
 
-def test_a_pelvis_has_one_sample_and_a_limb_with_joints_as_many_as_asked_for(tmp_path):
+def test_a_pelvis_has_one_sample_and_a_limb_with_joints_as_many_as_asked_for():
     assert {name: len(item) for name, item in SAMPLES.items() if name != "pelvis"} == dict.fromkeys(
         ["left_arm", "right_arm", "left_leg", "right_leg"], 400
     )
     assert len(SAMPLES["pelvis"]) == 1
     assert SAMPLES["pelvis"].products.tolist() == np.zeros((1, 3, 3)).tolist()
-    save_samples(tmp_path / "samples.npz", SAMPLES, BODY)
-    assert len(load_samples(tmp_path / "samples.npz", BODY)["pelvis"]) == 1
-    found = samples_for(tmp_path / "samples.npz", BODY, np.random.default_rng(0), 400)
-    assert np.array_equal(found["pelvis"].positions, SAMPLES["pelvis"].positions)
 
 
 def test_efort_of_what_needs_no_torque_orders_by_the_normal_alone_and_stays_finite():

@@ -12,11 +12,8 @@ from manikin.planning.guide.guide import (
     GuideSettings,
     GuideTask,
     GuideWorld,
-    load_roadmap,
     offline_roadmap,
     plan_guide,
-    roadmap_for,
-    save_roadmap,
 )
 from manikin.planning.guide.guide_restarts import plan_guide_with_restarts
 from manikin.planning.guide.roadmap import RoadmapSettings, request
@@ -194,30 +191,10 @@ def test_route_is_the_shortest_way_of_the_roadmap(open_world, roadmap):
     assert len(roadmap.poses) == len(grown.poses) - 2
 
 
-def test_a_roadmap_is_reused_for_the_same_world_only(open_world, walled, roadmap, tmp_path):
-    file = tmp_path / "roadmap.npz"
-    save_roadmap(file, roadmap, open_world)
-    back = load_roadmap(file, open_world)
-    assert np.array_equal(back.poses, roadmap.poses)
-    assert sorted(back.graph.edges(data="turn_at")) == sorted(roadmap.graph.edges(data="turn_at"))
-    assert load_roadmap(file, walled) is None
-    one, two = (
-        plan_guide(open_world, GuideTask(START, GOAL), np.random.default_rng(1), item)
-        for item in (roadmap, back)
-    )
-    assert one.succeeded
-    assert np.array_equal(one.path.control_points, two.path.control_points)
-    assert one.statistics.samples == 0
-    assert np.array_equal(roadmap_for(file, open_world, np.random.default_rng(9)).poses, roadmap.poses)
-
-
-def test_a_broken_roadmap_file_is_told(open_world, tmp_path):
-    file = tmp_path / "roadmap.npz"
-    with pytest.raises(InputError, match="does not exist"):
-        load_roadmap(file, open_world)
-    file.write_bytes(b"not an archive")
-    with pytest.raises(InputError, match="cannot be read"):
-        load_roadmap(file, open_world)
+def test_a_roadmap_with_a_way_needs_no_further_poses(open_world, roadmap):
+    result = plan_guide(open_world, GuideTask(START, GOAL), np.random.default_rng(1), roadmap)
+    assert result.succeeded
+    assert result.statistics.samples == 0
 
 
 def test_pruning_and_shortcuts_never_take_longer(open_world, found):

@@ -63,9 +63,8 @@ def test_motion_stays_below_its_bounds(path):
         assert angles_between(poses[:-1], poses[1:]).sum() <= angle * (1.0 + 1e-6) + 1e-6
 
 
-@given(path=paths, shares=st.lists(st.floats(0.0, 1.0), min_size=1, max_size=5))
-def test_time_and_parameter_are_inverse(path, shares):
-    np.testing.assert_allclose(path.share_of(path.time_of(shares)), shares, atol=1e-9)
+@given(path=paths)
+def test_poses_are_held_before_the_start_and_after_the_end(path):
     assert angles_between(path.at_times(0.0)[0], path.start) < 1e-7
     np.testing.assert_allclose(
         path.at_times([-1.0, path.duration + 1.0])[:, :3], [path.start[:3], path.goal[:3]]

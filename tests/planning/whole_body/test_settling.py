@@ -9,12 +9,8 @@ from manikin.balance.friction import edges_in_world
 from manikin.contact import ContactSchedule, Stance, StanceSequence, grasp, sole
 from manikin.contact.stance import Phase
 from manikin.control.edge_forces import SLIDING_SPEED, sliding_edges
-from manikin.planning.whole_body.fit_targets import (
-    phase_knots,
-    settled_share,
-    settling_map,
-    touch_downs_at_speed,
-)
+from manikin.planning.whole_body.fit_job import phase_knots, touch_downs_at_speed
+from manikin.planning.whole_body.fit_targets import settled_share, settling_map
 
 FOOT = sole("left_foot", (0.0, 0.1, 0.0), length=0.26, width=0.1, friction=0.7)
 SEAT = sole("buttocks", (0.1, 0.0, 0.5), length=0.14, width=0.24, friction=0.4, settle=0.5)
@@ -44,7 +40,7 @@ def test_a_settling_contact_is_held_along_its_normal_first(share):
 def test_knots_lie_closer_around_a_touch_down_at_speed():
     sudden = touch_downs_at_speed(SCHEDULE)
     assert sudden == pytest.approx([1.0])
-    plain, fine = (np.unique(phase_knots(SCHEDULE.instants, 0.05, 5, s)) for s in ((), sudden))
+    plain, fine = (np.unique(phase_knots(SCHEDULE.instants, 0.05, s)) for s in ((), sudden))
     near = (fine > 0.95) & (fine < 1.05)
     assert near.sum() > ((plain > 0.95) & (plain < 1.05)).sum() + 2
     assert np.diff(fine).min() > 0.0

@@ -31,8 +31,7 @@ class Residual:
     Attributes:
         requirement: ``"balance margin"``, ``"support distance"``, ``"phase duration"``,
             ``"total duration"``, ``"start position"``, ... or the name of a geometric constraint.
-        value: Largest violation; negative is what is left to spare.
-        unit: Of the value.
+        value: Largest violation [``unit``]; negative is what is left to spare.
         phase: Where it happens, or None for the whole motion.
         time: When it happens [s], or None.
     """
@@ -61,8 +60,8 @@ class Residuals:
     Attributes:
         items: One entry per requirement.
         min_margin: Smallest margin [N.m] or [N].
-        limiting_phase: Phase in which it occurs.
-        limiting_time: Instant at which it occurs [s].
+        limiting_phase: Phase of the smallest margin.
+        limiting_time: Instant of the smallest margin [s].
         min_zmp_distance: Least distance of the ZMP to the edge of the support polygon, negative
             outside [m]; of the phases whose contacts lie in one plane, None without any.
     """
@@ -89,11 +88,7 @@ class Residuals:
         return all(item.value <= tolerance for item in self.items)
 
     def table(self, problem: CentroidalProblem) -> RequirementTable:
-        """The margin, the total duration, and the most violated of the other requirements.
-
-        Args:
-            problem: Whose requirements were measured.
-        """
+        """The margin, the total duration, and the most violated of the other requirements of a problem."""
         others = [item for item in self.items if item.requirement not in ("balance margin", "total duration")]
         worst = max(others, key=lambda item: item.severity, default=None)
         duration = next((item for item in self.items if item.requirement == "total duration"), None)
@@ -135,8 +130,10 @@ def phase_margins(
 ) -> list[FloatArray]:
     """Margin at the instants of :func:`phase_times`; at key instants in both polytopes [N.m] or [N]."""
     return [
-        np.concatenate([block.min(axis=1) for block in facet_margins(problem, trajectory, polytope, times)])
-        for polytope, times in zip(polytopes, phase_times(trajectory), strict=True)
+        np.concatenate(
+            [block.min(axis=1) for block in facet_margins(problem, trajectory, polytope, times, phase)]
+        )
+        for phase, (polytope, times) in enumerate(zip(polytopes, phase_times(trajectory), strict=True))
     ]
 
 
@@ -145,23 +142,21 @@ def facet_margins(
     trajectory: CentroidalTrajectory,
     polytope: WrenchPolytope,
     times: FloatArray,
+    phase: int,
 ) -> Iterator[FloatArray]:
-    """(up to 1024, facets) distances to every facet at the given times, in blocks [N.m] or [N]."""
+    """(up to 1024, facets) distances to every facet at the given times of a phase, in blocks [N.m] or [N]."""
     for start in range(0, len(times), _BLOCK):
         part = times[start : start + _BLOCK]
-        distances = polytope.distances(trajectory.pseudo_wrench(part, problem.reference))
+        distances = polytope.distances(trajectory.pseudo_wrench(part, problem.reference, phase))
         yield distances / row_slopes(polytope, problem, trajectory.position(part))
 
 
 def measure(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytopes: Sequence[WrenchPolytope]
 ) -> Residuals:
-    """Measure every requirement of ``problem`` on a trajectory.
+    """Measure every requirement of ``problem`` on any trajectory through as many phases.
 
-    Args:
-        problem: The requirements.
-        trajectory: Any trajectory through the same number of phases.
-        polytopes: W_i of the phases about ``problem.reference``.
+    The polytopes W_i of the phases are about ``problem.reference``.
     """
     times = phase_times(trajectory)
     margins = phase_margins(problem, trajectory, polytopes)
@@ -175,12 +170,11 @@ def measure(
         shortfall,
         *_end_residuals(problem, trajectory),
         *_position_residuals(problem, trajectory, times),
-        *_key_plane_residuals(problem, trajectory),
         *_duration_residuals(problem, trajectory),
     )
     zmp = least_zmp_distance(
-        (part.stance, trajectory.pseudo_wrench(instants))
-        for part, instants in zip(problem.sequence, times, strict=True)
+        (part.stance, trajectory.pseudo_wrench(instants, phase=number))
+        for number, (part, instants) in enumerate(zip(problem.sequence, times, strict=True))
     )
     return Residuals(items, lowest[phase], phase, time, zmp)
 
@@ -225,20 +219,13 @@ def _position_residuals(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, times: list[FloatArray]
 ) -> Iterator[Residual]:
     for requirement, excess in position_excess(problem, trajectory, times):
-        yield _worst(requirement, excess, times)
-
-
-def _key_plane_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:
+        phase = int(np.argmax([values.max() for values in excess]))
+        worst = int(np.argmax(excess[phase]))
+        yield Residual(requirement, float(excess[phase][worst]), "m", phase, float(times[phase][worst]))
     for index, plane in enumerate(problem.key_planes):
         time = float(trajectory.schedule.instants[plane.key])
         beyond = float(plane.violation(trajectory.position(time)))
         yield Residual(f"key plane {index} at T_{plane.key}", beyond, "m", plane.key - 1, time)
-
-
-def _worst(requirement: str, values: list[FloatArray], times: list[FloatArray]) -> Residual:
-    phase = int(np.argmax([value.max() for value in values]))
-    index = int(np.argmax(values[phase]))
-    return Residual(requirement, float(values[phase][index]), "m", phase, float(times[phase][index]))
 
 
 def _duration_residuals(problem: CentroidalProblem, trajectory: CentroidalTrajectory) -> Iterator[Residual]:

@@ -1,12 +1,9 @@
-"""Smooth geometric constraints on the CoM, written once for numbers and for CasADi symbols.
+"""Geometric constraints on the CoM: smooth ones for numbers and CasADi symbols, and planes at key instants.
 
-Also here. An upper bound of the CoM's height below an overhead obstacle, smooth in x and y. Planes beyond
-which the CoM must not be at one key instant.
-
-Where the body, with the CoM at (x, y), would reach below the obstacle, the CoM must not be
-higher than the body can fold to; away from it the bound rises smoothly to a height that no
-posture reaches.  [Qiu2012]_ 5.29 drew such a surface by hand and left its construction open
-(8.2.2); this is our own.
+Below an overhead obstacle the height of the CoM is bounded: where the body, with the CoM at (x, y), would
+reach below the obstacle, the CoM must not be higher than the body can fold to; away from it the bound rises
+smoothly to a height that no posture reaches.  [Qiu2012]_ 5.29 drew such a surface by hand and left its
+construction open (8.2.2); this is our own.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,11 +37,7 @@ class KeyPlane:
     offset: float
 
     def __init__(self, key: int, normal: ArrayLike, offset: float) -> None:
-        """Normalise the normal, and the offset with it.
-
-        Raises:
-            InputError: If the key is not at least 1, or the normal vanishes.
-        """
+        """Normalise the normal, and the offset with it."""
         vector = frozen_array(normal, "key plane normal", (3,))
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
@@ -142,12 +135,7 @@ class _Below:
 def height_band(
     lower: CoordinateFunction, upper: CoordinateFunction
 ) -> tuple[GeometricConstraint, GeometricConstraint]:
-    """The CoM between two surfaces ([Qiu2012]_ 5.29).
-
-    Args:
-        lower: Least height [m] at (x, y, z), such as a :class:`BentSurface`.
-        upper: Greatest height [m] at (x, y, z).
-    """
+    """The CoM between two heights [m] at (x, y, z), such as :class:`BentSurface` ([Qiu2012]_ 5.29)."""
     return (
         GeometricConstraint("height above the lower surface", _Above(lower)),
         GeometricConstraint("height below the upper surface", _Below(upper)),
@@ -199,11 +187,8 @@ class Zone:
     def share(self, x: Any, y: Any) -> Any:
         """1 inside, 0 beyond the onset of any edge, twice continuously differentiable between.
 
-        The product of the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` over the edges.
-
-        Args:
-            x: Floats, arrays or CasADi symbols [m].
-            y: The same.
+        The product of the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` over the edges, of floats, arrays or
+        CasADi symbols [m].
         """
         share = 1.0
         for normal, offset in zip(self.normals, self.offsets, strict=True):
@@ -254,14 +239,6 @@ class CeilingHeight:
 
 
 @dataclass(frozen=True)
-class _OverheadBelow:
-    surface: CeilingHeight
-
-    def __call__(self, x: Any, y: Any, z: Any) -> Any:
-        return z - self.surface(x, y)
-
-
-@dataclass(frozen=True)
 class _Outside:
     zone: Zone
 
@@ -270,21 +247,16 @@ class _Outside:
 
 
 def height_below(name: str, surface: CeilingHeight) -> GeometricConstraint:
-    """The CoM below the surface of one overhead obstacle.
-
-    Args:
-        name: Of the obstacle.
-        surface: Greatest height of the CoM.
-    """
-    return GeometricConstraint(f"height below '{name}'", _OverheadBelow(surface))
+    """The CoM below the greatest height that one overhead obstacle, of a name, allows."""
+    return GeometricConstraint(f"height below '{name}'", _Below(surface))
 
 
 def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
-    """The CoM outside a zone through which nothing passes, at any height.
+    """The CoM outside a zone through which nothing passes, at any height; half its onset counts as inside.
 
     Args:
-        name: Of the obstacle.
-        zone: Where the body would be below it; half the onset counts as inside.
+        name: Name of the obstacle.
+        zone: Where the body would be below it.
         reason: Why nothing passes, for the explanation of a failure.
     """
     return GeometricConstraint(f"way around '{name}'", _Outside(zone), reason)
@@ -292,8 +264,7 @@ def keep_out(name: str, zone: Zone, reason: str) -> GeometricConstraint:
 
 def _edge_normals(points: FloatArray) -> FloatArray:
     """(k, 2) outward normals of the edges of the convex hull of (n, 2) points."""
-    hull = ConvexHull(points)
-    return np.asarray(hull.equations[:, :2], dtype=np.float64)
+    return np.asarray(ConvexHull(points).equations[:, :2], dtype=np.float64)
 
 
 def _distinct(normals: FloatArray) -> FloatArray:

@@ -1,7 +1,4 @@
-"""What the timing-free method is asked: bodies, stances, bounds and weights ([Qiu2012]_ 5.4).
-
-Also here. The CoM trajectory: a clamped B-spline over normalised time with its contact schedule.
-"""
+"""The CoM trajectory, and the problem that asks for one: stances, bounds and weights ([Qiu2012]_ 5.4)."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -28,7 +25,7 @@ class CentroidalTrajectory(Displayed):
     derivatives are zero.
 
     Attributes:
-        mass: [kg].
+        mass: Mass of the body [kg].
         spline: B-spline on [0, 1] in three dimensions [m].
         schedule: Stances with their key instants [s]; the motion starts at 0.
         binding_until: A whole body must keep its CoM on the trajectory until then [s]; after
@@ -77,21 +74,21 @@ class CentroidalTrajectory(Displayed):
         """
         if self.turning is not None or other.turning is not None:
             raise SplineError("trajectories that turn cannot be joined; valid: those of point masses")
-        k, here, there = self.spline.degree, self.spline, other.spline
+        k, leading, following = self.spline.degree, self.spline, other.spline
         gaps = [
             float(np.abs(self._derivative(self.duration, d) - other._derivative(0.0, d)).max())
             for d in range(3)
         ]
-        if there.degree != k or max(gaps) > 1e-4:
+        if following.degree != k or max(gaps) > 1e-4:
             raise SplineError(
-                f"trajectories of degrees {k} and {there.degree} meet with gaps of {gaps[0]:.2g} m, "
+                f"trajectories of degrees {k} and {following.degree} meet with gaps of {gaps[0]:.2g} m, "
                 f"{gaps[1]:.2g} m/s and {gaps[2]:.2g} m/s^2; valid: one degree, and the second starts as the "
                 "first ends"
             )
         total = self.duration + other.duration
         first, second = (
-            here.knots * (self.duration / total),
-            1.0 - (1.0 - there.knots) * (other.duration / total),
+            leading.knots * (self.duration / total),
+            1.0 - (1.0 - following.knots) * (other.duration / total),
         )
         # Two continuous derivatives: the joint is k - 2 knots.
         joint = np.full(k - 2, self.duration / total)
@@ -100,11 +97,11 @@ class CentroidalTrajectory(Displayed):
         times = np.unique(np.concatenate([np.linspace(a, b, 4 * k) for a, b in itertools.pairwise(inner)]))
         before = times <= joint[0]
         wanted = np.concatenate([
-            here(np.clip(times[before] * total / self.duration, 0.0, 1.0)),
-            there(np.clip(1.0 - (1.0 - times[~before]) * total / other.duration, 0.0, 1.0)),
+            leading(np.clip(times[before] * total / self.duration, 0.0, 1.0)),
+            following(np.clip(1.0 - (1.0 - times[~before]) * total / other.duration, 0.0, 1.0)),
         ])  # fmt: skip
         spline = BSpline.fit(
-            k, knots, times, wanted, first=here.control_points[:1], last=there.control_points[-1:]
+            k, knots, times, wanted, first=leading.control_points[:1], last=following.control_points[-1:]
         )
         phases = (*self.schedule.sequence, *other.schedule.sequence)
         instants = np.concatenate([self.schedule.instants, self.duration + other.schedule.instants[1:]])
@@ -127,15 +124,25 @@ class CentroidalTrajectory(Displayed):
         """(..., 3) third derivative at each time [m/s^3] ([Qiu2012]_ 5.6)."""
         return self._derivative(time, 3)
 
-    def pseudo_wrench(self, time: ArrayLike, reference: ArrayLike | None = None) -> FloatArray:
+    def pseudo_wrench(
+        self, time: ArrayLike, reference: ArrayLike | None = None, phase: int | None = None
+    ) -> FloatArray:
         """(..., 6) ``[m (a - g); (p - o) x m (a - g) + Ldot]`` about ``reference`` o [N, N.m].
 
-        Moments are about the world origin when it is omitted.
-
-        [Qiu2012]_ 4.6 for a point mass, 4.51 with the rate of its angular momentum.
+        [Qiu2012]_ 4.6 for a point mass, 4.51 with the rate of its angular momentum; o is the world's origin
+        when omitted. A load of the phases moves with the CoM, at its offset from it; at a key instant that of
+        ``phase`` counts, or of the later one.
         """
         rate = None if self.turning is None else self.angular_momentum_rate(time)
-        return pseudo_wrench(self.mass, self.position(time), self.acceleration(time), rate, reference)
+        position, acceleration = self.position(time), self.acceleration(time)
+        wrench = pseudo_wrench(self.mass, position, acceleration, rate, reference)
+        times = np.asarray(time, dtype=np.float64)
+        phases = self.schedule.phase_at(times) if phase is None else np.full(times.shape, phase)
+        for number, item in enumerate(self.schedule.sequence):
+            if item.load is not None and np.any(rows := phases == number):
+                place = position[rows] + item.load.offset
+                wrench[rows] += pseudo_wrench(item.load.mass, place, acceleration[rows], None, reference)
+        return wrench
 
     def angular_momentum_rate(self, time: ArrayLike) -> FloatArray:
         """(..., 3) rate of the angular momentum about the CoM at each time [N.m]; zero for a point mass."""
@@ -154,16 +161,16 @@ class CentroidalTrajectory(Displayed):
             "knots": self.spline.knots.tolist(),
             "control_points_m": self.spline.control_points.tolist(),
             "key_instants_s": self.schedule.instants.tolist(),
-            **({} if turning is None else {"turning": _spline_dict(turning)}),
-        }
+            **({} if turning is None else {"turning": {
+                "degree": int(turning.degree),
+                "knots": turning.knots.tolist(),
+                "control_points_Nm": turning.control_points.tolist(),
+            }}),
+        }  # fmt: skip
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], sequence: StanceSequence) -> Self:
-        """Rebuild a trajectory written by :meth:`to_dict`.
-
-        Args:
-            data: The dictionary.
-            sequence: The stances, which the dictionary does not hold.
+        """Rebuild what :meth:`to_dict` wrote, with the stances, which the dictionary does not hold.
 
         Raises:
             InputError: If a key is missing.
@@ -175,8 +182,8 @@ class CentroidalTrajectory(Displayed):
             raise InputError(f"centroidal trajectory lacks {missing[0]!r}; valid keys: {', '.join(wanted)}")
         spline = BSpline(data["degree"], data["knots"], data["control_points_m"])
         schedule = ContactSchedule(sequence, data["key_instants_s"])
-        told = data.get("turning")
-        turning = None if told is None else BSpline(told["degree"], told["knots"], told["control_points_Nm"])
+        rate = data.get("turning")
+        turning = None if rate is None else BSpline(rate["degree"], rate["knots"], rate["control_points_Nm"])
         return cls(float(data["mass_kg"]), spline, schedule, turning=turning)
 
     def _derivative(self, time: ArrayLike, order: int) -> FloatArray:
@@ -185,14 +192,6 @@ class CentroidalTrajectory(Displayed):
         if order > 0:
             values = np.where(((t >= 0.0) & (t <= self.duration))[..., None], values, 0.0)
         return values
-
-
-def _spline_dict(spline: BSpline) -> dict[str, Any]:
-    return {
-        "degree": int(spline.degree),
-        "knots": spline.knots.tolist(),
-        "control_points_Nm": spline.control_points.tolist(),
-    }
 
 
 MarginSpace = Literal["wrench", "force", "wrench_about_origin"]
@@ -213,9 +212,9 @@ class Weights:
     its number of samples, in the limit of many. Its sum has no acceleration term.
 
     Attributes:
-        margin: [1/(N.m)] or [1/N].
-        smoothness: Of S as a whole.
-        duration: [1/s].
+        margin: Weight of d_min [1/(N.m)] or [1/N].
+        smoothness: Weight of S as a whole.
+        duration: Weight of T [1/s].
         velocity: Diagonal of Qv [s^2/m^2].
         acceleration: Diagonal of Qa [s^4/m^2].
         jerk: Diagonal of Qj [s^6/m^2].
@@ -242,24 +241,21 @@ class Weights:
 class CentroidalProblem:
     """A CoM trajectory to find through a sequence of stances ([Qiu2012]_ 5.18-5.28).
 
+    Velocities and accelerations at the ends are (3,), or None when free [m/s, m/s^2] (5.24-5.25).
+
     Attributes:
-        mass: [kg].
+        mass: Mass of the body [kg].
         sequence: Stances with the bounds of their durations.
         start_com: (3,) p_i [m] (5.22).
         goal_com: (3,) p_f [m] (5.23).
-        start_velocity: (3,) [m/s] (5.24), or None when free.
-        goal_velocity: (3,) [m/s] (5.25), or None when free.
-        start_acceleration: (3,) [m/s^2], or None when free.
-        goal_acceleration: (3,) [m/s^2], or None when free.
         degree: Degree of the spline, >= 3; it has ``phases + degree`` control points.
         margin_space: Whether the margin is a wrench [N.m] or a force at the CoM [N].
         required_margin: d_min must not be smaller (5.21) [N.m] or [N].
         support_distance: Largest distance of the CoM from every active contact (5.26) [m].
-        geometric: Further constraints on the CoM position.
         key_planes: Planes behind which the CoM must be at single key instants, neither the first nor the
             last, where the CoM is given.
-        max_duration: Of the whole motion [s].
-        weights: Of the objectives (5.28).
+        max_duration: Longest duration of the whole motion [s].
+        weights: Weights of the objectives (5.28).
         samples: n_s, balance is imposed at j = 0 ... n_s in every phase.
     """
 
@@ -309,10 +305,6 @@ class CentroidalProblem:
             "sequence": sequence,
             "start_com": frozen_array(start_com, "centroidal start_com [m]", (3,)),
             "goal_com": frozen_array(goal_com, "centroidal goal_com [m]", (3,)),
-            "start_velocity": _optional_vector(start_velocity, "start_velocity [m/s]"),
-            "goal_velocity": _optional_vector(goal_velocity, "goal_velocity [m/s]"),
-            "start_acceleration": _optional_vector(start_acceleration, "start_acceleration [m/s^2]"),
-            "goal_acceleration": _optional_vector(goal_acceleration, "goal_acceleration [m/s^2]"),
             "degree": _integer(degree, "degree", 3),
             "margin_space": margin_space,
             "required_margin": finite_number(required_margin, "centroidal required_margin", at_least=0.0),
@@ -323,6 +315,14 @@ class CentroidalProblem:
             "weights": Weights() if weights is None else weights,
             "samples": _integer(samples, "samples", 2),
         }
+        derivatives = {
+            "start_velocity": (start_velocity, "[m/s]"), "goal_velocity": (goal_velocity, "[m/s]"),
+            "start_acceleration": (start_acceleration, "[m/s^2]"),
+            "goal_acceleration": (goal_acceleration, "[m/s^2]"),
+        }  # fmt: skip
+        for name, (vector, unit) in derivatives.items():
+            known = None if vector is None else frozen_array(vector, f"centroidal {name} {unit}", (3,))
+            object.__setattr__(self, name, known)
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -349,10 +349,6 @@ class CentroidalProblem:
     def max_durations(self) -> FloatArray:
         """(phases,) upper bounds of the durations [s], infinite where there is none."""
         return np.array([np.inf if p.max_duration is None else p.max_duration for p in self.sequence])
-
-
-def _optional_vector(value: ArrayLike | None, name: str) -> FloatArray | None:
-    return None if value is None else frozen_array(value, f"centroidal {name}", (3,))
 
 
 def _inner_planes(planes: Sequence[KeyPlane], phases: int) -> tuple[KeyPlane, ...]:

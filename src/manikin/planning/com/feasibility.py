@@ -1,10 +1,10 @@
 """What can be said before solving: Propositions 1 and 2 and the ends of the motion ([Qiu2012]_ 5.4.3).
 
-Also here. Why a stance cannot work at all: friction too low for a slope, feet too far apart for the legs.
+A failure also says why a stance cannot work at all: friction too low for a slope, feet too far apart.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from manikin.balance.margin import force_levers, wrench_levers
 from manikin.contact import ContactKind, Stance, StanceSequence
 from manikin.errors import InputError
 from manikin.numerics.polytope import Polytope
-from manikin.numerics.spatial import GRAVITY, FloatArray, skew
+from manikin.numerics.spatial import GRAVITY, FloatArray, rows_about, skew
 from manikin.planning.com.com_problem import CentroidalProblem
 
 FIRM_FRICTION = 0.7
@@ -35,7 +35,8 @@ def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str
     """Say that the friction is too low to stand still on the slopes of a stance, or None."""
     if any(contact.kind is ContactKind.GRASP for contact in stance) or not len(stance):
         return None
-    steepness = [(_slope(contact.normal), contact) for contact in stance]
+    slopes = [float(np.arccos(np.clip(contact.normal[2], -1.0, 1.0))) for contact in stance]
+    steepness = list(zip(slopes, stance, strict=True))
     if not all(np.tan(angle) > contact.friction for angle, contact in steepness):
         return None
     try:
@@ -50,22 +51,14 @@ def slipping_slope(stance: Stance, polytope: WrenchPolytope, mass: float) -> str
     )
 
 
-def _slope(normal: FloatArray) -> float:
-    """Angle of a surface to the horizontal [rad]."""
-    return float(np.arccos(np.clip(normal[2], -1.0, 1.0)))
-
-
 def low_friction(
     stances: Sequence[Stance],
     problem: CentroidalProblem,
     measure: Callable[[Sequence[WrenchPolytope]], float],
 ) -> str:
-    """Say that a quantity would suffice with firm friction; empty when friction is not the cause.
+    """Say that a quantity of some stances would suffice with firm friction; empty when it is not the cause.
 
-    Args:
-        stances: What the quantity depends on.
-        problem: Where it occurs.
-        measure: The quantity from the stances' polytopes; it suffices above the required margin.
+    ``measure`` gives the quantity from the stances' polytopes; it suffices above the required margin.
     """
     least = least_friction(stances)
     if least >= FIRM_FRICTION:
@@ -89,13 +82,10 @@ def with_firm_friction(problem: CentroidalProblem) -> CentroidalProblem:
 
 
 def _firm(stance: Stance) -> Stance:
-    contacts = [
-        contact
-        if contact.kind is ContactKind.GRASP
-        else replace(contact, friction=max(contact.friction, FIRM_FRICTION))
-        for contact in stance
-    ]
-    return stance.with_contacts(contacts)
+    return stance.with_contacts([
+        c if c.kind is ContactKind.GRASP else replace(c, friction=max(c.friction, FIRM_FRICTION))
+        for c in stance
+    ])  # fmt: skip
 
 
 def out_of_reach(problem: CentroidalProblem, phase: int) -> str | None:
@@ -193,16 +183,14 @@ def intersection_radii(polytopes: Sequence[Polytope]) -> FloatArray:
     The thesis calls it the radius of the Chebyshev ball; the *inscribed* one is meant. An
     empty intersection has the (negative) radius by which the facets would have to move out.
 
-    Args:
-        polytopes: W_i of n phases.
-
     Returns:
-        (n - 1,).
+        (n - 1,) of the W_i of n phases.
     """
-    return np.array([
-        _largest_distance(both, np.ones(len(both)))
-        for both in (a.intersection(b) for a, b in itertools.pairwise(polytopes))
-    ])  # fmt: skip
+    return np.array([_largest_distance(both, np.ones(len(both))) for both in _intersections(polytopes)])
+
+
+def _intersections(polytopes: Sequence[Polytope]) -> Iterator[Polytope]:
+    return (a.intersection(b) for a, b in itertools.pairwise(polytopes))
 
 
 def margin_bounds(polytopes: Sequence[Polytope]) -> FloatArray:
@@ -214,16 +202,10 @@ def margin_bounds(polytopes: Sequence[Polytope]) -> FloatArray:
     bound is a linear programme in the wrench. It takes the place of the largest ball of Proposition 2
     ([Qiu2012]_ 5.4.3), which is about a fixed point. Like that one it is necessary, not sufficient.
 
-    Args:
-        polytopes: W_i of n phases, all about one point.
-
     Returns:
-        (n - 1,) [N.m]; negative when no wrench is in both polytopes.
+        (n - 1,) of the W_i of n phases about one point [N.m]; negative when no wrench is in both polytopes.
     """
-    return np.array([
-        _largest_distance(both, _least_lengths(both.H))
-        for both in (a.intersection(b) for a, b in itertools.pairwise(polytopes))
-    ])  # fmt: skip
+    return np.array([_largest_distance(both, _least_lengths(both.H)) for both in _intersections(polytopes)])
 
 
 def _least_lengths(H: FloatArray) -> FloatArray:
@@ -235,23 +217,19 @@ def _least_lengths(H: FloatArray) -> FloatArray:
 
 
 def assess_feasibility(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> Feasibility:
-    """Test everything that needs no optimisation.
+    """Test everything that needs no optimisation, from the W_i of the phases about ``problem.reference``.
 
-    Durations against their bounds, whether the legs reach the contacts of each phase, end points
-    against their bounds, whether any phase lifts the weight,
-    whether the friction holds the body at both ends, then emptiness of the
-    intersections (Proposition 1) and the bound of the margin in them against the required one
-    (Proposition 2), then whether any acceleration balances the CoM at the start and at the goal.
-
-    Args:
-        problem: What to find.
-        polytopes: W_i of the phases about ``problem.reference``.
+    Durations against their bounds, whether the legs reach the contacts of each phase, end points against
+    their bounds, whether any phase lifts the weight, whether the friction holds the body at both ends, then
+    emptiness of the intersections (Proposition 1) and the bound of the margin in them against the required
+    one (Proposition 2), then whether any acceleration balances the CoM at the start and at the goal.
     """
-    radii = _bounds(problem, polytopes)
+    radii, last = _bounds(problem, polytopes), len(problem.sequence) - 1
     failure = (
         _duration_failure(problem)
         or _reach_failure(problem)
-        or _end_failure(problem)
+        or misplaced(problem, problem.start_com, (0,), "start CoM")
+        or misplaced(problem, problem.goal_com, (last,), "goal CoM")
         or _weight_failure(problem, polytopes)
         or _slope_failure(problem, polytopes)
         or _intersection_failure(problem, radii)
@@ -264,12 +242,7 @@ def _bounds(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> FloatA
     """Upper bounds of the margin at the key instants; of forces only the sign counts."""
     if problem.margin_space != "wrench_about_origin":
         return margin_bounds(polytopes)
-    return intersection_radii([_about_origin(polytope, problem.reference) for polytope in polytopes])
-
-
-def _about_origin(polytope: Polytope, reference: FloatArray) -> Polytope:
-    H = polytope.H
-    return Polytope(np.hstack([H[:, :3] - np.cross(H[:, 3:], reference), H[:, 3:]]), polytope.h)
+    return intersection_radii([Polytope(rows_about(P.H, -problem.reference), P.h) for P in polytopes])
 
 
 def _largest_distance(polytope: Polytope, lengths: FloatArray) -> float:
@@ -277,8 +250,8 @@ def _largest_distance(polytope: Polytope, lengths: FloatArray) -> float:
     cost = np.zeros(polytope.dimension + 1)
     cost[-1] = -1.0
     rows = np.column_stack([polytope.H, lengths])
-    found = linprog(cost, rows, polytope.h, bounds=(None, None), method="highs")
-    return float(found.x[-1]) if found.success else np.inf
+    result = linprog(cost, rows, polytope.h, bounds=(None, None), method="highs")
+    return float(result.x[-1]) if result.success else np.inf
 
 
 def _duration_failure(problem: CentroidalProblem) -> Failure | None:
@@ -292,25 +265,34 @@ def _duration_failure(problem: CentroidalProblem) -> Failure | None:
     )
 
 
-def _end_failure(problem: CentroidalProblem) -> Failure | None:
-    last = len(problem.sequence) - 1
-    for name, phase, com in (("start", 0, problem.start_com), ("goal", last, problem.goal_com)):
-        limit = problem.support_distance
-        for contact in problem.sequence[phase].stance if limit is not None else ():
+def misplaced(
+    problem: CentroidalProblem, com: FloatArray, phases: Sequence[int], what: str, tolerance: float = ROUNDING
+) -> Failure | None:
+    """Failure of a CoM position that is too far from a contact or breaks a constraint, or None.
+
+    Args:
+        problem: Says what the position has to keep.
+        com: (3,) position [m].
+        phases: Phases in which it occurs.
+        what: The position in words.
+        tolerance: Largest violation that counts as none [m].
+    """
+    limit = problem.support_distance
+    for phase in phases if limit is not None else ():
+        for contact in problem.sequence[phase].stance:
             distance = float(np.linalg.norm(com - contact.position))
-            if limit is not None and distance > limit + ROUNDING:
+            if limit is not None and distance > limit + tolerance:
                 return Failure(
                     "support distance",
-                    f"{name} CoM is {distance:.3f} m from {contact.effector}, out of reach: "
+                    f"{what} is {distance:.3f} m from {contact.effector}, out of reach: "
                     f"the limit is {limit:.3f} m",
                     phase, where=contact.effector,
                 )  # fmt: skip
-        for constraint in problem.geometric:
-            violation = float(constraint.violation(com))
-            if violation > ROUNDING:
-                return Failure(
-                    constraint.name, f"{name} CoM violates '{constraint.name}' by {violation:.4f} m", phase
-                )
+    for constraint in problem.geometric:
+        violation = float(constraint.violation(com))
+        if violation > tolerance:
+            reason = f"{what} violates '{constraint.name}' by {violation:.4f} m"
+            return Failure(constraint.name, reason, phases[-1])
     return None
 
 
@@ -367,8 +349,8 @@ def _largest_lift(polytope: Polytope) -> float:
     """Largest upward force of any admissible wrench [N]."""
     cost = np.zeros(polytope.dimension)
     cost[2] = -1.0
-    found = linprog(cost, polytope.H, polytope.h, bounds=(None, None), method="highs")
-    return -float(found.fun) if found.success else np.inf
+    result = linprog(cost, polytope.H, polytope.h, bounds=(None, None), method="highs")
+    return -float(result.fun) if result.success else np.inf
 
 
 def _intersection_failure(problem: CentroidalProblem, radii: FloatArray) -> Failure | None:
@@ -432,8 +414,7 @@ def best_margin_at(
 ) -> float:
     """Largest margin at a CoM position over all accelerations, or with the given one.
 
-    At a fixed position the pseudo-wrench is linear in the acceleration, so this is a linear
-    programme.
+    At a fixed position the pseudo-wrench is linear in the acceleration: a linear programme.
     """
     slopes = row_slopes(polytope, problem, com)
     arm = com - problem.reference
@@ -441,14 +422,9 @@ def best_margin_at(
     gain = problem.mass * np.vstack([np.eye(3), skew(arm)])
     if acceleration is not None:
         return float(np.min((still - polytope.H @ gain @ acceleration) / slopes))
-    found = linprog(
-        [0.0, 0.0, 0.0, -1.0],
-        np.column_stack([polytope.H @ gain, slopes]),
-        still,
-        bounds=(None, None),
-        method="highs",
-    )
-    return float(found.x[-1]) if found.success else np.inf
+    rows = np.column_stack([polytope.H @ gain, slopes])
+    result = linprog([0.0, 0.0, 0.0, -1.0], rows, still, bounds=(None, None), method="highs")
+    return float(result.x[-1]) if result.success else np.inf
 
 
 def row_slopes(polytope: Polytope, problem: CentroidalProblem, com: FloatArray) -> FloatArray:
@@ -456,10 +432,7 @@ def row_slopes(polytope: Polytope, problem: CentroidalProblem, com: FloatArray) 
 
     Its length with moments about the CoM, or about the world origin; ``|H1 + H2 p^|`` for forces.
 
-    Args:
-        polytope: About ``problem.reference``.
-        problem: Says what the margin measures.
-        com: In the world [m].
+    The polytope is about ``problem.reference``; the problem says what the margin measures.
     """
     place = np.asarray(com, dtype=np.float64)
     point = np.zeros_like(place) if problem.margin_space == "wrench_about_origin" else place

@@ -1,10 +1,7 @@
-"""What the keyframe-based method is asked: a recording and what the motion has to keep ([Qiu2012]_ 5.3.1).
+"""The keyframe-based problem: a CoM recorded on stances, and what a motion has to keep ([Qiu2012]_ 5.3.1)."""
 
-Also here. A recorded CoM with the stances it was recorded on ([Qiu2012]_ 3.2.2, 5.3.1).
-"""
-
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,8 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from manikin.contact import ContactSchedule, Phase, StanceSequence
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
-from manikin.planning.com.com_constraints import GeometricConstraint
-from manikin.planning.com.com_problem import CentroidalProblem, MarginSpace, Weights
+from manikin.planning.com.com_problem import CentroidalProblem, Weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +47,7 @@ class RecordedCom:
             time: (n,) [s], increasing; any origin.
             com: (n, 3) [m].
             sequence: Stances, one per phase, each with at least one contact.
-            key_times: (phases + 1,) [s], where the support changes, with both ends; each is
-                moved to the nearest sample.
+            key_times: (phases + 1,) changes of the support, with both ends; moved to the nearest sample [s].
             angular_momentum_rate: (n, 3) about the CoM [N.m]; None where it is not known.
 
         Raises:
@@ -64,8 +59,17 @@ class RecordedCom:
         wanted = frozen_array(key_times, "recording key times [s]", (len(sequence) + 1,))
         _check_increasing(times, "recording time")
         _check_increasing(wanted, "recording key times")
-        _check_supported(sequence)
-        _check_inside(times, wanted)
+        for number, phase in enumerate(sequence):
+            if not len(phase.stance):
+                raise InputError(
+                    f"recording has no support in phase {number}; valid: at least one contact in every phase"
+                )
+        slack = float(np.median(np.diff(times)))
+        if wanted[0] < times[0] - slack or wanted[-1] > times[-1] + slack:
+            raise InputError(
+                f"recording lasts from {times[0]:g} to {times[-1]:g} s but its key times from "
+                f"{wanted[0]:g} to {wanted[-1]:g} s; valid: key times inside the recording"
+            )
         frames = np.array([int(np.argmin(np.abs(times - instant))) for instant in wanted])
         for index in np.flatnonzero(np.diff(frames) < 1):
             raise InputError(
@@ -73,18 +77,23 @@ class RecordedCom:
                 f"{wanted[index + 1]:g} s; valid: samples that are closer than the shortest phase"
             )
         kept = slice(frames[0], frames[-1] + 1)
-        instants = times[frames] - times[frames[0]]
+        durations = np.diff(times[frames] - times[frames[0]]).tolist()
         turning = angular_momentum_rate
         if turning is not None:
             turning = frozen_array(turning, "recording angular momentum rate [N.m]", (len(times), 3))
             turning = frozen_array(turning[kept], "recording angular momentum rate [N.m]")
+        key_frames = frames - frames[0]
+        key_frames.setflags(write=False)
         values = {
             "time": frozen_array(times[kept] - times[frames[0]], "recording time [s]"),
             "com": frozen_array(positions[kept], "recording com [m]"),
-            "key_frames": _frozen_indices(frames - frames[0]),
-            "sequence": _with_durations(sequence, np.diff(instants)),
+            "key_frames": key_frames,
+            "sequence": StanceSequence([
+                Phase(part.stance, lasting, lasting)
+                for part, lasting in zip(sequence, durations, strict=True)
+            ]),
             "angular_momentum_rate": turning,
-        }
+        }  # fmt: skip
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
@@ -110,34 +119,6 @@ def _check_increasing(times: FloatArray, name: str) -> None:
         raise InputError(f"{name} values {found}; valid: at least two, strictly increasing seconds")
 
 
-def _check_supported(sequence: StanceSequence) -> None:
-    for number, phase in enumerate(sequence):
-        if not len(phase.stance):
-            raise InputError(
-                f"recording has no support in phase {number}; valid: at least one contact in every phase"
-            )
-
-
-def _check_inside(times: FloatArray, key_times: FloatArray) -> None:
-    slack = float(np.median(np.diff(times)))
-    if key_times[0] < times[0] - slack or key_times[-1] > times[-1] + slack:
-        raise InputError(
-            f"recording lasts from {times[0]:g} to {times[-1]:g} s but its key times from "
-            f"{key_times[0]:g} to {key_times[-1]:g} s; valid: key times inside the recording"
-        )
-
-
-def _with_durations(sequence: StanceSequence, durations: FloatArray) -> StanceSequence:
-    pairs = zip(sequence, durations.tolist(), strict=True)
-    return StanceSequence([Phase(phase.stance, duration, duration) for phase, duration in pairs])
-
-
-def _frozen_indices(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    values = np.array(values, dtype=np.int64)
-    values.setflags(write=False)
-    return values
-
-
 EXTRA_CONTROL_POINTS = 7
 """Control points by default beyond the number of key frames: 16 for the 9 of [Qiu2012]_ 5.3.3."""
 
@@ -152,7 +133,7 @@ class KeyframeProblem:
     Attributes:
         recording: Samples, key frames and stances.
         requirements: What the motion has to keep, with the timing and the ends of the recording.
-        control_points: Of the spline, before key frames are added; each added one brings one more.
+        control_points: Their number before key frames are added; each added one brings one more.
         frame_spacing: Least distance of an added key frame from the others [s].
     """
 
@@ -166,58 +147,36 @@ class KeyframeProblem:
         mass: float,
         recording: RecordedCom,
         *,
-        degree: int = 5,
         control_points: int | None = None,
-        start_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
-        goal_velocity: ArrayLike | None = (0.0, 0.0, 0.0),
-        start_acceleration: ArrayLike | None = None,
-        goal_acceleration: ArrayLike | None = None,
-        required_margin: float = 0.0,
-        margin_space: MarginSpace = "wrench",
-        support_distance: float | None = None,
-        geometric: Sequence[GeometricConstraint] = (),
-        weights: Weights | None = None,
         frame_spacing: float = FRAME_SPACING,
+        **requirements: Any,
     ) -> None:
         """Put the problem together.
 
         Args:
-            mass: [kg].
+            mass: Mass of the body [kg].
             recording: Samples, key frames and stances.
-            degree: Of the spline, >= 3.
             control_points: At least one more than there are key frames and end conditions; the
                 number of key frames plus 7 when omitted.
-            start_velocity: (3,) [m/s] (5.15), or None when free.
-            goal_velocity: (3,) [m/s] (5.16), or None when free.
-            start_acceleration: (3,) [m/s^2], or None when free; needs a velocity too.
-            goal_acceleration: (3,) [m/s^2], or None when free; needs a velocity too.
-            required_margin: The whole motion has to keep it [N.m] or [N].
-            margin_space: What the margin measures.
-            support_distance: Largest distance of the CoM from every active contact [m].
-            geometric: Further constraints on the CoM position.
-            weights: Qv and Qj of the objective, and a Qa that the thesis does not have; those of
-                margin and duration play no part.
             frame_spacing: Least distance of an added key frame from the others [s].
+            requirements: Further arguments of :class:`CentroidalProblem`: degree, conditions at the ends (an
+                acceleration needs a velocity), margin, support distance, geometric constraints, and weights,
+                of which those of margin and duration play no part.
 
         Raises:
             InputError: If a value is not usable or there are too few control points.
         """
-        requirements = CentroidalProblem(
-            mass, recording.sequence, recording.com[0], recording.com[-1],
-            start_velocity=start_velocity, goal_velocity=goal_velocity,
-            start_acceleration=start_acceleration, goal_acceleration=goal_acceleration,
-            degree=degree, margin_space=margin_space, required_margin=required_margin,
-            support_distance=support_distance, geometric=geometric,
-            weights=Weights() if weights is None else weights,
-        )  # fmt: skip
+        asked = CentroidalProblem(
+            mass, recording.sequence, recording.com[0], recording.com[-1], **requirements
+        )
         frames = len(recording.key_frames)
         if control_points is None:
-            control_points = max(frames + EXTRA_CONTROL_POINTS, degree + 1)
-        _check_control_points(control_points, frames, requirements)
-        _check_weights(requirements.weights)
+            control_points = max(frames + EXTRA_CONTROL_POINTS, asked.degree + 1)
+        _check_control_points(control_points, frames, asked)
+        _check_weights(asked.weights)
         spacing = finite_number(frame_spacing, "keyframes frame_spacing [s]", above=0.0)
         values = {
-            "recording": recording, "requirements": requirements,
+            "recording": recording, "requirements": asked,
             "control_points": int(control_points), "frame_spacing": spacing,
         }  # fmt: skip
         for name, value in values.items():
@@ -231,7 +190,6 @@ class KeyframeProblem:
 
         Args:
             problem: Whose body, margin, constraints, weights and conditions at the ends are taken over.
-            recording: Samples, key frames and stances.
             control_points: The number of key frames plus 7 when omitted.
 
         Raises:

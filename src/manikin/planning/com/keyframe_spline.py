@@ -36,7 +36,6 @@ class KeyframeProgramme:
     with the margin d.
 
     Attributes:
-        degree: Of the spline.
         knots: (n + k + 2,) on [0, 1].
         equalities: (e, n + 1) E.
         values: (e, 3) [m].
@@ -62,6 +61,10 @@ class KeyframeProgramme:
     def objective(self, control_points: FloatArray) -> float:
         """Mean over time of the weighted squared derivatives of (n + 1, 3) control points."""
         return float(np.einsum("ia,aij,ja->", control_points, self.grams, control_points))
+
+    def spline(self, control_points: FloatArray) -> BSpline:
+        """Spline over [0, 1] of (n + 1, 3) control points."""
+        return BSpline(self.degree, self.knots, control_points)
 
     def margins(self, control_points: FloatArray) -> FloatArray:
         """(m,) margin of every balance row [N.m] or [N]."""
@@ -92,7 +95,15 @@ class KeyframeProgramme:
             SolverError: If the solver fails.
         """
         room = self._room()
-        points = room.points(room.most_margin()[0])
+        cost = np.zeros(room.basis.shape[1] + 1)
+        cost[-1] = -1.0
+        # The margin's unit makes its column as long as the others.
+        unit = 1.0 / float(np.median(room.slopes))
+        rows = np.column_stack([room.rows, unit * room.slopes])
+        result = linprog(cost, rows, room.bounds, bounds=(None, None), method="highs")
+        if not result.success:
+            raise SolverError(f"the linear programme of the key frames failed: {result.message}")
+        points = room.points(result.x[:-1])
         margins = self.margins(points)
         return points, float(margins.min()), int(np.argmin(margins))
 
@@ -131,20 +142,6 @@ class _Room:
         """(n + 1, 3) control points."""
         return self.particular + (self.basis @ y).reshape(3, -1).T
 
-    def most_margin(self) -> tuple[FloatArray, float]:
-        """Unknowns with the largest least margin, and that margin."""
-        cost = np.zeros(self.basis.shape[1] + 1)
-        cost[-1] = -1.0
-        # The margin's unit makes its column as long as the others.
-        unit = 1.0 / float(np.median(self.slopes))
-        found = linprog(
-            cost, np.column_stack([self.rows, unit * self.slopes]), self.bounds, bounds=(None, None),
-            method="highs",
-        )  # fmt: skip
-        if not found.success:
-            raise SolverError(f"the linear programme of the key frames failed: {found.message}")
-        return found.x[:-1], unit * float(found.x[-1])
-
 
 @dataclass(frozen=True, eq=False)
 class KeyframeSolution:
@@ -153,7 +150,7 @@ class KeyframeSolution:
     Attributes:
         control_points: (n + 1, 3) [m].
         multipliers: (m,) >= 0 of the balance rows.
-        iterations: Of the solver.
+        iterations: Iterations of the solver.
     """
 
     control_points: FloatArray
@@ -169,18 +166,26 @@ def build_keyframe_programme(
     positions: FloatArray,
     control_points: int,
 ) -> KeyframeProgramme:
-    """Write the programme of [Qiu2012]_ 5.3.2 for some key frames.
+    """Write the programme of [Qiu2012]_ 5.3.2 for (f,) times of key frames, both ends among them [s].
 
     Args:
         problem: Mass, degree, weights, margin and end conditions.
         polytopes: W_i of the phases about ``problem.reference``.
         schedule: Stances with their recorded instants [s].
-        times: (f,) key frames, both ends among them [s].
+        times: (f,) key frames [s].
         positions: (f, 3) CoM there [m].
-        control_points: Their number.
+        control_points: Number of control points.
     """
     duration = float(schedule.instants[-1])
-    ends = _end_conditions(problem, duration)
+    given = (
+        (problem.start_velocity, problem.start_acceleration),
+        (problem.goal_velocity, problem.goal_acceleration),
+    )
+    # First and second derivative over normalised time at both ends, where imposed.
+    ends = [
+        [value * duration**order for order, value in enumerate(pair, start=1) if value is not None]
+        for pair in given
+    ]
     knots = keyframe_knots(problem.degree, times / duration, control_points, *map(len, ends))
     k = problem.degree
     equalities = [basis_matrix(k, knots, np.minimum(times / duration, 1.0))]
@@ -212,9 +217,9 @@ def keyframe_knots(
     Args:
         degree: Degree k.
         key_frames: (f,) increasing, from 0 to 1.
-        control_points: At least f plus the numbers of derivatives.
+        control_points: At least f plus the numbers of derivatives imposed at start and goal.
         start_derivatives: Number of derivatives imposed at the start.
-        goal_derivatives: At the end.
+        goal_derivatives: Number of derivatives imposed at the goal.
 
     Returns:
         (control_points + degree + 1,).
@@ -228,34 +233,18 @@ def keyframe_knots(
     return clamped_knots(degree, [0.0, *inner, 1.0])
 
 
-def spline_of(programme: KeyframeProgramme, control_points: FloatArray) -> BSpline:
-    """Spline over [0, 1] of (n + 1, 3) control points."""
-    return BSpline(programme.degree, programme.knots, control_points)
-
-
-def _end_conditions(
-    problem: CentroidalProblem, duration: float
-) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
-    """First and second derivative over normalised time at both ends, where imposed."""
-    given = (
-        (problem.start_velocity, problem.start_acceleration),
-        (problem.goal_velocity, problem.goal_acceleration),
-    )
-    start, goal = (
-        tuple(value * duration**order for order, value in enumerate(pair, start=1) if value is not None)
-        for pair in given
-    )
-    return start, goal
+def quadrature(degree: int, knots: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Nodes on [0, 1] and weights, (n,) each, exact for squared derivatives of a spline."""
+    nodes, shares = np.polynomial.legendre.leggauss(degree)
+    breaks = np.unique(knots)
+    half = 0.5 * np.diff(breaks)[:, None]
+    return (breaks[:-1, None] + half * (1.0 + nodes)).ravel(), (half * shares).ravel()
 
 
 def _grams(problem: CentroidalProblem, knots: FloatArray, duration: float) -> FloatArray:
     """(3, n + 1, n + 1) matrices of the objective, by quadrature that is exact for the polynomials."""
     k, weights = problem.degree, problem.weights
-    nodes, shares = np.polynomial.legendre.leggauss(k)
-    breaks = np.unique(knots)
-    half = 0.5 * np.diff(breaks)[:, None]
-    times = (breaks[:-1, None] + half * (1.0 + nodes)).ravel()
-    share = (half * shares).ravel()
+    times, share = quadrature(k, knots)
     total = np.zeros((3, len(knots) - k - 1, len(knots) - k - 1))
     for order, diagonal in enumerate((weights.velocity, weights.acceleration, weights.jerk), start=1):
         basis = basis_matrix(k, knots, times, order) / duration**order

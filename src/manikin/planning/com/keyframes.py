@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from manikin.balance import WrenchPolytope
-from manikin.contact import ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com.com_certificate import (
     TOLERANCE,
@@ -29,19 +28,14 @@ from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajec
 from manikin.planning.com.feasibility import (
     VANISHING_MARGIN,
     Failure,
-    Feasibility,
     assess_feasibility,
     best_margin_at,
+    misplaced,
     polytopes_of,
 )
 from manikin.planning.com.keyframe_problem import KeyframeProblem
-from manikin.planning.com.keyframe_spline import (
-    KeyframeProgramme,
-    build_keyframe_programme,
-    phases_touching,
-    spline_of,
-)
-from manikin.planning.com.timing_free import CentroidalResult, limiting_at
+from manikin.planning.com.keyframe_spline import KeyframeProgramme, build_keyframe_programme, phases_touching
+from manikin.planning.com.timing_free import CentroidalResult, missed_margin
 
 MAX_ROUNDS = 30
 """Key frames that are tried before the method gives up."""
@@ -56,7 +50,7 @@ class KeyframeResult(CentroidalResult):
         frames: Samples of the recording that the trajectory passes, in order.
         added: Those among them that were added, in the order of their addition.
         least_margins: Least margin of the motion after each solution [N.m] or [N].
-        programme: Of the last solution; None when nothing was attempted.
+        programme: Programme of the last solution; None when nothing was attempted.
     """
 
     keyframes: KeyframeProblem
@@ -87,13 +81,7 @@ def plan_com_through_key_frames(problem: KeyframeProblem) -> KeyframeResult:
     Every programme is convex and solved to its one optimum; see
     :mod:`manikin.planning.com.keyframe_spline`. A trajectory that does not meet its own
     certificate, measured every millisecond, gets key frames until it does or no sample of the
-    recording is left that would help.
-
-    Args:
-        problem: What to find.
-
-    Returns:
-        A result that holds the trajectory or says which requirement could not be met.
+    recording is left that would help; then the result says which requirement could not be met.
     """
     return _Search(problem).run()
 
@@ -119,8 +107,11 @@ class _Search:
     def run(self) -> KeyframeResult:
         began = clock.perf_counter()
         self.polytopes = polytopes_of(self.problem.requirements)
-        feasibility = _assess(self.problem, self.polytopes)
-        failure, attempt = feasibility.failure, None
+        # Propositions 1 and 2 and the ends, then each recorded position by itself.
+        feasibility = assess_feasibility(self.problem.requirements, self.polytopes)
+        failure, attempt = feasibility.failure or _position_failure(self.problem), None
+        failure = failure or _key_frame_failure(self.problem, self.polytopes)
+        feasibility = replace(feasibility, failure=failure)
         if failure is None:
             first = tuple(self.problem.recording.key_frames.tolist())
             attempt = self._solve(first)
@@ -178,9 +169,8 @@ class _Search:
         )  # fmt: skip
 
     def _trajectory(self, programme: KeyframeProgramme, control_points: FloatArray) -> CentroidalTrajectory:
-        schedule = self.problem.recording.schedule
-        spline = spline_of(programme, control_points)
-        return CentroidalTrajectory(self.problem.requirements.mass, spline, schedule)
+        mass, schedule = self.problem.requirements.mass, self.problem.recording.schedule
+        return CentroidalTrajectory(mass, programme.spline(control_points), schedule)
 
     def _next_frame(self, attempt: _Attempt) -> int | None:
         """Sample nearest to the worst violation, among those far enough from all key frames."""
@@ -208,65 +198,38 @@ class _Search:
         points, margin, row = programme.most_margin()
         phase = int(programme.phases[row])
         time = float(self.problem.recording.time[frames[programme.frames[row]]])
-        trajectory = self._trajectory(programme, points)
-        limit = limiting_at(requirements, trajectory, self.polytopes[phase], time)
-        return Failure(
-            "balance margin",
+        what = (
             f"no spline of degree {programme.degree} with {len(points)} control points through the "
-            f"{len(frames)} key frames keeps the required margin at all of them: the largest is "
-            f"{margin:.2f} {requirements.margin_unit}, limited in phase {phase} at {time:.3f} s by "
-            f"{limit.description}; required {requirements.required_margin:.2f} {requirements.margin_unit}",
-            phase, time, limit.effector,
-        )  # fmt: skip
+            f"{len(frames)} key frames keeps the required margin at all of them: the largest is {margin:.2f}"
+        )
+        trajectory = self._trajectory(programme, points)
+        return missed_margin(requirements, trajectory, self.polytopes, phase, time, what)
 
     def _explain(self, attempt: _Attempt) -> Failure:
         """Name what the best attempt breaks between its key frames."""
-        unit, certificate = self.problem.requirements.margin_unit, attempt.certificate
+        certificate = attempt.certificate
         count = len(attempt.frames) - len(self.problem.recording.key_frames)
         tried = f"with {count} key frames added, and no further sample of the recording helps"
         worst = certificate.largest
         if worst.requirement != "balance margin":
             return Failure(worst.requirement, f"{worst} {tried}", worst.phase, worst.time)
-        polytope = self.polytopes[certificate.limiting_phase]
-        limit = limiting_at(
-            self.problem.requirements, attempt.trajectory, polytope, certificate.limiting_time
-        )
-        reason = (
-            f"the largest margin found is {certificate.min_margin:.2f} {unit}, limited in phase "
-            f"{certificate.limiting_phase} at {certificate.limiting_time:.3f} s by {limit.description}, "
-            f"{tried}; required {self.problem.requirements.required_margin:.2f} {unit}"
-        )
-        return Failure(
-            "balance margin", reason, certificate.limiting_phase, certificate.limiting_time, limit.effector
-        )
-
-
-def _assess(problem: KeyframeProblem, polytopes: Sequence[WrenchPolytope]) -> Feasibility:
-    """Propositions 1 and 2 and the ends, then each recorded position by itself."""
-    found = assess_feasibility(problem.requirements, polytopes)
-    failure = found.failure or _position_failure(problem) or _key_frame_failure(problem, polytopes)
-    return replace(found, failure=failure)
+        what = f"the largest margin found is {certificate.min_margin:.2f}"
+        return missed_margin(
+            self.problem.requirements, attempt.trajectory, self.polytopes, certificate.limiting_phase,
+            certificate.limiting_time, what, f", {tried}",
+        )  # fmt: skip
 
 
 def _position_failure(problem: KeyframeProblem) -> Failure | None:
     """Find a key frame whose recorded position breaks a constraint; passing it, the motion would as well."""
-    requirements, recording = problem.requirements, problem.recording
+    recording = problem.recording
     for number, frame in enumerate(recording.key_frames):
         time, com = float(recording.time[frame]), recording.com[frame]
-        phase = int(recording.schedule.phase_at(time))
         what = f"recorded CoM {np.round(com, 3).tolist()} of key frame {number} at {time:.3f} s"
-        for constraint in requirements.geometric:
-            violation = float(constraint.violation(com))
-            if violation > TOLERANCE:
-                reason = f"{what} violates '{constraint.name}' by {violation:.4f} m"
-                return Failure(constraint.name, reason, phase, time)
-        limit = requirements.support_distance
-        for index in phases_touching(recording.schedule, time) if limit is not None else ():
-            for contact in recording.sequence[index].stance:
-                distance = float(np.linalg.norm(com - contact.position))
-                if limit is not None and distance > limit + TOLERANCE:
-                    reason = f"{what} is {distance:.3f} m from {contact.effector}; the limit is {limit:.3f} m"
-                    return Failure("support distance", reason, index, time, contact.effector)
+        phases = phases_touching(recording.schedule, time)
+        failure = misplaced(problem.requirements, com, phases, what, TOLERANCE)
+        if failure is not None:
+            return replace(failure, time=time)
     return None
 
 
@@ -280,7 +243,9 @@ def _key_frame_failure(problem: KeyframeProblem, polytopes: Sequence[WrenchPolyt
             both = both.intersection(polytopes[phase])
         margin = best_margin_at(both, requirements, com, None)
         if margin <= max(requirements.required_margin, VANISHING_MARGIN):
-            held = _shared(schedule, phases)
+            stances = [schedule.sequence[phase].stance for phase in phases]
+            names = [name for name in stances[0].effectors if all(name in stance for stance in stances)]
+            held = ", ".join(names) or "no contact"
             return Failure(
                 "key frame balance",
                 f"recorded CoM {np.round(com, 3).tolist()} of key frame {number} at {time:.3f} s reaches a "
@@ -291,13 +256,6 @@ def _key_frame_failure(problem: KeyframeProblem, polytopes: Sequence[WrenchPolyt
     return None
 
 
-def _shared(schedule: ContactSchedule, phases: Sequence[int]) -> str:
-    """Contacts held in all of some phases."""
-    stances = [schedule.sequence[phase].stance for phase in phases]
-    names = [name for name in stances[0].effectors if all(name in stance for stance in stances)]
-    return ", ".join(names) or "no contact"
-
-
 def _measure(
     problem: KeyframeProblem,
     trajectory: CentroidalTrajectory,
@@ -305,13 +263,13 @@ def _measure(
     frames: Sequence[int],
 ) -> Residuals:
     """Measure the requirements every millisecond, and the distance from the recording at the key frames."""
-    found = measure(problem.requirements, trajectory, polytopes)
+    certificate = measure(problem.requirements, trajectory, polytopes)
     times = problem.recording.time[list(frames)]
     errors = np.linalg.norm(trajectory.position(times) - problem.recording.com[list(frames)], axis=1)
     worst = int(np.argmax(errors))
     phase = int(trajectory.schedule.phase_at(times[worst]))
     distance = Residual("key frame position", float(errors[worst]), "m", phase, float(times[worst]))
-    return replace(found, items=(*found.items, distance))
+    return replace(certificate, items=(*certificate.items, distance))
 
 
 def _violations(

@@ -2,21 +2,16 @@
 
 :func:`~manikin.planning.com.keyframes.plan_com_through_key_frames` passes the recorded positions exactly, as
 [Qiu2012]_ 5.3 does. Where a walk's supports last a tenth of a second, a centimetre of error asks for
-accelerations that no foot can give, and further key frames make it worse. Here the key frames pull, balance
-is imposed all along, and the motion is measured every millisecond. Where it strays from the recording,
-the sample that is farthest off becomes one more key frame. With the recorded rate of the angular momentum the
-plan keeps its balance twice: as a point mass, as in the thesis, and with a rate near the recorded one.
+accelerations that no foot can give, and further key frames make it worse. Here the key frames pull, and the
+motion is measured every millisecond. Where it strays from the recording, the sample that is farthest off
+becomes one more key frame.
 
-Also here. The quadratic programme of a CoM that stays near key frames and keeps its balance all the time.
-
-A recorded position is not exact, so that the one CoM that passes all of them may be out of balance where a
-person was not. Here the key frames pull instead, and balance is imposed every ten milliseconds: the
-pseudo-wrench ``m [a - g; p x (a - g)]`` ([Qiu2012]_ 4.6), bilinear in position and acceleration, is
-linearised about the last solution; the rows' lengths, which make the margin one about the CoM, are
-those at the last solution. Where the recorded rate of the angular momentum is known, the plan has
-one too, near it, and both wrenches keep their balance: that of the point mass and that of the body which
-turns ([Qiu2012]_ 4.51). More margin than has to be kept is wished for, and what lacks of it is paid for.
-All this is our own.
+Balance is imposed every ten milliseconds by a quadratic programme: the pseudo-wrench ``m [a - g; p x (a -
+g)]`` ([Qiu2012]_ 4.6), bilinear in position and acceleration, is linearised about the last solution; the
+rows' lengths, which make the margin one about the CoM, are those at the last solution. Where the recorded
+rate of the angular momentum is known, the plan has one too, near it, and both wrenches keep their balance:
+that of the point mass, as in the thesis, and that of the body which turns ([Qiu2012]_ 4.51). More margin than
+has to be kept is wished for, and what lacks of it is paid for. All this is our own.
 """
 
 import time as clock
@@ -38,6 +33,7 @@ from manikin.planning.com.com_certificate import TOLERANCE, Residuals, measure, 
 from manikin.planning.com.com_problem import CentroidalProblem, CentroidalTrajectory, Weights
 from manikin.planning.com.feasibility import Failure, Feasibility, assess_feasibility, polytopes_of
 from manikin.planning.com.keyframe_problem import KeyframeProblem, RecordedCom
+from manikin.planning.com.keyframe_spline import quadrature
 from manikin.planning.com.timing_free import CentroidalResult
 
 DEGREE = 5
@@ -83,7 +79,7 @@ class NearProgramme:
     """Everything about the programme that does not depend on the last solution.
 
     Attributes:
-        mass: [kg].
+        mass: Mass of the body [kg].
         reference: (3,) point of the polytopes' moments [m].
         polytopes: W_i of the phases about ``reference``.
         knots: On [0, 1].
@@ -109,22 +105,19 @@ class NearProgramme:
     def of(
         cls, mass: float, polytopes: Sequence[WrenchPolytope], recording: RecordedCom, weights: Weights
     ) -> "NearProgramme":
-        """Lay out knots and instants.
+        """Lay out knots and instants for polytopes W_i of the phases about one point; the mass is in kg.
 
-        Args:
-            mass: [kg].
-            polytopes: W_i of the phases about one point.
-            recording: Stances with their instants, from 0 on, and the rate of the angular momentum.
-            weights: Of velocity, acceleration and jerk; the first entry of each counts for all three axes.
+        Of the weights, those of velocity, acceleration and jerk count, the first entry for all three axes.
         """
         schedule = recording.schedule
         duration = float(schedule.instants[-1])
         spans = max(1, round(duration / KNOT_SPACING))
         knots = clamped_knots(DEGREE, np.linspace(0.0, 1.0, spans + 1))
+        costs = {1: weights.velocity[0], 2: weights.acceleration[0], 3: weights.jerk[0]}
         times, phases = _instants(schedule)
         shares = np.minimum(times / duration, 1.0)
         return cls(
-            mass, polytopes[0].reference, tuple(polytopes), knots, _smoothness(knots, duration, weights),
+            mass, polytopes[0].reference, tuple(polytopes), knots, _squared(knots, duration, costs),
             _turning(knots, duration, recording), phases,
             basis_matrix(DEGREE, knots, shares), basis_matrix(DEGREE, knots, shares, 2) / duration**2,
         )  # fmt: skip
@@ -138,11 +131,9 @@ class NearProgramme:
         return None if self.turning is None else BSpline(DEGREE, self.knots, TURN * points[:, 3:])
 
     def free(self, shares: FloatArray, wanted: FloatArray) -> FloatArray:
-        """(n, 3 or 6) control points without regard to balance; the last three of the turning.
+        """(n, 3 or 6) control points near (f, 3) ``wanted`` [m] at (f,) ``shares`` of [0, 1], unbalanced.
 
-        Args:
-            shares: (f,) key frames on [0, 1].
-            wanted: (f, 3) CoM there [m].
+        The last three of six are those of the turning.
         """
         solved = [np.linalg.solve(q, -line) for q, line in self._objectives(shares, wanted)]
         return np.asarray(np.hstack(solved), dtype=np.float64)
@@ -195,7 +186,8 @@ class NearProgramme:
             bound = polytope.h - margin[phase] * length + by_acceleration @ gravity + moment @ np.cross(p, b)
             still = bound - by_acceleration @ (b + gravity) - by_position @ p
             bound += by_position @ self.reference
-            for turn in self._turns(polytope):
+            # Derivatives (facets, 3) by the turning: None of the point mass, those of the body that turns.
+            for turn in (None,) if self.turning is None else (None, TURN * polytope.H[:, 3:]):
                 room = still - (0.0 if turn is None else turn @ (self.position[row] @ near[:, 3:]))
                 chosen = np.argsort(room / length, kind="stable")[:FACETS]
                 block = (
@@ -219,10 +211,6 @@ class NearProgramme:
                 bounds.append((bound[chosen] - spare * length[chosen]) / scale)
         return sparse.vstack(blocks).tocsc(), np.concatenate(bounds)
 
-    def _turns(self, polytope: WrenchPolytope) -> list[FloatArray | None]:
-        """Derivatives (facets, 3) by the turning: None of the point mass, those of the body that turns."""
-        return [None] if self.turning is None else [None, TURN * polytope.H[:, 3:]]
-
 
 def _instants(schedule: ContactSchedule) -> tuple[FloatArray, np.ndarray]:
     times, phases = [], []
@@ -245,18 +233,9 @@ def _turning(
     return pull @ basis + bend, -pull @ recording.angular_momentum_rate / TURN
 
 
-def _smoothness(knots: FloatArray, duration: float, weights: Weights) -> FloatArray:
-    """(n, n) objective of the CoM's derivatives, the first entry of each weight."""
-    kinds = (weights.velocity, weights.acceleration, weights.jerk)
-    return _squared(knots, duration, {order: kind[0] for order, kind in enumerate(kinds, start=1)})
-
-
 def _squared(knots: FloatArray, duration: float, costs: Mapping[int, float]) -> FloatArray:
     """(n, n) mean over time of the weighted squared derivatives by order, exact for the polynomials."""
-    nodes, shares = np.polynomial.legendre.leggauss(DEGREE)
-    breaks = np.unique(knots)
-    half = 0.5 * np.diff(breaks)[:, None]
-    times, share = (breaks[:-1, None] + half * (1.0 + nodes)).ravel(), (half * shares).ravel()
+    times, share = quadrature(DEGREE, knots)
     total = np.zeros((len(knots) - DEGREE - 1,) * 2)
     for order, cost in costs.items():
         basis = basis_matrix(DEGREE, knots, times, order) / duration**order
@@ -344,7 +323,8 @@ class _Search:
         feasibility = assess_feasibility(self.problem.requirements, self.polytopes)
         failure, best = _hopeless(feasibility), None
         if failure is None:
-            best = self._best()
+            # The nearest of the balanced attempts, each with more key frames than the one before.
+            best = min(self._attempts(), key=self._order, default=None)
             failure = self._explain(best)
         succeeded = best is not None and failure is None
         distance = np.full(len(self.recording.time), np.nan) if best is None else self._distance(best)
@@ -358,14 +338,6 @@ class _Search:
             rounds=self.rounds, wall_time=clock.perf_counter() - began, keyframes=self.problem, frames=frames,
             added=tuple(frame for frame in frames if frame not in changes), distance=distance,
         )  # fmt: skip
-
-    def _best(self) -> _Attempt | None:
-        """The nearest of the balanced attempts, each with more key frames than the one before."""
-        best = None
-        for attempt in self._attempts():
-            if best is None or self._order(attempt) < self._order(best):
-                best = attempt
-        return best
 
     def _attempts(self) -> Iterator[_Attempt]:
         frames, start = tuple(self.recording.key_frames.tolist()), None
@@ -391,11 +363,11 @@ class _Search:
         margin, attempt = np.full(len(self.polytopes), required + SPARE), None
         for _ in range(LINEARISATIONS):
             self.rounds += 1
-            found = self.programme.solve(shares, wanted, margin, points)
-            if found is None:
+            solution = self.programme.solve(shares, wanted, margin, points)
+            if solution is None:
                 return attempt
-            moved = float(np.abs(found[0] - points).max())
-            points, self.iterations = found[0], self.iterations + found[1]
+            moved = float(np.abs(solution[0] - points).max())
+            points, self.iterations = solution[0], self.iterations + solution[1]
             if moved > STILL:
                 continue
             attempt = self._measured(frames, points)
@@ -417,9 +389,9 @@ class _Search:
         return _Attempt(frames, points, trajectory, problem, worst)
 
     def _margins(self, attempt: _Attempt) -> list[FloatArray]:
-        """Of each phase, the lesser ones of the point mass and of the body that turns."""
-        found = [phase_margins(attempt.problem, way, self.polytopes) for way in _ways(attempt.trajectory)]
-        return [np.minimum.reduce(margins) for margins in zip(*found, strict=True)]
+        """Margins of each phase, the lesser of the point mass and of the body that turns [N.m]."""
+        both = [phase_margins(attempt.problem, way, self.polytopes) for way in _ways(attempt.trajectory)]
+        return [np.minimum.reduce(margins) for margins in zip(*both, strict=True)]
 
     def _distance(self, attempt: _Attempt) -> FloatArray:
         offset = attempt.trajectory.position(self.recording.time) - self.recording.com
@@ -427,13 +399,13 @@ class _Search:
 
     def _straying(self, attempt: _Attempt) -> list[int]:
         """The farthest sample between each two key frames, where it is too far off and not too near them."""
-        distance, time, found = self._distance(attempt), self.recording.time, []
+        distance, time, frames = self._distance(attempt), self.recording.time, []
         for before, after in zip(attempt.frames[:-1], attempt.frames[1:], strict=True):
             away = np.minimum(time - time[before], time[after] - time)
             usable = np.where(away >= self.problem.frame_spacing - TOLERANCE, distance, 0.0)
             if usable.max() > STRAY:
-                found.append(int(np.argmax(usable)))
-        return found
+                frames.append(int(np.argmax(usable)))
+        return frames
 
     def _explain(self, best: _Attempt | None) -> Failure | None:
         if best is None:
@@ -447,7 +419,7 @@ class _Search:
 
 
 def _ways(trajectory: CentroidalTrajectory) -> tuple[CentroidalTrajectory, ...]:
-    """The trajectory, and without its turning."""
+    """The trajectory, and the same without its turning."""
     return (trajectory,) if trajectory.turning is None else (trajectory, replace(trajectory, turning=None))
 
 

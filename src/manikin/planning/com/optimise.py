@@ -1,8 +1,6 @@
 """One optimisation of the timing-free method: from a guess to a measured attempt.
 
-Also here. Which facets of the polytopes the optimisation has to know about.
-
-Far from all facets ever limit a motion: near an upright stance those of friction and of the
+By far not all facets of the polytopes limit a motion: near an upright stance those of friction and of the
 normal-force cap are hundreds of newtons away. The programme is given the nearest ones only,
 and every solution is measured against all of them; facets found violated are added and the
 programme is solved again (constraint generation).
@@ -40,8 +38,11 @@ def facet_distances(
 ) -> list[FloatArray]:
     """Least distance of the pseudo-wrench from every facet of each phase [N.m] or [N]."""
     return [
-        np.min([block.min(axis=0) for block in facet_margins(problem, trajectory, polytope, times)], axis=0)
-        for polytope, times in zip(polytopes, phase_times(trajectory), strict=True)
+        np.min(
+            [block.min(axis=0) for block in facet_margins(problem, trajectory, polytope, times, phase)],
+            axis=0,
+        )
+        for phase, (polytope, times) in enumerate(zip(polytopes, phase_times(trajectory), strict=True))
     ]
 
 
@@ -53,11 +54,11 @@ def nearest_facets(distances: Sequence[FloatArray], count: int = FIRST_COUNT) ->
 def with_violated(
     chosen: FacetIndices, distances: Sequence[FloatArray], margin: float, step: int = FIRST_COUNT // 2
 ) -> FacetIndices:
-    """Add to each phase its nearest left-out facets, up to ``step``, that are nearer than ``margin``.
+    """Add to each phase up to ``step`` nearest facets left out so far if one is nearer than ``margin``.
 
     Args:
         chosen: Facets of the last programme.
-        distances: Of its solution, from :func:`facet_distances`.
+        distances: Distances of its solution, see :func:`facet_distances` [N.m] or [N].
         margin: Distance that all facets should keep [N.m] or [N].
         step: Number of facets that a phase with a violation receives.
     """
@@ -71,7 +72,10 @@ def with_violated(
 
 
 SHORTFALL_WEIGHT = 20.0
-"""First exact penalty of a margin below the required one [1/(N.m)] or [1/N]."""
+"""Exact penalty of a margin below the required one [1/(N.m)] or [1/N]."""
+
+DURATION_ROOM = 1e-7
+"""Distance kept from the total duration [s]."""
 
 LONGEST_PHASE = 20.0
 """Bound of a phase's duration where the problem gives none [s]; without it waiting has no end."""
@@ -84,14 +88,10 @@ class MarginTargets:
     Attributes:
         margin: Smallest margin [N.m] or [N].
         position: Distance kept from the geometric constraints and the support distance [m].
-        duration: Distance kept from the total duration [s].
-        shortfall_weight: Penalty of a smaller margin [1/(N.m)] or [1/N].
     """
 
     margin: float
     position: float = 3e-4
-    duration: float = 1e-7
-    shortfall_weight: float = SHORTFALL_WEIGHT
 
     @classmethod
     def of(cls, problem: CentroidalProblem) -> "MarginTargets":
@@ -109,9 +109,9 @@ class MarginTargets:
 
     def grown(self, problem: CentroidalProblem, certificate: Residuals) -> "MarginTargets":
         """Targets that make up for what the last solution broke between its samples."""
-        positions = ["support distance"] if problem.support_distance is not None else []
-        positions += [constraint.name for constraint in problem.geometric]
-        position = max((certificate[name].value for name in positions), default=0.0)
+        names = ["support distance"] if problem.support_distance is not None else []
+        names += [constraint.name for constraint in problem.geometric]
+        position = max((certificate[name].value for name in names), default=0.0)
         return replace(
             self,
             margin=self.margin + 1.2 * max(certificate["balance margin"].value, 0.0),
@@ -125,10 +125,9 @@ class Attempt:
 
     Attributes:
         trajectory: Whatever the solver ended with.
-        certificate: Its residuals.
         bezier: (phases, k + 1, 3) Bezier points [m], to start again from.
         durations: (phases,) [s].
-        iterations: Of the solver.
+        iterations: Iterations of the solver.
         margin: d_min at the samples over the imposed facets [N.m] or [N].
         converged: Whether the solver reports an optimum.
     """
@@ -143,12 +142,7 @@ class Attempt:
 
 
 def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> ComProgram:
-    """The compiled optimisation of a problem, shared by all problems of the same structure.
-
-    Args:
-        problem: What to find.
-        facets: Indices of the facets imposed in each phase.
-    """
+    """The compiled optimisation of a problem, shared by all problems of the same structure."""
     return transcribe(
         ComStructure(
             degree=problem.degree,
@@ -159,6 +153,7 @@ def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> ComProg
             geometric=tuple(constraint.function for constraint in problem.geometric),
             limited_distance=problem.support_distance is not None,
             key_planes=tuple(plane.key for plane in problem.key_planes),
+            loaded=tuple(number for number, phase in enumerate(problem.sequence) if phase.load is not None),
         )
     )
 
@@ -171,25 +166,25 @@ def optimise(
     bezier: FloatArray,
     durations: FloatArray,
 ) -> Attempt:
-    """Run the solver once from the given Bezier points and durations.
+    """Run the solver once from Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s].
 
     Args:
         problem: What to find.
         polytopes: W_i of the phases about ``problem.reference``.
         facets: Indices of the facets imposed in each phase.
         targets: Bounds used at the samples.
-        bezier: (phases, k + 1, 3) [m].
-        durations: (phases,) [s].
+        bezier: Where to begin.
+        durations: Where to begin.
     """
     programme = build_programme(problem, facets)
-    lower, upper = _unknown_bounds(programme, problem, targets)
+    lower, upper = _unknown_bounds(programme, problem)
     row_lower, row_upper = _row_bounds(programme, problem, targets)
     unknowns = programme.pack_unknowns(
         bezier - problem.reference, durations, float(durations.sum()), problem.required_margin, 10.0
     )
     solution = programme.solver(
         x0=np.clip(unknowns, lower, upper),
-        p=programme.pack_parameters(_parameters(problem, polytopes, facets, targets)),
+        p=programme.pack_parameters(_parameters(problem, polytopes, facets)),
         lbx=lower, ubx=upper, lbg=row_lower, ubg=row_upper,
     )  # fmt: skip
     local, durations, margin = programme.unpack_unknowns(np.asarray(solution["x"], dtype=np.float64).ravel())
@@ -203,20 +198,14 @@ def optimise(
 
 
 def _parameters(
-    problem: CentroidalProblem,
-    polytopes: Sequence[WrenchPolytope],
-    facets: FacetIndices,
-    targets: MarginTargets,
+    problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], facets: FacetIndices
 ) -> dict[str, object]:
     weights, reference = problem.weights, problem.reference
     values: dict[str, object] = {
-        "mass": problem.mass,
-        "weights": (weights.margin, weights.smoothness, weights.duration, targets.shortfall_weight),
-        "velocity": weights.velocity,
-        "acceleration": weights.acceleration,
-        "jerk": weights.jerk,
-        "reference": reference,
-    }
+        "mass": problem.mass, "reference": reference,
+        "weights": (weights.margin, weights.smoothness, weights.duration, SHORTFALL_WEIGHT),
+        "velocity": weights.velocity, "acceleration": weights.acceleration, "jerk": weights.jerk,
+    }  # fmt: skip
     for name in ("start_velocity", "start_acceleration", "goal_velocity", "goal_acceleration"):
         value = getattr(problem, name)
         values[name] = np.zeros(3) if value is None else value
@@ -224,30 +213,26 @@ def _parameters(
         # About the world origin the rows have one length all along; then they are given with length 1.
         fixed = problem.margin_space == "wrench_about_origin"
         length = row_slopes(polytope, problem, problem.start_com)[rows] if fixed else np.ones(len(rows))
-        values[f"H{index}"], values[f"h{index}"] = (
-            polytope.H[rows] / length[:, None],
-            polytope.h[rows] / length,
-        )
+        values[f"H{index}"] = polytope.H[rows] / length[:, None]
+        values[f"h{index}"] = polytope.h[rows] / length
         values[f"contacts{index}"] = [contact.position - reference for contact in phase.stance]
+    for index, phase in enumerate(problem.sequence):
+        if phase.load is not None:
+            values[f"load{index}"] = (phase.load.mass, *phase.load.offset)
     for index, plane in enumerate(problem.key_planes):
-        values[f"normal{index}"], values[f"offset{index}"] = (
-            plane.normal,
-            plane.offset - plane.normal @ reference,
-        )
+        values[f"normal{index}"] = plane.normal
+        values[f"offset{index}"] = plane.offset - plane.normal @ reference
     return values
 
 
-def _unknown_bounds(
-    programme: ComProgram, problem: CentroidalProblem, targets: MarginTargets
-) -> tuple[FloatArray, FloatArray]:
+def _unknown_bounds(programme: ComProgram, problem: CentroidalProblem) -> tuple[FloatArray, FloatArray]:
     phases, k = programme.structure.phases, programme.structure.degree
     points = np.full((phases, k + 1, 3), np.inf)
     low, high = -points, points.copy()
     for bound in (low, high):
-        bound[0, 0], bound[-1, -1] = (
-            end - problem.reference for end in (problem.start_com, problem.goal_com)
-        )
-    total = np.inf if problem.max_duration is None else problem.max_duration - targets.duration
+        bound[0, 0] = problem.start_com - problem.reference
+        bound[-1, -1] = problem.goal_com - problem.reference
+    total = np.inf if problem.max_duration is None else problem.max_duration - DURATION_ROOM
     lower = programme.pack_unknowns(low, problem.min_durations, 0.0, -np.inf, 0.0)
     longest = np.maximum(LONGEST_PHASE, 2.0 * problem.min_durations)
     upper = programme.pack_unknowns(high, np.minimum(problem.max_durations, longest), total, np.inf, np.inf)
@@ -289,16 +274,8 @@ def trajectory_of(
     durations = np.clip(durations, problem.min_durations, problem.max_durations)
     spline = spline_from_bezier(
         bezier, durations,
-        start=_given(problem.start_com, problem.start_velocity, problem.start_acceleration),
-        goal=_given(problem.goal_com, problem.goal_velocity, problem.goal_acceleration),
+        start=(problem.start_com, problem.start_velocity, problem.start_acceleration),
+        goal=(problem.goal_com, problem.goal_velocity, problem.goal_acceleration),
     )  # fmt: skip
     instants = np.concatenate([[0.0], np.cumsum(durations)])
     return CentroidalTrajectory(problem.mass, spline, ContactSchedule(problem.sequence, instants))
-
-
-def _given(
-    position: FloatArray, velocity: FloatArray | None, acceleration: FloatArray | None
-) -> tuple[FloatArray, ...]:
-    if velocity is None:
-        return (position,)
-    return (position, velocity) if acceleration is None else (position, velocity, acceleration)

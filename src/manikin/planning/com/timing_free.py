@@ -1,6 +1,6 @@
 """The timing-free method: CoM trajectory, durations and margin in one optimisation ([Qiu2012]_ 5.4).
 
-Also here. First trajectory for the optimisation: of a pendulum on the supports, or through their centres.
+It starts from the path of a pendulum on the supports, or from one through their centres.
 """
 
 import itertools
@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import linprog
 
 from manikin.balance import LimitingConstraint, WrenchPolytope
-from manikin.contact import ContactKind, Stance
+from manikin.contact import ContactKind
 from manikin.numerics.spatial import GRAVITY, GRAVITY_VECTOR, FloatArray, skew
 from manikin.numerics.spline import BSpline, clamped_knots, end_control_points, start_control_points
 from manikin.planning.com.com_certificate import Residuals, measure
@@ -58,10 +58,10 @@ INFEASIBLE = 2
 """Status of a linear programme without a solution."""
 
 GUESS_STYLES = (GuessStyle(0.5, 1.5), GuessStyle(0.3, 1.2), GuessStyle(0.7, 2.5))
-"""Of any motion."""
+"""Ways of guessing any motion."""
 
 PENDULUM = GuessStyle(None, 1.5)
-"""Of a body on its feet, before the others."""
+"""Way of guessing the motion of a body on its feet, tried before the others."""
 
 _PENDULUM_SAMPLES = 5
 _JERK_TIME = 0.02
@@ -78,13 +78,7 @@ def guess_styles(problem: CentroidalProblem) -> tuple[GuessStyle, ...]:
 def guess(
     problem: CentroidalProblem, style: GuessStyle, polytopes: Sequence[WrenchPolytope]
 ) -> tuple[FloatArray, FloatArray]:
-    """Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s] to start from.
-
-    Args:
-        problem: What to find.
-        style: How to guess.
-        polytopes: W_i of the phases about ``problem.reference``.
-    """
+    """Bezier points (phases, k + 1, 3) [m] and durations (phases,) [s] to start from."""
     durations = _guess_durations(problem, style.stretch, polytopes)
     instants = np.concatenate([[0.0], np.cumsum(durations)])
     if style.pull is None:
@@ -128,8 +122,9 @@ def _pendulum(problem: CentroidalProblem, instants: FloatArray) -> BSpline:
     ])  # fmt: skip
     values = np.vstack([weight * wanted, np.zeros_like(wanted)])
     rest = np.zeros(3)
-    first = start_control_points(k, knots, problem.start_com, _or(problem.start_velocity, rest), rest)
-    last = end_control_points(k, knots, problem.goal_com, _or(problem.goal_velocity, rest), rest)
+    speeds = [rest if v is None else v for v in (problem.start_velocity, problem.goal_velocity)]
+    first = start_control_points(k, knots, problem.start_com, speeds[0], rest)
+    last = end_control_points(k, knots, problem.goal_com, speeds[1], rest)
     points = np.linspace(problem.start_com, problem.goal_com, count)
     points[: len(first)], points[count - len(last) :] = first, last
     inner = slice(len(first), count - len(last))
@@ -139,10 +134,6 @@ def _pendulum(problem: CentroidalProblem, instants: FloatArray) -> BSpline:
     if way[-1] > 0.0:
         points[inner, 2] = np.interp(way[inner], way[[0, -1]], points[[0, -1], 2])
     return BSpline(k, knots, points)
-
-
-def _or(given: FloatArray | None, default: FloatArray) -> FloatArray:
-    return default if given is None else given
 
 
 def _guess_durations(
@@ -165,14 +156,9 @@ def can_rest(polytope: WrenchPolytope, mass: float) -> bool:
     The wrench ``[m (-g); p ^ m (-g)]`` is linear in the position ``p``: a linear programme.
     """
     weight = -mass * GRAVITY_VECTOR
-    found = linprog(
-        np.zeros(3),
-        polytope.H[:, 3:] @ -skew(weight),
-        polytope.h - polytope.H[:, :3] @ weight,
-        bounds=(None, None),
-        method="highs",
-    )
-    return found.status != INFEASIBLE
+    rows, bounds = polytope.H[:, 3:] @ -skew(weight), polytope.h - polytope.H[:, :3] @ weight
+    result = linprog(np.zeros(3), rows, bounds, bounds=(None, None), method="highs")
+    return result.status != INFEASIBLE
 
 
 def _guess_key_positions(problem: CentroidalProblem, instants: FloatArray, pull: float) -> FloatArray:
@@ -180,17 +166,12 @@ def _guess_key_positions(problem: CentroidalProblem, instants: FloatArray, pull:
     positions = problem.start_com + progress * (problem.goal_com - problem.start_com)
     stances = [phase.stance for phase in problem.sequence]
     for index, (before, after) in enumerate(itertools.pairwise(stances), start=1):
-        centre = _shared_centre(before, after)
-        if centre is not None:
-            positions[index, :2] += pull * (centre[:2] - positions[index, :2])
+        # Towards the contacts held across the key instant, or towards all when none is.
+        held = [contact.position for contact in before if contact.effector in after]
+        held = held or [contact.position for stance in (before, after) for contact in stance]
+        if held:
+            positions[index, :2] += pull * (np.mean(held, axis=0)[:2] - positions[index, :2])
     return positions
-
-
-def _shared_centre(before: Stance, after: Stance) -> FloatArray | None:
-    """Mean position of the contacts held across a key instant, or of all when none is."""
-    held = [contact.position for contact in before if contact.effector in after]
-    held = held or [contact.position for stance in (before, after) for contact in stance]
-    return np.mean(held, axis=0) if held else None
 
 
 MAX_ROUNDS = 6
@@ -205,16 +186,14 @@ class CentroidalResult(Displayed):
     """A trajectory with its certificate, or why there is none.
 
     Attributes:
-        problem: What was asked.
         polytopes: W_i of the phases about ``problem.reference``.
         feasibility: Upper bounds of the margin at the key instants.
-        failure: Why it failed, or None.
         trajectory: The trajectory; None when it failed.
         certificate: Requirements measured every millisecond; of the best attempt when it
             failed, None when nothing was attempted.
-        iterations: Of the solver, over all rounds.
+        iterations: Iterations of the solver over all rounds.
         rounds: Number of optimisations.
-        wall_time: [s].
+        wall_time: Wall time of the search [s].
     """
 
     problem: CentroidalProblem
@@ -283,13 +262,7 @@ def plan_com(problem: CentroidalProblem) -> CentroidalResult:
     Every solution is measured every millisecond against all facets and all bounds. Where a
     requirement is broken between the samples it is asked for with more distance, where by a
     facet that was left out the facet is added, and the programme is solved again. A result
-    that does not meet its own certificate is a failure.
-
-    Args:
-        problem: What to find.
-
-    Returns:
-        A result that holds the trajectory or says which requirement could not be met.
+    that does not meet its own certificate is a failure that says which requirement could not be met.
     """
     began = time.perf_counter()
     polytopes = polytopes_of(problem)
@@ -334,29 +307,18 @@ def _rounds(
         kept = min(float(values[rows].min()) for values, rows in zip(distances, facets, strict=True))
         more_facets = with_violated(facets, distances, kept - NEGLIGIBLE * abs(kept))
         enough = all(len(new) == len(old) for new, old in zip(more_facets, facets, strict=True))
-        if enough and (attempt.certificate.within() or _hopeless(attempt, targets)):
-            return
+        hopeless = not attempt.converged or attempt.margin < targets.margin - 1e-3
+        if enough and (attempt.certificate.within() or hopeless):
+            return  # a violation that is more than an effect of sampling stays
         if enough:
             targets = targets.grown(problem, attempt.certificate)
         facets, bezier, durations = more_facets, attempt.bezier, attempt.durations
 
 
-def _hopeless(attempt: Attempt, targets: MarginTargets) -> bool:
-    """Whether a violation is more than an effect of sampling."""
-    return not attempt.converged or attempt.margin < targets.margin - 1e-3
-
-
 def limiting_at(
     problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytope: WrenchPolytope, time: float
 ) -> LimitingConstraint:
-    """Contact and limit nearest to the wrench of a trajectory at a time.
-
-    Args:
-        problem: Says what the margin measures.
-        trajectory: The trajectory.
-        polytope: Of the phase of that time, about ``problem.reference``.
-        time: [s].
-    """
+    """Contact and limit nearest to the wrench of a trajectory at a time [s], in the polytope of its phase."""
     fixed = problem.margin_space == "wrench_about_origin"
     about = np.zeros(3) if fixed else trajectory.position(time)
     return polytope.limiting(trajectory.pseudo_wrench(time, problem.reference), about)
@@ -382,20 +344,44 @@ def _explain(problem: CentroidalProblem, polytopes: Sequence[WrenchPolytope], be
     The required margin is penalised and not imposed, so that an attempt that breaks nothing
     else has the largest margin that was found.
     """
-    found, worst = best.certificate, best.certificate.largest
+    certificate, worst = best.certificate, best.certificate.largest
     barrier = next((item for item in problem.geometric if item.impassable), None)
     if barrier is not None:
-        at = found[barrier.name]
+        at = certificate[barrier.name]
         return Failure(barrier.name, f"{barrier.impassable}; no way around it was found", at.phase, at.time)
     if worst.requirement != "balance margin":
         return Failure(
             worst.requirement, f"no trajectory found: {worst} in the best attempt", worst.phase, worst.time
         )
-    polytope = polytopes[found.limiting_phase]
-    limit = limiting_at(problem, best.trajectory, polytope, found.limiting_time)
-    place = f"in phase {found.limiting_phase} at {found.limiting_time:.3f} s by {limit.description}"
+    what = f"the largest margin found is {certificate.min_margin:.2f}"
+    phase, instant = certificate.limiting_phase, certificate.limiting_time
+    return missed_margin(problem, best.trajectory, polytopes, phase, instant, what)
+
+
+def missed_margin(
+    problem: CentroidalProblem,
+    trajectory: CentroidalTrajectory,
+    polytopes: Sequence[WrenchPolytope],
+    phase: int,
+    time: float,
+    what: str,
+    tried: str = "",
+) -> Failure:
+    """Failure that names the contact limiting the margin of the best trajectory.
+
+    Args:
+        problem: What was asked.
+        trajectory: The best one found.
+        polytopes: W_i of the phases about ``problem.reference``.
+        phase: Phase in which the margin is smallest.
+        time: When [s].
+        what: How large the margin is, in words without the unit.
+        tried: What was tried, in words.
+    """
+    limit = limiting_at(problem, trajectory, polytopes[phase], time)
+    unit = problem.margin_unit
     reason = (
-        f"the largest margin found is {found.min_margin:.2f} {problem.margin_unit}, limited {place}; "
-        f"required {problem.required_margin:.2f} {problem.margin_unit}"
+        f"{what} {unit}, limited in phase {phase} at {time:.3f} s by {limit.description}{tried}; "
+        f"required {problem.required_margin:.2f} {unit}"
     )
-    return Failure("balance margin", reason, found.limiting_phase, found.limiting_time, limit.effector)
+    return Failure("balance margin", reason, phase, time, limit.effector)

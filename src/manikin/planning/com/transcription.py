@@ -10,7 +10,7 @@ formulation has the control points themselves as unknowns; the set of trajectori
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from math import comb
@@ -38,14 +38,11 @@ class ComStructure:
     """What the programme's expressions depend on; numbers are its parameters.
 
     Attributes:
-        degree: Degree of the spline.
-        samples: n_s.
+        samples: n_s, samples of each phase but one.
         rows: Number of facets imposed in each phase.
         contacts: Number of contacts of each phase.
-        margin_space: What the margin measures.
-        geometric: Functions of the geometric constraints.
-        limited_distance: Whether the CoM-support distance is limited.
         key_planes: Key instant of each plane.
+        loaded: Phases with a load.
     """
 
     degree: int
@@ -56,6 +53,7 @@ class ComStructure:
     geometric: tuple[Callable[[Any, Any, Any], Any], ...]
     limited_distance: bool
     key_planes: tuple[int, ...] = ()
+    loaded: tuple[int, ...] = ()
 
     @property
     def phases(self) -> int:
@@ -68,7 +66,6 @@ class ComProgram:
     """The compiled programme and the order of its rows.
 
     Attributes:
-        structure: What it was built for.
         solver: CasADi function made by ``nlpsol``; unknowns are the Bezier points of each
             phase (column by column), the durations and their sum [s], d_min and its shortfall below
             the required margin, both over MARGIN_SCALE.
@@ -89,11 +86,10 @@ class ComProgram:
 
     def pack_parameters(self, values: dict[str, Any]) -> FloatArray:
         """Parameter vector from arrays by name."""
-        packed = []
-        for name, shape in self.parameters:
-            array = np.asarray(values[name], dtype=np.float64).reshape(shape)
-            packed.append(array.ravel(order="F"))
-        return np.concatenate(packed)
+        return np.concatenate([
+            np.asarray(values[name], dtype=np.float64).reshape(shape).ravel(order="F")
+            for name, shape in self.parameters
+        ])  # fmt: skip
 
     def pack_unknowns(
         self, bezier: FloatArray, durations: FloatArray, total: float, margin: float, shortfall: float
@@ -153,42 +149,23 @@ def transcribe(structure: ComStructure) -> ComProgram:
     builder.add("total_duration", ca.sum1(builder.durations) - builder.total)
     builder.add("required_margin", builder.margin + builder.shortfall)
     objective = _objective(builder)
-    unknowns = ca.vertcat(
-        *[ca.vec(b) for b in builder.bezier],
-        builder.durations,
-        builder.total,
-        builder.margin,
-        builder.shortfall,
-    )
-    problem = {
-        "x": unknowns,
-        "p": ca.vertcat(*[ca.vec(p) for p in builder.parameters.values()]),
-        "f": objective,
-        "g": ca.vertcat(*builder.rows),
-    }
+    bezier = [ca.vec(points) for points in builder.bezier]
+    unknowns = ca.vertcat(*bezier, builder.durations, builder.total, builder.margin, builder.shortfall)
+    parameters = ca.vertcat(*[ca.vec(p) for p in builder.parameters.values()])
+    problem = {"x": unknowns, "p": parameters, "f": objective, "g": ca.vertcat(*builder.rows)}
     shapes = tuple((name, p.shape) for name, p in builder.parameters.items())
     return ComProgram(structure, _compile(problem), tuple(builder.groups), shapes)
 
 
 def _compile(problem: dict[str, ca.SX]) -> ca.Function:
+    ipopt = {
+        "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "adaptive_mu_globalization": "kkt-error",
+        "alpha_for_y": "min-dual-infeas", "max_iter": 250, "tol": 1e-5, "constr_viol_tol": 1e-8,
+        "bound_relax_factor": 0.0, "linear_solver": "mumps",
+    }  # fmt: skip
     options = {
-        "print_time": False,
-        "error_on_fail": False,
-        "calc_lam_p": False,
-        "no_nlp_grad": True,
-        "ipopt": {
-            "print_level": 0,
-            "sb": "yes",
-            "mu_strategy": "adaptive",
-            "adaptive_mu_globalization": "kkt-error",
-            "alpha_for_y": "min-dual-infeas",
-            "max_iter": 250,
-            "tol": 1e-5,
-            "constr_viol_tol": 1e-8,
-            "bound_relax_factor": 0.0,
-            "linear_solver": "mumps",
-        },
-    }
+        "print_time": False, "error_on_fail": False, "calc_lam_p": False, "no_nlp_grad": True, "ipopt": ipopt,
+    }  # fmt: skip
     return ca.nlpsol("timing_free", "ipopt", problem, options)
 
 
@@ -207,8 +184,8 @@ def _add_samples(builder: _Builder, phase: int, mass: ca.SX) -> None:
             builder.add("distance", ca.sum2(offset * offset))
     inner = slice(1 if phase == 0 else 0, len(s) - 1 if phase == structure.phases - 1 else len(s))
     for index, function in enumerate(structure.geometric):
-        there = position[inner, :]
-        values = _symbolic(function, there + ca.repmat(builder.parameters["reference"], there.shape[0], 1))
+        within = position[inner, :]
+        values = _symbolic(function, within + ca.repmat(builder.parameters["reference"], within.shape[0], 1))
         builder.add(f"geometric{index}", values)
 
 
@@ -232,6 +209,10 @@ def _add_balance(builder: _Builder, phase: int, mass: ca.SX, position: ca.SX, ac
     h = builder.parameter(f"h{phase}", facets)
     force = mass * (acceleration - ca.repmat(ca.DM([[0.0, 0.0, -GRAVITY]]), count, 1))
     wrench = ca.horzcat(force, _cross(position, force))
+    if phase in structure.loaded:  # a further mass that moves with the CoM, at an offset from it
+        load = builder.parameter(f"load{phase}", 4)
+        push = load[0] / mass * force
+        wrench += ca.horzcat(push, _cross(position + ca.repmat(load[1:].T, count, 1), push))
     slack = ca.repmat(h.T, count, 1) - wrench @ H.T
     scale = MARGIN_SCALE[structure.margin_space]
     wanted = builder.margin * ca.SX.ones(count, facets)
@@ -315,28 +296,26 @@ def _squared_integral(points: ca.SX, duration: ca.SX, order: int, diagonal: ca.S
 def bernstein_gram(degree: int) -> FloatArray:
     """(k + 1, k + 1) integrals over [0, 1] of the products of Bernstein polynomials."""
     index = range(degree + 1)
-    return np.array(
-        [
-            [comb(degree, i) * comb(degree, j) / comb(2 * degree, i + j) / (2 * degree + 1) for j in index]
-            for i in index
-        ]
-    )
+    return np.array([
+        [comb(degree, i) * comb(degree, j) / comb(2 * degree, i + j) / (2 * degree + 1) for j in index]
+        for i in index
+    ])  # fmt: skip
 
 
 def spline_from_bezier(
     bezier: FloatArray,
     durations: FloatArray,
     *,
-    start: tuple[FloatArray, ...],
-    goal: tuple[FloatArray, ...],
+    start: tuple[FloatArray | None, ...],
+    goal: tuple[FloatArray | None, ...],
 ) -> BSpline:
     """B-spline on normalised time with the key instants as internal knots ([Qiu2012]_ 5.4.3).
 
     Args:
         bezier: (phases, k + 1, 3) Bezier points of the phases [m].
         durations: (phases,) [s].
-        start: Position and, where imposed, velocity and acceleration at the start, met exactly.
-        goal: The same at the end.
+        start: Position, velocity and acceleration at the start, met exactly up to the first that is None.
+        goal: Position, velocity and acceleration at the goal, likewise.
     """
     k = bezier.shape[1] - 1
     instants = np.concatenate([[0.0], np.cumsum(durations)])
@@ -351,8 +330,11 @@ def spline_from_bezier(
     return BSpline.fit(k, knots, np.minimum(times, 1.0), values, first=first, last=last)
 
 
-def _per_normalised_time(derivatives: tuple[FloatArray, ...], total: float) -> list[FloatArray]:
-    return [value * total**order for order, value in enumerate(derivatives)]
+def _per_normalised_time(derivatives: tuple[FloatArray | None, ...], total: float) -> Iterator[FloatArray]:
+    for order, value in enumerate(derivatives):
+        if value is None:
+            return
+        yield value * total**order
 
 
 def _differences(points: ca.SX, order: int) -> ca.SX:

@@ -7,26 +7,22 @@ from manikin.planning.contacts.contact_plan import (
     PlanCertificate,
     Stage,
     certify_plan,
-    make_contact,
 )
 from manikin.planning.contacts.depth_first import Extension, GuideLine, heading_of
 from manikin.planning.contacts.efort import (
-    Ellipsoid,
     Task,
     efort,
     force_ellipsoid,
     force_transmission_ratio,
-    limb_strength,
     pulling_efort,
     velocity_ellipsoid,
 )
-from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit
-from manikin.planning.contacts.follow_guide import ExtendSettings, follow_guide
-from manikin.planning.contacts.follow_guide_with_limbs import (
+from manikin.planning.contacts.endpoint import Endpoint, Endpoints, Habit, starts_on_limbs
+from manikin.planning.contacts.follow_guide import (
+    ExtendSettings,
     LimbExtendSettings,
-    LimbStart,
+    follow_guide,
     follow_guide_with_limbs,
-    starts_on_limbs,
 )
 from manikin.planning.contacts.generator import (
     ContactGenerator,
@@ -47,21 +43,11 @@ from manikin.planning.contacts.heuristics import (
     StrongEfort,
     WeightedSum,
     duration,
-    heuristic_named,
 )
 from manikin.planning.contacts.limb_collisions import LimbCollisions
-from manikin.planning.contacts.limb_places import Foothold, Footholds, FootholdSettings, LimbPlaces, Near
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
-from manikin.planning.contacts.samples import (
-    LimbSamples,
-    load_samples,
-    manipulability,
-    mirrored,
-    sample_limb,
-    sample_limbs,
-    samples_for,
-    save_samples,
-)
+from manikin.planning.contacts.limb_places import Footholds, LimbPlaces
+from manikin.planning.contacts.posture_finder import PostureFinder, PostureFinderSettings
+from manikin.planning.contacts.samples import LimbSamples, manipulability, mirrored, sample_limb, sample_limbs
 
 __all__ = [
     "HEURISTICS",
@@ -74,13 +60,10 @@ __all__ = [
     "ContactRules",
     "Duration",
     "Efort",
-    "Ellipsoid",
     "Endpoint",
     "Endpoints",
     "ExtendSettings",
     "Extension",
-    "Foothold",
-    "FootholdSettings",
     "Footholds",
     "GeneratedContact",
     "GeneratorSettings",
@@ -92,11 +75,8 @@ __all__ = [
     "LimbExtendSettings",
     "LimbPlaces",
     "LimbSamples",
-    "LimbStart",
     "Manipulability",
-    "Near",
     "PlanCertificate",
-    "Posed",
     "PostureFinder",
     "PostureFinderSettings",
     "Random",
@@ -115,17 +95,11 @@ __all__ = [
     "force_ellipsoid",
     "force_transmission_ratio",
     "heading_of",
-    "heuristic_named",
-    "limb_strength",
-    "load_samples",
-    "make_contact",
     "manipulability",
     "mirrored",
     "pulling_efort",
     "sample_limb",
     "sample_limbs",
-    "samples_for",
-    "save_samples",
     "starts_on_limbs",
     "velocity_ellipsoid",
 ]

@@ -19,8 +19,6 @@ class Situation:
     """Where a limb is and what it is asked for.
 
     Attributes:
-        state: The body as it is.
-        limb: The limb that shall make a contact.
         rotation: (3, 3) from the limb's frame to the world's.
         origin: (3,) of the limb's frame in the world [m].
         reaction: (3,) unit direction in the world in which the scene shall push the limb.
@@ -72,7 +70,6 @@ class SurfaceTable:
     """The surfaces of a scene as arrays, so that all are tested at once.
 
     Attributes:
-        surfaces: The surfaces.
         normals: (m, 3) their unit normals.
         offsets: (m,) of their planes along the normals [m].
         group: (m,) number of the direction that a surface has for its normal.
@@ -113,15 +110,10 @@ class SurfaceTable:
         self.filled: NDArray[np.bool_] = areas >= np.prod(self.side_high - self.side_low, axis=1) * (1 - 1e-9)
 
     def within_reach(self, situation: Situation, samples: LimbSamples, tolerance: float) -> IntArray:
-        """Surfaces that may meet the reach of a limb (step 1): no reachable one is left out.
+        """Surfaces that may meet the reach of a limb, give or take a tolerance [m] (step 1); none is missed.
 
         The box of the polygon must meet the ball of the reach, and, along the normal and the sides of
         the polygon, the extents of the hull.
-
-        Args:
-            situation: Where the limb is.
-            samples: Samples of the limb.
-            tolerance: How far beyond the hull a surface may be [m].
         """
         hull, radius = samples.hull
         away = np.clip(situation.origin, self._low, self._high) - situation.origin
@@ -141,12 +133,9 @@ class SurfaceTable:
     def over(
         self, points: FloatArray, numbers: IntArray, margin: FloatArray | float = 0.0
     ) -> NDArray[np.bool_]:
-        """(n,) whether points project into the polygon of their surface.
+        """(n,) whether world points (n, 3) [m] project into the polygons of their surfaces, (n,) indices.
 
-        Args:
-            points: (n, 3) in the world [m].
-            numbers: (n,) indices of the surfaces.
-            margin: (n,) or one distance that points may lie outside [m].
+        They may lie outside by a margin, one or (n,) [m].
         """
         beyond = np.einsum("nei,ni->ne", self._walls[numbers], points) - self._wall_offsets[numbers]
         inside = (beyond <= np.asarray(margin)[..., None]).all(axis=1)
@@ -160,13 +149,9 @@ class SurfaceTable:
     def carries(
         self, points: FloatArray, turns: FloatArray, numbers: IntArray, footprint: FloatArray
     ) -> NDArray[np.bool_]:
-        """(n,) whether the whole footprint of placed effectors projects into their polygons.
+        """(n,) whether the whole footprint (c, 3) [m] of placed effectors projects into their polygons.
 
-        Args:
-            points: (n, 3) places of the effectors in the world [m].
-            turns: (n, 3, 3) from their axes to the world's.
-            numbers: (n,) indices of the surfaces.
-            footprint: (c, 3) points of the effector's frame [m].
+        The effectors are at points (n, 3) of the world [m], turned by (n, 3, 3), on surfaces of (n,) indices.
         """
         if self.filled[numbers].all():
             sides = self.frames[self.group[numbers], 1:]
@@ -184,10 +169,6 @@ class SurfaceTable:
             return bool((corners @ self._walls[number].T <= self._wall_offsets[number]).all())
         return bool((self.surfaces[number].outside(corners) <= 0.0).all())
 
-    def height_of(self, point: FloatArray, numbers: IntArray) -> FloatArray:
-        """(m,) signed distance of one world point to the planes of some surfaces [m]."""
-        return self.normals[numbers] @ point - self.offsets[numbers]
-
 
 def find_candidates(
     table: SurfaceTable,
@@ -203,7 +184,7 @@ def find_candidates(
 
     Args:
         table: Surfaces of the scene.
-        numbers: Those within reach.
+        numbers: Indices of those within reach.
         situation: Where the limb is.
         samples: Samples of the limb.
         tolerance: Largest distance of an effector to the plane, on either side [m].
@@ -226,14 +207,9 @@ def find_candidates(
         rows, owner, points = rows.take(inside), owner.take(inside), points.take(inside, axis=0)
     surfaces = numbers.take(owner)
     return Candidates(
-        rows,
-        surfaces,
-        points,
-        table.normals.take(surfaces, axis=0),
-        samples.products.take(rows, axis=0),
-        samples.manipulability.take(rows),
-        samples.rotations.take(rows, axis=0),
-    )
+        rows, surfaces, points, table.normals.take(surfaces, axis=0), samples.products.take(rows, axis=0),
+        samples.manipulability.take(rows), samples.rotations.take(rows, axis=0),
+    )  # fmt: skip
 
 
 def _near_planes(
@@ -253,7 +229,7 @@ def _near_planes(
     upward, places = lines @ samples.upward.T, lines @ samples.positions.T
     shift = (table.lines @ situation.origin).tolist()
     own_group = table.group[numbers]
-    found: list[tuple[IntArray, IntArray, FloatArray]] = []
+    selected: list[tuple[IntArray, IntArray, FloatArray]] = []
     for group in set(own_group.tolist()):
         own = (own_group == group).nonzero()[0]
         surfaces = numbers[own]
@@ -271,8 +247,8 @@ def _near_planes(
             inside &= place >= ends[0][:, axis, None]
             inside &= place <= ends[1][:, axis, None]
         which, near = np.divmod(inside.ravel().nonzero()[0], len(rows) or 1)
-        found.append((rows.take(near), own.take(which), sign * (height.take(near) - planes.take(which))))
-    rows, owner, gap = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        selected.append((rows.take(near), own.take(which), sign * (height.take(near) - planes.take(which))))
+    rows, owner, gap = (np.concatenate(parts) for parts in zip(*selected, strict=True))
     return rows, owner, gap
 
 

@@ -1,15 +1,13 @@
-"""A sequence of contacts with a posture for every change, as the contact planner finds it.
+"""A sequence of contacts with a posture for every change, as the contact planner finds it; its certificate.
 
-Also here. Certificate of a contact plan: every posture measured afresh, balance by other means than the
-search's. The contact that an effector makes where it has been put.
+The certificate measures every posture afresh, balance by other means than the search's.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +29,7 @@ from manikin.contact import (
 from manikin.errors import ContactError
 from manikin.kinematics import touching_pairs
 from manikin.numerics.spatial import FloatArray, frozen_array, skew
+from manikin.runtime.requirement import Requirement, RequirementTable, Sense
 from manikin.scene import Proximity, Scene
 
 _RECTANGLE = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
@@ -59,11 +58,7 @@ def footprint(
 ) -> FloatArray:
     """(c, 3) points of the effector's frame that must lie on the surface [m].
 
-    Args:
-        body: The body.
-        limb: Its limb, whose own patch goes before the body's soles.
-        kind: How it touches.
-        rules: Which part of a sole has to touch; all of it when omitted.
+    The limb's own patch goes before the body's soles, of which the rules may ask for a part only.
 
     Raises:
         ContactError: If a sole is asked for of a body without soles.
@@ -92,27 +87,20 @@ def make_contact(
     """Contact of a limb's effector.
 
     Args:
-        body: The body.
-        limb: The limb.
-        kind: How it touches.
         position: (3,) in the world [m].
         rotation: (3, 3) effector-to-world; its z column is the normal.
-        rules: Friction and strengths.
 
     Raises:
         ContactError: If a value is out of its range, or a sole is asked for of a body without.
     """
+    name = limb.effector
     if kind is ContactKind.GRASP:
-        return grasp(
-            limb.effector, position, max_force=rules.grasp_force, max_moment=rules.grasp_moment,
-            rotation=rotation,
-        )  # fmt: skip
+        force, moment = rules.grasp_force, rules.grasp_moment
+        return grasp(name, position, max_force=force, max_moment=moment, rotation=rotation)
     if kind is ContactKind.POINT:
-        return point(limb.effector, position, friction=rules.friction, rotation=rotation)
+        return point(name, position, friction=rules.friction, rotation=rotation)
     length, width = 2.0 * footprint(body, limb, kind)[0, :2]
-    whole = sole(
-        limb.effector, position, length=length, width=width, friction=rules.friction, rotation=rotation
-    )
+    whole = sole(name, position, length=length, width=width, friction=rules.friction, rotation=rotation)
     if rules.patch is None or limb.patch is not None:
         return whole
     return replace(whole, points=frozen_array(footprint(body, limb, kind, rules), "sole's patch [m]", (4, 3)))
@@ -202,14 +190,7 @@ class ContactPlan:
     def of(
         cls, body: BodyModel, stages: Sequence[Stage], goal: FloatArray, hinge_pace: float = HINGE_PACE
     ) -> "ContactPlan":
-        """Plan with the centre of mass of its last posture.
-
-        Args:
-            body: The body.
-            stages: From the start to the goal.
-            goal: (nq,) posture with which the last one ends.
-            hinge_pace: Mean speed of the hinge that turns most between two postures [rad/s].
-        """
+        """Plan that ends with a posture (nq,), with time for each change at an unhurried pace [rad/s]."""
         com = frozen_array(Configuration(body, goal).com, "goal com [m]", (3,))
         ends = [(stage.q, stage.com) for stage in stages[1:]] + [(goal, com)]
         timed = [
@@ -219,31 +200,19 @@ class ContactPlan:
         return cls(tuple(timed), frozen_array(goal, "goal posture", (body.nq,)), com)
 
     def sequence(self, model: ContactModel | None = None) -> StanceSequence:
-        """The stances in order, as the stages that follow take them.
-
-        Args:
-            model: Contact model of each; the default one without a cap when omitted.
-        """
+        """The stances in order, with a contact model; the default one without a cap when omitted."""
         stances = [Stance(list(stage.contacts.values()), model=model) for stage in self.stages]
         return StanceSequence(
             [Phase(stance, stage.min_duration) for stance, stage in zip(stances, self.stages, strict=True)]
         )
 
     def schedule(self, model: ContactModel) -> ContactSchedule:
-        """The stances in time, each as short as it may be, from zero on.
-
-        Args:
-            model: Contact model of each.
-        """
+        """The stances with a contact model in time, each as short as it may be, from zero on."""
         durations = [stage.min_duration for stage in self.stages]
         return ContactSchedule(self.sequence(model), np.concatenate([[0.0], np.cumsum(durations)]))
 
     def keys(self, instants: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Key times (k,) [s] and configurations (k, nq): at every change, and in between where there is one.
-
-        Args:
-            instants: (n + 1,) times of the changes [s].
-        """
+        """Key times (k,) [s] and configurations (k, nq): at (n + 1,) changes and, if any, in between."""
         times, keys = [float(instants[0])], [self.stages[0].q]
         ends = [*(stage.q for stage in self.stages[1:]), self.goal]
         for number, (stage, end) in enumerate(zip(self.stages, ends, strict=True)):
@@ -272,36 +241,32 @@ def _least_time(stage: Stage, q: FloatArray, com: FloatArray, hinge_pace: float)
     return max(turn / hinge_pace, float(np.linalg.norm(com - stage.com)) / COM_PACE)
 
 
+_QUANTITIES: tuple[tuple[str, str, str, Sense, float], ...] = (
+    ("max_contact_error_m", "distance of an effector from its contact", "m", "<=", 1.0e-3),
+    ("max_sole_turn_rad", "angle of a sole from its contact", "rad", "<=", 5.0e-3),
+    ("min_clearance_m", "clearance", "m", ">=", 0.0),
+    ("max_range_violation_rad", "joint range violation", "rad", "<=", 1.0e-9),
+    ("min_room_m", "room of the centre of mass", "m", ">=", 0.0),
+    ("max_torque_share", "share of a torque limit at rest", "", "<=", 1.0),
+)
+"""Key, name, unit, sense and limit of what is measured of a plan."""
+
+
 @dataclass(frozen=True)
-class PlanCertificate:
-    """Largest violations of the postures of a plan.
+class PlanCertificate(RequirementTable):
+    """Worst values of the postures of a plan beside their limits; ``where`` names the posture.
+
+    ``min_room_m`` is the least room of the centre of mass on the contacts that stay, see
+    :func:`~manikin.balance.static.static_room`, ``max_torque_share`` the largest share of a torque limit with
+    which the postures can be held at rest, ``min_clearance_m`` the least distance of what does not touch.
 
     Attributes:
         postures: Number of postures: at every change, in the middle of flights, at the goal.
         changes: Largest number of contacts made and broken at one change.
-        max_contact_error_m: Distance of an effector from a contact that it holds [m].
-        max_sole_turn_rad: Angle of a sole from its contact [rad].
-        min_clearance_m: Least distance of what does not touch [m].
-        closest_pair: Names of the shapes at that distance.
-        max_range_violation_rad: Violation of a joint range [rad].
-        min_room_m: Least room of the centre of mass on the contacts that stay, see
-            :func:`~manikin.balance.static.static_room` [m].
-        max_torque_share: Largest share of a torque limit with which the postures can be held at rest.
     """
 
     postures: int
     changes: int
-    max_contact_error_m: float
-    max_sole_turn_rad: float
-    min_clearance_m: float
-    closest_pair: tuple[str, str]
-    max_range_violation_rad: float
-    min_room_m: float
-    max_torque_share: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """The values by name."""
-        return {**asdict(self), "closest_pair": list(self.closest_pair)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,36 +284,45 @@ def certify_plan(
     """Measure every posture of a plan.
 
     Args:
-        body: The body.
-        scene: Its surroundings.
-        plan: The plan.
         model: Contact model; with the default cap of the body when omitted.
     """
     model = model or ContactModel.of_body(body.mass)
-    postures = _postures(plan)
-    proximity = Proximity(body, scene)
-    error = turn = beyond = share = 0.0
-    room, nearest, pair = np.inf, np.inf, ("", "")
-    for item in postures:
-        state = Configuration(body, item.q)
-        for contact in item.held:
-            rotation, place = state.effector_placement(contact.effector)
-            error = max(error, float(np.linalg.norm(place - contact.position)))
-            if contact.kind is ContactKind.SOLE:
-                off = rotation.T @ contact.rotation_contact_to_world
-                turn = max(turn, float(np.linalg.norm(pin.log3(off))))
-        touched = [(contact.effector, scene.touched_obstacle(contact)) for contact in item.held]
-        found = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched))
-        if len(found.distance) and found.distance.min() < nearest:
-            nearest, pair = float(found.distance.min()), found.pairs[int(np.argmin(found.distance))]
-        angles = item.q[7:]
-        beyond = max(beyond, float(np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)))
-        stance = Stance(item.carrying, model=model)
-        room = min(room, static_room(stance, body.mass, state.com))
-        share = max(share, static_torque_share(body, item.q, stance))
-    return PlanCertificate(
-        len(postures), _changes(plan), error, turn, nearest, pair, beyond, float(room), share
-    )
+    postures, proximity = _postures(plan), Proximity(body, scene)
+    measured = [_measured(body, scene, proximity, item, model) for item in postures]
+    rows = []
+    for key, name, unit, sense, limit in _QUANTITIES:
+        values = [item[key][0] for item in measured]
+        worst = int(np.argmax(values) if sense == "<=" else np.argmin(values))
+        where = f"posture {worst}{measured[worst][key][1]}"
+        rows.append(Requirement(key, name, unit, values[worst], sense, limit, where=where))
+    return PlanCertificate(tuple(rows), len(postures), _changes(plan))
+
+
+def _measured(
+    body: BodyModel, scene: Scene, proximity: Proximity, item: "_Held", model: ContactModel
+) -> dict[str, tuple[float, str]]:
+    """Value of each quantity in one posture, and the rest of where."""
+    state, angles = Configuration(body, item.q), item.q[7:]
+    error = turn = 0.0
+    for contact in item.held:
+        rotation, position = state.effector_placement(contact.effector)
+        error = max(error, float(np.linalg.norm(position - contact.position)))
+        if contact.kind is ContactKind.SOLE:
+            off = rotation.T @ contact.rotation_contact_to_world
+            turn = max(turn, float(np.linalg.norm(pin.log3(off))))
+    touched = [(contact.effector, scene.touched_obstacle(contact)) for contact in item.held]
+    near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched))
+    pair = f", {' and '.join(near.pairs[int(np.argmin(near.distance))])}" if len(near.distance) else ""
+    beyond = np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)
+    stance = Stance(item.carrying, model=model)
+    return {
+        "max_contact_error_m": (error, ""),
+        "max_sole_turn_rad": (turn, ""),
+        "min_clearance_m": (float(near.distance.min(initial=np.inf)), pair),
+        "max_range_violation_rad": (float(beyond), ""),
+        "min_room_m": (float(static_room(stance, body.mass, state.com)), ""),
+        "max_torque_share": (static_torque_share(body, item.q, stance), ""),
+    }
 
 
 def _postures(plan: ContactPlan) -> list[_Held]:

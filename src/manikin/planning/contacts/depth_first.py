@@ -2,12 +2,8 @@
 
 A plan grows by one change at a time.  Each change is proposed, and accepted where its postures exist;
 where none is accepted, the change before is taken back and the next one is tried in its place.  What a
-body can do, and when it has arrived, is said by its :class:`Moves`: feet that step
-(:mod:`manikin.planning.contacts.follow_guide`), or any limbs
-(:mod:`manikin.planning.contacts.follow_guide_with_limbs`).
-
-Also here. A plan of contacts along a guide: as far as it has come, and what became of it. A guide of the root
-by the length of its way.
+body can do, and when it has arrived, is said by its :class:`Moves`, see
+:mod:`manikin.planning.contacts.follow_guide`.
 """
 
 from collections import Counter
@@ -20,14 +16,15 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.planning.contacts.contact_plan import ContactPlan, Stage
+from manikin.planning.contacts.posture_finder import PostureFinder
 
 
 @dataclass(frozen=True, eq=False)
 class PartialPlan:
-    """Stages from the start on, and how far along the guide each limb has come.
+    """Contacts along a guide as far as they are planned.
 
     Attributes:
-        stages: At least the start.
+        stages: From the start on; at least that.
         along: How far along the guide the contact of each limb is, by effector or limb [m].
     """
 
@@ -51,10 +48,7 @@ class Extension:
     """A contact plan, or why there is none.
 
     Attributes:
-        plan: The plan, or None.
-        searches: Postures looked for.
         backtracks: Changes taken back.
-        failure: None, or the reason in one line.
         reached: Share of the guide that the farthest attempt got to.
     """
 
@@ -76,7 +70,7 @@ TURN_LENGTH = 0.35
 
 @dataclass(frozen=True, eq=False)
 class GuideLine:
-    """Poses of the root with the length of the way to each.
+    """A guide: poses of the root with the length of the way to each.
 
     Attributes:
         poses: (n, 7) positions and quaternions xyzw.
@@ -135,22 +129,11 @@ class Moves(Protocol[Change]):
         ...
 
 
-class Counted(Protocol):
-    """What counts the postures it looks for, such as a ``PostureFinder``."""
-
-    searches: int
-
-
 class SearchLog:
     """What a search has cost, and why changes were refused."""
 
-    def __init__(self, poser: Counted, most: int) -> None:
-        """Begin to count.
-
-        Args:
-            poser: Looks for postures, perhaps after other searches.
-            most: Postures that may be looked for.
-        """
+    def __init__(self, poser: PostureFinder, most: int) -> None:
+        """Begin to count the postures that ``poser`` looks for, ``most`` at most."""
         self._poser, self._before, self._most = poser, poser.searches, most
         self._reasons: Counter[str] = Counter()
 
@@ -172,8 +155,8 @@ class SearchLog:
         """A search without a plan, with its commonest reason.
 
         Args:
-            what: Could not be done.
-            length: Of the guide [m].
+            what: What could not be done.
+            length: Length of the guide [m].
             farthest: How far along it the root came [m].
             backtracks: Changes taken back.
         """
@@ -185,13 +168,9 @@ class SearchLog:
 
 
 def search_depth_first(first: PartialPlan, moves: Moves[Change], log: SearchLog, length: float) -> Extension:
-    """Grow a plan until it is finished, nothing is left to try, or the search is spent.
+    """Grow a plan along a guide of a length [m] until it is done, nothing is left, or the search is spent.
 
-    Args:
-        first: Where it begins.
-        moves: What may change.
-        log: Bounds and records the search; the moves refuse in it.
-        length: Of the guide [m].
+    The log bounds and records the search; the moves refuse in it.
     """
     grown = [(first, _followers(first, moves, log))]
     backtracks, farthest = 0, 0.0

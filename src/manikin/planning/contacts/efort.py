@@ -3,66 +3,15 @@
 All functions take the translation's ``J J^T`` (3, 3) of each limb configuration, as the Jacobian of
 one limb is 3 by the number of its joints (the thesis prints l by n in 5.2), and directions of unit
 length, which 5.11 needs and does not say.
-
-Also here. The force that a limb can really exert at a contact: strength of each joint and friction.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import linprog
 
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, frozen_array
-
-SIDES = 8
-"""Of the pyramid inside the friction cone."""
-
-
-def limb_strength(
-    jacobian: FloatArray,
-    torque_lower: FloatArray,
-    torque_upper: FloatArray,
-    direction: FloatArray,
-    normal: FloatArray | None,
-    friction: float = 0.7,
-) -> float:
-    """Largest force along a direction that the scene can exert on a limb at rest [N].
-
-    ``max f . v`` over the forces ``f`` on the effector with ``-J^T f`` within the torque limits and,
-    where the limb does not hold on, inside the friction cone about the normal. The weight of the limb itself
-    is left out. This is what EFORT (5.12) stands for in the request, where all joints count alike
-    and friction does not exist.
-
-    Args:
-        jacobian: (3, k) of the effector's translation [m/rad].
-        torque_lower: (k,) most negative torques of the joints [N.m].
-        torque_upper: (k,) largest ones [N.m].
-        direction: (3,) unit vector ``v``, in the Jacobian's frame.
-        normal: (3,) unit normal of the surface in the same frame, or None for a grasp.
-        friction: Coulomb coefficient.
-
-    Returns:
-        At least 0; infinite where the limb carries the direction without torque.
-
-    Raises:
-        InputError: If the linear program fails for another reason.
-    """
-    table, bounds = [jacobian.T, -jacobian.T], [-torque_lower, torque_upper]
-    if normal is not None:
-        across = np.linalg.svd(normal[None])[2][1:]
-        turns = 2.0 * np.pi * (np.arange(SIDES) + 0.5) / SIDES
-        sides = np.column_stack([np.cos(turns), np.sin(turns)]) @ across
-        table.append(sides - friction * np.cos(np.pi / SIDES) * normal)
-        bounds.append(np.zeros(SIDES))
-    found = linprog(-direction, A_ub=np.vstack(table), b_ub=np.concatenate(bounds), bounds=[(None, None)] * 3)
-    if found.status == 3:
-        return float("inf")
-    if found.status != 0:
-        raise InputError(f"exertable force cannot be computed ({found.message}); valid: finite values")
-    return float(-found.fun)
-
 
 MOST_RATIO = 1e6
 """Ratio at which EFORT takes a limb that needs no torque, which has an infinite one [N per N.m]."""
@@ -113,12 +62,8 @@ def unit_direction(direction: ArrayLike, name: str = "task direction") -> FloatA
 def force_transmission_ratio(products: FloatArray, direction: ArrayLike) -> FloatArray:
     """``f_T = (v^T J J^T v)^(-1/2)``, the force along ``v`` of unit torque (5.11) [N per N.m].
 
-    Args:
-        products: (n, 3, 3) ``J J^T`` [m^2].
-        direction: (3,) ``v`` in the same frame; only its direction counts.
-
-    Returns:
-        (n,); infinite where the limb carries the direction without torque.
+    From (n, 3, 3) ``J J^T`` [m^2] and a vector ``v`` (3,) in the same frame, of which the direction counts;
+    (n,), infinite where the limb carries it without torque.
     """
     v = unit_direction(direction)
     squares = np.maximum((products.reshape(-1, 9) @ np.outer(v, v).ravel()), 0.0)

@@ -1,4 +1,4 @@
-"""From a guide of the root to a sequence of contacts: the road of [Tonneau2015]_ 7.2, algorithm 7.
+"""Contacts along a guide of the root, on feet or on any limbs: algorithm 7 of [Tonneau2015]_ 7.2.
 
 The guide is followed limb by limb.  The limb that is farthest behind is put to a new place, its
 contact broken and made; all others are maintained.  A change counts only when two postures exist,
@@ -6,18 +6,22 @@ free of collision and at rest on the contacts that stay: one that still holds th
 one that already holds the new one.  Where there is none, a shorter step, another place or another
 limb is tried, and then the change before is taken back.
 
-Also here. From a seat onto the feet: the first stages of a plan whose start holds on by more than feet.
+Feet step to footholds below the guide until they are at their places at the goal.  Any limbs go to contacts
+of the :class:`~manikin.planning.contacts.ContactGenerator` until the root is at its goal, and a limb in
+flight has a third posture, off the line between its contacts.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from manikin.body import BodyModel, Configuration
-from manikin.contact import Contact, FrictionModel
+from manikin.contact import Contact, ContactKind
+from manikin.kinematics import Placement
 from manikin.numerics.spatial import FloatArray, rotation_from_yaw
-from manikin.planning.contacts.contact_plan import ContactPlan, Stage
+from manikin.planning.contacts.contact_plan import HINGE_PACE, ContactPlan, Stage
 from manikin.planning.contacts.depth_first import (
     Extension,
     GuideLine,
@@ -26,68 +30,11 @@ from manikin.planning.contacts.depth_first import (
     heading_of,
     search_depth_first,
 )
-from manikin.planning.contacts.limb_places import Footholds, stature_of
-from manikin.planning.contacts.posture_finder import Posed, PostureFinder, PostureFinderSettings
-from manikin.scene import Scene
+from manikin.planning.contacts.endpoint import UP, stand_up
+from manikin.planning.contacts.limb_places import Footholds, LimbPlaces, stature_of
+from manikin.planning.contacts.posture_finder import Posed, PostureFinder
 
-LEANING = (0.2, 0.4, 0.6, 0.8, 0.92)
-"""Shares of the way of the centre of mass to the feet at which a body that leaves a seat has a posture."""
-
-LEANING_TIME = 0.3
-"""Shortest time between two of them [s]."""
-
-SEAT_OFF_INSET = 0.015
-"""Distance of the centre of mass to the edge of where it may rest on the feet when a seat is left [m]."""
-
-RISING_TIME = 1.8
-"""Shortest time from there to standing [s]."""
-
-SETTLING_TIME = 0.8
-"""Shortest time that the body stands then [s]."""
-
-SEATED_ROOM = (0.01, 0.01, 0.006)
-"""How far from these postures the centre of mass may be [m]: a seated trunk cannot follow any path."""
-
-
-def on_feet(
-    poser: PostureFinder, start: Stage, feet: frozenset[str], upright: FloatArray, log: SearchLog
-) -> PartialPlan | None:
-    """The start on feet; its other contacts are left first, all at once.
-
-    Args:
-        poser: Finds postures.
-        start: Contacts and posture at the start.
-        feet: Effectors to stand on.
-        upright: (7,) pose of the root that has risen.
-        log: Where a missing posture is noted.
-
-    Returns:
-        The stages up to standing on feet alone; None where a posture is missing.
-    """
-    body = poser.body
-    held = {name: contact for name, contact in start.contacts.items() if name in feet}
-    along = dict.fromkeys(held, 0.0)
-    if len(held) == len(start.contacts):
-        return PartialPlan((start,), along)
-    leaving = poser.pose(start.contacts, held, start.q, inset=SEAT_OFF_INSET, restarts=True)
-    if leaving.q is None:
-        log.refuse(leaving.reason)
-        return None
-    over_feet = Configuration(body, leaving.q).com[:2]
-    stages = [start]
-    for share in LEANING:
-        place = (1.0 - share) * start.com[:2] + share * over_feet
-        posed = poser.pose(start.contacts, start.contacts, stages[-1].q, place=place)
-        if posed.q is not None:
-            stages.append(Stage.of(body, start.contacts, posed.q, LEANING_TIME, SEATED_ROOM))
-    stages.append(Stage.of(body, held, leaving.q, RISING_TIME, SEATED_ROOM))
-    risen = poser.pose(held, held, leaving.q, upright, restarts=True)
-    if risen.q is None:
-        log.refuse(risen.reason)
-        return None
-    stages.append(Stage.of(body, held, risen.q, SETTLING_TIME))
-    return PartialPlan(tuple(stages), along)
-
+Item = TypeVar("Item")
 
 NEARER = (0.7, 0.4)
 """Shares of the way to its place with which a foot comes nearer when no stride is possible."""
@@ -96,7 +43,7 @@ AT_GOAL = 0.06
 """Distance of a foot from its place at the goal that is not worth a step [m]."""
 
 AT_GOAL_TURN = float(np.deg2rad(15.0))
-"""The same for its heading [rad]."""
+"""Angle between the headings of a foot and its place at the goal that is not worth a step [rad]."""
 
 
 @dataclass(frozen=True)
@@ -104,140 +51,251 @@ class ExtendSettings:
     """How contacts follow a guide; the values are our choice.
 
     Attributes:
-        stride: Way from a foot to the next one [m], for a body of 1.75 m.
+        stride: Way from a foot to the next one, for a body of 1.75 m [m].
         shares: Shares of the stride that are tried, in order.
         searches: Most postures that are looked for.
-        swing_duration: Shortest flight of a foot [s].
+        lift: How far a limb in flight keeps from the line between its contacts [m]; 0 plans no posture there.
+        swing_duration: Shortest flight of a limb [s].
         swing_speed: Its mean speed on longer ways [m/s].
         shift_duration: Shortest time between two flights [s].
-        friction: Coulomb coefficient of the soles.
-        natural: Whether hips and shoulders keep to their learnt ranges.
-        friction_model: Of the stances.
+        hinge_pace: Mean speed of the hinge that turns most [rad/s].
     """
 
     stride: float = 0.36
     shares: tuple[float, ...] = (1.0, 0.75, 0.5, 0.3)
     searches: int = 250
+    lift: float = 0.0
     swing_duration: float = 0.7
     swing_speed: float = 0.7
     shift_duration: float = 0.35
-    friction: float = 0.7
-    natural: bool = False
-    friction_model: FrictionModel = "outer"
+    hinge_pace: float = HINGE_PACE
 
 
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """One foot to another place.
+@dataclass(frozen=True)
+class LimbExtendSettings(ExtendSettings):
+    """How contacts of any limbs follow a guide; the stride is the root's way while every limb moves once.
 
     Attributes:
-        foot: Its effector.
-        contact: Where it goes.
-        along: How far along the guide that is [m].
+        places: Places that are tried for each share of the stride.
+        same_place: Distance between two contacts that is not worth a move [m].
+        goal_distance: Distance of the root from its goal at which it is reached [m].
+        goal_turn: Angle between the root's attitude and the goal's at which it is reached [rad].
     """
 
-    foot: str
-    contact: Contact
-    along: float
+    shares: tuple[float, ...] = (1.0, 0.6, 0.3)
+    searches: int = 600
+    lift: float = 0.08
+    places: int = 4
+    same_place: float = 0.12
+    goal_distance: float = 0.08
+    goal_turn: float = float(np.deg2rad(15.0))
 
 
 def follow_guide(
-    body: BodyModel,
-    scene: Scene,
+    poser: PostureFinder,
     guide: GuideLine,
     start: Stage,
     goal: Stage,
     settings: ExtendSettings | None = None,
-    reference: FloatArray | None = None,
+    *,
+    friction: float = 0.7,
 ) -> Extension:
     """Find the contacts with which a body on feet follows a guide.
 
     Contacts of the start that are no feet, such as a seat, are left first.
 
     Args:
-        body: A body with soles.
-        scene: Its surroundings.
+        poser: Finds postures of a body with soles in its scene.
         guide: Way of the root, from where it is at the start.
         start: Contacts and posture at the start.
         goal: Contacts and posture at the goal, on feet.
-        settings: How to search.
-        reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
+        friction: Coulomb coefficient of the soles.
     """
     settings = settings or ExtendSettings()
-    asked = PostureFinderSettings(natural=settings.natural, friction_model=settings.friction_model)
-    poser = PostureFinder(body, scene, reference, asked)
     log = SearchLog(poser, settings.searches)
-    steps = _Steps(poser, guide, goal, settings, log)
-    first = on_feet(poser, start, steps.feet, guide.at(0.0), log)
+    moves = _FootMoves(poser, guide, settings, log, goal, friction)
+    first = stand_up(poser, start, moves.feet, guide.at(0.0), log)
     if first is None:
-        return log.failure(f"cannot leave {', '.join(set(start.contacts) - steps.feet)}", guide.length)
-    return search_depth_first(first, steps, log, guide.length)
+        return log.failure(f"cannot leave {', '.join(set(start.contacts) - moves.feet)}", guide.length)
+    return search_depth_first(first, moves, log, guide.length)
 
 
-class _Steps:
+def follow_guide_with_limbs(
+    poser: PostureFinder,
+    places: LimbPlaces,
+    guide: GuideLine,
+    start: Stage,
+    settings: LimbExtendSettings | None = None,
+) -> Extension:
+    """Find the contacts with which a body follows a guide on any of its limbs.
+
+    Args:
+        guide: Way of the root, from where it is at the start.
+        start: Contacts and posture at the start; limbs without a contact make one where they can.
+    """
+    settings = settings or LimbExtendSettings()
+    log = SearchLog(poser, settings.searches)
+    along = dict.fromkeys(places.limbs, -settings.stride) | dict.fromkeys(start.contacts, 0.0)
+    moves = _LimbMoves(poser, guide, settings, log, places)
+    return search_depth_first(PartialPlan((start,), along), moves, log, guide.length)
+
+
+@dataclass(frozen=True, eq=False)
+class _Move:
+    """One limb to another place, or away for good.
+
+    Attributes:
+        limb: Its effector, or that of what makes no contacts, such as a seat.
+        contact: Where it goes; None for what is left for good.
+        along: How far along the guide each contact is then [m].
+        root_along: How far along it the root is then [m].
+        lifting: (nq,) posture that rests on all other contacts; None where it is not known yet.
+        start: (nq,) where the search for the posture on the new contact begins; ``lifting`` when None.
+    """
+
+    limb: str
+    contact: Contact | None
+    along: Mapping[str, float]
+    root_along: float
+    lifting: FloatArray | None = None
+    start: FloatArray | None = None
+
+
+class _Moves:
+    """What the moves of feet and those of any limbs have in common."""
+
+    def __init__(
+        self, poser: PostureFinder, guide: GuideLine, settings: ExtendSettings, log: SearchLog
+    ) -> None:
+        self._poser, self._guide, self._pace, self._log = poser, guide, settings, log
+
+    def _lifted(self, partial: PartialPlan, name: str) -> Posed:
+        """Posture that holds all contacts and rests on all but one."""
+        held = partial.last.contacts
+        return self._pose(held, _without(name, held), partial.last.q, self._guide.at(partial.here))
+
+    def _landed(
+        self, partial: PartialPlan, move: _Move, contact: Contact, lifting: FloatArray
+    ) -> PartialPlan | None:
+        """The plan with a limb put to a place, or None where a posture is missing."""
+        name, staying = move.limb, _without(move.limb, partial.last.contacts)
+        landed = {**staying, name: contact}
+        start = lifting if move.start is None else move.start
+        landing = self._pose(landed, staying, start, self._guide.at(move.root_along))
+        if landing.q is None:
+            self._log.refuse(f"{name} cannot be put down: {landing.reason}")
+            return None
+        before = partial.last.contacts.get(name)
+        way = 0.0 if before is None else float(np.linalg.norm(contact.position - before.position))
+        flight = max(self._pace.swing_duration, way / self._pace.swing_speed)
+        stages, body = partial.stages, self._poser.body
+        if before is None:
+            # The limb is free already: it reaches its contact while the phase before lasts.
+            stages = (*stages[:-1], replace(stages[-1], min_duration=max(stages[-1].min_duration, flight)))
+        else:
+            via = self._between(staying, lifting, landing.q, before, contact) if self._pace.lift else None
+            if self._pace.lift and via is None:
+                self._log.refuse(f"{name} finds no way around")
+                return None
+            stages = (*stages, Stage.of(body, staying, lifting, flight, via=via))
+        stages = (*stages, Stage.of(body, landed, landing.q, self._pace.shift_duration))
+        return PartialPlan(stages, move.along)
+
+    def _between(
+        self,
+        staying: Mapping[str, Contact],
+        lifting: FloatArray,
+        landing: FloatArray,
+        before: Contact,
+        after: Contact,
+    ) -> FloatArray | None:
+        """Posture in the middle of a flight, the limb off the line between its contacts, or None."""
+        lift = self._pace.lift
+        middle = 0.5 * (before.position + after.position)
+        root = np.concatenate([0.5 * (lifting[:3] + landing[:3]), landing[3:7]])
+        start = np.concatenate([root, 0.5 * (lifting + landing)[7:]])
+        inward = (root[:3] - middle) * [1.0, 1.0, 0.0]
+        inward /= max(float(np.linalg.norm(inward)), 1e-9)
+        # What stands out of a wall is passed on the body's side, the ground from above.
+        for share in (0.7, 0.0, 2.0):
+            out = 0.5 * (before.normal + after.normal) + share * inward
+            place = middle + lift * out / max(float(np.linalg.norm(out)), 1e-9)
+            wish = {before.effector: Placement(place, None, None, 0.5 / lift**2)}
+            posed = self._poser.pose(staying, staying, start, root, placements=wish)
+            if posed.q is not None:
+                return posed.q
+        return None
+
+    def _pose(
+        self,
+        held: Mapping[str, Contact],
+        carrying: Mapping[str, Contact],
+        start: FloatArray,
+        root: FloatArray,
+    ) -> Posed:
+        """A posture whose points stand upright on their surfaces, as far as they can."""
+        wish = {
+            name: Placement(None, contact.rotation_contact_to_world, 0.05)
+            for name, contact in held.items()
+            if contact.kind is ContactKind.POINT
+        }
+        return self._poser.pose(held, carrying, start, root, placements=wish)
+
+
+class _FootMoves(_Moves):
     """Steps of feet, as :class:`~manikin.planning.contacts.depth_first.Moves`."""
 
     def __init__(
-        self, poser: PostureFinder, guide: GuideLine, goal: Stage, settings: ExtendSettings, log: SearchLog
+        self,
+        poser: PostureFinder,
+        guide: GuideLine,
+        settings: ExtendSettings,
+        log: SearchLog,
+        goal: Stage,
+        friction: float,
     ) -> None:
-        self._poser, self._guide, self._goal, self._settings, self._log = poser, guide, goal, settings, log
-        self._body = body = poser.body
-        self._footholds = Footholds(body, poser.scene)
-        self._below_root = _standing_feet(body)
-        self._stride = settings.stride * stature_of(body) / 1.75
-        self._lifted: dict[tuple[int, str], tuple[Stage, Posed]] = {}  # by identity of the stage
+        super().__init__(poser, guide, settings, log)
+        self._goal, self._friction = goal, friction
+        self._footholds = Footholds(poser.body, poser.scene)
+        self._stride = settings.stride * stature_of(poser.body) / 1.75
+        self._known: dict[tuple[int, str], tuple[Stage, Posed]] = {}  # by identity of the stage
 
     @property
     def feet(self) -> frozenset[str]:
         """Effectors that step."""
-        return frozenset(self._below_root)
+        return frozenset(self._footholds.below_root)
 
     def finished(self, partial: PartialPlan) -> ContactPlan | None:
         """The plan, when every foot is where it is at the goal."""
-        if not all(self._is_at_goal(partial, foot) for foot in self._below_root):
+        if not all(self._is_at_goal(partial, foot) for foot in self._footholds.below_root):
             return None
         contacts = partial.last.contacts
         posed = self._poser.pose(contacts, contacts, self._goal.q, self._goal.q[:7], restarts=True)
         if posed.q is None:
             self._log.refuse(f"at the goal: {posed.reason}")
             return None
-        return ContactPlan.of(self._body, partial.stages, posed.q)
+        return ContactPlan.of(self._poser.body, partial.stages, posed.q, self._pace.hinge_pace)
 
-    def proposals(self, partial: PartialPlan) -> Iterator[_Step]:
+    def proposals(self, partial: PartialPlan) -> Iterator[_Move]:
         """Steps, the longest of the foot that is farthest behind first."""
         for name in sorted(partial.along, key=lambda foot: partial.along[foot]):
             if self._is_at_goal(partial, name):
                 continue
             tried: list[FloatArray] = []
-            for along, contact in self._wanted(partial, name):
+            for way, contact in self._wanted(partial, name):
                 if any(np.linalg.norm(contact.position - other) < 0.03 for other in tried):
                     continue
                 tried.append(contact.position)
-                yield _Step(name, contact, along)
+                along = {**partial.along, name: way}
+                yield _Move(name, contact, along, float(np.mean(list(along.values()))))
 
-    def accepted(self, partial: PartialPlan, change: _Step) -> PartialPlan | None:
+    def accepted(self, partial: PartialPlan, change: _Move) -> PartialPlan | None:
         """The plan with a step more, or None where a posture is missing."""
-        foot, contact, held = change.foot, change.contact, partial.last.contacts
-        standing = {name: other for name, other in held.items() if name != foot}
-        landed = {**standing, foot: contact}
-        along = {**partial.along, foot: change.along}
-        lifting = self._lifting(partial, foot)
+        lifting = self._lifted(partial, change.limb)
         if lifting.q is None:
-            self._log.refuse(f"{foot} cannot be lifted: {lifting.reason}")
+            self._log.refuse(f"{change.limb} cannot be lifted: {lifting.reason}")
             return None
-        there = float(np.mean(list(along.values())))
-        landing = self._poser.pose(landed, standing, lifting.q, self._guide.at(there))
-        if landing.q is None:
-            self._log.refuse(f"{foot} cannot be put down: {landing.reason}")
-            return None
-        way = 0.0 if foot not in held else float(np.linalg.norm(contact.position - held[foot].position))
-        flight = max(self._settings.swing_duration, way / self._settings.swing_speed)
-        stages = (
-            *partial.stages,
-            Stage.of(self._body, standing, lifting.q, flight),
-            Stage.of(self._body, landed, landing.q, self._settings.shift_duration),
-        )
-        return PartialPlan(stages, along)
+        return None if change.contact is None else self._landed(partial, change, change.contact, lifting.q)
 
     def _is_at_goal(self, partial: PartialPlan, foot: str) -> bool:
         held, wanted = partial.last.contacts.get(foot), self._goal.contacts[foot]
@@ -250,51 +308,140 @@ class _Steps:
         """Contacts to which a foot may go, each with how far along the guide it is."""
         own = partial.along[foot]
         ahead = max(value for name, value in partial.along.items() if name != foot)
-        strides = [ahead + share * self._stride for share in self._settings.shares]
+        strides = [ahead + share * self._stride for share in self._pace.shares]
         # Where no stride leads, the foot comes nearer first, as on a turn.
         nearer = [own + share * (min(strides[0], self._guide.length) - own) for share in NEARER]
         for along in (*strides, *nearer):
             if along >= self._guide.length - 1e-6:
                 yield self._guide.length, self._goal.contacts[foot]
             elif along > own:
-                for contact in self._places(foot, along):
-                    yield along, contact
+                yield from ((along, contact) for contact in self._places(foot, along))
 
     def _places(self, foot: str, along: float) -> list[Contact]:
         """Contacts of a foot near where it would be if the body stood below the guide's pose."""
         pose = self._guide.at(along)
         yaw = heading_of(pose)
-        wanted = pose[:3] + rotation_from_yaw(yaw) @ self._below_root[foot]
-        holds = self._footholds.near(wanted, yaw)
-        if not holds:
+        wanted = pose[:3] + rotation_from_yaw(yaw) @ self._footholds.below_root[foot]
+        contacts = self._footholds.near(foot, wanted, yaw, self._friction)
+        if not contacts:
             self._log.refuse(f"no foothold for {foot} near {np.round(wanted, 2).tolist()} m")
-        return [
-            hold.contact(foot, self._footholds.length, self._footholds.width, self._settings.friction)
-            for hold in holds
-        ]
+        return contacts
 
-    def _lifting(self, partial: PartialPlan, foot: str) -> Posed:
+    def _lifted(self, partial: PartialPlan, name: str) -> Posed:
         """Posture before a foot is lifted: the same wherever it goes, and looked for once.
 
         It counts every time, so that a foot that cannot be lifted uses up the search.
         """
-        key = id(partial.last), foot
-        if key in self._lifted:
+        key = id(partial.last), name
+        if key in self._known:
             self._poser.searches += 1
-            return self._lifted[key][1]
-        held = partial.last.contacts
-        standing = {name: other for name, other in held.items() if name != foot}
-        posed = self._poser.pose(held, standing, partial.last.q, self._guide.at(partial.here))
-        self._lifted[key] = partial.last, posed
+            return self._known[key][1]
+        posed = super()._lifted(partial, name)
+        self._known[key] = partial.last, posed
         return posed
 
 
-def _standing_feet(body: BodyModel) -> dict[str, FloatArray]:
-    """(3,) place of each foot's sole relative to the root in the standing posture, root level [m]."""
-    q = np.array(body.standing_posture())
-    state = Configuration(body, q)
-    return {
-        limb.effector: state.effector_placement(limb.effector)[1] - q[:3]
-        for limb in body.limbs
-        if limb.effector.endswith("foot")
-    }
+class _LimbMoves(_Moves):
+    """Moves of any limbs, as :class:`~manikin.planning.contacts.depth_first.Moves`."""
+
+    def __init__(
+        self,
+        poser: PostureFinder,
+        guide: GuideLine,
+        settings: LimbExtendSettings,
+        log: SearchLog,
+        places: LimbPlaces,
+    ) -> None:
+        super().__init__(poser, guide, settings, log)
+        self._settings, self._places = settings, places
+
+    def finished(self, partial: PartialPlan) -> ContactPlan | None:
+        """The plan, when the root can be where the guide ends."""
+        if partial.here < self._guide.length - 0.5 * self._settings.stride:
+            return None
+        contacts, goal = partial.last.contacts, self._guide.at(self._guide.length)
+        posed = self._poser.pose(contacts, contacts, partial.last.q, goal)
+        if posed.q is None:
+            return None
+        away = float(np.linalg.norm(posed.q[:3] - goal[:3]))
+        turn = Rotation.from_quat(posed.q[3:7]) * Rotation.from_quat(goal[3:]).inv()
+        if away > self._settings.goal_distance or turn.magnitude() > self._settings.goal_turn:
+            self._log.refuse(f"the root stays {away:.2f} m from its goal")
+            return None
+        return ContactPlan.of(self._poser.body, partial.stages, posed.q, self._settings.hinge_pace)
+
+    def proposals(self, partial: PartialPlan) -> Iterator[_Move]:
+        """Moves of the limb that is farthest behind first."""
+        for name in sorted(partial.along, key=lambda limb: partial.along[limb]):
+            lifting = self._lifted(partial, name)
+            if lifting.q is None:
+                self._log.refuse(f"{name} cannot leave its contact: {lifting.reason}")
+                continue
+            if name not in self._places.limbs:
+                yield _Move(name, None, _without(name, partial.along), partial.here, lifting.q)
+                continue
+            for along in self._aims(partial, name):
+                yield from self._ahead(partial, name, lifting.q, along)
+                if self._log.is_spent:
+                    return
+
+    def accepted(self, partial: PartialPlan, change: _Move) -> PartialPlan | None:
+        """The plan with a move more, or None where a posture is missing."""
+        held, lifting = partial.last.contacts, change.lifting
+        if lifting is None:
+            return None
+        if change.contact is None:
+            left = _without(change.limb, held)
+            stage = Stage.of(self._poser.body, left, lifting, self._settings.swing_duration)
+            return PartialPlan((*partial.stages, stage), change.along)
+        contact, before = replace(change.contact, oriented=False), held.get(change.limb)
+        near = self._settings.same_place
+        if before is not None and np.linalg.norm(before.position - contact.position) < near:
+            return replace(partial, along=change.along)
+        return self._landed(partial, change, contact, lifting)
+
+    def _aims(self, partial: PartialPlan, name: str) -> Iterator[float]:
+        """How far along the guide the limb may go next."""
+        held = [partial.along[other] for other in partial.last.contacts if other != name]
+        ahead, own = max(held, default=0.0), partial.along[name]
+        step = self._settings.stride / max(1, len(self._places.limbs) - 1)
+        if name not in partial.last.contacts:
+            step = 0.0
+        tried: list[float] = []
+        for share in self._settings.shares:
+            along = min(max(ahead, 0.0) + share * step, self._guide.length)
+            if along > own + 1e-6 and along not in tried:
+                tried.append(along)
+                yield along
+
+    def _lifted(self, partial: PartialPlan, name: str) -> Posed:
+        """Posture without one contact; as it is where the limb has none."""
+        return super()._lifted(partial, name) if name in partial.last.contacts else Posed(partial.last.q)
+
+    def _ahead(self, partial: PartialPlan, name: str, lifting: FloatArray, along: float) -> Iterator[_Move]:
+        """Places ahead to which one limb may move."""
+        staying = _without(name, partial.last.contacts)
+        progress = {**partial.along, name: along}
+        root_along = float(np.mean([progress[other] for other in (*staying, name)]))
+        ahead = self._pose(staying, staying, lifting, self._guide.at(root_along))
+        if ahead.q is None:
+            self._log.refuse(f"the root cannot go on without {name}: {ahead.reason}")
+            return
+        direction, root = self._direction(root_along), self._guide.at(along)
+        for place in self._places.find(name, ahead.q, root, direction, self._settings.places):
+            if place.contact is None or place.q is None:
+                self._log.refuse(place.message)
+            else:
+                yield _Move(name, place.contact, progress, root_along, lifting, place.q)
+
+    def _direction(self, along: float) -> FloatArray:
+        """(3,) where the scene shall push a limb: onward and up against the weight."""
+        onward = self._guide.at(along + 0.3 * self._settings.stride)[:3] - self._guide.at(along)[:3]
+        length = float(np.linalg.norm(onward))
+        direction = UP + (onward / length if length > 1e-9 else 0.0)
+        return direction if np.linalg.norm(direction) > 0.1 else UP
+
+
+def _without(name: str, items: Mapping[str, Item]) -> dict[str, Item]:
+    """All items but that of one name."""
+    return {other: item for other, item in items.items() if other != name}

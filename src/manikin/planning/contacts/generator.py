@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -54,7 +54,7 @@ class GeneratorSettings:
         tolerance: Largest distance of a sample's effector to a surface, closed by inverse kinematics; of a
             limb without joints it stays [m].
         max_tilt: Largest angle between the effector's z axis and the normal before the alignment [rad].
-        point_tilt: The same after it, for points, grasps and limbs without joints; soles lie flat [rad].
+        point_tilt: That angle after the alignment of points, grasps and limbs without joints [rad].
         tries: Candidates that are aligned and tested before giving up.
     """
 
@@ -69,8 +69,6 @@ class GeneratedContact:
     """Answer to a request: a contact and the posture that makes it, or why there is none.
 
     Attributes:
-        limb: Name of the limb.
-        contact: The contact, or None.
         q: (nq,) the body with this limb in contact and all else as asked, or None.
         obstacle: Name of the obstacle touched, or None.
         score: Score of the candidate; minus infinity without one.
@@ -78,9 +76,8 @@ class GeneratedContact:
         tried: How many of them were tried, or, without a contact, were found impossible.
         failure: What kept the limb from a contact, or None.
         message: The failure in words, or an empty text.
-        gap: Distance of the effector from its contact in ``q`` [m]: none where joints close it.  A limb
-            without joints touches where the root puts it, at most the settings' tolerance away; it is for
-            whoever places the root to close the rest.
+        gap: Distance of the effector from its contact in ``q`` [m]: none where joints close it, at most the
+            settings' tolerance for a limb without joints, which touches where the root puts it.
     """
 
     limb: str
@@ -119,11 +116,7 @@ class ContactGenerator:
         """Prepare a scene.
 
         Args:
-            body: A body with limbs.
-            scene: Its surroundings.
             samples: Samples by name of the limb, see :func:`manikin.planning.contacts.sample_limbs`.
-            settings: How to search.
-            rules: What contacts can carry.
 
         Raises:
             BodyError: If samples belong to no limb of the body.
@@ -156,8 +149,6 @@ class ContactGenerator:
 
         Args:
             q: (nq,) the body; all but the limb stays as it is.
-            limb: Name of the limb.
-            task: What is to be done.
             heuristic: What to prefer; EFORT when omitted.
             kind: How the effector touches; the limb's own way when omitted.
 
@@ -178,23 +169,13 @@ class ContactGenerator:
         most: int = 1,
         apart: float = 0.05,
     ) -> list[GeneratedContact]:
-        """Find the best contacts of one limb in different places, best first.
+        """Find the best contacts of one limb in different places, best first; one answer where there is none.
+
+        The other arguments and errors are those of :meth:`request`.
 
         Args:
-            q: As for :meth:`request`.
-            limb: As there.
-            task: As there.
-            heuristic: As there.
-            kind: As there.
             most: Largest number of contacts.
             apart: Distance between two of them [m].
-
-        Returns:
-            Contacts, or one answer without a contact.
-
-        Raises:
-            BodyError: As there.
-            ContactError: As there.
         """
         if limb not in self._tools:
             raise BodyError(f"no samples of limb {limb!r}; valid: {', '.join(self._tools) or 'none'}")
@@ -209,13 +190,9 @@ class ContactGenerator:
             max_tilt=self.settings.max_tilt, footprint=footprint(self.body, tools.limb, touch, self.rules),
         )  # fmt: skip
         if not len(candidates):
-            names = sorted({self._table.surfaces[number].obstacle for number in near})
-            return [
-                _failure(
-                    limb, Hindrance.SURFACE, f"no sample of {limb} lies flat on a surface of "
-                    f"{', '.join(names)}, though these are near",
-                )
-            ]  # fmt: skip
+            names = ", ".join(sorted({self._table.surfaces[number].obstacle for number in near}))
+            message = f"no sample of {limb} lies flat on a surface of {names}, though these are near"
+            return [_failure(limb, Hindrance.SURFACE, message)]
         scores = (heuristic or Efort()).score(situation, candidates)
         return self._choose(tools, situation, candidates, scores, touch, most, apart)
 
@@ -230,7 +207,7 @@ class ContactGenerator:
         apart: float,
     ) -> list[GeneratedContact]:
         """Steps 3 and 4: best first, the first that can be aligned and are free."""
-        found: list[GeneratedContact] = []
+        answers: list[GeneratedContact] = []
         faults: Counter[tuple[str, str]] = Counter()
         flat = kind is ContactKind.SOLE
         gap, allowed = tools.allowed(self.settings, flat=flat)
@@ -242,7 +219,9 @@ class ContactGenerator:
         for row, goal in self._worth_trying(tools, situation, candidates, order, faults):
             if tried == self.settings.tries:
                 break
-            if found and _is_near(candidates.points[row], found, apart):
+            point = candidates.points[row]
+            places = (item.contact.position for item in answers if item.contact is not None)
+            if any(np.linalg.norm(point - place) < apart for place in places):
                 continue
             tried += 1
             aligned = tools.aligner.align(*goal, allowed)
@@ -259,14 +238,19 @@ class ContactGenerator:
                 faults[hit] += 1
                 continue
             turn = situation.rotation @ aligned.rotation
-            if flat and not self._table.carries_one(candidates.points[row] + sole @ turn.T, surface):
+            if flat and not self._table.carries_one(point + sole @ turn.T, surface):
                 faults[_TILTED] += 1
                 continue
-            made = self._found(tools.limb, kind, candidates, row, turn, q.copy(), scores, tried)
-            found.append(made if len(tools.chain) else replace(made, gap=aligned.error))
-            if len(found) == most:
+            contact = make_contact(
+                self.body, tools.limb, kind, point, onto_normal(turn, candidates.normals[row]), self.rules
+            )
+            answers.append(GeneratedContact(
+                tools.limb.name, contact, q.copy(), self._table.surfaces[surface].obstacle,
+                float(scores[row]), len(candidates), tried, gap=0.0 if len(tools.chain) else aligned.error,
+            ))  # fmt: skip
+            if len(answers) == most:
                 break
-        return found or [_none_fits(tools.limb.name, faults, len(candidates))]
+        return answers or [_none_fits(tools.limb.name, faults, len(candidates))]
 
     def _worth_trying(
         self,
@@ -293,23 +277,6 @@ class ContactGenerator:
             goals = tools.goals(situation, candidates, rows)
             yield from zip(rows.tolist(), zip(*goals, strict=True), strict=True)
             size = max(size, _SOME)
-
-    def _found(
-        self,
-        limb: Limb,
-        kind: ContactKind,
-        candidates: Candidates,
-        row: int,
-        turn: FloatArray,
-        q: FloatArray,
-        scores: FloatArray,
-        tried: int,
-    ) -> GeneratedContact:
-        surface = self._table.surfaces[int(candidates.surfaces[row])]
-        rotation = onto_normal(turn, surface.normal)
-        contact = make_contact(self.body, limb, kind, candidates.points[row], rotation, self.rules)
-        score = float(scores[row])
-        return GeneratedContact(limb.name, contact, q, surface.obstacle, score, len(candidates), tried)
 
 
 class _LimbTools:
@@ -358,12 +325,6 @@ def _order(scores: FloatArray) -> NDArray[np.int64]:
     left = np.ones(len(order), dtype=bool)
     left[steps] = False
     return order[np.concatenate([steps, np.flatnonzero(left)])]
-
-
-def _is_near(point: FloatArray, found: list[GeneratedContact], apart: float) -> bool:
-    """Whether one of the contacts is nearer to a point (3,) than a distance [m]."""
-    places = (item.contact.position for item in found if item.contact is not None)
-    return any(np.linalg.norm(point - place) < apart for place in places)
 
 
 def _failure(

@@ -1,7 +1,4 @@
-"""What makes one contact better than another: interchangeable scores of candidates.
-
-Also here. Scores that hardly change within a small place, asked once for each.
-"""
+"""What makes one contact better than another: interchangeable scores of candidates."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,12 +21,12 @@ from manikin.planning.contacts.samples import LimbSamples
 
 
 def cached_score(candidates: Candidates, spacing: float, value: Callable[[int], float]) -> FloatArray:
-    """(n,) scores; candidates on one surface and in one cell of a grid share that of their first.
+    """(n,) scores that hardly change within a small place: one for each surface and cell of a grid.
 
     Args:
         candidates: n of them.
-        spacing: Of the grid [m].
-        value: Score of a candidate by its row.
+        spacing: Size of the cells [m].
+        value: Score of a candidate by its row, asked of the first one in each cell.
     """
     keys = np.column_stack([candidates.surfaces, np.round(candidates.points / spacing)])
     _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
@@ -40,15 +37,7 @@ def cached_score(candidates: Candidates, spacing: float, value: Callable[[int], 
 def contact_at(
     situation: Situation, candidates: Candidates, row: int, kind: ContactKind, rules: ContactRules
 ) -> Contact:
-    """The contact that a candidate makes, turned onto its surface the shortest way.
-
-    Args:
-        situation: Body and limb.
-        candidates: Where the limb may touch.
-        row: Of the candidate.
-        kind: How it touches.
-        rules: Friction and strengths.
-    """
+    """The contact that one candidate makes, turned onto its surface the shortest way."""
     turn = onto_normal(situation.rotation @ candidates.rotations[row], candidates.normals[row])
     return make_contact(situation.state.body, situation.limb, kind, candidates.points[row], turn, rules)
 
@@ -97,12 +86,12 @@ class StrongEfort:
     @staticmethod
     def of(body: BodyModel, samples: Mapping[str, LimbSamples], *, pulling: bool = False) -> "StrongEfort":
         """Prepare the samples of some limbs."""
-        found = {}
+        products = {}
         for name, item in samples.items():
             chain = LimbKinematics(body, item.limb)
             scaled = chain.place(item.angles).jacobians / np.minimum(-chain.torque_lower, chain.torque_upper)
-            found[name] = scaled @ scaled.transpose(0, 2, 1)
-        return StrongEfort(found, pulling)
+            products[name] = scaled @ scaled.transpose(0, 2, 1)
+        return StrongEfort(products, pulling)
 
     def score(self, situation: Situation, candidates: Candidates) -> FloatArray:
         """See :class:`Heuristic`."""
@@ -164,23 +153,18 @@ HEURISTICS = ("efort", "distance", "manipulability", "random")
 
 
 def heuristic_named(name: str, seed: int = 0, *, pulling: bool = False) -> Heuristic:
-    """Heuristic by its name.
-
-    Args:
-        name: One of :data:`HEURISTICS`.
-        seed: Of the random one.
-        pulling: Whether EFORT is that of a limb which holds on and pulls.
+    """Heuristic of a name in :data:`HEURISTICS`; a seed for the random one, EFORT of what pulls if asked for.
 
     Raises:
         InputError: If there is none of that name.
     """
-    found: dict[str, Heuristic] = {
+    known: dict[str, Heuristic] = {
         "efort": Efort(pulling), "distance": ClosestDistance(), "manipulability": Manipulability(),
         "random": Random(seed),
     }  # fmt: skip
-    if name not in found:
+    if name not in known:
         raise InputError(f"heuristic is {name!r}; valid: {', '.join(HEURISTICS)}")
-    return found[name]
+    return known[name]
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +174,6 @@ class Duration:
     The range of motion is the largest sphere inside the reach (7.1.1).
 
     Attributes:
-        reach: Reach of the limb.
         ahead: (rotation (3, 3) segment-to-world, position (3,) [m]) of the segment that carries the
             limb at the next configurations ``q_2 ... q_w``.
     """
@@ -210,12 +193,8 @@ def duration(within: ArrayLike) -> FloatArray:
     """Share of the next configurations up to the first that cannot reach ([Tonneau2015]_ 7.4).
 
     The product of 7.3 stops at the first configuration out of reach, so later ones do not count.
-
-    Args:
-        within: (..., w - 1) whether the contact is within reach at ``q_2 ... q_w``.
-
-    Returns:
-        (...) in [0, 1]; 1 when nothing lies ahead.
+    ``within`` (..., w - 1) says whether the contact is within reach at ``q_2 ... q_w``; the share (...) is in
+    [0, 1], and 1 when nothing lies ahead.
     """
     reached = np.asarray(within, dtype=bool)
     if reached.shape[-1] == 0:
@@ -234,11 +213,10 @@ class BalanceScore:
 
     Attributes:
         held: The other contacts, with what caps their forces.
-        acceleration: (3,) of the CoM [m/s^2].
+        acceleration: (3,) acceleration of the CoM [m/s^2].
         binary: 1 where balanced and else 0, as printed (7.6), instead of the margin [N.m].
-        spacing: [m].
+        spacing: Largest distance of candidates that share a margin [m].
         kind: How the new contact touches; the limb's own way when None.
-        rules: Friction and strengths.
     """
 
     held: Stance

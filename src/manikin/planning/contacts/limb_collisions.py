@@ -1,7 +1,5 @@
 """Whether one limb of a body touches the scene or the rest of the body.
 
-Also here. Samples of a limb that are so deep in something that no small move of the joints frees them.
-
 Before a candidate is aligned and tested exactly, balls along the limb at its sample are compared with the
 boxes, capsules and balls around it, all candidates at once. Each of these is a box of half sizes ``h``
 widened by a radius ``r``, whose distance from a point ``p`` in its frame is, with ``e = |p| - h``,
@@ -29,7 +27,7 @@ from manikin.scene.collision import CollisionPart, collision_parts
 TOUCH = 0.002
 """Depth to which a limb may be in an obstacle, so that what it rests on is no collision [m]."""
 YIELD = 0.8
-"""The same for a hand and its wrist in what the hand touches, as a share of the forearm's radius.
+"""Depth to which a hand and its wrist may be in what the hand touches, as a share of the forearm's radius.
 
 The wrist of our shapes is thicker than the hand, so that a palm flat on a wall has it in the wall.
 """
@@ -108,14 +106,11 @@ class LimbCollisions:
         return self._names[number]
 
     def first(self, q: FloatArray, touched: str | None = None) -> tuple[str, str] | None:
-        """Names of the first pair that collides at a configuration (nq,), or None.
+        """Shape of the body, and obstacle or other shape, of the first pair that collides, or None.
 
         Args:
-            q: The configuration; all but the limb as in the situation that was begun, if one was.
+            q: (nq,) configuration; all but the limb as in the situation that was begun, if one was.
             touched: Name of the obstacle on which the limb has its contact.
-
-        Returns:
-            (shape of the body, obstacle or shape of the body).
         """
         if touched != self._touched:
             self._set_margin(self._touched, TOUCH)
@@ -145,15 +140,12 @@ class FarPairs:
         placed: pin.GeometryData,
         pairs: Sequence[tuple[int, int]],
     ) -> None:
-        """Prepare the pairs.
+        """Prepare pairs of a shape of the limb with a part of the scene or another shape of the body.
 
         Args:
-            body: The body.
-            limb: Its limb.
-            parts: Of the scene.
             shapes: Shapes of the body, then the parts.
             placed: Where they are, updated by the caller.
-            pairs: (shape of the limb, part, or shape of the body) each.
+            pairs: Numbers of the shapes of each pair.
         """
         reaches = _reaches(body, limb)
         names = [item.name for item in shapes.geometryObjects]
@@ -264,9 +256,6 @@ class DeepSamples:
         """Place the balls of all samples.
 
         Args:
-            body: The body.
-            chain: Its limb.
-            samples: Samples of the limb.
             collisions: Its exact collision test, whose pairs these are.
         """
         self._collisions = collisions
@@ -302,14 +291,8 @@ class DeepSamples:
         return Surroundings(turns, places, self._half[near], reach, self._pair[near])
 
     def pairs(self, around: "Surroundings", rows: IntArray, depth: float) -> IntArray:
-        """(n,) number of a pair in which a sample is deeper than ``depth`` [m], or -1.
-
-        Args:
-            around: See :meth:`around`.
-            rows: (n,) samples.
-            depth: [m].
-        """
-        found = np.full(len(rows), -1, dtype=np.int64)
+        """(n,) number of a pair in which each of (n,) samples is deeper than ``depth`` [m], or -1."""
+        numbers = np.full(len(rows), -1, dtype=np.int64)
         others, balls = around.reach.shape
         beyond = around.turns.reshape(-1, 3) @ self._centres[rows].reshape(-1, 3).T
         beyond = beyond.reshape(others, 3, len(rows), balls) - around.places[:, :, None, None]
@@ -323,8 +306,8 @@ class DeepSamples:
         least = (around.reach - depth)[:, None]
         deep = (squared < np.maximum(least, 0.0) ** 2) | (largest < np.minimum(least, 0.0))
         other, row, ball = deep.nonzero()
-        found[row] = around.pair[other, ball]
-        return found
+        numbers[row] = around.pair[other, ball]
+        return numbers
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,4 @@
-"""Places for one limb along a guide: what the generator offers near where the limb should be.
-
-Also here. Places for a sole near a wanted one.
-"""
+"""Places for one limb near where it should be: footholds of soles, and offers of the contact generator."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -15,7 +12,7 @@ from manikin.body import BodyModel, Configuration, Limb
 from manikin.body.limbs import is_further
 from manikin.contact import Contact, ContactKind, sole
 from manikin.errors import BodyError, ContactError
-from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_yaw
+from manikin.numerics.spatial import FloatArray, rotation_from_yaw
 from manikin.planning.contacts.candidates import Candidates, Situation
 from manikin.planning.contacts.contact_plan import ContactRules, footprint, make_contact, onto_normal
 from manikin.planning.contacts.depth_first import heading_of
@@ -46,7 +43,7 @@ class FootholdSettings:
         foot_height: Height of the foot above its sole that has to be free [m].
         steepest: Largest slope of a surface to stand on [rad].
         height_weight: What a difference in height counts beside one along the ground.
-        apart: Distance between two places of the same surface that are both offered [m].
+        apart: Distance between two places of one surface that are both offered [m].
         offered: Most places of one surface that are offered.
     """
 
@@ -60,39 +57,15 @@ class FootholdSettings:
     apart: float = 0.08
     offered: int = 2
 
-    def __post_init__(self) -> None:
-        for name in ("spacing", "foot_height", "apart"):
-            finite_number(getattr(self, name), f"foothold settings {name}", above=0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Foothold:
-    """A place for a sole.
-
-    Attributes:
-        position: (3,) of the middle of the sole [m].
-        rotation: (3, 3) sole-to-world.
-        obstacle: Name of the obstacle that carries it.
-        cost: Weighted distance to the wanted place [m].
-    """
-
-    position: FloatArray
-    rotation: FloatArray
-    obstacle: str
-    cost: float
-
-    def contact(self, effector: str, length: float, width: float, friction: float) -> Contact:
-        """The contact of a foot that stands there."""
-        return sole(
-            effector, self.position, length=length, width=width, friction=friction, rotation=self.rotation
-        )
-
 
 class Footholds:
     """Looks for footholds in one scene.
 
-    A place is one where the whole sole lies on a surface and nothing else of the scene is in the way of
+    A foothold is where the whole sole lies on a surface and nothing else of the scene is in the way of
     the foot. One instance works on buffers of its own: use one per thread.
+
+    Attributes:
+        below_root: (3,) place of each foot's sole relative to the root, level, in the standing posture [m].
     """
 
     def __init__(self, body: BodyModel, scene: Scene, settings: FootholdSettings | None = None) -> None:
@@ -103,24 +76,36 @@ class Footholds:
         """
         if body.sole_length is None or body.sole_width is None:
             raise ContactError(f"body {body.name!r} has no soles; valid: a body that stands on feet")
-        self.length, self.width = body.sole_length, body.sole_width
+        self._size = np.array([body.sole_length, body.sole_width])
         self.settings = settings or FootholdSettings()
         self._surfaces = scene.surfaces_facing((0.0, 0.0, 1.0), self.settings.steepest)
         self._parts = [(item.name, part) for item in scene for part in collision_parts(item)]
         gap = 2.0 * self.settings.clearance
-        self._foot = coal.Box(self.length + gap, self.width + gap, self.settings.foot_height)
+        self._foot = coal.Box(*(self._size + gap), self.settings.foot_height)
+        q = np.array(body.standing_posture())
+        state = Configuration(body, q)
+        self.below_root = {
+            limb.effector: state.effector_placement(limb.effector)[1] - q[:3]
+            for limb in body.limbs
+            if limb.effector.endswith("foot")
+        }
 
-    def near(self, wanted: FloatArray, yaw: float) -> list[Foothold]:
-        """Footholds around a place, the nearest first.
+    def near(self, foot: str, wanted: FloatArray, yaw: float, friction: float) -> list[Contact]:
+        """Contacts of a foot around a place (3,) of its sole's middle [m], the nearest first.
 
-        Args:
-            wanted: (3,) where the middle of the sole should be [m].
-            yaw: Heading of the toes [rad].
+        The toes head to ``yaw`` [rad]; the friction is a Coulomb coefficient.
         """
-        found = [hold for surface in self._surfaces for hold in self._on(surface, wanted, yaw)]
-        return sorted(found, key=lambda hold: hold.cost)
+        places = [place for surface in self._surfaces for place in self._on(surface, wanted, yaw)]
+        length, width = self._size
+        return [
+            sole(foot, position, length=length, width=width, friction=friction, rotation=rotation)
+            for _, position, rotation in sorted(places, key=lambda place: place[0])
+        ]
 
-    def _on(self, surface: Surface, wanted: FloatArray, yaw: float) -> Iterator[Foothold]:
+    def _on(
+        self, surface: Surface, wanted: FloatArray, yaw: float
+    ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
+        """Weighted distance to the wanted place [m], position (3,) [m] and rotation (3, 3) of soles."""
         rotation = onto_normal(rotation_from_yaw(yaw), surface.normal)
         places = self._places(surface, wanted, rotation)
         lifted = np.abs(places[:, 2] - wanted[2]) * self.settings.height_weight
@@ -132,13 +117,14 @@ class Footholds:
                 continue
             if self._is_free(place, rotation, surface):
                 taken.append(place)
-                yield Foothold(place, rotation, surface.obstacle, float(cost[row]))
+                yield float(cost[row]), place, rotation
                 if len(taken) == self.settings.offered:
                     return
 
     def _places(self, surface: Surface, wanted: FloatArray, rotation: FloatArray) -> FloatArray:
         """(n, 3) places of a grid around the wanted one where the whole sole lies on the surface."""
-        steps = [self.settings.spacing * np.arange(-n, n + 1) for n in self._counts()]
+        counts = (int(reach / self.settings.spacing) for reach in self.settings.reach)
+        steps = [self.settings.spacing * np.arange(-n, n + 1) for n in counts]
         along, across = (axis.ravel() for axis in np.meshgrid(*steps, indexing="ij"))
         heading = rotation[:2, 0] / np.linalg.norm(rotation[:2, 0])
         side = np.array([-heading[1], heading[0]])
@@ -146,14 +132,10 @@ class Footholds:
         places[:, :2] = wanted[:2] + along[:, None] * heading + across[:, None] * side
         base = surface.polygon[0]
         places[:, 2] = base[2] - (places[:, :2] - base[:2]) @ surface.normal[:2] / surface.normal[2]
-        half = np.array([0.5 * self.length, 0.5 * self.width]) + self.settings.edge
+        half = 0.5 * self._size + self.settings.edge
         corners = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]]) * half @ rotation[:, :2].T
         outside = surface.outside((places[:, None] + corners).reshape(-1, 3)).reshape(-1, 4)
         return places[(outside <= 1e-9).all(axis=1)]
-
-    def _counts(self) -> tuple[int, int]:
-        along, across = (int(reach / self.settings.spacing) for reach in self.settings.reach)
-        return along, across
 
     def _is_free(self, place: FloatArray, rotation: FloatArray, surface: Surface) -> bool:
         """Whether nothing but the surface's own obstacle is in the foot's way, nor that one above it."""
@@ -200,21 +182,19 @@ STEEPEST = float(np.deg2rad(40.0))
 FINGERS = 0.08
 """Distance from an edge at which a hand has its fingers around it [m]; our choice."""
 
-GRASP_TILT = float(np.deg2rad(80.0))
-"""Largest angle between the palm and what a hand has its fingers around [rad]; our choice."""
+TILTS = {ContactKind.GRASP: float(np.deg2rad(80.0)), ContactKind.POINT: float(np.deg2rad(35.0))}
+"""Largest angle between an effector's normal and the surface's [rad]; our choice.
 
-POINT_TILT = float(np.deg2rad(35.0))
-"""The same between a point's normal and the surface's [rad]; our choice."""
+A hand has its fingers around an edge at any angle, a tip may lean."""
 
 
 @dataclass(frozen=True)
 class Near:
-    """Near a place, and of those the one that another preference likes best; ours.
+    """A heuristic for contacts near a place, and of those the one that another preference likes best; ours.
 
     Attributes:
         place: (3,) where the effector should be [m].
         room: Distance from there that counts as much as the whole other preference [m].
-        other: The other preference.
         edges: Where there are edges, for a hand that has to have its fingers around one; None for others.
     """
 
@@ -248,7 +228,7 @@ class Edges:
 
     def near(self, candidates: Candidates) -> NDArray[np.bool_]:
         """(n,) whether candidates lie near an edge of their surface."""
-        found = np.zeros(len(candidates), dtype=bool)
+        near = np.zeros(len(candidates), dtype=bool)
         for number in np.unique(candidates.surfaces):
             rows = np.flatnonzero(candidates.surfaces == number)
             start = self.polygons[number]
@@ -256,8 +236,8 @@ class Edges:
             away = candidates.points[rows, None] - start
             share = np.einsum("nei,ei->ne", away, along) / np.maximum(np.sum(along**2, axis=1), 1e-18)
             gap = away - np.clip(share, 0.0, 1.0)[..., None] * along
-            found[rows] = np.linalg.norm(gap, axis=2).min(axis=1) <= self.reach
-        return found
+            near[rows] = np.linalg.norm(gap, axis=2).min(axis=1) <= self.reach
+        return near
 
 
 class LimbPlaces:
@@ -281,13 +261,10 @@ class LimbPlaces:
         """Prepare a scene.
 
         Args:
-            body: The body.
-            scene: Its surroundings.
             limbs: Limbs that make contacts.
             kinds: How each touches, by name of the limb.
-            rules: What contacts can carry.
             reference: (nq,) posture in which every limb is where it should be relative to the root.
-            samples: Of the limbs; made when omitted.
+            samples: Samples of the limbs; made when omitted.
         """
         self.limbs = {limb.effector: limb for limb in limbs}
         self._kinds = kinds
@@ -296,7 +273,8 @@ class LimbPlaces:
         self._generators = {
             kind: ContactGenerator(
                 body, scene, {limb.name: known[limb.name] for limb in limbs if kinds[limb.name] is kind},
-                _settings(kind), rules,
+                GeneratorSettings(max_tilt=TILTS[kind], point_tilt=TILTS[kind]) if kind in TILTS else None,
+                rules,
             )
             for kind in set(kinds.values())
         }  # fmt: skip
@@ -324,7 +302,7 @@ class LimbPlaces:
         """Contacts of one limb, the best first; one answer without a contact where there is none.
 
         Args:
-            effector: Of the limb.
+            effector: Effector of the limb.
             q: (nq,) the body; all but the limb stays as it is.
             root: (7,) pose of the root at which the limb should be where it should be.
             direction: (3,) where the scene shall push the limb.
@@ -335,16 +313,16 @@ class LimbPlaces:
         place = self.wanted(effector, root)
         edges = self._edges if kind is ContactKind.GRASP else None
         heuristic = Near((place[0], place[1], place[2]), ROOM * self.reach, Efort(), edges)
-        found = self._generators[kind].request_several(
+        answers = self._generators[kind].request_several(
             q, limb.name, Task(direction), heuristic, kind=kind, most=most, apart=0.07 * self.reach
         )
-        near = [item for item in found if item.contact is not None and item.score > 1.0 - FAR]
+        near = [item for item in answers if item.contact is not None and item.score > 1.0 - FAR]
         if len(near) < most and kind is not ContactKind.GRASP:
             near += self._nearest(limb, kind, q, place, heading_of(root), near)
-        if near or not found[0].found:
-            return near or found
+        if near or not answers[0].found:
+            return near or answers
         message = f"nothing for {limb.name} near {np.round(place, 2).tolist()} m"
-        return [replace(found[0], contact=None, q=None, failure=Hindrance.SURFACE, message=message)]
+        return [replace(answers[0], contact=None, q=None, failure=Hindrance.SURFACE, message=message)]
 
     def _nearest(
         self,
@@ -367,7 +345,7 @@ class LimbPlaces:
                 [np.where(points[:, 0] > points[:, 0].mean(), toes, points[:, 0]), points[:, 1:]]
             )
         outward = float(np.sign(self._wanted[limb.effector][1])) * TURN_OUT
-        found: list[tuple[float, GeneratedContact]] = []
+        offers: list[tuple[float, GeneratedContact]] = []
         taken = [item.contact.position for item in others if item.contact is not None]
         for surface in self._level:
             for turn in (0.0, outward) if kind is ContactKind.SOLE else (0.0,):
@@ -378,8 +356,8 @@ class LimbPlaces:
                 contact = make_contact(self._body, limb, kind, spot, rotation, self._rules)
                 score = -float(np.linalg.norm(spot - wanted)) / (ROOM * self.reach)
                 item = GeneratedContact(limb.name, contact, q, surface.obstacle, score, 0, 0)
-                found.append((-score + (0.1 if turn else 0.0), item))
-        return [item for cost, item in sorted(found, key=lambda pair: pair[0])[:NEAREST] if cost < 2.0]
+                offers.append((-score + (0.1 if turn else 0.0), item))
+        return [item for cost, item in sorted(offers, key=lambda pair: pair[0])[:NEAREST] if cost < 2.0]
 
     def _spot(self, surface: Surface, wanted: FloatArray, corners: FloatArray) -> FloatArray | None:
         """(3,) place on a surface nearest to a wanted one, corners (c, 3) about it inside, or None."""
@@ -391,11 +369,3 @@ class LimbPlaces:
         outside = surface.outside((places[:, None] + corners).reshape(-1, 3)).reshape(len(places), -1)
         inside = places[(outside <= 0.0).all(axis=1)]
         return inside[0] if len(inside) else None
-
-
-def _settings(kind: ContactKind) -> GeneratorSettings:
-    """A hand has its fingers around an edge at any angle; a tip may lean."""
-    if kind is ContactKind.SOLE:
-        return GeneratorSettings()
-    tilt = GRASP_TILT if kind is ContactKind.GRASP else POINT_TILT
-    return GeneratorSettings(max_tilt=tilt, point_tilt=tilt)

@@ -9,7 +9,14 @@ import pinocchio as pin
 from manikin.balance.static import StaticRegion
 from manikin.body import BodyModel, Configuration, with_root
 from manikin.contact import Contact, ContactModel, FrictionModel, Stance
-from manikin.kinematics import Placement, PostureProblem, SolverSettings, generate_posture, touching_pairs
+from manikin.kinematics import (
+    Placement,
+    PostureProblem,
+    Preferences,
+    SolverSettings,
+    generate_posture,
+    touching_pairs,
+)
 from manikin.numerics.spatial import FloatArray
 from manikin.scene import Proximity, Scene
 
@@ -26,11 +33,11 @@ class PostureFinderSettings:
         range_margin: Angle to the ends of the joint ranges [rad].
         natural: Whether hips and shoulders of a human keep to their learnt volumes as well.
         inset: Distance of the centre of mass to the edges of the region where it may rest [m].
-        root_weight: Of the distance between the root and the guide [1/m^2].
-        turn_weight: Of the angle between the root and the guide [1/rad^2].
+        root_weight: Weight of the distance between the root and the guide [1/m^2].
+        turn_weight: Weight of the angle between the root and the guide [1/rad^2].
         tolerance: Largest residual of a contact [m, rad].
-        iterations: Of each search.
-        friction_model: Of the stances on which the body has to be able to rest.
+        iterations: Iterations of each search.
+        friction_model: Friction model of the stances on which the body has to be able to rest.
     """
 
     clearance: float = 0.014
@@ -49,7 +56,7 @@ class PostureFinderSettings:
         return LEARNT_MARGIN if self.natural else None
 
     def scaled(self, factor: float) -> "PostureFinderSettings":
-        """The same for a body of another size: lengths times a factor."""
+        """Settings for a body of another size: lengths times a factor."""
         return replace(
             self, clearance=factor * self.clearance, inset=factor * self.inset,
             root_weight=self.root_weight / factor**2,
@@ -86,10 +93,7 @@ class PostureFinder:
         """Prepare a scene.
 
         Args:
-            body: The body.
-            scene: Its surroundings.
             reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
-            settings: What to keep to.
         """
         self.body, self._root = with_root(body)
         self.scene, self._reference = scene, reference
@@ -113,6 +117,7 @@ class PostureFinder:
         inset: float | None = None,
         restarts: bool = False,
         placements: Mapping[str, Placement] | None = None,
+        preferences: Preferences | None = None,
     ) -> Posed:
         """Find a posture that holds contacts and rests on some of them alone.
 
@@ -125,56 +130,41 @@ class PostureFinder:
             inset: Distance of that place to the edges of where it may rest [m]; the settings' when omitted.
             restarts: Whether to try again from crouched postures.
             placements: Where further effectors should be, by name.
+            preferences: Weights of what is not required; the default ones when omitted.
         """
         if place is None:
-            near = Configuration(self.body, start).com[:2] if guide is None else self._over(guide)
-            place = self._region(carrying).nearest(
-                np.asarray(near), self.settings.inset if inset is None else inset
-            )
+            if guide is None:
+                near = np.asarray(Configuration(self.body, start).com[:2])
+            else:  # over the root of a person, and over what a creature has ahead of its root
+                near = guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
+            place = self._region(carrying).nearest(near, self.settings.inset if inset is None else inset)
         if place is None:
             return Posed(None, f"{', '.join(carrying) or 'nothing'} cannot carry the body at rest")
         self.searches += 1
+        settings, led = self.settings, {} if guide is None else self.led(guide)
         problem = PostureProblem(
-            self.body,
-            tuple(held.values()),
-            {**self._wish(guide), **(placements or {})},
-            com=np.array([*place, np.nan]),
-            proximity=self._proximity,
-            clearance=self.settings.clearance,
-            self_clearance=self.settings.clearance,
-            ignore=self._touching(held),
-            range_margin=self.settings.range_margin,
-            learnt_margin=self.settings.learnt_margin,
-            reference=self._reference,
-        )
+            self.body, tuple(held.values()), {**led, **(placements or {})}, com=np.array([*place, np.nan]),
+            proximity=self._proximity, clearance=settings.clearance, self_clearance=settings.clearance,
+            ignore=self._touching(held), range_margin=settings.range_margin,
+            learnt_margin=settings.learnt_margin, reference=self._reference,
+            preferences=preferences or Preferences(),
+        )  # fmt: skip
         once = SolverSettings(
-            tolerance=self.settings.tolerance,
-            iterations=self.settings.iterations,
-            restarts=False,
-            explain=False,
+            tolerance=settings.tolerance, iterations=settings.iterations, restarts=False, explain=False
         )
         if guide is not None:
             # The guide's trunk is free, so that from there no obstacle is passed on its wrong side.
-            led = np.concatenate([guide, start[7:]])
-            found = generate_posture(problem, led, settings=once)
-            if found.succeeded:
-                return Posed(found.q)
-        found = generate_posture(problem, start, settings=replace(once, restarts=restarts))
-        return Posed(found.q) if found.succeeded else Posed(None, found.failure or "no posture")
+            result = generate_posture(problem, np.concatenate([guide, start[7:]]), settings=once)
+            if result.succeeded:
+                return Posed(result.q)
+        result = generate_posture(problem, start, settings=replace(once, restarts=restarts))
+        return Posed(result.q) if result.succeeded else Posed(None, result.failure or "no posture")
 
-    def _over(self, guide: FloatArray) -> FloatArray:
-        """(2,) where the centre of mass is in a body whose root has a (7,) pose: a person's over the root."""
-        return guide[:2] + (pin.XYZQUATToSE3(guide).rotation @ self._ahead)[:2]
-
-    def _wish(self, guide: FloatArray | None) -> dict[str, Placement]:
-        if guide is None:
-            return {}
-        pose = pin.XYZQUATToSE3(guide)
-        return {
-            self._root: Placement(
-                pose.translation, pose.rotation, self.settings.turn_weight, self.settings.root_weight
-            )
-        }
+    def led(self, guide: FloatArray) -> dict[str, Placement]:
+        """Wish for the root to be near a (7,) pose, by the root's effector."""
+        pose, settings = pin.XYZQUATToSE3(guide), self.settings
+        wish = Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)
+        return {self._root: wish}
 
     def _touching(self, held: Mapping[str, Contact]) -> frozenset[tuple[str, str]]:
         for contact in held.values():
@@ -186,7 +176,6 @@ class PostureFinder:
         """Where the body may rest; asked again and again for the same contacts."""
         key = frozenset(carrying.values())
         if key not in self._regions:
-            self._regions[key] = StaticRegion.of(
-                Stance(tuple(carrying.values()), model=self._model), self.body.mass
-            )
+            stance = Stance(tuple(carrying.values()), model=self._model)
+            self._regions[key] = StaticRegion.of(stance, self.body.mass)
         return self._regions[key]

@@ -1,28 +1,18 @@
-"""Sampled configurations of a limb, made once and asked often ([Tonneau2015]_ 5.1.4, 5.3.1).
+"""Sampled configurations of a limb, made once and asked often ([Tonneau2015]_ 5.1.4, 5.3.1)."""
 
-Also here. Samples of limbs in files, to be used again for the same body.
-"""
-
-import json
-import zipfile
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from manikin.body import BodyModel, Limb, are_mirrored, limb_named
+from manikin.body import BodyModel, Limb, are_mirrored
 from manikin.body.limbs import REFLECTION, limb_origin, limb_slots, parent_segment
 from manikin.body.natural_range import NaturalRange
 from manikin.errors import BodyError
 from manikin.kinematics import LimbKinematics, ReachVolume
 from manikin.kinematics.limb_kinematics import hull_of, rigid_reach
-from manikin.motion.description import body_key
 from manikin.numerics.spatial import FloatArray, finite_number
-from manikin.runtime.files import atomic_path
 
 THRESHOLD = 0.05
 """Smallest manipulability, as a share of the largest one seen; our choice, the thesis leaves it open."""
@@ -34,7 +24,6 @@ class LimbSamples:
     """Random configurations of one limb, in the limb's frame.
 
     Attributes:
-        limb: The limb.
         segment: Name of the segment that carries it.
         origin: (3,) origin of the limb's frame in that segment [m].
         angles: (n, k) joint angles [rad].
@@ -112,15 +101,12 @@ def sample_limb(
     little manipulability are dropped (5.4.1).  A limb without joints has one configuration, which is kept.
 
     Args:
-        body: The body.
-        limb: One of its limbs.
-        rng: Source of randomness.
         count: Number of samples that are kept, > 0.
         threshold: Smallest manipulability kept, as a share of the largest among the first
             ``count`` samples, in [0, 1).
-        natural: Whether hips and shoulders of the human keep to their learnt volumes (4.3.3) and not
-            to the intervals of their hinges alone; of no effect on other limbs. Off unless asked for:
-            the recordings hold no movement of the largest amplitude, and climbing needs more.
+        natural: Whether hips and shoulders of the human keep to their learnt volumes (4.3.3) and not to the
+            intervals of their hinges alone. Off unless asked for: the recordings hold no movement of the
+            largest amplitude, and climbing needs more.
 
     Raises:
         BodyError: If a value is out of its range, or fewer than one sample in fifty passes.
@@ -128,13 +114,17 @@ def sample_limb(
     if count < 4:
         raise BodyError(f"limb samples count is {count}; valid: at least 4")
     share = finite_number(threshold, "limb samples threshold", at_least=0.0, error=BodyError)
-    count = samples_of(body, limb, count)
-    chain = LimbKinematics(body, limb)
-    angles_of = _source(body, limb, chain, rng, natural)
+    if not len(limb_slots(body, limb)):
+        count = 1  # without joints there is one configuration
+    chain, volumes = LimbKinematics(body, limb), NaturalRange(body, limb)
+    source = volumes if natural and volumes.learnt else chain
     parts: list[tuple[FloatArray, ...]] = []
     kept, drawn, least = 0, 0, None
     while kept < count:
-        part, values = _placed(chain, angles_of(count))
+        angles = source.random_angles(rng, count)
+        placed = chain.place(angles)
+        products = placed.jacobians @ placed.jacobians.transpose(0, 2, 1)
+        part, values = (angles, placed.positions, placed.rotations, products), manipulability(products)
         least = share * float(values.max()) if least is None else least
         good = values >= least
         parts.append(tuple(values[good] for values in part))
@@ -145,32 +135,8 @@ def sample_limb(
                 "largest; valid: a smaller threshold"
             )
     joined = [np.concatenate(arrays)[:count] for arrays in zip(*parts, strict=True)]
-    origin = limb_origin(body, limb)
-    return LimbSamples(
-        limb, parent_segment(body, limb), origin, *joined, threshold=float(least or 0.0), natural=natural
-    )
-
-
-def samples_of(body: BodyModel, limb: Limb, count: int) -> int:
-    """Number of samples that there are of a limb where ``count`` are asked for: without joints, one."""
-    return count if len(limb_slots(body, limb)) else 1
-
-
-def _source(
-    body: BodyModel, limb: Limb, chain: LimbKinematics, rng: np.random.Generator, natural: bool
-) -> Callable[[int], FloatArray]:
-    """What draws (count, k) joint angles."""
-    volumes = NaturalRange(body, limb)
-    if natural and volumes.learnt:
-        return lambda count: volumes.random_angles(rng, count)
-    return lambda count: chain.random_angles(rng, count)
-
-
-def _placed(chain: LimbKinematics, angles: FloatArray) -> tuple[tuple[FloatArray, ...], FloatArray]:
-    """Angles, positions, rotations, products; and the manipulabilities."""
-    placed = chain.place(angles)
-    products = placed.jacobians @ placed.jacobians.transpose(0, 2, 1)
-    return (angles, placed.positions, placed.rotations, products), manipulability(products)
+    segment, origin = parent_segment(body, limb), limb_origin(body, limb)
+    return LimbSamples(limb, segment, origin, *joined, threshold=float(least or 0.0), natural=natural)
 
 
 def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
@@ -178,13 +144,8 @@ def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
 
     Equal angles give ``M p``, ``M R M`` and ``M J J^T M`` with ``M = diag(1, -1, 1)``.
 
-    Args:
-        body: The body.
-        samples: Samples of a limb.
-        limb: The limb that is its mirror image.
-
     Raises:
-        BodyError: If it is not.
+        BodyError: If the limb is not the mirror image of the one that was sampled.
     """
     if not are_mirrored(body, samples.limb, limb):
         raise BodyError(
@@ -192,17 +153,10 @@ def mirrored(body: BodyModel, samples: LimbSamples, limb: Limb) -> LimbSamples:
             f"valid: {samples.limb.mirror or 'none'}"
         )
     flip: NDArray[np.float64] = np.outer(REFLECTION, REFLECTION)
-    return LimbSamples(
-        limb,
-        samples.segment,
-        samples.origin * REFLECTION,
-        samples.angles,
-        samples.positions * REFLECTION,
-        samples.rotations * flip,
-        samples.products * flip,
-        samples.threshold,
-        samples.natural,
-    )
+    return replace(
+        samples, limb=limb, origin=samples.origin * REFLECTION, positions=samples.positions * REFLECTION,
+        rotations=samples.rotations * flip, products=samples.products * flip,
+    )  # fmt: skip
 
 
 def sample_limbs(
@@ -215,150 +169,13 @@ def sample_limbs(
 ) -> dict[str, LimbSamples]:
     """Samples of every limb by its name; mirrored limbs share one set, reflected.
 
-    Args:
-        body: A body with limbs.
-        rng: Source of randomness.
-        count: Samples per limb.
-        threshold: See :func:`sample_limb`.
-        natural: See :func:`sample_limb`.
+    The arguments are those of :func:`sample_limb`.
     """
-    found: dict[str, LimbSamples] = {}
+    sampled: dict[str, LimbSamples] = {}
     for limb in body.limbs:
-        twin = found.get(limb.mirror or "")
+        twin = sampled.get(limb.mirror or "")
         if twin is not None and are_mirrored(body, twin.limb, limb):
-            found[limb.name] = mirrored(body, twin, limb)
+            sampled[limb.name] = mirrored(body, twin, limb)
         else:
-            found[limb.name] = sample_limb(body, limb, rng, count, threshold, natural=natural)
-    return found
-
-
-FORMAT = "manikin-samples-1"
-_ARRAYS = ("origin", "angles", "positions", "rotations", "products")
-
-
-def save_samples(path: str | Path, samples: Mapping[str, LimbSamples], body: BodyModel) -> None:
-    """Write the samples of a body's limbs and the digest of the body into a NumPy archive (``.npz``).
-
-    Limbs that share their samples with their reflection share them in the file.
-
-    Args:
-        path: Where to; its folder must exist. An interruption leaves the old file or none.
-        samples: By name of the limb, of :func:`manikin.planning.contacts.sample_limbs`.
-        body: Whose they are.
-
-    Raises:
-        BodyError: If the body has no such limb.
-        OSError: If the folder cannot be written to.
-    """
-    arrays: dict[str, Any] = {}
-    limbs: dict[str, dict[str, Any]] = {}
-    for name, item in samples.items():
-        _check_limb(body, name, item)
-        twin = next((key for key in limbs if samples[key].angles is item.angles), None)
-        limbs[name] = {"twin": twin, "threshold": item.threshold, "natural": item.natural}
-        if twin is None:
-            arrays |= {f"{name}/{key}": getattr(item, key) for key in _ARRAYS}
-    head = {"format": FORMAT, "body": body.name, "key": body_key(body), "limbs": limbs}
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez(file, head=np.array(json.dumps(head)), **arrays)
-
-
-def load_samples(path: str | Path, body: BodyModel) -> dict[str, LimbSamples]:
-    """Read samples back, bit for bit.
-
-    Args:
-        path: File written by :func:`save_samples`.
-        body: Whose they should be.
-
-    Raises:
-        BodyError: If the file is missing, holds no samples, or those of another body.
-    """
-    file = Path(path)
-    try:
-        with np.load(file, allow_pickle=False) as archive:
-            head = json.loads(str(archive["head"]))
-            if head["format"] != FORMAT:
-                raise ValueError(f"format {head['format']}")
-            _check_body(file, head, body)
-            return _samples(archive, head["limbs"], body)
-    except BodyError:
-        raise
-    except FileNotFoundError:
-        raise BodyError(f"samples file '{file}' does not exist; valid: a file of save_samples") from None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-        reason = " ".join(str(error).split())[:100]
-        raise BodyError(
-            f"samples file '{file}' cannot be read ({reason}); valid: a file of save_samples"
-        ) from None
-
-
-def samples_for(
-    path: str | Path,
-    body: BodyModel,
-    rng: np.random.Generator,
-    count: int = 10_000,
-    threshold: float = THRESHOLD,
-    *,
-    natural: bool = False,
-) -> dict[str, LimbSamples]:
-    """Samples of a body from their file, or made now and written there.
-
-    The arguments are those of :func:`manikin.planning.contacts.sample_limbs`; a file that exists is taken as
-    it is, whatever its threshold and seed.
-
-    Raises:
-        BodyError: If the file exists and holds other than ``count`` samples of each limb of this body,
-            natural or not as asked for.
-        OSError: If the folder cannot be written to.
-    """
-    if not Path(path).exists():
-        made = sample_limbs(body, rng, count, threshold, natural=natural)
-        save_samples(path, made, body)
-        return made
-    found = load_samples(path, body)
-    wanted = {limb.name: (samples_of(body, limb, count), natural) for limb in body.limbs}
-    held = {name: (len(item), item.natural) for name, item in found.items()}
-    if held != wanted:
-        raise BodyError(f"samples file '{path}' holds {_words(held)}; valid: {_words(wanted)}, or a new file")
-    return found
-
-
-def _words(held: Mapping[str, tuple[int, bool]]) -> str:
-    kinds = sorted({f"{count} {'natural ' if natural else ''}samples" for count, natural in held.values()})
-    return f"{' and '.join(kinds) or 'no samples'} of {', '.join(held) or 'no limb'}"
-
-
-def _check_limb(body: BodyModel, name: str, samples: LimbSamples) -> None:
-    limb = limb_named(body, name)
-    if samples.limb != limb or samples.angles.shape[1] != len(limb_slots(body, limb)):
-        raise BodyError(f"samples of {name!r} are not of this body's limb; valid: samples made of this body")
-
-
-def _check_body(file: Path, head: Mapping[str, Any], body: BodyModel) -> None:
-    if head["key"] != body_key(body):
-        raise BodyError(
-            f"samples file '{file}' is about another body ({str(head['body'])[:60]!r} of other dimensions, "
-            f"joints or limbs); valid: samples of this {body.name!r}, or a new file"
-        )
-
-
-def _samples(archive: Any, limbs: Mapping[str, Mapping[str, Any]], body: BodyModel) -> dict[str, LimbSamples]:
-    found: dict[str, LimbSamples] = {}
-    for name, about in limbs.items():
-        limb = limb_named(body, name)
-        if about["twin"] is not None:
-            found[name] = mirrored(body, found[about["twin"]], limb)
-            continue
-        arrays = [np.asarray(archive[f"{name}/{key}"], dtype=np.float64) for key in _ARRAYS]
-        n, k = len(arrays[1]), len(limb_slots(body, limb))
-        shapes = [(3,), (n, k), (n, 3), (n, 3, 3), (n, 3, 3)]
-        if [array.shape for array in arrays] != shapes or not all(np.isfinite(a).all() for a in arrays):
-            raise ValueError(f"samples of {name!r} are damaged")
-        found[name] = LimbSamples(
-            limb,
-            parent_segment(body, limb),
-            *arrays,
-            threshold=float(about["threshold"]),
-            natural=bool(about["natural"]),
-        )
-    return found
+            sampled[limb.name] = sample_limb(body, limb, rng, count, threshold, natural=natural)
+    return sampled

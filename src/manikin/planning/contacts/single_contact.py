@@ -1,7 +1,4 @@
-"""One task-efficient contact of a scenario: what ``manikin contact`` answers.
-
-Also here. Contacts of all limbs of a body that is moved by hand: what the viewer's interactive mode shows.
-"""
+"""Contacts for one task: of one limb, for ``manikin contact``, and of all limbs of a body moved by hand."""
 
 import time
 from collections.abc import Sequence
@@ -12,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.body import BodyModel, Configuration, limb_named
+from manikin.body import BodyModel, Configuration, Limb, limb_named
 from manikin.body.limbs import parent_segment
 from manikin.contact import ContactKind
 from manikin.errors import BodyError, InputError
 from manikin.kinematics import LimbKinematics
 from manikin.numerics.spatial import FloatArray, frozen_array
 from manikin.planning.contacts.contact_plan import ContactRules
-from manikin.planning.contacts.efort import Task, efort
+from manikin.planning.contacts.efort import Task, efort, unit_direction
 from manikin.planning.contacts.generator import ContactGenerator, GeneratedContact
 from manikin.planning.contacts.heuristics import Heuristic, heuristic_named
 from manikin.planning.contacts.samples import sample_limb, sample_limbs
@@ -45,14 +42,13 @@ class ContactQuestion:
     """What is asked of one limb.
 
     Attributes:
-        limb: Name of the limb.
         task: Direction of the task in the world; its length does not count.
         role: What the limb does.
         pulling: Whether it holds on and pulls instead of pressing (5.13).
         heuristic: Name of the preference, one of :data:`manikin.planning.contacts.HEURISTICS`.
         kind: How the effector touches; its own way when None.
         samples: Number of samples of the limb.
-        seed: Of the samples and of the random heuristic.
+        seed: Seed of the samples and of the random heuristic.
     """
 
     limb: str
@@ -75,11 +71,7 @@ class ContactQuestion:
         samples: int = 10_000,
         seed: int = 0,
     ) -> "ContactQuestion":
-        """Question from words.
-
-        Raises:
-            InputError: If a word is not known.
-        """
+        """Question from words; an InputError if one is not known."""
         if role not in list(Role):
             raise InputError(f"role is {role!r}; valid: {', '.join(Role)}")
         if kind is not None and kind not in list(ContactKind):
@@ -93,9 +85,7 @@ class ContactAnswer:
     """The contact found, or why there is none.
 
     Attributes:
-        question: What was asked.
         q: (nq,) the body before.
-        result: The generator's answer.
         role: The role that was taken, never ``auto``.
         efort: EFORT of the posture found, with the sign of that role [N per N.m]; None without one.
         prepare_wall_s: Wall time of the samples, the scene's preparation and a first request [s].
@@ -112,46 +102,38 @@ class ContactAnswer:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON; the keys are documented in ``docs/json.md``."""
-        found, contact = self.result, self.result.contact
+        result, contact = self.result, self.result.contact
         return {
-            "found": found.found,
+            "found": result.found,
             "position": None if contact is None else contact.position,
             "normal": None if contact is None else contact.normal,
-            "obstacle": found.obstacle,
+            "obstacle": result.obstacle,
             "efort": self.efort,
-            "candidates": found.candidates,
+            "candidates": result.candidates,
             "wall_ms": 1e3 * self.wall_s,
-            "failure": None if found.found else found.message,
-            "hindrance": None if found.failure is None else str(found.failure),
-            "limb": found.limb,
+            "failure": None if result.found else result.message,
+            "hindrance": None if result.failure is None else str(result.failure),
+            "limb": result.limb,
             "kind": None if contact is None else str(contact.kind),
             "role": str(self.role),
             "heuristic": self.question.heuristic,
-            "score": found.score if found.found else None,
-            "gap_m": found.gap if found.found else None,
-            "tried": found.tried,
+            "score": result.score if result.found else None,
+            "gap_m": result.gap if result.found else None,
+            "tried": result.tried,
             "samples": self.question.samples,
             "seed": self.question.seed,
             "prepare_wall_ms": 1e3 * self.prepare_wall_s,
-            "q": found.q,
+            "q": result.q,
         }
 
 
 def find_contact(
-    body: BodyModel,
-    scene: Scene,
-    q: FloatArray,
-    question: ContactQuestion,
-    rules: ContactRules | None = None,
+    body: BodyModel, scene: Scene, q: FloatArray, question: ContactQuestion, rules: ContactRules | None = None
 ) -> ContactAnswer:
     """Answer one question about a body in a scene.
 
     Args:
-        body: A body with limbs.
-        scene: Its surroundings.
         q: (nq,) the body; all but the limb stays as it is.
-        question: What is asked.
-        rules: What contacts can carry.
 
     Raises:
         InputError: If the limb or the heuristic is not known, the direction is zero, or the limb has
@@ -159,25 +141,21 @@ def find_contact(
     """
     check_limbs(body)
     limb = limb_named(body, question.limb)
-    roles = _roles(question, limb.kind)
-    tasks = [_task(question, role) for role in roles]
+    unit_direction(question.task, "task")
     heuristic = heuristic_named(question.heuristic, question.seed, pulling=question.pulling)
+    kind = question.kind or (ContactKind.GRASP if question.pulling else None)
     started = time.perf_counter()
     samples = sample_limb(body, limb, np.random.default_rng(question.seed), question.samples)
     generator = ContactGenerator(body, scene, {limb.name: samples}, rules=rules)
-    _ask(generator, q, question, heuristic, roles, tasks)  # as in a dialogue, where caches are filled
+    asked = generator, q, limb, question.task, question.role, heuristic, kind, question.pulling
+    _ask(*asked)  # as in a dialogue, where caches are filled
     prepared = time.perf_counter()
-    found, wall = _ask(generator, q, question, heuristic, roles, tasks)
-    role, result, score = max(found, key=lambda item: -np.inf if item[2] is None else item[2])
+    role, result, score, wall = _ask(*asked)
     return ContactAnswer(question, np.array(q), result, role, score, prepared - started, wall)
 
 
 def check_limbs(body: BodyModel) -> None:
-    """Check that a body has limbs that can make contacts.
-
-    Raises:
-        BodyError: If it has none.
-    """
+    """Raise a BodyError if a body has no limbs that could make contacts."""
     if not body.limbs:
         raise BodyError(f"body {body.name!r} has no limbs; valid: a body with limbs, such as a human")
 
@@ -185,23 +163,26 @@ def check_limbs(body: BodyModel) -> None:
 def _ask(
     generator: ContactGenerator,
     q: FloatArray,
-    question: ContactQuestion,
+    limb: Limb,
+    direction: ArrayLike,
+    role: Role,
     heuristic: Heuristic,
-    roles: tuple[Role, ...],
-    tasks: list[Task],
-) -> tuple[list[tuple[Role, GeneratedContact, float | None]], float]:
-    """Answers for one role after the other, until one has a positive EFORT; wall time of the requests [s]."""
-    kind = question.kind or (ContactKind.GRASP if question.pulling else None)
-    found: list[tuple[Role, GeneratedContact, float | None]] = []
+    kind: ContactKind | None,
+    pulling: bool,
+) -> tuple[Role, GeneratedContact, float | None, float]:
+    """Role, answer and EFORT of the best role, asked until one is positive; wall time of the requests [s]."""
+    roles = (Role.BODY,) if limb.kind is ContactKind.SOLE else (Role.BODY, Role.OBJECT)
+    answers: list[tuple[Role, GeneratedContact, float | None]] = []
     wall = 0.0
-    for role, task in zip(roles, tasks, strict=True):
+    for tried in roles if role is Role.AUTO else (role,):
+        task = Task(direction, {limb.name} if tried is Role.OBJECT else ())
         started = time.perf_counter()
-        result = generator.request(q, question.limb, task, heuristic, kind=kind)
+        result = generator.request(q, limb.name, task, heuristic, kind=kind)
         wall += time.perf_counter() - started
-        found.append((role, result, reached_efort(generator.body, result, task, pulling=question.pulling)))
-        if (found[-1][2] or 0.0) > SOME_EFORT:
+        answers.append((tried, result, reached_efort(generator.body, result, task, pulling=pulling)))
+        if (answers[-1][2] or 0.0) > SOME_EFORT:
             break
-    return found, wall
+    return *max(answers, key=lambda item: -np.inf if item[2] is None else item[2]), wall
 
 
 def reached_efort(
@@ -219,22 +200,9 @@ def reached_efort(
     return -value if pulling else value
 
 
-def _roles(question: ContactQuestion, kind: ContactKind) -> tuple[Role, ...]:
-    if question.role is not Role.AUTO:
-        return (question.role,)
-    return (Role.BODY,) if kind is ContactKind.SOLE else (Role.BODY, Role.OBJECT)
-
-
-def _task(question: ContactQuestion, role: Role) -> Task:
-    try:
-        return Task(question.task, {question.limb} if role is Role.OBJECT else ())
-    except InputError as error:
-        raise InputError(str(error).replace("task direction", "task", 1)) from None
-
-
 @dataclass(frozen=True, eq=False)
 class LiveAnswer:
-    """What every limb found.
+    """Answers of all limbs.
 
     Attributes:
         q: (nq,) the body with each limb that found a contact in it.
@@ -253,13 +221,10 @@ class LiveContacts:
     """The pose of a body, a task, and the contacts that follow from both.
 
     Attributes:
-        body: The body.
-        scene: Its surroundings.
         q: (nq,) the body as it was put, before any limb is moved.
-        azimuth_deg: Of the task about the vertical, from world x [deg].
-        elevation_deg: Of the task above the horizon [deg].
+        azimuth_deg: Direction of the task about the vertical, from world x [deg].
+        elevation_deg: Direction of the task above the horizon [deg].
         limbs: Names of the limbs that are asked.
-        heuristic: Name of the preference.
         role: What the limbs do with their contacts.
         pulling: Whether they hold on and pull.
     """
@@ -274,15 +239,7 @@ class LiveContacts:
         seed: int = 0,
         rules: ContactRules | None = None,
     ) -> None:
-        """Sample the limbs and prepare the scene.
-
-        Args:
-            body: A body with limbs.
-            scene: Its surroundings.
-            q: (nq,) where it begins.
-            samples: Number of samples of each limb.
-            seed: Of the samples.
-            rules: What contacts can carry.
+        """Begin at a configuration (nq,), with a number of samples of each limb drawn from a seed.
 
         Raises:
             BodyError: If the body has no limbs.
@@ -300,12 +257,7 @@ class LiveContacts:
         )
 
     def move(self, position: ArrayLike, quaternion: ArrayLike) -> None:
-        """Put the root elsewhere.
-
-        Args:
-            position: (3,) of the root [m].
-            quaternion: (4,) xyzw of the root; normalised here.
-        """
+        """Put the root at a position (3,) [m] with a quaternion xyzw (4,), normalised here."""
         turn = frozen_array(quaternion, "quaternion", (4,))
         self.q[:3] = frozen_array(position, "position [m]", (3,))
         self.q[3:7] = turn / np.linalg.norm(turn)
@@ -332,21 +284,12 @@ class LiveContacts:
         kind = ContactKind.GRASP if self.pulling else None
         q, answers, efforts = np.array(self.q), {}, {}
         for name in self.limbs:
-            for role in self._roles(name):
-                task = Task(self.direction, {name} if role is Role.OBJECT else ())
-                found = self._generator.request(q, name, task, heuristic, kind=kind)
-                effort = reached_efort(self.body, found, task, pulling=self.pulling)
-                if name not in answers or (effort is not None and effort > efforts.get(name, -np.inf)):
-                    answers[name] = found
-                    efforts |= {} if effort is None else {name: effort}
-                if (effort or 0.0) > SOME_EFORT:
-                    break
+            limb, asked = (
+                limb_named(self.body, name),
+                (self.direction, self.role, heuristic, kind, self.pulling),
+            )
+            _, answers[name], effort, _ = _ask(self._generator, q, limb, *asked)
+            efforts |= {} if effort is None else {name: effort}
             reached = answers[name].q
             q = q if reached is None else np.array(reached)
         return LiveAnswer(q, answers, efforts, time.perf_counter() - started)
-
-    def _roles(self, name: str) -> tuple[Role, ...]:
-        if self.role is not Role.AUTO:
-            return (self.role,)
-        feet = {limb.name for limb in self.body.limbs if limb.kind is ContactKind.SOLE}
-        return (Role.BODY,) if name in feet else (Role.BODY, Role.OBJECT)

@@ -9,11 +9,8 @@ from manikin.planning.guide.guide import (
     GuideSettings,
     GuideTask,
     GuideWorld,
-    load_roadmap,
     offline_roadmap,
     plan_guide,
-    roadmap_for,
-    save_roadmap,
 )
 from manikin.planning.guide.guide_restarts import plan_guide_with_restarts
 from manikin.planning.guide.roadmap import Roadmap, RoadmapSettings, Route, request
@@ -48,14 +45,11 @@ __all__ = [
     "TrunkShape",
     "UsableSurface",
     "abstraction_of",
-    "load_roadmap",
     "nearest_fit",
     "offline_roadmap",
     "plan_guide",
     "plan_guide_with_restarts",
     "relax",
     "request",
-    "roadmap_for",
     "root_pose",
-    "save_roadmap",
 ]

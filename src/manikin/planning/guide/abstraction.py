@@ -5,11 +5,8 @@ in one posture, slightly enlarged so that the limbs' own roots have room, and fo
 convex hull of the places its effector can take.
 """
 
-import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -20,43 +17,11 @@ from scipy.spatial import ConvexHull, QhullError
 from manikin.body.model import BodyModel
 from manikin.body.segments import Shape, ShapeKind
 from manikin.errors import BodyError
+from manikin.kinematics import ReachVolume
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 
 TRUNK_SCALE = 1.1
 """Factor on the radii and sides of the trunk's shapes; our choice, the thesis gives none."""
-
-
-class LimbName(Protocol):
-    """What is read of a limb."""
-
-    @property
-    def name(self) -> str:
-        """Unique name of the limb."""
-        ...
-
-    @property
-    def segments(self) -> tuple[str, ...]:
-        """Names of its segments, from its root to the effector's own."""
-        ...
-
-
-class LimbVolume(Protocol):
-    """What is read of a limb's reach: vertices of its hull in the frame of the segment it hangs on."""
-
-    @property
-    def limb(self) -> LimbName:
-        """The limb."""
-        ...
-
-    @property
-    def segment(self) -> str:
-        """Segment to which the volume is fixed."""
-        ...
-
-    @property
-    def vertices(self) -> FloatArray:
-        """(n, 3) in that segment's frame [m]."""
-        ...
 
 
 class TrunkShape(Shape):
@@ -65,12 +30,11 @@ class TrunkShape(Shape):
     @property
     def radius_about_root(self) -> float:
         """Largest distance of a point of the shape from the root's origin, or more [m]."""
-        half = {
-            ShapeKind.SPHERE: lambda size: size[0],
-            ShapeKind.CAPSULE: lambda size: size[0] + 0.5 * size[1],
-            ShapeKind.BOX: lambda size: 0.5 * np.linalg.norm(size),
-        }[self.kind]
-        return float(np.linalg.norm(self.translation) + half(self.size))
+        if self.kind is ShapeKind.BOX:
+            half = 0.5 * np.linalg.norm(self.size)
+        else:
+            half = self.size[0] + (0.5 * self.size[1] if self.kind is ShapeKind.CAPSULE else 0.0)
+        return float(np.linalg.norm(self.translation) + half)
 
     def enlarged(self, factor: float, margin: float = 0.0) -> "TrunkShape":
         """The shape with radii or sides times ``factor`` and a skin of ``margin`` [m].
@@ -90,7 +54,6 @@ class LimbReach:
     """Where one limb's effector can be, as a convex volume in the frame of the root.
 
     Attributes:
-        name: Name of the limb.
         vertices: (n, 3) corners of the hull [m].
         normals: (m, 3) unit normals of its faces, outward.
         offsets: (m,) so that the volume is ``normals x <= offsets`` [m].
@@ -106,11 +69,7 @@ class LimbReach:
     radius: float
 
     def __init__(self, name: str, vertices: ArrayLike) -> None:
-        """Take the hull of points.
-
-        Args:
-            name: Name of the limb.
-            vertices: (n, 3) points in the root's frame, not all in one plane [m].
+        """Take the hull of (n, 3) points in the root's frame [m].
 
         Raises:
             BodyError: If the points have no volume.
@@ -125,11 +84,13 @@ class LimbReach:
             ) from None
         rows = hull.equations
         centre, radius = _inscribed_ball(rows[:, :3], -rows[:, 3])
+        values = {
+            "vertices": points[hull.vertices], "normals": rows[:, :3], "offsets": -rows[:, 3],
+            "centre": centre,
+        }  # fmt: skip
+        for key, value in values.items():
+            object.__setattr__(self, key, frozen_array(value, key))
         object.__setattr__(self, "name", name)
-        object.__setattr__(self, "vertices", frozen_array(points[hull.vertices], "vertices"))
-        object.__setattr__(self, "normals", frozen_array(rows[:, :3], "normals"))
-        object.__setattr__(self, "offsets", frozen_array(-rows[:, 3], "offsets"))
-        object.__setattr__(self, "centre", frozen_array(centre, "centre"))
         object.__setattr__(self, "radius", radius)
 
     def contains(self, points: FloatArray) -> NDArray[np.bool_]:
@@ -188,21 +149,10 @@ class Abstraction:
         """Names of the limbs, in order."""
         return tuple(limb.name for limb in self.limbs)
 
-    @cached_property
-    def signature(self) -> str:
-        """Digest of every shape and volume; equal abstractions have equal signatures."""
-        digest = hashlib.sha256()
-        for shape in self.trunk:
-            digest.update(f"{shape.name}|{shape.kind}|".encode())
-            digest.update(np.concatenate([shape.size, shape.translation, shape.rotation.ravel()]).tobytes())
-        for limb in self.limbs:
-            digest.update(f"{limb.name}|".encode() + limb.vertices.tobytes())
-        return digest.hexdigest()
-
 
 def abstraction_of(
     body: BodyModel,
-    volumes: Sequence[LimbVolume],
+    volumes: Sequence[ReachVolume],
     *,
     angles: Mapping[str, float] | None = None,
     trunk_scale: float = TRUNK_SCALE,
@@ -224,10 +174,13 @@ def abstraction_of(
     wanted = _outside_limbs(body, volumes) if trunk_segments is None else list(trunk_segments)
     frames = _segment_frames(body, angles)
     shapes = [
-        _in_root(frames[name], f"{name}/{shape.name}", shape).enlarged(factor)
+        TrunkShape(
+            f"{name}/{shape.name}", shape.kind, shape.size, frames[name].act_points(shape.translation),
+            frames[name].rotation @ shape.rotation,
+        ).enlarged(factor)
         for name in wanted
         for shape in body.segment(name).shapes
-    ]
+    ]  # fmt: skip
     limbs = [
         LimbReach(volume.limb.name, frames[body.segment(volume.segment).name].act_points(volume.vertices))
         for volume in volumes
@@ -260,7 +213,7 @@ def _segment_frames(body: BodyModel, angles: Mapping[str, float] | None) -> dict
     return {name: _Frame(frame.rotation.copy(), frame.translation.copy()) for name, frame in placed.items()}
 
 
-def _outside_limbs(body: BodyModel, volumes: Sequence[LimbVolume]) -> list[str]:
+def _outside_limbs(body: BodyModel, volumes: Sequence[ReachVolume]) -> list[str]:
     """Names of the segments that belong to no limb and hang on none, as toes do; the root always."""
     in_limbs = {name for volume in volumes for name in volume.limb.segments} - {body.segments[0].name}
     for segment in body.segments:
@@ -269,14 +222,9 @@ def _outside_limbs(body: BodyModel, volumes: Sequence[LimbVolume]) -> list[str]:
     return [segment.name for segment in body.segments if segment.name not in in_limbs]
 
 
-def _in_root(frame: _Frame, name: str, shape: Shape) -> TrunkShape:
-    place = frame.act_points(shape.translation)
-    return TrunkShape(name, shape.kind, shape.size, place, frame.rotation @ shape.rotation)
-
-
 def _inscribed_ball(normals: FloatArray, offsets: FloatArray) -> tuple[FloatArray, float]:
     """Centre and radius of the largest ball inside ``normals x <= offsets``."""
     rows = np.hstack([normals, np.ones((len(normals), 1))])
     bounds = [(None, None)] * 3 + [(0.0, None)]
-    found = linprog([0.0, 0.0, 0.0, -1.0], rows, offsets, bounds=bounds)
-    return found.x[:3], float(found.x[3])
+    result = linprog([0.0, 0.0, 0.0, -1.0], rows, offsets, bounds=bounds)
+    return result.x[:3], float(result.x[3])

@@ -6,8 +6,9 @@ farther than that between them then satisfies the plain condition everywhere, no
 was checked.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import coal
 import numpy as np
@@ -54,15 +55,9 @@ NO_MARGINS = Margins(0.0, 0.0)
 
 
 class ReachabilityChecker:
-    """Checks poses of one abstraction in one scene.
-
-    One instance works on buffers of its own: use one per thread. Answers do not depend on earlier
-    queries.
+    """Checks poses of one abstraction in one scene; use one instance per thread, as it has its own buffers.
 
     Attributes:
-        abstraction: The creature.
-        scene: The obstacles.
-        condition: What is asked.
         margins: What is kept in hand.
     """
 
@@ -130,9 +125,9 @@ class ReachabilityChecker:
         """Whether every rule about the limbs holds."""
         lean = tilt(pose)
         self._limbs.place(pose)
-        known: dict[int, bool] = {}
+        reaches = cache(self._limbs.meets)
         return all(
-            self._rule_holds(rule.at_least, required, optional, known)
+            self._rule_holds(rule.at_least, required, optional, reaches)
             for rule, required, optional in self._rules
             if rule.holds_at(lean, self._tilt_slack)
         )
@@ -151,7 +146,7 @@ class ReachabilityChecker:
 
     def inside_solid(self, pose: FloatArray) -> str | None:
         """Name of a closed, non-convex mesh in which a trunk shape's centre lies, or None."""
-        rotation, origin = _matrix(pose), pose[:3]
+        rotation, origin = pin.XYZQUATToSE3(pose).rotation, pose[:3]
         for part in self._parts:
             if part.surface is None:
                 continue
@@ -171,29 +166,27 @@ class ReachabilityChecker:
         solid = self.inside_solid(pose)
         if solid is not None:
             return f"the trunk is inside {solid!r}"
-        lean, found = tilt(pose), self.reaching(pose)
-        have = f"within reach: {', '.join(found) or 'none'}"
+        lean, reached = tilt(pose), self.reaching(pose)
+        have = f"within reach: {', '.join(reached) or 'none'}"
         for rule in self.condition.rules:
             if not rule.holds_at(lean, self._tilt_slack):
                 continue
-            missing = [name for name in rule.required if name not in found]
+            missing = [name for name in rule.required if name not in reached]
             if missing:
                 return f"limb {missing[0]!r} reaches no usable surface ({have})"
-            if len(found) < rule.at_least:
-                return f"{len(found)} limbs reach a usable surface and {rule.at_least} are wanted ({have})"
+            if len(reached) < rule.at_least:
+                return f"{len(reached)} limbs reach a usable surface and {rule.at_least} are wanted ({have})"
         return None
 
     def steps(self, way: float, angle: float) -> int:
         """Into how many steps a motion is cut so that nothing is missed between checked poses.
 
         Between two poses every point moves by at most ``way + radius angle``, so that it is never
-        farther from where it was checked than half of that.
+        farther from where it was checked than half of that. The margins must not be zero.
 
         Args:
             way: Length of the path of the root's origin [m].
             angle: Angle turned [rad].
-
-        The margins must not be zero.
         """
         trunk = (way + self._trunk_radius * angle) / (2.0 * self.margins.trunk)
         reach = (way + self._reach_radius * angle) / (2.0 * self._reach_margin)
@@ -207,7 +200,7 @@ class ReachabilityChecker:
     def triangle_in_reach(self, pose: FloatArray, corners: FloatArray) -> bool:
         """Whether some limb's volume meets one triangle (3, 3) [m]."""
         triangle = coal.TriangleP(*corners)
-        place = coal.Transform3s(_matrix(pose), pose[:3])
+        place = coal.Transform3s(pin.XYZQUATToSE3(pose).rotation, pose[:3])
         for geometry in self._limbs.moving:
             result = coal.CollisionResult()
             coal.collide(geometry, place, triangle, _HERE, _REQUEST, result)
@@ -226,21 +219,16 @@ class ReachabilityChecker:
         return 2.0 * self.margins.trunk / self._trunk_radius if self.margins.trunk > 0.0 else 0.0
 
     def _rule_holds(
-        self, at_least: int, required: Sequence[int], optional: Sequence[int], known: dict[int, bool]
+        self, at_least: int, required: Sequence[int], optional: Sequence[int], reaches: Callable[[int], bool]
     ) -> bool:
-        if not all(self._asked(row, known) for row in required):
+        if not all(reaches(row) for row in required):
             return False
         wanted = at_least - len(required)
         for left, row in zip(range(len(optional), 0, -1), optional, strict=True):
             if wanted <= 0 or wanted > left:
                 break
-            wanted -= self._asked(row, known)
+            wanted -= reaches(row)
         return wanted <= 0
-
-    def _asked(self, row: int, known: dict[int, bool]) -> bool:
-        if row not in known:
-            known[row] = self._limbs.meets(row)
-        return known[row]
 
 
 _Target = tuple[coal.CollisionGeometry, pin.SE3]
@@ -311,7 +299,7 @@ def _trunk_object(shape: TrunkShape) -> _Target:
         geometry = coal.Capsule(shape.size[0], shape.size[1])
     else:
         geometry = coal.Box(*shape.size)
-    return geometry, pin.SE3(np.array(shape.rotation), np.array(shape.translation))
+    return geometry, _place(shape)
 
 
 def _volume_object(limb: LimbReach, margin: float) -> _Target:
@@ -322,25 +310,21 @@ def _volume_object(limb: LimbReach, margin: float) -> _Target:
 
 def _targets(scene: Scene, triangles: SceneTriangles, surface: UsableSurface) -> list[_Target]:
     """What counts for a limb: endless shapes one by one, all triangles as one mesh."""
-    found = []
+    targets = []
     for item in scene:
         if endless(item) and surface.allows_obstacle(item.name):
             (part,) = collision_parts(item)
             two_sided = isinstance(part.geometry, coal.Plane)
             if surface.allows_normal(item.world_plane[0], two_sided=two_sided):
-                found.append((part.geometry, _place(part)))
+                targets.append((part.geometry, _place(part)))
     kept: NDArray[np.bool_] = triangles.usable(scene, surface)
     if kept.any():
         corners = triangles.corners[kept].reshape(-1, 3)
         vertices, inverse = np.unique(corners, axis=0, return_inverse=True)
         mesh = triangle_geometry(vertices, inverse.reshape(-1, 3).astype(np.int64))
-        found.append((mesh, pin.SE3.Identity()))
-    return found
+        targets.append((mesh, pin.SE3.Identity()))
+    return targets
 
 
-def _place(part: CollisionPart) -> pin.SE3:
+def _place(part: CollisionPart | TrunkShape) -> pin.SE3:
     return pin.SE3(np.array(part.rotation), np.array(part.translation))
-
-
-def _matrix(pose: FloatArray) -> FloatArray:
-    return pin.XYZQUATToSE3(pose).rotation

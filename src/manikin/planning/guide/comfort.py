@@ -49,16 +49,9 @@ def relax(
     rng: np.random.Generator,
     settings: ComfortSettings | None = None,
 ) -> FloatArray:
-    """Make a guide comfortable.
+    """Make a guide comfortable: (m, 7) poses that satisfy the condition, ``spacing`` apart or less.
 
-    Args:
-        poses: (n, 7) along a guide, close together; the ends stay.
-        planner: Decides about poses.
-        rng: Source of all randomness.
-        settings: Numbers of the search.
-
-    Returns:
-        (m, 7) poses that all satisfy the condition, ``spacing`` apart or less.
+    The given poses (n, 7) are close together; the ends stay.
     """
     settings = settings or ComfortSettings()
     line = _resampled(_coordinates(poses), settings.spacing)
@@ -76,14 +69,9 @@ def relax(
 def nearest_fit(
     pose: FloatArray, checker: ReachabilityChecker, settings: ComfortSettings | None = None
 ) -> FloatArray | None:
-    """The pose above the same place that satisfies the condition with least sinking and leaning, or None.
+    """The pose near a (7,) one, above the same place, that holds with least sinking and leaning, or None.
 
     A body may bend its back where the guide's stiff trunk has to sink or lean.
-
-    Args:
-        pose: (7,) wanted; returned as it is where the condition holds.
-        checker: Decides about poses.
-        settings: Heights and pitches that are tried.
     """
     if checker.holds(pose):
         return pose
@@ -147,7 +135,7 @@ def _way(line: FloatArray) -> float:
 
 
 def _raised(line: FloatArray, planner: LocalPlanner, settings: ComfortSettings) -> FloatArray | None:
-    """The same way from above with the heights and pitches that cost least; None where none holds.
+    """The line with the heights and pitches that cost least, unchanged from above; None where none holds.
 
     The ends stay as they are.
     """
@@ -172,11 +160,11 @@ def _raised(line: FloatArray, planner: LocalPlanner, settings: ComfortSettings) 
     chosen = [int(np.argmin(total + settings.change * moves[upright]))]
     for back in reversed(came_from[1:]):
         chosen.append(int(back[chosen[-1]]))
-    found = line.copy()
+    raised = line.copy()
     if len(line) > 2:
-        found[1:-1, _Z] = ideal[1:-1] - depth[chosen[::-1]]
-        found[1:-1, _PITCH] = pitch[chosen[::-1]]
-    return found
+        raised[1:-1, _Z] = ideal[1:-1] - depth[chosen[::-1]]
+        raised[1:-1, _PITCH] = pitch[chosen[::-1]]
+    return raised
 
 
 def _smoothed(line: FloatArray, planner: LocalPlanner) -> FloatArray:
@@ -186,10 +174,6 @@ def _smoothed(line: FloatArray, planner: LocalPlanner) -> FloatArray:
         mean = line.copy()
         mean[1:-1] = (line[:-2] + 2.0 * line[1:-1] + line[2:]) / 4.0
         for row in range(1, len(line) - 1):
-            if _holds(mean[row : row + 1], planner):
+            if planner.holds(_poses(mean[row : row + 1])[0]):
                 line[row] = mean[row]
     return line
-
-
-def _holds(line: FloatArray, planner: LocalPlanner) -> bool:
-    return all(planner.holds(pose) for pose in _poses(line))

@@ -1,7 +1,4 @@
-"""The reachability condition and its stricter variants ([Tonneau2015]_ 6.1, 6.4.2).
-
-Also here. Triangles of a scene and which of them a limb can use.
-"""
+"""The reachability condition with its stricter variants, and usable surfaces ([Tonneau2015]_ 6.1, 6.4.2)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -47,16 +44,15 @@ class UsableSurface:
             if length < 1e-9:
                 raise SceneError("usable surface direction is zero; valid: a direction")
             unit = frozen_array(vector / length, "usable surface direction", (3,), SceneError)
-        object.__setattr__(self, "direction", unit)
-        angle = finite_number(
-            max_angle, "usable surface max_angle [rad]", at_least=0.0, at_most=np.pi, error=SceneError
-        )
-        object.__setattr__(self, "max_angle", angle)
-        object.__setattr__(self, "obstacles", None if obstacles is None else tuple(obstacles))
-        area = finite_number(
-            smallest_area, "usable surface smallest_area [m^2]", at_least=0.0, error=SceneError
-        )
-        object.__setattr__(self, "smallest_area", area)
+        limits = {"at_least": 0.0, "error": SceneError}
+        values = {
+            "direction": unit,
+            "max_angle": finite_number(max_angle, "usable surface max_angle [rad]", at_most=np.pi, **limits),
+            "obstacles": None if obstacles is None else tuple(obstacles),
+            "smallest_area": finite_number(smallest_area, "usable surface smallest_area [m^2]", **limits),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     @property
     def key(self) -> str:
@@ -199,32 +195,17 @@ class Condition:
     ) -> "Condition":
         """Condition that some limbs reach when upright and others when bent ([Tonneau2015]_ 6.4.2).
 
-        Args:
-            standing: Limbs that must reach when the trunk is tilted by ``upright`` or less.
-            bent: Limbs that must reach when it is tilted by ``upright`` or more.
-            upright: Border of the two [rad]; our choice.
+        The trunk is upright up to a tilt of ``upright`` [rad] and bent from there on; our choice.
         """
-        rules = (
-            LimbRule(tuple(standing), len(standing), (0.0, upright)),
-            LimbRule(tuple(bent), len(bent), (upright, float(np.pi))),
-        )
-        return cls(rules)
-
-    @property
-    def key(self) -> str:
-        """Text that is equal for equal values."""
-        return repr((self.rules, sorted((name, item.key) for name, item in self.surfaces.items())))
+        upper = LimbRule(tuple(standing), len(standing), (0.0, upright))
+        return cls((upper, LimbRule(tuple(bent), len(bent), (upright, float(np.pi)))))
 
     def surface(self, limb: str) -> UsableSurface:
         """Surfaces that count for a limb."""
         return self.surfaces.get(limb, _ANY)
 
     def check_names(self, limbs: Sequence[str]) -> None:
-        """Check every name against those of the limbs there are.
-
-        Raises:
-            InputError: If a name is unknown or more limbs are wanted than there are.
-        """
+        """Raise an InputError if a name is none of these limbs, or more limbs are wanted than there are."""
         named = [name for rule in self.rules for name in rule.required] + list(self.surfaces)
         unknown = sorted(set(named) - set(limbs))
         if unknown:

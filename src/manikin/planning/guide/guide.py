@@ -1,17 +1,10 @@
-"""A guide for the root from start to goal: roadmap, request, spline ([Tonneau2015]_ chapter 6).
+"""A guide for the root from start to goal: roadmap, request, spline ([Tonneau2015]_ chapter 6)."""
 
-Also here. Roadmaps in files, to be used again for the same scene, creature and condition.
-"""
-
-import hashlib
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
-import networkx as nx
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.guide.abstraction import Abstraction
 from manikin.planning.guide.checker import Margins, ReachabilityChecker
@@ -21,7 +14,6 @@ from manikin.planning.guide.roadmap import (
     RoadmapSettings,
     Route,
     attach,
-    build_roadmap,
     find_route,
     grow,
     unfit_end,
@@ -36,8 +28,7 @@ from manikin.planning.guide.root_path import (
 )
 from manikin.planning.guide.root_pose import checked_pose
 from manikin.planning.guide.sampler import PoseSampler, SamplerSettings, SamplingRegion
-from manikin.planning.guide.steering import LocalPlanner, Way
-from manikin.runtime.files import atomic_path
+from manikin.planning.guide.steering import LocalPlanner
 from manikin.scene.scene import Scene
 
 CHUNK = 10
@@ -52,7 +43,6 @@ class GuideSettings:
     """Everything that chapter 6 leaves to its user.
 
     Attributes:
-        margins: What planning keeps in hand.
         sampler: Numbers of Algorithm 3.
         roadmap: Numbers of Algorithm 4; its ``samples`` is the budget of one search.
         shortcut: Numbers of 6.3.2.
@@ -69,11 +59,8 @@ class GuideWorld:
     """Scene, creature and condition: what a roadmap is about.
 
     Attributes:
-        scene: The obstacles.
-        abstraction: The creature.
         region: Where roots are drawn.
         condition: What every pose must satisfy.
-        settings: Numbers of the algorithms.
     """
 
     scene: Scene
@@ -81,20 +68,6 @@ class GuideWorld:
     region: SamplingRegion
     condition: Condition = field(default_factory=Condition)
     settings: GuideSettings = field(default_factory=GuideSettings)
-
-    @property
-    def key(self) -> str:
-        """Digest of everything that decides which poses and ways a roadmap may hold."""
-        text = "|".join(
-            [
-                self.scene.signature,
-                self.abstraction.signature,
-                self.condition.key,
-                self.region.key,
-                repr((self.settings.margins, self.settings.sampler, self.settings.roadmap)),
-            ]
-        )
-        return hashlib.sha256(text.encode()).hexdigest()
 
     def checker(self) -> ReachabilityChecker:
         """Checker with the margins of planning."""
@@ -108,7 +81,6 @@ class GuideTask:
     Attributes:
         start: (7,) pose of the root.
         goal: (7,) pose of the root.
-        limits: Speed limits of the path.
     """
 
     start: FloatArray
@@ -151,10 +123,7 @@ class GuideResult:
     """A path of the root, or why there is none.
 
     Attributes:
-        path: The path, or None.
         milestones: (n, 7) poses that straight ways join, before the spline; None without a way.
-        statistics: What the search did.
-        failure: None, or the reason.
         where: ``"start"``, ``"goal"`` or ``"roadmap"``: what the failure is about.
     """
 
@@ -171,10 +140,11 @@ class GuideResult:
 
 
 def offline_roadmap(world: GuideWorld, rng: np.random.Generator) -> Roadmap:
-    """Roadmap of a world without a task in mind, to be asked many times."""
-    checker = world.checker()
+    """Roadmap of a world without a task in mind, to be asked many times ([Tonneau2015]_ Algorithm 4)."""
+    checker, roadmap = world.checker(), Roadmap(world.settings.roadmap)
     sampler = PoseSampler(checker, world.region, world.settings.sampler)
-    return build_roadmap(sampler, LocalPlanner(checker), rng, world.settings.roadmap)
+    grow(roadmap, sampler, LocalPlanner(checker), rng, roadmap.settings.samples)
+    return roadmap
 
 
 def plan_guide(
@@ -189,9 +159,6 @@ def plan_guide(
     spent; then the way is pruned, made a spline and shortened.
 
     Args:
-        world: Scene, creature and condition.
-        task: Start, goal and speed limits.
-        rng: Source of all randomness.
         roadmap: A roadmap of this world to begin with; it is left as it is. Empty when omitted.
     """
     checker = world.checker()
@@ -209,12 +176,9 @@ def plan_guide(
     shortcuts = world.settings.shortcut
     path = shorten(approximate(pruned, planner, task.limits, rng, shortcuts), planner, rng, shortcuts)
     counted = replace(
-        statistics,
-        asked=planner.asked,
-        route_poses=len(route.poses),
-        pruned_poses=len(pruned),
+        statistics, asked=planner.asked, route_poses=len(route.poses), pruned_poses=len(pruned),
         control_poses=len(path.control_points),
-    )
+    )  # fmt: skip
     return GuideResult(path, pruned, counted)
 
 
@@ -242,86 +206,3 @@ def _search(
 
 def _failed(route: Route, statistics: GuideStatistics) -> GuideResult:
     return GuideResult(None, None, statistics, route.failure, route.where)
-
-
-FORMAT = "manikin-roadmap-1"
-_STRAIGHT = -1.0  # stands for "no turn on the spot" in the file
-
-
-def save_roadmap(path: str | Path, roadmap: Roadmap, world: GuideWorld) -> None:
-    """Write a roadmap and the digest of its world into a NumPy archive (``.npz``).
-
-    Raises:
-        OSError: If the folder cannot be written to.
-    """
-    edges = sorted((min(edge), max(edge)) for edge in roadmap.graph.edges)
-    turns = [roadmap.way(a, b).turn_at for a, b in edges]
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez(
-            file,
-            format=np.array(FORMAT),
-            key=np.array(world.key),
-            poses=roadmap.poses,
-            guard=np.array([roadmap.graph.nodes[node]["guard"] for node in range(len(roadmap.poses))], bool),
-            edges=np.array(edges, dtype=np.int64).reshape(-1, 2),
-            turn_at=np.array([_STRAIGHT if turn is None else turn for turn in turns], dtype=np.float64),
-            counts=np.array([roadmap.samples, roadmap.rejected]),
-        )
-
-
-def load_roadmap(path: str | Path, world: GuideWorld) -> Roadmap | None:
-    """Read a roadmap back.
-
-    Args:
-        path: File written by :func:`save_roadmap`.
-        world: What it should be about.
-
-    Returns:
-        None if the file is about another scene, creature, condition or setting.
-
-    Raises:
-        InputError: If the file is missing or holds no roadmap.
-    """
-    file = Path(path)
-    try:
-        with np.load(file, allow_pickle=False) as archive:
-            values = {name: archive[name] for name in archive.files}
-        if str(values["format"]) != FORMAT:
-            raise ValueError(f"format {values['format']}")
-        if str(values["key"]) != world.key:
-            return None
-        return _roadmap(world, values)
-    except FileNotFoundError:
-        raise InputError(f"roadmap file '{file}' does not exist; valid: a file of save_roadmap") from None
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        reason = " ".join(str(error).split())[:100]
-        raise InputError(
-            f"roadmap file '{file}' cannot be read ({reason}); valid: a file of save_roadmap"
-        ) from None
-
-
-def roadmap_for(path: str | Path, world: GuideWorld, rng: np.random.Generator) -> Roadmap:
-    """Roadmap of a world from its file, or made now and written there.
-
-    A file about another world is replaced.
-
-    Raises:
-        InputError: If the file exists and holds no roadmap.
-        OSError: If the folder cannot be written to.
-    """
-    found = load_roadmap(path, world) if Path(path).exists() else None
-    if found is None:
-        found = offline_roadmap(world, rng)
-        save_roadmap(path, found, world)
-    return found
-
-
-def _roadmap(world: GuideWorld, values: dict[str, np.ndarray]) -> Roadmap:
-    roadmap = Roadmap(world.settings.roadmap, nx.Graph())
-    for pose, guard in zip(values["poses"], values["guard"], strict=True):
-        roadmap.add(pose, guard=bool(guard))
-    for (first, second), turn in zip(values["edges"], values["turn_at"], strict=True):
-        way = Way(None if turn == _STRAIGHT else float(turn))
-        roadmap.join(int(first), int(second), way)
-    roadmap.samples, roadmap.rejected = (int(count) for count in values["counts"])
-    return roadmap

@@ -34,8 +34,6 @@ def plan_guide_with_restarts(
     """Plan a path with several independent searches.
 
     Args:
-        world: Scene, creature and condition.
-        task: Start, goal and speed limits.
         seed: Each restart draws from its own stream of this seed.
         restarts: Searches at most.
         workers: Processes, see :func:`manikin.runtime.parallel.side_by_side`; the result is the same for any

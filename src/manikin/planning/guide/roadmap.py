@@ -2,14 +2,12 @@
 
 A pose that sees no guard becomes a guard; one that sees guards of several parts of the roadmap
 joins them; any other is rejected.  In print the visible guard is never remembered, so that every
-pose would become a guard; the test is the other way round here.
-
-Also here. Requests to a roadmap: joining start and goal, A*, and why there is no way ([Tonneau2015]_ 6.3.1).
+pose would become a guard; the test is the other way round here.  A request joins start and goal and finds the
+shortest way by A*, or says why there is none ([Tonneau2015]_ 6.3.1).
 """
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import networkx as nx
 import numpy as np
@@ -51,7 +49,6 @@ class Roadmap:
     """Poses and the ways between them.
 
     Attributes:
-        settings: How it was made.
         graph: Nodes 0, 1, ... with ``guard`` (bool); edges with ``weight``, the distance 6.3, and
             ``turn_at``, the share at which the root turns on the spot seen from the node of the
             smaller number, or None for a straight way.
@@ -78,14 +75,7 @@ class Roadmap:
 
     def copy(self) -> "Roadmap":
         """A copy that can grow without changing this one."""
-        return Roadmap(
-            self.settings,
-            self.graph.copy(),
-            self.samples,
-            self.rejected,
-            self._poses.copy(),
-            list(self._part),
-        )
+        return replace(self, graph=self.graph.copy(), _poses=self._poses.copy(), _part=list(self._part))
 
     def joined(self, first: int, second: int) -> bool:
         """Whether two nodes lie in one part."""
@@ -122,11 +112,7 @@ class Roadmap:
         return way if first < second else way.reversed()
 
     def consider(self, pose: FloatArray, planner: LocalPlanner, rng: np.random.Generator) -> bool:
-        """One pass of Algorithm 4: keep a pose as a guard or as a connection, or reject it.
-
-        Returns:
-            Whether it was kept.
-        """
+        """One pass of Algorithm 4: whether a pose (7,) is kept, as a guard or as a connection."""
         seen: dict[int, tuple[int, Way]] = {}
         for node in self.nearest_nodes(pose, guards_only=True):
             part = self._root(node)
@@ -178,29 +164,6 @@ def grow(
             roadmap.consider(pose, planner, rng)
 
 
-def build_roadmap(
-    sampler: PoseSampler,
-    planner: LocalPlanner,
-    rng: np.random.Generator,
-    settings: RoadmapSettings | None = None,
-    poses: Sequence[FloatArray] = (),
-) -> Roadmap:
-    """Build a roadmap of a scene ([Tonneau2015]_ Algorithm 4).
-
-    Args:
-        sampler: Draws poses.
-        planner: Joins them.
-        rng: Source of all randomness.
-        settings: When to stop and whom to ask.
-        poses: Poses (7,) that become guards before the first draw, whatever they see.
-    """
-    roadmap = Roadmap(settings or RoadmapSettings())
-    for pose in poses:
-        roadmap.add(pose, guard=True)
-    grow(roadmap, sampler, planner, rng, roadmap.settings.samples)
-    return roadmap
-
-
 @dataclass(frozen=True, eq=False)
 class Route:
     """Way through a roadmap, or why there is none.
@@ -209,7 +172,6 @@ class Route:
         poses: (n, 7) poses that straight ways join, from start to goal; None without a way.
         nodes: Nodes of the roadmap along it.
         length: Its length by the distance 6.3.
-        failure: None, or the reason.
         where: ``"start"``, ``"goal"`` or ``"roadmap"``: what the failure is about.
     """
 
@@ -249,12 +211,6 @@ def find_route(roadmap: Roadmap, planner: LocalPlanner, start: int, goal: int) -
     """Shortest way between two nodes (Algorithm 5, A*), its straight parts spelled out.
 
     The estimate is the distance 6.3 itself, which never overestimates, because it is a metric.
-
-    Args:
-        roadmap: The roadmap.
-        planner: Knows how ways are joined.
-        start: Node.
-        goal: Node.
     """
     if not roadmap.joined(start, goal):
         return Route(None, failure=_walled_off(roadmap, start, goal), where="roadmap")
@@ -273,11 +229,7 @@ def find_route(roadmap: Roadmap, planner: LocalPlanner, start: int, goal: int) -
 
 
 def request(
-    roadmap: Roadmap,
-    planner: LocalPlanner,
-    start: FloatArray,
-    goal: FloatArray,
-    rng: np.random.Generator,
+    roadmap: Roadmap, planner: LocalPlanner, start: FloatArray, goal: FloatArray, rng: np.random.Generator
 ) -> Route:
     """Ask a roadmap for a way between two poses (7,); the roadmap is left as it is."""
     unfit = unfit_end(planner, start, goal)
@@ -291,14 +243,14 @@ def request(
 
 def _walled_off(roadmap: Roadmap, start: int, goal: int) -> str:
     """Reason in words why no way joins two nodes."""
-    here = sorted(nx.node_connected_component(roadmap.graph, start))
-    there = sorted(nx.node_connected_component(roadmap.graph, goal))
-    places, others = roadmap.poses[here], roadmap.poses[there]
+    from_start = sorted(nx.node_connected_component(roadmap.graph, start))
+    from_goal = sorted(nx.node_connected_component(roadmap.graph, goal))
+    places, others = roadmap.poses[from_start], roadmap.poses[from_goal]
     apart = np.array([distance(others, pose, roadmap.settings.position_share) for pose in places])
     row, column = np.unravel_index(int(np.argmin(apart)), apart.shape)
     closest = [np.round(pose[:3], 2).tolist() for pose in (places[row], others[column])]
     return (
         f"the goal is walled off from the start as far as {roadmap.samples} sampled poses show: "
-        f"{len(here)} of {len(roadmap.poses)} poses of the roadmap can be reached from the start and "
-        f"{len(there)} from the goal; the closest two are at {closest[0]} m and {closest[1]} m"
+        f"{len(from_start)} of {len(roadmap.poses)} poses of the roadmap can be reached from the start and "
+        f"{len(from_goal)} from the goal; the closest two are at {closest[0]} m and {closest[1]} m"
     )

@@ -4,7 +4,7 @@ Positions and quaternions are blended by the same basis functions and the quater
 afterwards, so that a control pose acts on its neighbourhood only.  The three Euler angles of
 [Tonneau2015]_ would be singular for a crawling trunk.
 
-Also here. From a polygonal way to a short, smooth path ([Tonneau2015]_ 6.3.2).
+A polygonal way becomes a short, smooth path in three steps ([Tonneau2015]_ 6.3.2).
 
 1. Pruning (Algorithm 6, read "if l(P_i, P_j) then remove").
 2. Approximation by a B-spline whose control poses lie on the way, more of them until the condition
@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
-from manikin.numerics.spline import check_clamped, derivative_matrix
+from manikin.numerics.spline import check_clamped, clamped_knots, derivative_matrix
 from manikin.planning.guide.root_pose import angles_between, between
 from manikin.planning.guide.steering import LocalPlanner
 
@@ -93,16 +93,14 @@ class RootPath:
     def through(
         cls, control_points: ArrayLike, limits: RootLimits | None = None, degree: int = 3
     ) -> "RootPath":
-        """Spline with evenly spaced knots.
+        """Spline with evenly spaced knots from the first to the last of (n, 7) points, n >= 2.
 
-        Args:
-            control_points: (n, 7), n >= 2; it begins at the first and ends at the last.
-            limits: Speed limits.
-            degree: Degree, lowered to n - 1 where there are fewer points.
+        The degree is lowered to n - 1 where there are fewer points.
         """
         points = np.asarray(control_points, dtype=np.float64)
         degree = min(degree, len(points) - 1)
-        return cls(degree, even_knots(degree, len(points)), points, limits)
+        knots = clamped_knots(degree, np.linspace(0.0, 1.0, len(points) - degree + 1))
+        return cls(degree, knots, points, limits)
 
     @property
     def start(self) -> FloatArray:
@@ -133,11 +131,6 @@ class RootPath:
         """(n,) parameter in [0, 1] at (n,) times [s]."""
         shares, law = self._law
         return np.interp(np.atleast_1d(np.asarray(times, dtype=np.float64)), law, shares)
-
-    def time_of(self, shares: ArrayLike) -> FloatArray:
-        """(n,) times [s] at (n,) values of the parameter."""
-        grid, law = self._law
-        return np.interp(np.atleast_1d(np.asarray(shares, dtype=np.float64)), grid, law)
 
     def velocities(self, times: ArrayLike) -> FloatArray:
         """(n, 6) speed along the world axes [m/s] and about the root's axes [rad/s] at (n,) times [s].
@@ -210,12 +203,6 @@ class RootPath:
         return grid, np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def even_knots(degree: int, count: int) -> FloatArray:
-    """Clamped knots from 0 to 1 with evenly spaced inner ones, for ``count`` control points."""
-    inner = np.linspace(0.0, 1.0, count - degree + 1)
-    return np.concatenate([np.zeros(degree), inner, np.ones(degree)])
-
-
 def _one_hemisphere(quaternions: FloatArray) -> FloatArray:
     """Unit quaternions with signs such that neighbours are less than half a turn apart."""
     unit = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
@@ -235,7 +222,6 @@ class ShortcutSettings:
     Attributes:
         shortcuts: N, random shortcuts tried.
         spacing: Time between control poses of the first approximation [s].
-        degree: Degree of the spline.
     """
 
     shortcuts: int = 150
@@ -249,15 +235,7 @@ class ShortcutSettings:
 
 
 def prune(poses: FloatArray, planner: LocalPlanner) -> FloatArray:
-    """Leave out what a straight way skips (Algorithm 6).
-
-    Args:
-        poses: (n, 7) joined by straight ways.
-        planner: Decides about straight ways.
-
-    Returns:
-        (k, 7), k <= n, with the same ends.
-    """
+    """Leave out of (n, 7) poses, joined by straight ways, what a straight way skips (Algorithm 6)."""
     kept, here, last = [0], 0, len(poses) - 1
     while here < last:
         ahead = range(last, here + 1, -1)
@@ -284,17 +262,9 @@ def approximate(
     rng: np.random.Generator,
     settings: ShortcutSettings | None = None,
 ) -> RootPath:
-    """Spline close to a polygonal way; with many control poses it becomes the way itself.
+    """Spline close to a way of (n, 7) poses joined by straight ways, along all of which the condition holds.
 
-    Args:
-        poses: (n, 7) joined by straight ways along which the condition holds.
-        planner: Decides about poses.
-        limits: Speed limits.
-        rng: Places the control poses.
-        settings: How many there are at first.
-
-    Returns:
-        A path along which the condition holds; of degree 1 where no spline was found.
+    With many control poses it becomes the way itself; it is of degree 1 where no other was found.
     """
     wanted = settings or ShortcutSettings()
     poses = _without_repeats(poses)
@@ -324,19 +294,9 @@ def path_holds(path: RootPath, planner: LocalPlanner, low: float = 0.0, high: fl
 
 
 def shorten(
-    path: RootPath,
-    planner: LocalPlanner,
-    rng: np.random.Generator,
-    settings: ShortcutSettings | None = None,
+    path: RootPath, planner: LocalPlanner, rng: np.random.Generator, settings: ShortcutSettings | None = None
 ) -> RootPath:
-    """Try random shortcuts; each one that is kept makes the way along the control poses quicker.
-
-    Args:
-        path: A path along which the condition holds.
-        planner: Decides about poses.
-        rng: Chooses the stretches.
-        settings: How many are tried.
-    """
+    """Try random shortcuts; each one that is kept makes the way along the control poses quicker."""
     wanted = settings or ShortcutSettings()
     if path.degree < 2 or len(path.control_points) < 4:
         return path
@@ -370,7 +330,7 @@ def _spread(poses: FloatArray, times: FloatArray, count: int, rng: np.random.Gen
 
 
 def _with_small_turns(poses: FloatArray) -> FloatArray:
-    """The same way with poses in between, so that none is turned far from the one before."""
+    """The way with poses added in between, so that none is turned far from the one before."""
     pieces = [poses[:1]]
     for first, second in itertools.pairwise(poses):
         count = max(1, int(np.ceil(float(angles_between(first, second)) / _SMALL_TURN)))

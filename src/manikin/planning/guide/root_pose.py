@@ -18,14 +18,9 @@ _NEARLY_ALIGNED = 1.0 - 1e-12  # cosine above which the two quaternions are blen
 
 
 def root_pose(position: ArrayLike, rotation: ArrayLike | None = None) -> FloatArray:
-    """Make a pose.
+    """Make a pose (7,) of a position in the world (3,) [m] and a rotation root-to-world (3, 3).
 
-    Args:
-        position: (3,) root origin in the world [m].
-        rotation: (3, 3) rotation root to world; upright, looking along x, when omitted.
-
-    Returns:
-        (7,) read-only.
+    It is upright and looks along x when the rotation is omitted.
 
     Raises:
         InputError: If a part is not finite or not a rotation.
@@ -60,26 +55,16 @@ def distance(first: FloatArray, second: FloatArray, share: float = 0.5) -> Float
 
     The print has ``|d|`` in place of the squares, which is not the Euclidean distance that its
     text names; squares are used. It is a metric, so A* with it as estimate finds shortest paths.
-
-    Args:
-        first: (..., 7) poses.
-        second: (..., 7) poses.
-        share: s in [0, 1], weight of the positions.
+    Poses are (..., 7), and the share s in [0, 1] is the weight of the positions.
     """
     way = np.sum((first[..., :3] - second[..., :3]) ** 2, axis=-1)
     return np.sqrt(share * way + (1.0 - share) * angles_between(first, second) ** 2)
 
 
 def between(first: FloatArray, second: FloatArray, shares: FloatArray) -> FloatArray:
-    """Poses on the straight way: positions on a line, the shortest turn at constant speed.
+    """Poses (n, 7) at (n,) shares in [0, 1] of the straight way from one pose (7,) to another.
 
-    Args:
-        first: (7,) pose at share 0.
-        second: (7,) pose at share 1.
-        shares: (n,) in [0, 1].
-
-    Returns:
-        (n, 7).
+    Positions are on a line, and the shortest turn has a constant speed.
     """
     out = np.empty((len(shares), 7))
     t = shares[:, None]

@@ -37,7 +37,7 @@ class Way:
     turn_at: float | None
 
     def reversed(self) -> "Way":
-        """The same way from the other end."""
+        """The way seen from its other end."""
         return self if self.turn_at is None else Way(1.0 - self.turn_at)
 
 
@@ -65,7 +65,7 @@ class LocalPlanner:
 
     @property
     def plain(self) -> ReachabilityChecker:
-        """The same condition without margins."""
+        """Checker of the condition without margins."""
         if self._plain is None:
             kept = self.checker
             self._plain = ReachabilityChecker(kept.abstraction, kept.scene, kept.condition, NO_MARGINS)
@@ -88,7 +88,8 @@ class LocalPlanner:
 
         The answer does not depend on the order of the two.
         """
-        first, second = _ordered(first, second)
+        if tuple(first) > tuple(second):
+            first, second = second, first
         count = self.checker.steps_between(first, second)
         poses = between(first, second, np.arange(count + 1) / count)
         return self.poses_hold(poses, ends_hold=True)
@@ -124,16 +125,9 @@ class LocalPlanner:
         )
 
     def waypoints(self, first: FloatArray, second: FloatArray, turn_at: float | None) -> FloatArray:
-        """Poses that straight ways join on the way from one pose to another.
+        """(2, 7) or (4, 7) poses that straight ways join from one pose (7,) to another.
 
-        Args:
-            first: (7,) where the way begins.
-            second: (7,) where it ends.
-            turn_at: Share of the way at which the root turns on the spot, or None for the
-                straight way.
-
-        Returns:
-            (2, 7) or (4, 7), both ends included.
+        ``turn_at`` is the share of the way at which the root turns on the spot, or None for the straight way.
         """
         if turn_at is None:
             return np.stack([first, second])
@@ -153,26 +147,15 @@ class LocalPlanner:
         return all(self.straight(a, b) for a, b in itertools.pairwise(points))
 
     def connect(self, first: FloatArray, second: FloatArray, turn_at: float) -> "Way | None":
-        """SIMPLEPATH: try the straight way, then rotate-at-s.
+        """SIMPLEPATH: the straight way, else rotate-at-s at ``turn_at`` in (0, 1), else None.
 
-        Args:
-            first: (7,) pose that satisfies the condition.
-            second: (7,) another.
-            turn_at: s in (0, 1), drawn by the caller.
-
-        Returns:
-            The way, or None when neither holds.
+        Both poses (7,) satisfy the condition.
         """
         if self.straight(first, second):
             return Way(None)
         if angles_between(first, second) > 1e-9 and self.rotate_at(first, second, turn_at):
             return Way(turn_at)
         return None
-
-
-def _ordered(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The two in an order that does not depend on how they came."""
-    return (first, second) if tuple(first) <= tuple(second) else (second, first)
 
 
 _ORDERS: dict[int, list[int]] = {}

@@ -1,6 +1,4 @@
-"""What is to be pushed or pulled, where to and how hard.
-
-Also here. What a posture can exert on an object: linear programs of the whole body at rest.
+"""What is to be pushed or pulled, and what a posture can exert: linear programs of the whole body at rest.
 
     max F   over the forces of feet and hands and F
     s.t.    g(q) = tau + sum J^T f,   tau_min <= tau <= tau_max,   feet and pressing hands inside their
@@ -12,7 +10,7 @@ of the friction model that is asked for, and never hold more than the circular c
 are those of ``cone``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -20,10 +18,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import linprog
 
-from manikin.balance.friction import edges_in_world
+from manikin.balance.contact_forces import ContactGenerators
 from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import carrying_segment
-from manikin.contact import Contact, ContactKind, FrictionModel
+from manikin.contact import Contact, ContactKind, ContactModel, FrictionModel, Stance, point
 from manikin.errors import InputError
 from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number
 from manikin.planning.contacts import Efort, Task
@@ -48,7 +46,6 @@ class Act:
 
     Attributes:
         kind: Push or pull.
-        obstacle: Name of the object.
         direction: (3,) unit, level: where the force on the object points.
         force: Its size [N].
     """
@@ -109,9 +106,9 @@ class BracedForces:
     """Forces of a posture at rest that acts on an object.
 
     Attributes:
-        force: On the object along the act's direction [N].
+        force: Force on the object along the act's direction [N].
         torque_share: Largest torque of a joint as a share of its limit.
-        tightest: Name of that joint.
+        tightest: Name of the joint with the largest share.
         tau: (nv - 6,) torques [N.m].
         contact_force: (c, 6) force of the scene on each contact, in their order, and its moment about the
             contact's position [N, N.m].
@@ -138,17 +135,13 @@ def largest_force(
     friction: float = 0.7,
     friction_model: FrictionModel = "outer",
 ) -> BracedForces | None:
-    """The largest force that a posture can exert, or None where it cannot even stand.
+    """The largest force that a posture (nq,) can exert the way of an act, or None where it cannot even stand.
 
-    Args:
-        body: The body.
-        q: (nq,) posture.
-        contacts: Of feet and hands.
-        act: Where to; its force does not count.
-        friction: Coulomb coefficient of pressing palms.
-        friction_model: Of feet and palms.
+    The contacts are those of feet and hands; the friction is the Coulomb coefficient of pressing palms, the
+    friction model that of feet and palms.
     """
-    return _Program(body, q, contacts, act, friction, friction_model).largest()
+    programme = _Programme(body, q, contacts, act, friction, friction_model)
+    return programme.solve(np.array([-1.0, 0.0]), (0.0, None), (1.0, 1.0))
 
 
 def share_force(
@@ -162,20 +155,14 @@ def share_force(
     """The act's force with the smallest share of any joint's strength, or None where friction forbids it.
 
     A share above 1 is more than the joints have. Pressing palms use :data:`PALM_RESERVE` of their friction.
-
-    Args:
-        body: The body.
-        q: (nq,) posture.
-        contacts: Of feet and hands.
-        act: Where to and how hard.
-        friction: Coulomb coefficient of pressing palms.
-        friction_model: Of feet and palms.
+    The arguments are those of :func:`largest_force`.
     """
-    return _Program(body, q, contacts, act, PALM_RESERVE * friction, friction_model).shared()
+    programme = _Programme(body, q, contacts, act, PALM_RESERVE * friction, friction_model)
+    return programme.solve(np.array([0.0, 1.0]), (act.force, act.force), (0.0, None))
 
 
-class _Program:
-    """Variables: multipliers of the contacts' force directions, then ``F``, then the torque share."""
+class _Programme:
+    """Variables: magnitudes of the contacts' generators, then ``F``, then the torque share."""
 
     def __init__(
         self,
@@ -186,49 +173,58 @@ class _Program:
         friction: float,
         friction_model: FrictionModel,
     ) -> None:
-        self._body, self._act = body, act
+        self._body, self._direction = body, act.direction
+        model = ContactModel("cone" if friction_model == "outer" else friction_model)
+        touching = [_touching(contact, act, friction) for contact in contacts]
+        generators = ContactGenerators.of(Stance(touching, model=model), grasp_moments=False)
+        # Of a grasp the first of two opposite generators stands for both, with a magnitude of either sign.
+        kept = (generators.normal > 0.0) | (generators.force.sum(axis=1) > 0.0)
+        self._owner, force = generators.contact[kept], generators.force[kept]
+        places = np.array([contact.position for contact in contacts])[generators.contact]
+        self._wrenches = generators.about(places)[:, kept]
         state = Configuration(body, q)
-        inside: FrictionModel = "cone" if friction_model == "outer" else friction_model
-        parts = [_generators(state, contact, act, friction, inside) for contact in contacts]
-        self._wrenches = np.hstack([wrenches for _, wrenches, _ in parts])
-        self._maps = np.hstack([maps for maps, _, _ in parts])
-        self._limits = [limit for _, _, limits in parts for limit in limits]
-        self._owner = np.repeat(np.arange(len(parts)), [part[0].shape[1] for part in parts])
+        rows = np.array_split(np.arange(len(force)), np.flatnonzero(np.diff(self._owner)) + 1)
+        self._maps = np.hstack([
+            jacobian.T @ force[part].T
+            for contact, mine in zip(touching, rows, strict=True)
+            for jacobian, part in zip(
+                _jacobians(state, contact), np.split(mine, len(contact.points)), strict=True
+            )
+        ])  # fmt: skip
+        held = [contact.max_force if contact.kind is ContactKind.GRASP else np.inf for contact in contacts]
+        upper = np.array(held)[self._owner]
+        lower = np.where(generators.normal[kept] > 0.0, 0.0, -upper)
+        self._limits = list(zip(lower.tolist(), upper.tolist(), strict=True))
         self._bias = np.array(state.nonlinear_effects)
         self._on_hands = np.isin(self._owner, [k for k, c in enumerate(contacts) if c.effector in HANDS])
 
-    def largest(self) -> BracedForces | None:
-        return self._solve(np.array([-1.0, 0.0]), (0.0, None), (1.0, 1.0))
-
-    def shared(self) -> BracedForces | None:
-        return self._solve(np.array([0.0, 1.0]), (self._act.force, self._act.force), (0.0, None))
-
-    def _solve(
+    def solve(
         self, cost: FloatArray, force: tuple[float, float | None], share: tuple[float, float | None]
     ) -> BracedForces | None:
+        """Least ``cost`` of force and share within their bounds, or None where there is no solution."""
         count, body = self._maps.shape[1], self._body
         zeros = np.zeros((6, 2))
         on_hands = self._wrenches[:3] * self._on_hands
         equal = np.vstack([
             np.hstack([self._maps[:6], zeros]),
-            np.hstack([on_hands, self._act.direction[:, None], np.zeros((3, 1))]),
+            np.hstack([on_hands, self._direction[:, None], np.zeros((3, 1))]),
         ])  # fmt: skip
         joints = np.hstack([self._maps[6:], np.zeros((len(body.torque_upper), 1))])
         most, least = body.torque_upper[:, None], body.torque_lower[:, None]
         below = np.vstack([np.hstack([-joints, -most]), np.hstack([joints, least])])
-        found = linprog(
+        result = linprog(
             np.concatenate([np.zeros(count), cost]),
             A_ub=below, b_ub=np.concatenate([-self._bias[6:], self._bias[6:]]),
             A_eq=equal, b_eq=np.concatenate([self._bias[:6], np.zeros(3)]),
             bounds=[*self._limits, force, share],
         )  # fmt: skip
-        if found.status in (2, 3):
+        if result.status in (2, 3):
             return None
-        if found.status != 0:
+        if result.status != 0:
             raise InputError(
-                f"forces of the posture cannot be computed ({found.message}); valid: finite values"
+                f"forces of the posture cannot be computed ({result.message}); valid: finite values"
             )
-        return self._forces(np.array(found.x))
+        return self._forces(np.array(result.x))
 
     def _forces(self, x: FloatArray) -> BracedForces:
         multipliers = x[:-2]
@@ -245,28 +241,22 @@ class _Program:
         )  # fmt: skip
 
 
-def _generators(
-    state: Configuration, contact: Contact, act: Act, friction: float, model: FrictionModel
-) -> tuple[FloatArray, FloatArray, list[tuple[float | None, float | None]]]:
-    """Generalised forces (nv, g), wrenches about the contact (6, g) and bounds of what a contact can do."""
-    body = state.body
-    hand = contact.effector in HANDS
-    free = contact.kind is ContactKind.GRASP and not (hand and act.kind is ActKind.PUSH)
-    rubbing = replace(contact, friction=friction) if hand else contact
-    edges = edges_in_world(rubbing, model)
-    directions = np.eye(3) if free else edges.T
-    limit = contact.max_force if contact.kind is ContactKind.GRASP else None
-    maps, wrenches = [], []
-    for local in np.atleast_2d(contact.points):
+def _touching(contact: Contact, act: Act, friction: float) -> Contact:
+    """A contact as it is in an act: hands rub as palms, and hold on only where they pull."""
+    if contact.effector not in HANDS:
+        return contact
+    if contact.kind is ContactKind.GRASP and act.kind is ActKind.PUSH:
+        rotation = contact.rotation_contact_to_world
+        return point(contact.effector, contact.position, friction=friction, rotation=rotation)
+    return contact if contact.kind is ContactKind.GRASP else replace(contact, friction=friction)
+
+
+def _jacobians(state: Configuration, contact: Contact) -> Iterator[FloatArray]:
+    """(3, nv) of each point of a contact, on the segment that carries it."""
+    body, effector = state.body, state.body.effector(contact.effector)
+    for local in contact.points:
         segment = carrying_segment(body, contact.effector, local)
-        effector = body.effector(contact.effector)
         offset = effector.translation + effector.rotation @ local
         if segment != effector.segment:
             offset = offset - body.segment(segment).origin
-        maps.append(state.point_jacobian(segment, offset).T @ directions)
-        arm = contact.rotation_contact_to_world @ local
-        wrenches.append(np.vstack([directions, np.cross(arm, directions.T).T]))
-    count = directions.shape[1] * len(maps)
-    low = None if limit is None else -limit
-    bounds = [(low, limit) if free else (0.0, limit)] * count
-    return np.hstack(maps), np.hstack(wrenches), bounds
+        yield state.point_jacobian(segment, offset)

@@ -47,7 +47,6 @@ class PlannedAct:
     Attributes:
         motion: The whole of it.
         schedule: Its contacts in time.
-        timing: When the force acts.
         wishes: What each hand should feel.
     """
 
@@ -65,7 +64,7 @@ def plan_act(
     Args:
         motion: Up to the act.
         schedule: Its contacts; the last stance has feet and hands.
-        forces: Of its last posture with the act's force, contacts in the order of the last stance.
+        forces: Forces of its last posture with the act's force, contacts in the order of the last stance.
         ramp: Time in which the force rises [s].
         hold: Time for which it is held [s].
     """
@@ -111,7 +110,7 @@ class MeasuredAct:
 
     Attributes:
         mean_force: On the object along the act's direction [N].
-        least_force: [N].
+        least_force: Least force on the object along that direction [N].
         sideways: Largest force on the object across that direction [N].
         palm_friction: Largest share of their friction that pressing palms needed; 0 for a pull.
         least_feet_margin: Least margin of the measured forces of the feet in what the feet alone can
@@ -140,13 +139,7 @@ def measure_act(
 ) -> MeasuredAct | None:
     """Measure an executed act, or None where the motion ended before its force was held.
 
-    Args:
-        motion: What was executed.
-        schedule: Its contacts.
-        act: What was to be done.
-        timing: When.
-        mass: Of the body [kg].
-        friction: Coulomb coefficient of pressing palms.
+    The mass is that of the body [kg], the friction the Coulomb coefficient of pressing palms.
     """
     acting = motion.time >= timing.start
     held = (motion.time >= timing.start + timing.ramp + SETTLED) & (motion.time <= timing.end + 1e-9)

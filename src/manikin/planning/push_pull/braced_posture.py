@@ -1,7 +1,4 @@
-"""The posture that acts: trunk, hands and feet by EFORT, then balance, strength and obstacles.
-
-Also here. From the way to an act to the act: the last contacts of a contact plan.
-"""
+"""The posture that acts: trunk, hands and feet by EFORT, then balance, strength and obstacles."""
 
 import itertools
 from collections import Counter
@@ -12,16 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel, Configuration
-from manikin.body.limbs import PELVIS as ROOT
 from manikin.contact import Contact, FrictionModel, grasp
-from manikin.kinematics import (
-    Placement,
-    PostureProblem,
-    Preferences,
-    SolverSettings,
-    generate_posture,
-    touching_pairs,
-)
+from manikin.kinematics import Preferences
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts import (
     ContactGenerator,
@@ -31,6 +20,7 @@ from manikin.planning.contacts import (
     GeneratedContact,
     Heuristic,
     LimbSamples,
+    PostureFinder,
     PostureFinderSettings,
     Stage,
     WeightedSum,
@@ -38,7 +28,7 @@ from manikin.planning.contacts import (
 from manikin.planning.contacts.limb_places import stature_of
 from manikin.planning.push_pull.act import Act, ActKind, BracedForces, largest_force, share_force
 from manikin.planning.push_pull.stance_heuristics import Footing, Loads, Mirrored, Natural
-from manikin.scene import Proximity, Scene, Surface
+from manikin.scene import Scene, Surface
 
 ARMS = ("left_arm", "right_arm")
 LEGS = ("right_leg", "left_leg")
@@ -47,10 +37,8 @@ LEGS = ("right_leg", "left_leg")
 BALANCED = 1e3
 """Weight of balance beside EFORT: among balanced places EFORT decides."""
 
-
 FLAT_PALMS = 3.0
 """Weight of the palms' turn against the face [1/rad^2]."""
-
 
 HANDS_ROOM = 0.2
 """Distance of the body's middle to the sides of what it acts on [m]; our choice."""
@@ -66,16 +54,15 @@ class BraceSettings:
     """Where the trunk is tried; lengths are those of a body of 1.75 m, the values are our choice.
 
     Attributes:
-        distances: Of the root from the face that is acted on [m].
-        heights: Of the root, relative to standing.
+        distances: Distances of the root from the face that is acted on [m].
+        heights: Heights of the root, relative to standing.
         leans: Pitch of the root the way of the act [rad].
         margin: Least margin of the feet about the CoM with no force and with all of it [N.m].
         torque_share: Largest share of a joint's strength.
         enough: Postures that act after which the best one is taken.
         palm_room: Distance of the palms to the face [m]: the wrist of our shapes is thicker than the hand.
-        samples: Of each limb.
-        friction: Coulomb coefficient.
-        friction_model: Of feet and palms.
+        samples: Number of samples of each limb.
+        friction_model: Friction model of feet and palms.
     """
 
     distances: tuple[float, ...] = (0.60, 0.52, 0.68, 0.44, 0.76, 0.36, 0.30)
@@ -121,10 +108,8 @@ class BraceResult:
     """A posture that acts, or why there is none.
 
     Attributes:
-        brace: The posture, or None.
         tried: Places of the trunk.
         strongest: Largest force of any balanced posture that was found [N]; 0 without one.
-        failure: None, or the reason in one line.
     """
 
     brace: Brace | None
@@ -150,12 +135,8 @@ def find_braced_posture(
 
     Args:
         body: A body with arms, legs and soles.
-        scene: Its surroundings.
-        samples: Of its limbs.
-        act: What is to be done.
         near: (2,) where the body comes from; it acts on the part of the object nearest to there [m].
         level: Height of the ground [m].
-        settings: Where to try.
         hands_by: What hands prefer; EFORT, pulling EFORT for a pull, when omitted.
         feet_by: What feet prefer; EFORT when omitted.
         reference: (nq,) posture to be like where the task leaves freedom; standing when omitted.
@@ -177,37 +158,34 @@ class _Search:
         self._body, self._scene, self._act, self._settings = body, scene, act, settings
         self._rules = ContactRules(friction=settings.friction)
         self._generator = ContactGenerator(body, scene, samples, rules=self._rules)
-        self._poser = PostureFinderSettings(natural=any(item.natural for item in samples.values()))
-        self._proximity = Proximity(body, scene)
         self._reference = body.standing_posture() if reference is None else reference
+        asked = PostureFinderSettings(natural=any(item.natural for item in samples.values()))
+        self._poser = PostureFinder(body, scene, self._reference, asked)
         self._reasons: dict[int, Counter[str]] = {step: Counter() for step in _STEPS}
         self._tried = 0
         self._strongest = 0.0
 
     def run(self, near: FloatArray, hands_by: Heuristic, feet_by: Heuristic) -> BraceResult:
-        faces = self._faces()
-        if not faces:
-            return self._failed(f"{self._act.obstacle} has no face against {self._act.kind}ing hands")
-        found: list[Brace] = []
-        for q in self._trunks(faces, near):
-            self._tried += 1
-            brace = self._at(q, hands_by, feet_by)
-            if brace is not None:
-                found.append(brace)
-            if len(found) >= self._settings.enough:
-                break
-        if not found:
-            return self._failed(self._why())
-        best = min(found, key=lambda item: item.forces.torque_share)
-        return BraceResult(best, self._tried, self._strongest)
-
-    def _faces(self) -> list[Surface]:
-        """Surfaces of the object that look at the body."""
-        return [
+        faces = [
             face
             for face in self._scene.surfaces
             if face.obstacle == self._act.obstacle and float(face.normal @ self._act.facing) < -0.7
         ]
+        if not faces:
+            reason = f"{self._act.obstacle} has no face against {self._act.kind}ing hands"
+            return BraceResult(None, self._tried, self._strongest, reason)
+        braces: list[Brace] = []
+        for q in self._trunks(faces, near):
+            self._tried += 1
+            brace = self._at(q, hands_by, feet_by)
+            if brace is not None:
+                braces.append(brace)
+            if len(braces) >= self._settings.enough:
+                break
+        if not braces:
+            return BraceResult(None, self._tried, self._strongest, self._why())
+        best = min(braces, key=lambda item: item.forces.torque_share)
+        return BraceResult(best, self._tried, self._strongest)
 
     def _trunks(self, faces: list[Surface], near: FloatArray) -> Iterator[FloatArray]:
         """Postures before the nearest face, the trunk at the settings' places."""
@@ -217,7 +195,9 @@ class _Search:
         yaw = float(np.arctan2(facing[1], facing[0]))
         face = min(faces, key=lambda item: float((item.polygon @ facing).min()))
         depth = float((face.polygon @ facing).min())
-        middle = _beside(face.polygon @ across, float(near @ across))
+        sides = face.polygon @ across
+        low, high = float(sides.min()) + HANDS_ROOM, float(sides.max()) - HANDS_ROOM
+        middle = 0.5 * (low + high) if low >= high else float(np.clip(float(near @ across), low, high))
         size = stature_of(self._body) / 1.75
         forwards = 1.0 if act.kind is ActKind.PUSH else -1.0
         places = itertools.product(settings.leans, settings.heights, settings.distances)
@@ -244,36 +224,15 @@ class _Search:
         if margin < self._settings.margin:
             self._reasons[_FEET][UNBALANCED] += 1
             return None
-        found = self._pose({**feet, **hands}, posture, q[:7], place)
-        return None if found is None else self._strong(found, feet, hands, margin)
-
-    def _pose(
-        self, contacts: dict[str, Contact], start: FloatArray, root: FloatArray, place: FloatArray
-    ) -> FloatArray | None:
-        """Posture on the contacts with its centre of mass over a place, free of obstacles, or None."""
-        pose, settings = pin.XYZQUATToSE3(root), self._poser
-        touching = [(name, self._scene.touched_obstacle(contact)) for name, contact in contacts.items()]
-        problem = PostureProblem(
-            self._body,
-            tuple(contacts.values()),
-            {ROOT: Placement(pose.translation, pose.rotation, settings.turn_weight, settings.root_weight)},
-            com=np.array([*place, np.nan]),
-            proximity=self._proximity,
-            clearance=settings.clearance,
-            self_clearance=settings.clearance,
-            ignore=touching_pairs(self._body, touching),
-            range_margin=settings.range_margin,
-            learnt_margin=settings.learnt_margin,
-            reference=self._reference,
+        contacts = {**feet, **hands}
+        posed = self._poser.pose(
+            contacts, contacts, posture, place=place, placements=self._poser.led(q[:7]),
             preferences=Preferences(grasp=FLAT_PALMS),
-        )
-        found = generate_posture(problem, start, settings=SolverSettings(
-            tolerance=settings.tolerance, iterations=settings.iterations, restarts=False, explain=False,
-        ))  # fmt: skip
-        if not found.succeeded:
-            self._reasons[_POSTURE][found.failure or "no posture"] += 1
+        )  # fmt: skip
+        if posed.q is None:
+            self._reasons[_POSTURE][posed.reason] += 1
             return None
-        return np.array(found.q)
+        return self._strong(posed.q, feet, hands, margin)
 
     def _strong(
         self, q: FloatArray, feet: dict[str, Contact], hands: dict[str, Contact], margin: float
@@ -291,7 +250,7 @@ class _Search:
         return Brace(q, feet, hands, forces, largest, margin)
 
     def _hands(self, q: FloatArray, heuristic: Heuristic) -> tuple[FloatArray, dict[str, Contact] | None]:
-        task, found = self._act.hand_task(ARMS), {}
+        task, hands = self._act.hand_task(ARMS), {}
         middle, across = np.array(q[:3]), np.array([-self._act.facing[1], self._act.facing[0], 0.0])
         order = heuristic
         for arm in ARMS:
@@ -303,21 +262,18 @@ class _Search:
                 self._reasons[_HANDS][f"{arm} prefers {answer.obstacle}"] += 1
                 return q, None
             q = answer.q
-            found[answer.contact.effector] = self._hold(answer.contact)
-            if len(found) == 2 and answer.score < 0.5 * BALANCED:
+            # Held so that any force up to a hand's strength is felt.
+            contact, away = answer.contact, self._settings.palm_room * answer.contact.normal
+            hands[contact.effector] = grasp(
+                contact.effector, contact.position + away, max_force=self._rules.grasp_force,
+                rotation=contact.rotation_contact_to_world,
+            )  # fmt: skip
+            if len(hands) == 2 and answer.score < 0.5 * BALANCED:
                 self._reasons[_HANDS]["the hands cannot act side by side"] += 1
                 return q, None
             alike = Mirrored(answer.contact.position, middle, across)
             order = WeightedSum([(1.0, heuristic), (BALANCED, alike)])
-        return q, found
-
-    def _hold(self, contact: Contact) -> Contact:
-        """The contact as one at which any force up to a hand's strength is felt."""
-        away = self._settings.palm_room * contact.normal
-        return grasp(
-            contact.effector, contact.position + away, max_force=self._rules.grasp_force,
-            rotation=contact.rotation_contact_to_world,
-        )  # fmt: skip
+        return q, hands
 
     def _feet(
         self, q: FloatArray, loads: Loads, heuristic: Heuristic
@@ -352,15 +308,6 @@ class _Search:
             f"with {act.force:g} N{best}{why}"
         )
 
-    def _failed(self, reason: str) -> BraceResult:
-        return BraceResult(None, self._tried, self._strongest, reason)
-
-
-def _beside(sides: FloatArray, wanted: float) -> float:
-    """Place across a face that is nearest to a wanted one and leaves room for both hands [m]."""
-    low, high = float(sides.min()) + HANDS_ROOM, float(sides.max()) - HANDS_ROOM
-    return 0.5 * (low + high) if low >= high else float(np.clip(wanted, low, high))
-
 
 REACHING_TIME = 1.2
 """Shortest time in which the hands go to the object [s]; our choice."""
@@ -378,13 +325,7 @@ def arrival(body: BodyModel, brace: Brace) -> Stage:
 
 
 def with_hands(body: BodyModel, way: ContactPlan, brace: Brace) -> ContactPlan:
-    """The way to the act and the hands put to the object, both at once.
-
-    Args:
-        body: The body.
-        way: Contacts from the start to the feet of the act.
-        brace: The posture that acts, on the feet of the way's last stage.
-    """
+    """The way to the feet of an act, and the hands put to the object, both at once."""
     last = way.stages[-1]
     reaching = Stage.of(body, last.contacts, last.q, REACHING_TIME, last.com_room)
     acting = Stage.of(body, {**last.contacts, **brace.hands}, brace.q, TOUCHING_TIME, ROOM)

@@ -16,9 +16,9 @@ class Loads:
     """Wrenches on the hands that feet have to stand against.
 
     Attributes:
-        mass: Of the body [kg].
+        mass: Mass of the body [kg].
         wrenches: (k, 6) force and moment about the world origin on the hands [N, N.m], of each load.
-        friction_model: Of the feet.
+        friction_model: Friction model of the feet.
     """
 
     mass: float
@@ -32,15 +32,9 @@ class Loads:
         model = ContactModel.of_body(self.mass, self.friction_model)
         (polytope,) = wrench_polytopes([Stance(feet, model=model)])
         weight = pseudo_wrench(self.mass, places, np.zeros(3))
-        return np.min(
-            [
-                stability_margins(
-                    polytope, wrench_about(weight - load, polytope.reference), places
-                ).wrench_about_com
-                for load in self.wrenches
-            ],
-            axis=0,
-        )
+        needed = [wrench_about(weight - load, polytope.reference) for load in self.wrenches]
+        margins = [stability_margins(polytope, wrench, places).wrench_about_com for wrench in needed]
+        return np.min(margins, axis=0)
 
     def _slides(self, feet: list[Contact], load: FloatArray) -> bool:
         """Whether feet on parallel surfaces slide under a load, wherever the centre of mass is."""
@@ -55,12 +49,10 @@ class Loads:
     def best_place(
         self, feet: list[Contact], near: FloatArray, reach: FloatArray
     ) -> tuple[FloatArray, float]:
-        """(2,) place of the centre of mass with the largest least margin, and that margin [N.m].
+        """(2,) place of the centre of mass on feet with the largest least margin, and that margin [N.m].
 
-        Args:
-            feet: Contacts that carry.
-            near: (3,) middle of the places that are looked at, at the height of the CoM [m].
-            reach: (2,) how far they go along x and y [m].
+        The places looked at are around a point (3,) at the height of the CoM, as far as (2,) along x and y
+        [m].
         """
         x, y = (np.linspace(-r, r, 2 * int(np.ceil(r / 0.02)) + 1) for r in reach)
         grid = np.stack(np.meshgrid(near[0] + x, near[1] + y, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -129,8 +121,7 @@ class Footing:
         other: Contact of the other foot.
         margin: Least margin that counts as balance [N.m].
         reach: (2,) how far the centre of mass may be moved [m].
-        spacing: [m].
-        rules: Friction.
+        spacing: Largest distance of candidates that share an answer [m].
     """
 
     loads: Loads

@@ -27,8 +27,6 @@ def point_mass_motion(
     """Sample a CoM trajectory with its margin and contact forces.
 
     Args:
-        problem: What was planned.
-        trajectory: The plan.
         polytopes: W_i of the phases.
 
     Returns:
@@ -82,7 +80,6 @@ def point_mass_forces(trajectory: CentroidalTrajectory, time: FloatArray) -> Flo
     """(n, c, 6) contact forces of a CoM trajectory, with moments about each contact's origin [N, N.m].
 
     Args:
-        trajectory: The plan.
         time: (n,) [s].
     """
     names = trajectory.schedule.sequence.effectors
