@@ -7,7 +7,7 @@ grasp box is a segment added to it. Each facet is explained by the contacts and 
 
 A stance with few contacts has a flat W_p (a point contact can give no moment about itself). Such a W_p
 carries each equality as a pair of opposite rows at the end of H: the margin of a wrench is then 0 at best,
-and negative as soon as the equality is broken.
+and at most the negative distance to the flat off it.
 """
 
 from __future__ import annotations
@@ -237,9 +237,8 @@ class WrenchPolytope(Displayed, Polytope):
         row = int(np.argmin(distances))
         shares = facet_shares(self, row)
         first = shares[0]
-        return LimitingConstraint(
-            row, first.effector, first.kind, str(first), self.H[row], float(distances[row]), shares
-        )
+        margin = float(self.margin(w) if len(self.off_flat(w[None])[0]) else distances[row])
+        return LimitingConstraint(row, first.effector, first.kind, str(first), self.H[row], margin, shares)
 
 
 def pseudo_wrench(
