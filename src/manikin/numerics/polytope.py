@@ -108,42 +108,12 @@ class Polytope:
         off = np.flatnonzero(np.any(np.abs(residual) > thickness, axis=1))
         return off, residual[off]
 
-    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
-        """Whether each point is inside or at most ``tolerance`` beyond a facet."""
-        return np.asarray(self.margin(points) >= -tolerance)
-
     def inscribed_ball(self) -> tuple[FloatArray, float]:
         """Centre (d,) and radius of the largest ball inside ([Qiu2012]_ 2.25).
 
         Raises:
             PolytopeError: If the polytope is empty or holds balls of any size.
         """
-        centre, radius = self._largest_ball()
-        if radius < -_tolerance(self.h):
-            raise PolytopeError("polytope is empty; valid: a polytope with at least one point")
-        return centre, max(radius, 0.0)
-
-    def intersection(self, other: "Polytope") -> "Polytope":
-        """Points of both polytopes (rows of both, none removed)."""
-        return Polytope(np.vstack([self.H, other.H]), np.concatenate([self.h, other.h]))
-
-    def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Polytope":
-        """Points ``y`` (k,) with ``matrix (d, k) @ y + offset (d,)`` inside: a slice of the polytope."""
-        m = np.asarray(matrix, dtype=np.float64)
-        return Polytope(self.H @ m, self.h - self.H @ np.broadcast_to(offset, (self.dimension,)))
-
-    def vertices(self) -> FloatArray:
-        """(n, d) vertices.
-
-        Raises:
-            PolytopeError: If the polytope is empty, flat, unbounded or of dimension 1.
-        """
-        centre, radius = self.inscribed_ball()
-        if radius <= _tolerance(self.h):
-            raise PolytopeError("polytope is flat; valid: one with a ball inside")
-        return vertices_around(self.H, self.h, centre)
-
-    def _largest_ball(self) -> tuple[FloatArray, float]:
         d = self.dimension
         cost = np.zeros(d + 1)
         cost[-1] = -1.0
@@ -154,9 +124,18 @@ class Polytope:
         )
         if answer.status == 3:
             raise PolytopeError("polytope holds balls of any size; valid: a bounded polytope")
-        if answer.x is None:
-            return np.full(d, np.nan), -np.inf
-        return answer.x[:-1] * scale, float(answer.x[-1]) * scale
+        if answer.x is None or answer.x[-1] * scale < -_tolerance(self.h):
+            raise PolytopeError("polytope is empty; valid: a polytope with at least one point")
+        return answer.x[:-1] * scale, max(float(answer.x[-1]) * scale, 0.0)
+
+    def intersection(self, other: "Polytope") -> "Polytope":
+        """Points of both polytopes (rows of both, none removed)."""
+        return Polytope(np.vstack([self.H, other.H]), np.concatenate([self.h, other.h]))
+
+    def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Polytope":
+        """Points ``y`` (k,) with ``matrix (d, k) @ y + offset (d,)`` inside: a slice of the polytope."""
+        m = np.asarray(matrix, dtype=np.float64)
+        return Polytope(self.H @ m, self.h - self.H @ np.broadcast_to(offset, (self.dimension,)))
 
 
 def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
