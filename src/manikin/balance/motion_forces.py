@@ -23,7 +23,7 @@ from manikin.body.limbs import carrying_segment, hinge_line
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.motion.dynamics import FreeDynamics, centroidal_motion
+from manikin.motion.dynamics import CarriedForces, FreeDynamics, centroidal_motion
 from manikin.numerics.spatial import FloatArray, wrench_about
 from manikin.scene.distance import moves_by_joint
 
@@ -51,7 +51,9 @@ def full_motion(
     Returns:
         The motion, and (n, 6) its whole-body pseudo-wrench about the world origin.
     """
-    needed = centroidal_motion(body, q, v, a)
+    needed, load = centroidal_motion(body, q, v, a), CarriedForces.of(body, schedule, time, q, v, a)
+    if load is not None:
+        needed = replace(needed, wrench=needed.wrench + load.wrench)
     forces = plan_forces(body, schedule, time, q, v, a)
     stances = [phase.stance for phase in schedule.sequence]
     margin = motion_margin(stances, schedule.phase_at(time), needed.wrench, needed.com, polytopes=polytopes)
@@ -203,7 +205,9 @@ def plan_forces(
     a: FloatArray,
 ) -> ContactForces:
     """Distribute the contact forces of a motion and compute its joint torques, see :func:`full_motion`."""
-    dynamics = FreeDynamics.of(body, q, v, a)
+    dynamics, load = FreeDynamics.of(body, q, v, a), CarriedForces.of(body, schedule, time, q, v, a)
+    if load is not None:
+        dynamics = dynamics.carrying(load)
     names = schedule.sequence.effectors
     shares = load_shares(schedule, time, names)
     tau = np.zeros((len(time), body.nv))

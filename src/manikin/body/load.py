@@ -32,23 +32,43 @@ def carrying(body: BodyModel, mass: float, hand: str = "both") -> BodyModel:
     Raises:
         BodyError: If the mass is negative, the hand is not known, or the body has no such hand.
     """
+    return with_masses(body, hand_masses(body, mass, hand))
+
+
+def hand_masses(body: BodyModel, mass: float, hand: str = "both") -> dict[str, float]:
+    """What each hand of a body carries of a load [kg], by the name of its effector.
+
+    Args:
+        body: Who carries it.
+        mass: Of the load [kg]; of 0 nothing.
+        hand: ``"left"``, ``"right"`` or ``"both"``.
+
+    Raises:
+        BodyError: If the mass is negative, the hand is not known, or the body has no such hand.
+    """
     finite_number(mass, "load [kg]", at_least=0.0, error=BodyError)
     if hand not in HANDS:
         raise BodyError(f"hand of the load is {hand!r}; valid: {', '.join(HANDS)}")
     if mass == 0.0:
-        return body
+        return {}
     missing = [name for name in HANDS[hand] if name not in body.effectors]
     if missing:
         raise BodyError(f"body {body.name!r} has no {missing[0]} to carry a load; valid: a body with hands")
-    share = mass / len(HANDS[hand])
+    return dict.fromkeys(HANDS[hand], mass / len(HANDS[hand]))
+
+
+def with_masses(body: BodyModel, masses: Mapping[str, float]) -> BodyModel:
+    """The body with point masses [kg] at the origins of effectors, as parts of their segments."""
+    if not masses:
+        return body
     loads = dict(body.loads)
     segments = list(body.segments)
-    for name in HANDS[hand]:
+    for name, share in masses.items():
         effector = body.effector(name)
         number = next(k for k, segment in enumerate(segments) if segment.name == effector.segment)
         segments[number] = _with_point(segments[number], share, effector.translation)
         loads[name] = loads.get(name, 0.0) + share
-    nominal = None if body.nominal_mass is None else body.nominal_mass + mass
+    nominal = None if body.nominal_mass is None else body.nominal_mass + sum(masses.values())
     return replace(body, segments=tuple(segments), loads=loads, nominal_mass=nominal)
 
 

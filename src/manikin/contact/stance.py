@@ -7,7 +7,7 @@ against single support.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -119,6 +119,25 @@ class Stance(Displayed):
 
 
 @dataclass(frozen=True, eq=False)
+class CarriedLoad:
+    """Point masses that effectors carry during a phase, rigidly held at the origins of their frames.
+
+    Attributes:
+        masses: [kg] by the name of the effector.
+        offset: (3,) from the body's CoM to the masses' common centre, world axes [m]: an estimate, for plans
+            that know no posture.
+    """
+
+    masses: Mapping[str, float]
+    offset: FloatArray
+
+    @property
+    def mass(self) -> float:
+        """Of all effectors [kg]."""
+        return float(sum(self.masses.values()))
+
+
+@dataclass(frozen=True, eq=False)
 class Phase:
     """A stance and how long it may last.
 
@@ -126,11 +145,13 @@ class Phase:
         stance: The contacts held during the phase.
         min_duration: Lower bound [s], > 0.
         max_duration: Upper bound [s], or None.
+        load: What is carried during the phase and is no part of the body, or None.
     """
 
     stance: Stance
     min_duration: float = 0.1
     max_duration: float | None = None
+    load: CarriedLoad | None = None
 
     def __post_init__(self) -> None:
         finite_number(self.min_duration, "phase min_duration [s]", above=0.0, error=ContactError)
@@ -321,7 +342,7 @@ def _split(sequence: StanceSequence, index: int, hinge: float, rolling: Rolling)
     taken = (rolling.heel if landing else 0.0) + (rolling.toes if leaving else 0.0)
     if landing:
         stance = _with_part(phase.stance, landing, SolePart.HEEL, hinge)
-        yield Phase(stance, rolling.heel, rolling.stretch * rolling.heel)
+        yield Phase(stance, rolling.heel, rolling.stretch * rolling.heel, phase.load)
     if landing or leaving:
         least = max(phase.min_duration - taken, rolling.flat)
         most = None if phase.max_duration is None else max(phase.max_duration - taken, least)
@@ -330,7 +351,7 @@ def _split(sequence: StanceSequence, index: int, hinge: float, rolling: Rolling)
         yield phase
     if leaving:
         stance = _with_part(phase.stance, leaving, SolePart.TOES, hinge)
-        yield Phase(stance, rolling.toes, rolling.stretch * rolling.toes)
+        yield Phase(stance, rolling.toes, rolling.stretch * rolling.toes, phase.load)
 
 
 def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:

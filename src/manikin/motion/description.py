@@ -14,7 +14,16 @@ import numpy as np
 
 from manikin.body import BodyModel, Effector, Hinge, Limb, Segment
 from manikin.body import Shape as BodyShape
-from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance, StanceSequence
+from manikin.contact import (
+    CarriedLoad,
+    Contact,
+    ContactKind,
+    ContactSchedule,
+    Phase,
+    SolePart,
+    Stance,
+    StanceSequence,
+)
 from manikin.numerics.spatial import frozen_array
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
 from manikin.scene.obstacle import Shape
@@ -164,6 +173,7 @@ def describe_schedule(schedule: ContactSchedule) -> Json:
                 "normal_force_cap": phase.stance.normal_force_cap,
                 "friction_model": phase.stance.friction_model,
                 "contacts": [_describe_contact(contact) for contact in phase.stance],
+                **({} if phase.load is None else {"load": _describe_load(phase.load)}),
             }
             for phase in schedule.sequence
         ],
@@ -186,10 +196,21 @@ def schedule_from(description: Mapping[str, Any]) -> ContactSchedule:
             ),
             phase["min_duration"],
             phase["max_duration"],
+            _load_from(phase["load"]) if "load" in phase else None,
         )
         for phase in description["phases"]
     ]
     return ContactSchedule(StanceSequence(phases), description["instants"])
+
+
+def _describe_load(load: CarriedLoad) -> Json:
+    return {"masses_kg": dict(load.masses), "offset": load.offset.tolist()}
+
+
+def _load_from(description: Mapping[str, Any]) -> CarriedLoad:
+    return CarriedLoad(
+        description["masses_kg"], frozen_array(description["offset"], "offset of the load [m]", (3,))
+    )
 
 
 def _describe_contact(contact: Contact) -> Json:

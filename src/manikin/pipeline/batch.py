@@ -64,7 +64,7 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class RunOptions:
-    """What is passed on to every run.
+    """Options of every run.
 
     Attributes:
         out: Directory of the run directories, or None to write none.
@@ -97,7 +97,7 @@ def built_in_jobs(*, statures: bool = False) -> tuple[Job, ...]:
         Job.of(name, variant, load_scenario(name, variant))
         for name in list_scenarios()
         for variant in (None, *list_variants(name))
-        if load_scenario(name, variant).has_stature or not statures
+        if load_scenario(name, variant).file.body.model == "human" or not statures
     )
 
 
@@ -126,13 +126,13 @@ def run_jobs(
         runs that did and did not succeed; ``wall_s``.
     """
     began = clock.perf_counter()
-    found: dict[int, dict[str, Any]] = {}
+    result: dict[int, dict[str, Any]] = {}
     with closing(_completed(jobs, command, workers or usable_cores(), time_limit)) as completed:
         for index, entry in completed:
-            found[index] = entry
+            result[index] = entry
             if report is not None:
-                report(entry, len(found))
-    runs = [found[index] for index in range(len(jobs))]
+                report(entry, len(result))
+    runs = [result[index] for index in range(len(jobs))]
     return {"runs": runs, **counts(runs), "wall_s": clock.perf_counter() - began}
 
 
