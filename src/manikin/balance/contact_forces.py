@@ -209,8 +209,8 @@ class _Program:
         weight, stiff = np.asarray(self.gain[row] ** -0.5), self.softness**-0.5
         stacked = np.vstack([stiff * self.A, np.diag(weight)])
         target = np.concatenate([stiff * self.b[row], weight * self.prior[row]])
-        found = lsq_linear(stacked, target, bounds=(0.0, self.upper), method="bvls", tol=1e-12).x
-        magnitude: FloatArray = np.clip(found, 0.0, self.upper).astype(np.float64)
+        solution = lsq_linear(stacked, target, bounds=(0.0, self.upper), method="bvls", tol=1e-12).x
+        magnitude: FloatArray = np.clip(solution, 0.0, self.upper).astype(np.float64)
         return magnitude, (self.b[row] - self.A @ magnitude) / self.softness
 
 

@@ -18,7 +18,7 @@ from manikin.numerics.spatial import FloatArray, cross
 
 
 class LimitKind(StrEnum):
-    """What gives way when a limit is reached."""
+    """Kinds of limits by what gives way."""
 
     SLIPPING = "slipping"
     TIPPING = "tipping"

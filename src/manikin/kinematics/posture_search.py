@@ -345,7 +345,7 @@ class PostureSolver:
         return lower, upper
 
     def _misses(self, iterate: _Iterate) -> tuple[str, ...]:
-        """What is not met, worst first."""
+        """Descriptions of the requirements that are not met, worst first."""
         misses: list[tuple[float, str]] = []
         for term, part in zip(self.requirements, iterate.parts, strict=True):
             residual = iterate.requirement.residual[part]
