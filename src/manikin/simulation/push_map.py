@@ -1,20 +1,17 @@
 """Push maps: how hard a standing body can be pushed, by direction, searched in several processes."""
 
 import itertools
-import multiprocessing
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from multiprocessing.synchronize import Event
 from typing import Any
 
 import numpy as np
 
 from manikin.control.recovery import RecoverySettings
-from manikin.errors import InputError, ManikinError
+from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 from manikin.runtime.display import Displayed
-from manikin.runtime.parallel import FRESH, prepare_worker, side_by_side
+from manikin.runtime.parallel import side_by_side
 from manikin.simulation.push_search import DirectionSearch, HeldImpulse
 
 USUAL = {
@@ -64,7 +61,7 @@ def _words(conditions: Mapping[str, Any]) -> list[str]:
 
 def search_directions(
     searches: Sequence[DirectionSearch], *, jobs: int = 1
-) -> Iterator[tuple[int, HeldImpulse]]:
+) -> Generator[tuple[int, HeldImpulse]]:
     """Search directions, of one map or several, side by side.
 
     Each search depends on nothing but itself, so the result is the same for any number of jobs.
@@ -73,8 +70,8 @@ def search_directions(
         searches: Directions to search.
         jobs: Processes, see :func:`manikin.runtime.parallel.side_by_side`.
 
-    Yields:
-        Index of a search and its result, in the order in which they end.
+    Returns:
+        Index of each search and its result, in the order in which they end; closing it ends the rest.
 
     Raises:
         InputError: If ``jobs`` is less than 1, or a search refuses its push.
@@ -82,31 +79,7 @@ def search_directions(
     """
     if jobs < 1:
         raise InputError(f"jobs is {jobs}; valid: at least 1")
-    given_up = multiprocessing.get_context(FRESH).Event()
-    try:
-        yield from side_by_side(_run, searches, jobs, "search", prepare=partial(_prepare, given_up))
-    finally:
-        given_up.set()
-
-
-_given_up: Event | None = None
-
-
-def _prepare(given_up: Event) -> None:
-    """Make a new process one of the search, which ends when it is given up."""
-    global _given_up
-    _given_up = given_up
-    prepare_worker()
-
-
-def _run(search: DirectionSearch) -> HeldImpulse:
-    return search.run(_check_wanted)
-
-
-def _check_wanted() -> None:
-    """Raise if the search was given up."""
-    if _given_up is not None and _given_up.is_set():
-        raise ManikinError("the search was given up")
+    return side_by_side(DirectionSearch.run, searches, jobs, "search")
 
 
 def equal_directions(count: int) -> tuple[float, ...]:

@@ -270,26 +270,22 @@ class DirectionSearch:
     direction_deg: float
     tolerance: float = 1.0
 
-    def run(self, go_on: Callable[[], None] | None = None) -> HeldImpulse:
-        """Search, calling ``go_on`` before every trial, which raises to give up.
+    def run(self) -> HeldImpulse:
+        """Search.
 
         Trials end early once the body has stood at rest for a while. The final impulse is confirmed by a run
         to its end; if the body falls there, the search is repeated with such runs alone.
         """
-        quick = self._search(AT_REST, go_on)
+        quick = self._search(AT_REST)
         if not quick.held:
             return quick
-        if go_on is not None:
-            go_on()
         if self.trials.push(self.direction_deg, quick.held).recovered:
             return replace(quick, trials=quick.trials + 1)
-        whole = self._search(None, go_on)
+        whole = self._search(None)
         return replace(whole, trials=whole.trials + quick.trials + 1)
 
-    def _search(self, until_at_rest: float | None, go_on: Callable[[], None] | None) -> HeldImpulse:
+    def _search(self, until_at_rest: float | None) -> HeldImpulse:
         def holds(impulse: float) -> bool:
-            if go_on is not None:
-                go_on()
             return self.trials.push(self.direction_deg, impulse, until_at_rest=until_at_rest).recovered
 
         return largest_held(holds, tolerance=self.tolerance, strongest=self.trials.strongest)

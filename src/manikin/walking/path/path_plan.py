@@ -262,8 +262,8 @@ def walking_paths(
         start: (3,) x, y [m], heading [rad].
         goals: (k, 3) x, y [m], heading [rad].
         objective: Cost to be minimised.
-        workers: Number of processes. They are started afresh, which takes longer than a hundred goals without
-            obstacles do; and a script must ask for more than one under ``if __name__ == "__main__"``.
+        workers: Number of processes. They are started afresh, which takes longer than 100 goals without
+            obstacles.
         options: Further arguments of :func:`walking_path`.
 
     Raises:
