@@ -113,8 +113,8 @@ def test_limbs_go_all_the_way_and_are_refined(name):
     keyed = keyed.with_lifted_feet(body, scene, ())
     refined = refine_motion(body, scene, keyed.time, keyed.q, keyed.schedule)
     assert refined.failure is None, refined.failure
-    assert refined.certificate.min_margin > 0.0
-    assert refined.certificate.max_penetration_m < 1e-3
+    assert refined.certificate.value("min_margin") > 0.0
+    assert refined.certificate.value("max_penetration_m") < 1e-3
 
 
 def test_refinement_makes_a_contact_plan_a_motion():
@@ -160,7 +160,7 @@ def test_a_ceiling_below_the_head_is_reported_with_its_pair(height):
     coarse = WholeBodySettings(guide_spacing=0.5, knot_spacing=0.15, manner=CLOSE)
     result = plan_whole_body(person, scene, com, rng=np.random.default_rng(0), settings=coarse)
     assert not result.succeeded
-    assert result.certificate.min_clearance_m < 0.01
+    assert result.certificate.value("min_clearance_m") < 0.01
     assert "ceiling" in str(result.certificate.closest_pair) or "error" in result.failure.reason
 
 

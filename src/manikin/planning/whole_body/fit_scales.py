@@ -1,7 +1,4 @@
-"""How much the residuals of every whole-body spline matter, and how long its fit iterates.
-
-Also here. How much each residual of the whole-body fit matters. How much each term of the refinement matters.
-"""
+"""Scales of the residuals of a whole-body spline, planned or refined, and limits of its iteration."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -105,9 +102,6 @@ PERSON_ROOT = 0.92
 PERSON_MASS = 75.0
 """Mass of that person [kg]."""
 
-LEAST_NEAR = 0.25
-"""Least factor on distances for safety."""
-
 
 @dataclass(frozen=True)
 class RefineScales(MotionScales):
@@ -162,15 +156,13 @@ class RefineScales(MotionScales):
 
         With lengths by ``l`` and masses by ``m``, at the same gravity, forces go by ``m``, moments by ``m l``
         and accelerations of the joints by ``1 / l``. Distances for safety shrink to a quarter at most.
-
-        Args:
-            body: The body.
         """
         plain = cls()
         if body.stature is not None:
             return plain
         length = float(body.standing_posture()[2]) / PERSON_ROOT
-        force, near = body.mass / PERSON_MASS, max(length, LEAST_NEAR)
+        # Least factor on distances for safety.
+        force, near = body.mass / PERSON_MASS, max(length, 0.25)
         return replace(
             plain,
             safe_distance=plain.safe_distance * near, softness=plain.softness * near,
