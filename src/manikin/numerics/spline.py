@@ -16,7 +16,7 @@ from manikin.errors import SplineError
 from manikin.numerics.spatial import FloatArray, frozen_array
 
 _DOMAIN_TOLERANCE = 1e-9
-"""How far outside the domain a parameter may lie, as a share of it (rounding of sums of durations)."""
+"""Share of the domain by which a parameter may lie outside it (rounding of sums of durations)."""
 
 
 @dataclass(frozen=True, eq=False)

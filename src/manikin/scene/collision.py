@@ -28,7 +28,7 @@ class CollisionPart:
     """One Coal geometry of an obstacle.
 
     A convex mesh piece has a signed distance as exact as a primitive's. A closed piece
-    that is not convex carries ``surface`` so that depth can be told from clearance; an
+    that is not convex carries ``surface`` so that depth differs from clearance; an
     open piece is a surface without inside.
 
     Attributes:

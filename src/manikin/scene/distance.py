@@ -33,7 +33,7 @@ WINDOW = 200
 
 
 class BodyGeometry(Protocol):
-    """What a body must offer: kinematics, shapes named ``"segment/shape"``, pairs to check."""
+    """Required of a body: kinematics, shapes named ``"segment/shape"``, pairs to check."""
 
     @property
     def pinocchio(self) -> pin.Model:
