@@ -13,8 +13,8 @@ import pytest
 
 from manikin.numerics.banded import BlockBandedSystem, SampledBasis
 from manikin.planning.whole_body import refine_motion
+from manikin.planning.whole_body.fit_job import phase_knots, sample_times
 from manikin.planning.whole_body.fit_scales import RefineScales
-from manikin.planning.whole_body.fit_targets import phase_knots, sample_times
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.refine_measures import rooms_of
 from manikin.planning.whole_body.refine_objective import RefineObjective, refine_targets
@@ -53,7 +53,7 @@ def problem(cases):
     """Objective and control points of the climb at its start."""
     body, scene, times, q, schedule = cases.climb(2)
     scales, path = RefineScales(), KeyPath(times, q)
-    knots = phase_knots(schedule.instants, 0.1, 5)
+    knots = phase_knots(schedule.instants, 0.1)
     time = sample_times(knots, 3)
     basis = SampledBasis.at(time, knots, 5)
     targets = refine_targets(body, scene, path, schedule, time, scales, None)

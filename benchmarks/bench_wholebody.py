@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from manikin.balance.motion_forces import plan_forces
-from manikin.numerics.banded import BlockBandedSystem, SampledBasis
+from manikin.numerics.banded import BlockBandedSystem
 from manikin.pipeline.runner import run
 from manikin.planning.com import plan_com
 from manikin.planning.whole_body import plan_whole_body
-from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_targets import ignored_pairs
-from manikin.planning.whole_body.plan_whole_body import WholeBodySettings, _Planner
+from manikin.planning.whole_body.plan_whole_body import WholeBodySettings, _Goal, _Planner
+from manikin.planning.whole_body.posture_style import READY
 from manikin.scenarios import load_scenario
 from manikin.scene import Proximity
 
@@ -31,18 +31,19 @@ def platform():
 
 @pytest.fixture(scope="module")
 def planner(platform):
-    return _Planner(*platform, np.random.default_rng(0), WholeBodySettings(), None)
+    return _Planner(*platform, np.random.default_rng(0), WholeBodySettings())
 
 
 @pytest.fixture(scope="module")
 def linearisation(planner, swings):
     """Objective, basis, control points at rest in the first posture, and no multipliers."""
-    knots = planner._knots()
-    targets = planner._targets(swings, planner._guide(swings), knots)
-    basis = SampledBasis.at(targets.time, knots, 5)
-    objective = MotionObjective(planner.body, planner.proximity, targets, basis)
-    points = np.tile(targets.reference[0], (basis.size, 1))
-    return objective, basis, points, np.zeros((len(targets.time), objective.task_rows))
+    time, basis = planner.job.samples(planner.job.knots(planner.trajectory.schedule))
+    scales = planner.settings.fit
+    objective = _Goal(planner, swings, planner.guide(swings, READY), READY, True).objective(
+        time, basis, scales
+    )
+    points = np.tile(objective.targets.reference[0], (basis.size, 1))
+    return objective, basis, points, np.zeros((len(time), objective.task_rows))
 
 
 @pytest.fixture(scope="module")
@@ -57,17 +58,16 @@ def test_swings(benchmark, planner):
 
 
 def test_guide_postures(benchmark, planner, swings):
-    benchmark.pedantic(planner._guide, args=(swings,), rounds=3, iterations=1)
+    def guide():
+        planner._guides.clear()
+        return planner.guide(swings, READY)
+
+    benchmark.pedantic(guide, rounds=3, iterations=1)
 
 
 def test_fit(benchmark, planner, swings):
-    guide = planner._guide(swings)
-
-    def fit():
-        problem, start = planner._prepare(swings, guide, planner._knots(), planner._scales())
-        return problem.solve(start)
-
-    benchmark.pedantic(fit, rounds=3, iterations=1)
+    goal = _Goal(planner, swings, planner.guide(swings, READY), READY, True)
+    benchmark.pedantic(planner.job.solve, args=(goal, planner.settings.fit), rounds=3, iterations=1)
 
 
 def test_dense_clearance(benchmark, platform):

@@ -12,7 +12,7 @@ import pytest
 
 from manikin.balance import wrench_polytope
 from manikin.body import human
-from manikin.contact import ContactModel, Phase, Stance, StanceSequence, sole
+from manikin.contact import ContactModel, ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.pipeline.runner import run
 from manikin.pipeline.stages.contact_stage import find_supports
 from manikin.pipeline.stages.refinement_stage import KeyedContacts
@@ -34,7 +34,16 @@ from manikin.walking import (
 )
 from manikin.walking.words import residuals, word_paths
 
-CASES = Path(__file__).parents[1] / "tests/planning/whole_body/refine_cases.py"
+TESTS = Path(__file__).parents[1] / "tests"
+
+
+def of_the_tests(path):
+    """A module of the tests, from which cases are taken."""
+    spec = importlib.util.spec_from_file_location(Path(path).stem, TESTS / path)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 # --- centre of mass -------------------------------------------------------------------------------
@@ -67,11 +76,20 @@ def test_a_stance_moved_elsewhere_has_the_polytope_it_would_have():
 
 @pytest.fixture(scope="module")
 def cases():
-    spec = importlib.util.spec_from_file_location("refine_cases", CASES)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["refine_cases"] = module
-    spec.loader.exec_module(module)
-    return module
+    return of_the_tests("planning/whole_body/refine_cases.py")
+
+
+def test_constraints_that_forbid_the_postures_are_named(tmp_path):
+    """A stride of 1 m with the CoM above 0.94 m: legs of 0.9 m would need it far before the standing foot."""
+    band = '[{height_band: {lower: "0.94", upper: "1.0"}}]'
+    stride = of_the_tests("pipeline/test_key_postures.py").stride
+    result = run(stride(tmp_path, length=1.0, constraints=band))
+    failure = result.summary["failure"]
+    assert failure["stage"] == "centroidal"
+    assert "no posture at T_" in failure["reason"]
+    assert "no plan of the centre of mass passes there" in failure["reason"]
+    assert "1 further plan of the centre of mass tried" in failure["reason"]
+    assert result.summary["centroidal"]["replans"] == 1
 
 
 @pytest.mark.parametrize(("name", "length"), [("climb", 8), ("crouch", 5)])
@@ -84,7 +102,7 @@ def test_a_long_climb_and_a_long_crouch_are_refined(cases, name, length):
     assert result.after.min_margin > 0.0
 
 
-@pytest.mark.parametrize("name", ["climb-wall", "insect-books", "climb@aslant"])
+@pytest.mark.parametrize("name", ["climb-wall", "insect-books", "climb@aslant", "climb@down"])
 def test_limbs_go_all_the_way_and_are_refined(name):
     """Margin at every sample of 5 ms, no penetration, contacts kept."""
     scenario = load_scenario(name)
@@ -95,8 +113,32 @@ def test_limbs_go_all_the_way_and_are_refined(name):
     keyed = keyed.with_lifted_feet(body, scene, ())
     refined = refine_motion(body, scene, keyed.time, keyed.q, keyed.schedule)
     assert refined.failure is None, refined.failure
+    assert refined.certificate.value("min_margin") > 0.0
+    assert refined.certificate.value("max_penetration_m") < 1e-3
+
+
+def test_refinement_makes_a_contact_plan_a_motion():
+    """Against the postures joined by straight lines, at the same timing."""
+    scenario = load_scenario("crouch")
+    body, scene = scenario.build_body(), scenario.build_scene()
+    found = find_supports(scenario, body, scene, np.random.default_rng(0))
+    sequence = found.scenario.build_sequence()
+    time = np.concatenate([[0.0], np.cumsum([phase.min_duration for phase in sequence])])
+    refined = refine_motion(body, scene, time, found.plan.postures, ContactSchedule(sequence, time))
+    assert refined.failure is None
+    before, after = refined.before, refined.after
+    assert before.physics_violation > 10.0 * after.physics_violation
+    assert before.squared_accelerations > 5.0 * after.squared_accelerations
+    assert after.min_clearance_m > max(0.0, before.min_clearance_m)
     assert refined.certificate.min_margin > 0.0
-    assert refined.certificate.max_penetration_m < 1e-3
+
+
+def test_a_climb_with_hands_stays_within_the_learnt_ranges_where_that_is_asked_for():
+    ranges = of_the_tests("planning/contacts/test_learnt_ranges.py")
+    _, freely = ranges.found_with("limits", "climb")
+    assert freely.min() < -np.deg2rad(10.0)
+    _, kept = ranges.found_with("learnt", "climb")
+    assert kept.min() >= -ranges.SLACK
 
 
 @pytest.mark.parametrize("height", [1.1, 1.2, 1.3])
@@ -118,8 +160,30 @@ def test_a_ceiling_below_the_head_is_reported_with_its_pair(height):
     coarse = WholeBodySettings(guide_spacing=0.5, knot_spacing=0.15, manner=CLOSE)
     result = plan_whole_body(person, scene, com, rng=np.random.default_rng(0), settings=coarse)
     assert not result.succeeded
-    assert result.certificate.min_clearance_m < 0.01
+    assert result.certificate.value("min_clearance_m") < 0.01
     assert "ceiling" in str(result.certificate.closest_pair) or "error" in result.failure.reason
+
+
+# --- recorded ranges of motion --------------------------------------------------------------------
+
+
+def test_people_and_clips_that_were_not_learnt_from_are_inside():
+    """Hips and shoulders: 95 % of the frames of each fourth of the clips, and of each person left out.
+
+    Shoulders of the three who climbed, crawled and swung their arms as nobody else did: 80 %.
+    """
+    anatomy = of_the_tests("recordings/test_anatomy.py")
+    script = of_the_tests("../docs/ranges_of_motion.py")
+    clips = script.recorded_angles(Path(__file__).parents[2] / "shared/data/mocap")
+    names = sorted(clips)
+    folds = [(number, set(names[number::4])) for number in range(4)]
+    people = [(person, {name for name in names if name[0] == person}) for person in {n[0] for n in names}]
+    for label, left_out in (*folds, *people):
+        learnt = script.learn(clips[name] for name in names if name not in left_out)
+        own = [clips[name] for name in sorted(left_out)]
+        assert anatomy.inside(learnt, own, "thigh") >= 0.95, label
+        shoulder = 0.8 if label in ("01", "Male1", "08") else 0.95
+        assert anatomy.inside(learnt, own, "upper_arm") >= shoulder, label
 
 
 # --- walks ----------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Hundreds of random pushes against the stored map of held ones: `pytest benchmarks/sweep_pushes.py -n 2`.
 
-Two minutes on two cores; the tests make 40 of these 400 pushes.
+Two minutes on two cores; the tests make 16 of these 400 pushes.
 """
 
 import json
@@ -16,6 +16,7 @@ from manikin.simulation import (
     PushMap,
     PushTrials,
     RecoveryTask,
+    feet_apart_posture,
     one_foot_posture,
     push_near_com,
     recover,
@@ -73,6 +74,20 @@ def test_a_push_is_held_on_one_foot(body, force):
     q = one_foot_posture(body, "left_foot")
     found = pushed(body, force, q=q, support=("left_foot",))
     assert found.recovered, found.failure
+
+
+def test_from_the_side_less_is_held_with_the_feet_together():
+    """As in the thesis ([Kudoh2002]_ 3.3, experiment 4): the soles are then 20 cm wide and 25 cm long."""
+
+    def together(force):
+        push = push_near_com(kudoh(), force, 0.2, 0.1, q=feet_apart_posture(kudoh(), 0.1))
+        task = RecoveryTask((push,), Feet.HELD, 3.5, q=feet_apart_posture(kudoh(), 0.1))
+        return recover(kudoh(), task, RecoverySettings(delay=0.2)).recovered
+
+    assert together((250.0, 0.0, 0.0))
+    assert together((-250.0, 0.0, 0.0))
+    assert not together((0.0, 250.0, 0.0))
+    assert together((0.0, 180.0, 0.0))
 
 
 @pytest.mark.parametrize(("stature", "mass", "sex"), [(1.55, 48.0, "female"), (1.95, 105.0, "male")])

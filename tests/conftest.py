@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, settings
 from manikin.body import human
 from manikin.motion import Motion
 from manikin.motion.file import MotionFile
-from manikin.reports.export.write import to_bvh
+from manikin.reports.export import to_bvh
 
 FEET = ("left_foot", "right_foot")
 
@@ -32,13 +32,18 @@ settings.load_profile("standard")
 
 
 APART = frozenset({
-    "tests/planning/com/test_walls.py", "tests/pipeline/test_beam.py",
-    "tests/pipeline/test_contact_search.py",
-    "tests/pipeline/test_key_postures.py", "tests/pipeline/test_limb_contacts.py",
-    "tests/pipeline/test_pushed_moving.py", "tests/pipeline/test_run.py", "tests/pipeline/test_walked.py",
-    "tests/simulation/test_push_map_holds.py",
+    "tests/pipeline/test_beam.py", "tests/pipeline/test_key_postures.py",
+    "tests/pipeline/test_limb_contacts.py", "tests/pipeline/test_pushed_moving.py",
+    "tests/pipeline/test_run.py", "tests/pipeline/test_walked.py", "tests/simulation/test_push_map_holds.py",
 })  # fmt: skip
 """Modules of long tests that share no results, but for those with the same parameters."""
+
+
+LONG = frozenset({
+    "test_batch.py", "test_contact_model.py", "test_execute.py", "test_limb_contacts.py", "test_obstacles.py",
+    "test_push_map.py", "test_pushed.py", "test_recover.py", "test_timing_free.py", "test_walking.py",
+})  # fmt: skip
+"""Modules without slow tests that take fifteen seconds and more."""
 
 
 def unit_of(nodeid):
@@ -58,12 +63,17 @@ def pytest_collection_finish():
 
 
 def pytest_collection_modifyitems(items):
-    """Modules with slow tests come first, so that no worker is left alone with a long one at the end.
+    """Long modules come first, so that no worker is left alone with one at the end.
 
-    Modules stay together, because their tests share results.
+    Modules stay together, because their tests share results; what looks at all runs comes last.
     """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: item.path not in slow)
+
+    def place(item):
+        last = item.path.name == "test_friction_shares.py"
+        return last, item.path not in slow, item.path.name not in LONG
+
+    items.sort(key=place)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -79,6 +89,14 @@ def pytest_xdist_make_scheduler(config, log):
 
     config.option.loadscopereorder = False
     return UnitScheduling(config, log)
+
+
+SHORTER = {
+    "crouch": ("task.start.at=[0.45, 0.0]", "task.goal.at=[1.95, 0.0]"),
+    "stairs": ("task.goal.at=[0.98, 0.0]",),
+    "walk-and-platform": ("walking.start.at=[0.0, -1.2]",),
+}
+"""Shorter ways through scenarios: fewer steps before and after the slab, two of four steps of the stairs."""
 
 
 class Runs:
@@ -113,6 +131,10 @@ class Runs:
                     )
                 self.read[key] = pickle.loads(result.read_bytes())
         return self.read[key]
+
+    def shorter(self, name, **given):
+        """Result of a run on the shorter way through a scenario, if there is one."""
+        return self(name, overrides=SHORTER.get(name, ()), **given)
 
     def _made(self, name, variant, overrides, seed, body, moved, place):
         from manikin.pipeline.runner import run

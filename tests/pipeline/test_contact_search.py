@@ -1,22 +1,25 @@
 """From start and goal alone: contacts, and the motion that is executed on them."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import yaml
 
 from manikin.balance import support_polygon
-from manikin.contact import ContactSchedule, Stance
+from manikin.contact import Stance
 from manikin.numerics.polygon import signed_distance
 from manikin.pipeline import runner
 from manikin.pipeline.stages.contact_stage import find_supports
-from manikin.planning.whole_body import refine_motion
 from manikin.scenarios import load_scenario
 from manikin.scene.distance import Proximity
 
 FOUND = ("crouch", "stairs", "stand-up-chair", "stand-up-sofa", "platform@found")
 
 
+@cache
 def search(name, seed=0):
+    """Contacts that are found, with the body and the scene."""
     scenario = load_scenario(name)
     body, scene = scenario.build_body(), scenario.build_scene()
     return find_supports(scenario, body, scene, np.random.default_rng(seed)), body, scene
@@ -61,8 +64,8 @@ def test_a_scenario_with_planned_supports_can_be_kept_and_run_again(tmp_path):
 
 
 def test_the_same_seed_has_the_same_contacts():
-    one, _, _ = search("crouch", 3)
-    other, _, _ = search("crouch", 3)
+    one, _, _ = search("crouch", 1)
+    other, _, _ = search.__wrapped__("crouch", 1)
     np.testing.assert_array_equal(one.plan.postures, other.plan.postures)
     np.testing.assert_array_equal(one.guide.poses, other.guide.poses)
 
@@ -104,8 +107,8 @@ def test_what_nobody_can_do_is_explained(name, where, reason, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_person_rises_from_a_sofa_in_the_physics_engine(runs):
-    result = runs("stand-up-sofa")
+def test_a_person_rises_from_a_chair_in_the_physics_engine(runs):
+    result = runs("stand-up-chair")
     assert result.succeeded, result.summary["failure"]
     executed = result.executed
     assert not result.summary["execution"]["fell"]
@@ -118,7 +121,7 @@ def test_a_person_rises_from_a_sofa_in_the_physics_engine(runs):
 
 @pytest.mark.slow
 def test_a_person_walks_from_start_to_goal_in_the_physics_engine(runs):
-    result = runs("crouch")
+    result = runs.shorter("crouch")
     assert result.succeeded, result.summary["failure"]
     executed, planned = result.executed, result.planned
     assert not result.summary["execution"]["fell"]
@@ -126,17 +129,3 @@ def test_a_person_walks_from_start_to_goal_in_the_physics_engine(runs):
     assert executed.margin.min() > 0.0
     # Below a slab at 1.25 m a body of 1.75 m stoops: its centre of mass is 0.25 m lower than before it.
     assert planned.com[0, 2] - planned.com[:, 2].min() > 0.2
-
-
-def test_refinement_makes_a_contact_plan_a_motion():
-    """Against the postures joined by straight lines, at the same timing."""
-    found, body, scene = search("crouch")
-    sequence = found.scenario.build_sequence()
-    time = np.concatenate([[0.0], np.cumsum([phase.min_duration for phase in sequence])])
-    refined = refine_motion(body, scene, time, found.plan.postures, ContactSchedule(sequence, time))
-    assert refined.failure is None
-    before, after = refined.before, refined.after
-    assert before.physics_violation > 10.0 * after.physics_violation
-    assert before.squared_accelerations > 5.0 * after.squared_accelerations
-    assert after.min_clearance_m > max(0.0, before.min_clearance_m)
-    assert refined.certificate.min_margin > 0.0

@@ -29,7 +29,6 @@ SHORT = {
     "climb-wall": ("task.goal.height_m=0.55",),
     "insect-books": ("task.start.at=[-0.25, 0.0]", "task.goal.at=[-0.05, 0.0]", "task.goal.height_m=0.05"),
     "climb@left": (),
-    "climb@down": ("task.goal.height_m=0.9",),
 }
 """Two rows of holds; onto the first books; and along a wall from where the climber already hangs on it."""
 
@@ -45,12 +44,12 @@ def test_every_posture_is_free_balanced_and_on_its_contacts(found):
     assert result.failure is None
     certificate = certify_plan(body, scene, result.plan, ContactModel.of_body(body.mass))
     assert certificate.changes == 1
-    assert certificate.max_contact_error_m < 3e-4
-    assert certificate.max_sole_turn_rad < 3e-4
-    assert certificate.min_clearance_m > 0.004
-    assert certificate.max_range_violation_rad == 0.0
-    assert certificate.min_room_m > 0.01
-    assert certificate.max_torque_share < 1.0
+    assert certificate.value("max_contact_error_m") < 3e-4
+    assert certificate.value("max_sole_turn_rad") < 3e-4
+    assert certificate.value("min_clearance_m") > 0.004
+    assert certificate.value("max_range_violation_rad") == 0.0
+    assert certificate.value("min_room_m") > 0.01
+    assert certificate.value("max_torque_share") < 1.0
 
 
 def test_the_root_gets_to_its_goal(found):
@@ -138,7 +137,7 @@ def test_a_creature_from_a_robot_description_walks_up_a_step(tmp_path):
     assert result.failure is None
     certificate = certify_plan(body, scene, result.plan, ContactModel.of_body(body.mass))
     assert certificate.changes == 1
-    assert certificate.min_room_m > 0.005
+    assert certificate.value("min_room_m") > 0.005
     last = result.plan.stages[-1].contacts.values()
     assert sum(contact.position[2] == pytest.approx(0.04) for contact in last) >= 2
 

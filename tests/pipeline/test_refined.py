@@ -11,7 +11,7 @@ from manikin.motion.file import read_motions
 from manikin.pipeline import runner
 from manikin.pipeline.run_directory import read_run
 from manikin.pipeline.stages import ExecutionRequirements
-from manikin.planning.whole_body.refine_certificate import contact_slack
+from manikin.planning.whole_body.refine_physics import contact_slack
 from manikin.reports.figures.effectors import flights_figure
 from manikin.reports.summary_table import verdict_line
 from manikin.scenarios import load_scenario

@@ -236,7 +236,6 @@ def measured_mass(
     Args:
         plates: On the clock of the schedule.
         dynamics: Its motion, of any mass.
-        schedule: Its stances.
         start: The schedule's clock at the motion's first instant [s].
     """
     if not plates:
@@ -253,7 +252,6 @@ def plate_report(
     Args:
         plates: At least one, on the clock of the supports.
         supports: Of the motion.
-        schedule: Its stances.
         measured: The motion, with the person's mass.
         motions: As recorded, and shifted where that is to be believed, with forces and torques.
         mass: Of the person, by the plates [kg].

@@ -1,6 +1,6 @@
-"""Force and moment spaces of W_p and the three stability margins ([Qiu2012]_ 4.2.7, 4.2.9).
+"""Force and moment spaces of W_p, the three stability margins, and a report on one stance and CoM state.
 
-Also here. Everything about the balance of one stance and one CoM state, in one report.
+Sources: [Qiu2012]_ 4.2.7, 4.2.9.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from manikin.balance.wrench import LimitingConstraint, WrenchPolytope, pseudo_wr
 from manikin.contact import ContactKind, FrictionModel, Stance
 from manikin.errors import InputError
 from manikin.numerics.polygon import signed_distance
-from manikin.numerics.polytope import Polytope
-from manikin.numerics.spatial import FloatArray, frozen_array, skew
+from manikin.numerics.polytope import Polytope, least_change
+from manikin.numerics.spatial import FloatArray, cross, frozen_array, skew
 from manikin.runtime.display import Displayed
 
 _BLOCK = 200_000
@@ -50,31 +50,16 @@ class StabilityMargins:
 
 
 def force_space(W: WrenchPolytope, com: ArrayLike) -> Polytope:
-    """F_p: forces at the CoM, without angular momentum, that W_p admits ([Qiu2012]_ 4.38).
-
-    Args:
-        W: Wrench polytope.
-        com: (3,) in the world [m].
-
-    Returns:
-        A polytope of dimension 3 in ``m (a - g)`` [N].
-    """
+    """F_p: forces ``m (a - g)`` (3,) at a CoM (3,) [m], without angular momentum ([Qiu2012]_ 4.38) [N]."""
     arm = frozen_array(com, "com [m]", (3,)) - W.reference
     return W.preimage(np.vstack([np.eye(3), skew(arm)]))
 
 
 def moment_space(W: WrenchPolytope, force: ArrayLike) -> Polytope:
-    """T_p: moments about the reference that W_p admits beside a fixed force.
+    """T_p: moments (3,) about the reference [N.m] that W_p admits beside a force ``m (a - g)`` (3,) [N].
 
     The thesis projects F_p (4.39), which is flat; a perturbing moment leaves the force
     alone, so the right set is the slice ``{tau : H2 tau <= h - H1 f}``.
-
-    Args:
-        W: Wrench polytope.
-        force: (3,) pseudo-force ``m (a - g)`` [N].
-
-    Returns:
-        A polytope of dimension 3 [N.m].
     """
     f = frozen_array(force, "force [N]", (3,))
     return W.preimage(np.vstack([np.zeros((3, 3)), np.eye(3)]), np.concatenate([f, np.zeros(3)]))
@@ -84,7 +69,8 @@ def stability_margins(W: WrenchPolytope, wrench: ArrayLike, com: ArrayLike) -> S
     """All margins of pseudo-wrenches, each the smallest over the facets of a distance.
 
     Row ``i`` is reached after ``d_i = h_i - H_i w``; a unit force at the CoM covers
-    ``|H1_i + H2_i (x - o)^|`` of it, a unit moment ``|H2_i|``.
+    ``|H1_i + H2_i (x - o)^|`` of it, a unit moment ``|H2_i|``. Off a flat W_p the least perturbation that
+    leads back to the flat takes the place of its pairs of rows.
 
     Args:
         W: Wrench polytope.
@@ -100,21 +86,16 @@ def stability_margins(W: WrenchPolytope, wrench: ArrayLike, com: ArrayLike) -> S
     shape = np.broadcast_shapes(w.shape[:-1], x.shape[:-1])
     w = np.broadcast_to(w, (*shape, 6)).reshape(-1, 6)
     x = np.broadcast_to(x, (*shape, 3)).reshape(-1, 3)
-    found = np.empty((4, len(w)))
+    margins = np.empty((4, len(w)))
     step = max(1, _BLOCK // max(1, len(W)))
     for start in range(0, len(w), step):
         part = slice(start, start + step)
-        found[:, part] = _margins(W, w[part], x[part] - W.reference)
-    return StabilityMargins(*(row.reshape(shape) for row in found))
+        margins[:, part] = _margins(W, w[part], x[part] - W.reference)
+    return StabilityMargins(*(row.reshape(shape) for row in margins))
 
 
 def force_levers(H: FloatArray, arm: FloatArray) -> FloatArray:
-    """(n, m) ``|H1 + H2 arm^|``: change of each row per newton at points ``arm`` (n, 3) from the reference.
-
-    Args:
-        H: (m, 6) rows over force and moment.
-        arm: (n, 3) from the point of the rows' moments [m].
-    """
+    """(n, m) ``|H1 + H2 arm^|``: change of rows (m, 6) per newton at ``arm`` (n, 3) off the reference [m]."""
     force, (x, y, z) = H[:, :3], H[:, 3:].T
     zero = np.zeros_like(x)
     squares = np.zeros((len(arm), len(H)))
@@ -124,38 +105,48 @@ def force_levers(H: FloatArray, arm: FloatArray) -> FloatArray:
 
 
 def wrench_levers(H: FloatArray, arm: FloatArray) -> FloatArray:
-    """(n, m) lengths that rows have with moments about points ``arm`` (n, 3) from the reference.
-
-    Args:
-        H: (m, 6) rows over force and moment.
-        arm: (n, 3) from the point of the rows' moments [m].
-    """
+    """(n, m) lengths of rows (m, 6) with moments about points ``arm`` (n, 3) from the reference [m]."""
     return np.hypot(force_levers(H, arm), np.linalg.norm(H[:, 3:], axis=1))
 
 
 def _margins(W: WrenchPolytope, wrench: FloatArray, arm: FloatArray) -> FloatArray:
     """(4, n) margins in the order of :class:`StabilityMargins`."""
     distances = W.distances(wrench)
-    moment_lever = np.linalg.norm(W.H[:, 3:], axis=1)
-    force_lever = force_levers(W.H, arm)
-    return np.stack(
-        [
-            _smallest(distances, force_lever),
-            _smallest(distances, moment_lever),
-            distances.min(axis=1),
-            _smallest(distances, np.hypot(force_lever, moment_lever)),
-        ]
-    )
+    margins = _row_margins(distances, W.H, arm)
+    off, residual = W.off_flat(wrench)
+    if len(off):
+        rows = W.equalities[0]
+        facets = slice(0, -2 * len(rows))
+        at_com = rows[:, :3] + cross(np.broadcast_to(rows[:, 3:], (len(off), len(rows), 3)), arm[off, None])
+        moment = np.broadcast_to(rows[:, 3:], at_com.shape)
+        perturbed = (at_com, moment, rows, np.concatenate([at_com, moment], axis=-1))
+        margins[:, off] = np.minimum(
+            _row_margins(distances[off, facets], W.H[facets], arm[off]),
+            np.stack([-least_change(matrix, residual) for matrix in perturbed]),
+        )
+    return margins
+
+
+def _row_margins(distances: FloatArray, H: FloatArray, arm: FloatArray) -> FloatArray:
+    """(4, n) margins by distances (n, m) to rows (m, 6) with the CoM at ``arm`` (n, 3) from the reference."""
+    moment_lever = np.linalg.norm(H[:, 3:], axis=1)
+    force_lever = force_levers(H, arm)
+    return np.stack([
+        _smallest(distances, force_lever),
+        _smallest(distances, moment_lever),
+        distances.min(axis=1, initial=np.inf),
+        _smallest(distances, np.hypot(force_lever, moment_lever)),
+    ])  # fmt: skip
 
 
 def _smallest(distances: FloatArray, lever: FloatArray) -> FloatArray:
     """Smallest ``distance / lever``; rows without lever count only when they are broken."""
     still = lever < _NO_LEVER
     if not still.any():
-        return (distances / lever).min(axis=1)
+        return (distances / lever).min(axis=1, initial=np.inf)
     ratio = distances / np.where(still, 1.0, lever)
     out_of_reach = np.where(distances < 0, -np.inf, np.inf)
-    return np.where(still, out_of_reach, ratio).min(axis=1)
+    return np.where(still, out_of_reach, ratio).min(axis=1, initial=np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,6 +282,8 @@ def evaluate_balance(
     polygon = support_polygon(stance)
     height = support_height(stance) if plane_height is None else plane_height
     zmp = zero_moment_point(wrench, height, W.reference)
+    fri = foot_rotation_indicator(wrench, height, None, W.reference)
+    single = len(stance) == 1 and stance.contacts[0].kind is ContactKind.SOLE
     return BalanceReport(
         W=W,
         wrench=wrench,
@@ -307,15 +300,9 @@ def evaluate_balance(
         plane_height=height,
         com_projection=_point(x[:2], polygon),
         zmp=_point(zmp, polygon),
-        fri=_point(foot_rotation_indicator(wrench, height, None, W.reference), polygon)
-        if _single(stance)
-        else None,
+        fri=_point(fri, polygon) if single else None,
         cmp=_point(centroidal_moment_pivot(wrench[:3], x, height), polygon),
     )
-
-
-def _single(stance: Stance) -> bool:
-    return len(stance) == 1 and stance.contacts[0].kind is ContactKind.SOLE
 
 
 def _static_polygon(W: WrenchPolytope, mass: float) -> FloatArray:

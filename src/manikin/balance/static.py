@@ -1,9 +1,8 @@
 """Contact forces that hold a posture at rest, by one linear program ([Bretl2008]_'s test, with grasps).
 
 Unlike the wrench polytope it knows the posture, and with it the torques of the joints; it costs a few
-milliseconds and shares no code with the polytope.
-
-Also here. Where the centre of mass may stand still on a stance.
+milliseconds and shares no code with the polytope. The region where the centre of mass may rest comes from
+the polytope.
 """
 
 from dataclasses import dataclass
@@ -33,12 +32,7 @@ class StaticRegion:
 
     @classmethod
     def of(cls, stance: Stance, mass: float) -> "StaticRegion":
-        """Region of a stance ([Qiu2012]_ 4.41); a stance without caps has the default one of the body.
-
-        Args:
-            stance: The contacts, with their contact model.
-            mass: Of the body [kg].
-        """
+        """Region of a stance ([Qiu2012]_ 4.41), without caps with the default one of a body's mass [kg]."""
         return cls(admissible_com_polygon(wrench_polytope(stance.bounded(mass)), mass))
 
     @property
@@ -47,11 +41,9 @@ class StaticRegion:
         return len(self.polygon) < 3
 
     def nearest(self, point: FloatArray, inset: float) -> FloatArray | None:
-        """(2,) nearest place to a (2,) point that keeps a distance to the region's edges, or None.
+        """(2,) nearest point to a (2,) point [m] with a distance to the region's edges, or None.
 
-        Args:
-            point: [m].
-            inset: Distance to keep [m]; half of what is possible where the region is too narrow for it.
+        The distance is ``inset`` [m], or half or a quarter of it where the region is too narrow.
         """
         for distance in (inset, 0.5 * inset, 0.25 * inset):
             inner = self._inset(distance)
@@ -77,12 +69,12 @@ def _onto(polygon: FloatArray, point: FloatArray) -> FloatArray:
     shares = np.einsum("ni,ni->n", point - polygon, edges) / np.maximum(
         np.einsum("ni,ni->n", edges, edges), 1e-18
     )
-    places = polygon + np.clip(shares, 0.0, 1.0)[:, None] * edges
-    return places[int(np.argmin(np.linalg.norm(places - point, axis=1)))]
+    points = polygon + np.clip(shares, 0.0, 1.0)[:, None] * edges
+    return points[int(np.argmin(np.linalg.norm(points - point, axis=1)))]
 
 
 def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 8) -> float:
-    """How far the centre of mass may move in any direction on the ground while the contacts hold it at rest.
+    """Distance that the centre of mass may move in any horizontal direction while held at rest [m].
 
     One linear program for each direction; the room is exact in these directions.
 
@@ -106,15 +98,15 @@ def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 
         step = np.array([np.cos(angle), np.sin(angle), 0.0])
         column = np.concatenate([np.zeros(3), -np.cross(step, [0.0, 0.0, weight])])
         wanted = np.concatenate([[0.0, 0.0, weight], np.cross(com, [0.0, 0.0, weight])])
-        found = linprog(
+        solution = linprog(
             np.append(np.zeros(len(bounds)), -1.0),
             A_ub=np.append(generators.normal, 0.0)[None], b_ub=[cap],
             A_eq=np.column_stack([about_origin, column]), b_eq=wanted,
             bounds=[*bounds, (0.0, 1e3)], method="highs",
         )  # fmt: skip
-        if not found.success:
+        if not solution.success:
             return -np.inf
-        room = min(room, float(found.x[-1]))
+        room = min(room, float(solution.x[-1]))
     return room
 
 
@@ -135,8 +127,8 @@ def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float
     if not len(stance):
         return np.inf
     generators, state = ContactGenerators.of(stance), Configuration(body, q)
-    places = np.array([contact.position for contact in stance])[generators.contact]
-    wrenches = generators.about(places).T
+    origins = np.array([contact.position for contact in stance])[generators.contact]
+    wrenches = generators.about(origins).T
     model = body.pinocchio
     gravity = pin.computeGeneralizedGravity(model, model.createData(), np.asarray(q))
     jacobians = [state.effector_jacobian(contact.effector) for contact in stance]
@@ -146,14 +138,14 @@ def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float
     count = len(wrenches)
     above = np.column_stack([columns[6:], body.torque_lower])
     below = np.column_stack([-columns[6:], -body.torque_upper])
-    found = linprog(
+    solution = linprog(
         np.append(np.zeros(count), 1.0),
         A_ub=np.vstack([above, below, np.append(generators.normal, 0.0)]),
         b_ub=np.concatenate([gravity[6:], -gravity[6:], [_cap(stance, body.mass)]]),
         A_eq=np.column_stack([columns[:6], np.zeros(6)]), b_eq=gravity[:6],
         bounds=[*((0.0, limit) for limit in generators.upper), (0.0, None)], method="highs",
     )  # fmt: skip
-    return float(found.x[-1]) if found.success else np.inf
+    return float(solution.x[-1]) if solution.success else np.inf
 
 
 def _cap(stance: Stance, mass: float) -> float:

@@ -1,11 +1,13 @@
 """Convex polytopes ``{x : H x <= h}`` with unit rows, and hulls that may be flat.
 
-A flat (lower-dimensional) hull carries each equality ``n x = c`` as the pair of rows
-``n x <= c`` and ``-n x <= -c``, both loosened by :data:`FLATNESS` times the size of the
-hull, so that the margin of a point on the flat is zero (to that rounding), never negative.
+A flat (lower-dimensional) hull carries each equality ``n x = c`` as the pair of rows ``n x <= c`` and
+``-n x <= -c`` at the end, both loosened by :data:`FLATNESS` times the size of the hull, so that the margin of
+a point on the flat is zero (to that rounding), never negative. The margin of a point off the flat is at most
+its negative distance to the flat, whatever basis the equalities have.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +20,9 @@ from manikin.numerics.spatial import FloatArray
 
 FLATNESS = 1e-12
 """Half thickness of a flat polytope, relative to its extent."""
+
+_THIN = 1e-6
+"""Thickness, relative to the offsets, below which two opposite rows are an equality."""
 
 _BLOCK = 400_000
 """Distances looked at together: they stay in the processor's cache."""
@@ -40,31 +45,6 @@ class Polytope:
         object.__setattr__(self, "H", rows)
         object.__setattr__(self, "h", offsets)
 
-    @staticmethod
-    def from_vertices(points: ArrayLike) -> "Polytope":
-        """Hull of points; it may be flat.
-
-        Args:
-            points: (n, d), at least one.
-
-        Raises:
-            PolytopeError: If there is no point or a coordinate is not finite.
-        """
-        return Polytope(*convex_hull(points))
-
-    @staticmethod
-    def from_generators(points: ArrayLike, segments: ArrayLike) -> "Polytope":
-        """Hull of points plus the sum of the segments ``[-s, s]`` (a zonotope for one point).
-
-        Args:
-            points: (n, d), at least one.
-            segments: (q, d) half segments.
-
-        Raises:
-            PolytopeError: If there is no point or a number is not finite.
-        """
-        return Polytope(*convex_hull(points, segments))
-
     @property
     def dimension(self) -> int:
         """Dimension d of the space."""
@@ -74,24 +54,17 @@ class Polytope:
         return len(self.h)
 
     def distances(self, points: ArrayLike) -> FloatArray:
-        """Signed distances ``h - H x`` to every facet's plane ([Qiu2012]_ Algorithm 3, corrected).
+        """(..., m) signed distances ``h - H x`` of (..., d) points to every facet's plane, positive inside.
 
-        Args:
-            points: (..., d).
-
-        Returns:
-            (..., m), positive inside.
+        [Qiu2012]_ Algorithm 3, corrected.
         """
         return self.h - np.asarray(points, dtype=np.float64) @ self.H.T
 
     def margin(self, points: ArrayLike) -> FloatArray:
-        """Smallest signed facet distance, ``min_i h_i - H_i x``; inside it is the residual radius.
+        """(...) smallest signed facet distance of (..., d) points, ``min_i h_i - H_i x``, negative outside.
 
-        Args:
-            points: (..., d).
-
-        Returns:
-            (...), negative outside.
+        Inside it is the residual radius, that of the largest ball about the point within the polytope. Off a
+        flat polytope the distance to the flat takes the place of those to its pairs of rows.
         """
         x = np.asarray(points, dtype=np.float64)
         if x.shape[-1:] != (self.dimension,):
@@ -108,15 +81,32 @@ class Polytope:
             block = np.matmul(lifted, columns, out=excess[:, : len(part)] if len(part) == step else None)
             margins[start : start + step] = block.max(axis=0, initial=-np.inf)
         np.negative(margins, out=margins)
+        off, residual = self.off_flat(flat)
+        if len(off):
+            facets = (self.h - flat[off] @ self.H.T)[:, : -2 * residual.shape[1]].min(axis=1, initial=np.inf)
+            margins[off] = np.minimum(facets, -least_change(self.equalities[0], residual))
         return margins.reshape(x.shape[:-1])
 
-    def residual_radius(self, point: ArrayLike) -> FloatArray:
-        """Radius of the largest ball about ``point`` inside the polytope, 0 outside."""
-        return np.maximum(self.margin(point), 0.0)
+    @cached_property
+    def equalities(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Rows (e, d), offsets (e,) and half thickness (e,) of the equalities ``n x = c``."""
+        for count in range(min(self.dimension, len(self) // 2), 0, -1):
+            rows, opposite = self.H[-2 * count :].reshape(2, count, -1)
+            above, below = self.h[-2 * count :].reshape(2, count)
+            thickness = 0.5 * (above + below)
+            thin = _THIN * max(1.0, float(np.abs(self.h).max()))
+            if np.array_equal(rows, -opposite) and np.all(np.abs(thickness) < thin):
+                return rows, 0.5 * (above - below), thickness
+        return self.H[:0], self.h[:0], self.h[:0]
 
-    def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
-        """Whether each point is inside, give or take ``tolerance``."""
-        return np.asarray(self.margin(points) >= -tolerance)
+    def off_flat(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+        """Indices of points (n, d) off two or more equalities' flat, and their residuals (k, e) there."""
+        rows, offsets, thickness = self.equalities
+        if len(offsets) < 2:  # of a single one the pair of rows measures the distance
+            return np.zeros(0, dtype=np.int64), np.zeros((0, len(offsets)))
+        residual = points @ rows.T - offsets
+        off = np.flatnonzero(np.any(np.abs(residual) > thickness, axis=1))
+        return off, residual[off]
 
     def inscribed_ball(self) -> tuple[FloatArray, float]:
         """Centre (d,) and radius of the largest ball inside ([Qiu2012]_ 2.25).
@@ -124,67 +114,36 @@ class Polytope:
         Raises:
             PolytopeError: If the polytope is empty or holds balls of any size.
         """
-        centre, radius = self._largest_ball(None)
-        if radius < -_tolerance(self.h):
-            raise PolytopeError("polytope is empty; valid: a polytope with at least one point")
-        return centre, max(radius, 0.0)
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no point satisfies all rows."""
-        return self._largest_ball(1.0)[1] < -_tolerance(self.h)
-
-    def intersection(self, other: "Polytope") -> "Polytope":
-        """Points of both polytopes (rows of both, none removed)."""
-        return Polytope(np.vstack([self.H, other.H]), np.concatenate([self.h, other.h]))
-
-    def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Polytope":
-        """Points ``y`` whose image ``matrix @ y + offset`` is inside (a slice of the polytope).
-
-        Args:
-            matrix: (d, k).
-            offset: (d,) or 0.
-        """
-        m = np.asarray(matrix, dtype=np.float64)
-        return Polytope(self.H @ m, self.h - self.H @ np.broadcast_to(offset, (self.dimension,)))
-
-    def vertices(self) -> FloatArray:
-        """(n, d) vertices.
-
-        Raises:
-            PolytopeError: If the polytope is empty, flat, unbounded or of dimension 1.
-        """
-        centre, radius = self.inscribed_ball()
-        if radius <= _tolerance(self.h):
-            raise PolytopeError("polytope is flat; valid: one with a ball inside")
-        return vertices_around(self.H, self.h, centre)
-
-    def _largest_ball(self, largest: float | None) -> tuple[FloatArray, float]:
         d = self.dimension
         cost = np.zeros(d + 1)
         cost[-1] = -1.0
         lifted = np.column_stack([self.H, np.linalg.norm(self.H, axis=1)])
         scale = max(1.0, float(np.abs(self.h).max(initial=0.0)))
         answer = linprog(
-            cost,
-            A_ub=lifted,
-            b_ub=self.h / scale,
-            bounds=[(None, None)] * d + [(None, None if largest is None else largest / scale)],
-            method="highs",
+            cost, A_ub=lifted, b_ub=self.h / scale, bounds=[(None, None)] * (d + 1), method="highs"
         )
         if answer.status == 3:
             raise PolytopeError("polytope holds balls of any size; valid: a bounded polytope")
-        if answer.x is None:
-            return np.full(d, np.nan), -np.inf
-        return answer.x[:-1] * scale, float(answer.x[-1]) * scale
+        if answer.x is None or answer.x[-1] * scale < -_tolerance(self.h):
+            raise PolytopeError("polytope is empty; valid: a polytope with at least one point")
+        return answer.x[:-1] * scale, max(float(answer.x[-1]) * scale, 0.0)
+
+    def intersection(self, other: "Polytope") -> "Polytope":
+        """Points of both polytopes (rows of both, none removed)."""
+        return Polytope(np.vstack([self.H, other.H]), np.concatenate([self.h, other.h]))
+
+    def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Polytope":
+        """Points ``y`` (k,) with ``matrix (d, k) @ y + offset (d,)`` inside: a slice of the polytope."""
+        m = np.asarray(matrix, dtype=np.float64)
+        return Polytope(self.H @ m, self.h - self.H @ np.broadcast_to(offset, (self.dimension,)))
 
 
 def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[FloatArray, FloatArray]:
     """Facets of the hull of points (plus segments ``[-s, s]``), each once, flat hulls included.
 
     Args:
-        points: (n, d).
-        segments: (q, d), none when omitted.
+        points: (n, d), at least one.
+        segments: (q, d) half segments; with a single point the hull is a zonotope.
 
     Returns:
         H (m, d) with unit rows and h (m,).
@@ -204,6 +163,20 @@ def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[F
     return H, h + H @ centre
 
 
+def least_change(rows: FloatArray, residual: FloatArray) -> FloatArray:
+    """(n,) length of the least change ``c`` with ``rows c = residual``; infinite where there is none.
+
+    Args:
+        rows: (e, d) or (n, e, d).
+        residual: (n, e).
+    """
+    wanted = residual[..., None]
+    change = np.linalg.pinv(rows, rcond=1e-9) @ wanted
+    missing = np.linalg.norm(rows @ change - wanted, axis=(-2, -1))
+    reached = missing <= 1e-6 * np.linalg.norm(residual, axis=-1)
+    return np.where(reached, np.linalg.norm(change, axis=(-2, -1)), np.inf)
+
+
 def vertices_around(H: FloatArray, h: FloatArray, interior: FloatArray) -> FloatArray:
     """(n, d) vertices of ``H x <= h`` around a point strictly inside.
 
@@ -212,12 +185,12 @@ def vertices_around(H: FloatArray, h: FloatArray, interior: FloatArray) -> Float
     """
     try:
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = HalfspaceIntersection(np.column_stack([H, -h]), interior).intersections
+            vertices = HalfspaceIntersection(np.column_stack([H, -h]), interior).intersections
     except QhullError:
-        found = np.full((1, H.shape[1]), np.inf)
-    if not np.all(np.abs(found) < 1e12 * (1.0 + np.abs(h).max())):
+        vertices = np.full((1, H.shape[1]), np.inf)
+    if not np.all(np.abs(vertices) < 1e12 * (1.0 + np.abs(h).max())):
         raise PolytopeError("polytope has no vertices; valid: a bounded one of dimension 2 or more")
-    return found
+    return vertices
 
 
 def facet_rows(fan: NormalFan, extent: float) -> tuple[FloatArray, FloatArray, FloatArray]:

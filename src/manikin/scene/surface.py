@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
-from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.numerics.spatial import FloatArray, axes_of_normal, frozen_array
 from manikin.scene.mesh import Mesh, as_trimesh
 from manikin.scene.obstacle import Box, Cylinder, HalfSpace, Obstacle, Plane
 
@@ -34,9 +34,7 @@ class Surface:
     @cached_property
     def rotation(self) -> FloatArray:
         """(3, 3) surface-to-world rotation with z along the normal."""
-        across = np.cross(np.eye(3)[int(np.argmin(np.abs(self.normal)))], self.normal)
-        across /= np.linalg.norm(across)
-        rotation = np.column_stack([across, np.cross(self.normal, across), self.normal])
+        rotation = axes_of_normal(self.normal)
         rotation.setflags(write=False)
         return rotation
 
@@ -149,7 +147,7 @@ def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
     A facet with a hole gives its outer outline only; an outline that touches itself is
     skipped. Open pieces are seen from the side their triangles turn to.
     """
-    found = []
+    surfaces = []
     for piece in mesh.pieces:
         whole = as_trimesh(piece.vertices, piece.faces)
         groups = [np.asarray(group) for group in whole.facets]
@@ -160,8 +158,8 @@ def _facets(obstacle: Obstacle, mesh: Mesh) -> tuple[Surface, ...]:
                 normal = np.einsum("i,ij->j", whole.area_faces[group], whole.face_normals[group])
                 outline = _outline(whole, group, normal / np.linalg.norm(normal))
                 if outline is not None:
-                    found.append(_surface(obstacle, outline, normal / np.linalg.norm(normal)))
-    return tuple(found)
+                    surfaces.append(_surface(obstacle, outline, normal / np.linalg.norm(normal)))
+    return tuple(surfaces)
 
 
 def _outline(mesh: trimesh.Trimesh, group: np.ndarray, normal: FloatArray) -> FloatArray | None:

@@ -270,7 +270,7 @@ def test_a_foot_is_on_its_contact_up_to_the_instant_of_its_lift_off(walked):
             assert paths.targets[name].weight[index] == 1.0
             left += 1
     assert left == 3
-    assert walked.adapted.certificate.max_support_error_m < 2e-3
+    assert walked.adapted.certificate.value("max_support_error_m") < 2e-3
 
 
 def test_a_foot_about_to_land_where_a_clip_ends_is_not_held_up(walk):

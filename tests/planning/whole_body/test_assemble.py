@@ -17,11 +17,17 @@ from manikin.planning.whole_body import (
     plan_whole_body,
     swing_planner,
 )
-from manikin.planning.whole_body.fit import with_updated_penalties
+from manikin.planning.whole_body.fit_job import (
+    CLOSEST_KNOTS,
+    FitAttempt,
+    FitJob,
+    no_progress,
+    phase_knots,
+    refined,
+    sample_times,
+)
 from manikin.planning.whole_body.fit_scales import FitScales
-from manikin.planning.whole_body.fit_targets import CLOSEST_KNOTS, phase_knots, refined, sample_times
 from manikin.planning.whole_body.posture_style import CLOSE
-from manikin.planning.whole_body.whole_body_certificate import WholeBodyFailure
 
 MODULE = importlib.import_module("manikin.planning.whole_body.plan_whole_body")
 """The module; the room hands on the function of the same name."""
@@ -29,7 +35,7 @@ MODULE = importlib.import_module("manikin.planning.whole_body.plan_whole_body")
 
 def test_knots_hold_every_key_instant_and_are_dense_enough():
     instants = np.array([0.0, 0.33, 0.75, 1.2])
-    knots = phase_knots(instants, 0.1, 5)
+    knots = phase_knots(instants, 0.1)
     assert set(instants) <= set(knots)
     assert np.diff(np.unique(knots)).max() <= 0.1 + 1e-12
     assert np.all(knots[:6] == 0.0)
@@ -50,7 +56,7 @@ def test_the_step_succeeds_and_its_feet_stay_where_they_stand(step_motion, perso
             assert np.linalg.norm(placement.translation - contact.position) <= 1.0e-3
     worst = np.linalg.norm(motion.com - step_com.position(motion.time), axis=1).max()
     assert worst <= 2.0e-3
-    assert worst <= step_motion.certificate.max_com_error_m + 1e-12
+    assert worst <= step_motion.certificate.value("max_com_error_m") + 1e-12
 
 
 def test_velocities_and_accelerations_are_those_of_the_configurations(step_motion, person):
@@ -129,7 +135,7 @@ def test_a_caught_fit_is_led_by_the_key_postures_unless_that_is_caught_too(
     arm = 7 + person.joint_index("left_elbow_flexion")
     bent = [replace(p, q=np.where(np.arange(person.nq) == arm, 1.4, p.q)) for p in postures.postures]
     answers = iter([True, led_is_caught])
-    monkeypatch.setattr(MODULE, "_is_caught", lambda _: next(answers, False))
+    monkeypatch.setattr(FitAttempt, "is_caught", property(lambda _: next(answers, False)))
     result = plan_whole_body(
         person, flat_ground, step_com, rng=np.random.default_rng(0), waypoints=KeyPostures(tuple(bent))
     )
@@ -142,15 +148,27 @@ def test_a_caught_fit_is_led_by_the_key_postures_unless_that_is_caught_too(
         assert np.abs(step_motion.motion.q[middle, arm] - 1.4).min() > 0.2
 
 
-def blocked(result, name, value):
-    """The motion as if it broke one requirement."""
-    certificate = replace(result.certificate, **{name: value})
-    table, failure = certificate.table(WholeBodyRequirements()), WholeBodyFailure(name, 0.6, "phase 1")
-    return replace(result, certificate=certificate, requirements=table, failure=failure)
+def with_value(certificate, key, value, time):
+    """The certificate with another measured value."""
+    rows = (replace(row, measured=value, time_s=time) if row.key == key else row for row in certificate)
+    return replace(certificate, rows=tuple(rows))
+
+
+def blocked(attempt, name, value):
+    """The attempt as if it broke one requirement, at 0.6 s."""
+    return replace(attempt, certificate=with_value(attempt.certificate, name, value, 0.6))
+
+
+@pytest.fixture(scope="module")
+def step_attempt(person, flat_ground, step_com):
+    """The attempt that the planned step ends with."""
+    planner = MODULE._Planner(person, flat_ground, step_com, np.random.default_rng(0), WholeBodySettings())
+    swings = tuple(planner.flights.plan(swing) for swing in planner.flights.flights())
+    return planner._attempt(swings, planner.settings.manner, no_progress)
 
 
 def test_where_straight_toes_are_in_the_way_they_may_bend(
-    step_motion, person, flat_ground, step_com, monkeypatch
+    step_motion, step_attempt, person, flat_ground, step_com, monkeypatch
 ):
     """What is too near something with straight toes, the arms close or not, is fitted without them.
 
@@ -158,11 +176,11 @@ def test_where_straight_toes_are_in_the_way_they_may_bend(
     """
     attempt, straight = MODULE._Planner._attempt, []
 
-    def nothing_with_straight_toes(planner, swings, began):
-        straight.append(planner.straight_toes)
-        if planner.straight_toes:
-            return blocked(step_motion, "min_clearance_m", -0.004)
-        return attempt(planner, swings, began)
+    def nothing_with_straight_toes(planner, swings, manner, progress, straight_toes=True):
+        straight.append(straight_toes)
+        if straight_toes:
+            return blocked(step_attempt, "min_clearance_m", -0.004)
+        return attempt(planner, swings, manner, progress, straight_toes)
 
     monkeypatch.setattr(MODULE._Planner, "_attempt", nothing_with_straight_toes)
     result = plan_whole_body(person, flat_ground, step_com, rng=np.random.default_rng(0))
@@ -178,14 +196,14 @@ def test_where_straight_toes_are_in_the_way_they_may_bend(
     [("max_support_error_m", 0.01, [True, True]), ("min_clearance_m", -0.004, [True, True, False])],
 )
 def test_toes_stay_straight_where_something_else_breaks(
-    name, value, tried, step_motion, person, flat_ground, step_com, monkeypatch
+    name, value, tried, step_attempt, person, flat_ground, step_com, monkeypatch
 ):
     """A contact that is missed has nothing to do with toes; they are loosened for clearance alone."""
     straight = []
 
-    def misses(planner, *_):
-        straight.append(planner.straight_toes)
-        return blocked(step_motion, name, value)
+    def misses(*_, straight_toes=True):
+        straight.append(straight_toes)
+        return blocked(step_attempt, name, value)
 
     monkeypatch.setattr(MODULE._Planner, "_attempt", misses)
     monkeypatch.setattr(MODULE._Planner, "_search_again", lambda *_: None)
@@ -213,13 +231,12 @@ def test_a_step_found_by_the_bi_rrt_is_followed_like_any_other(person, flat_grou
     ("name", "what"), [("torque_share", "share of a torque limit"), ("missing_wrench", "missing wrench")]
 )
 def test_the_certificate_refuses_forces_beyond_the_body_or_its_contacts(step_motion, name, what):
-    residuals = step_motion.certificate
-    assert residuals.table(WholeBodyRequirements()).held
-    excess = replace(residuals, **{f"max_{name}": 1.01})
-    found = excess.table(WholeBodyRequirements()).first_broken
+    certificate, key = step_motion.certificate, f"max_{name}"
+    assert certificate.held
+    found = with_value(certificate, key, 1.01, certificate[key].time_s).first_broken
     assert found is not None
     assert found.name.startswith(what)
-    assert found.time_s == residuals.worst_times_s[f"max_{name}"]
+    assert found.time_s == certificate[key].time_s
 
 
 @given(
@@ -229,8 +246,8 @@ def test_the_certificate_refuses_forces_beyond_the_body_or_its_contacts(step_mot
 def test_refined_knots_keep_the_old_ones_and_halve_the_spans_at_key_instants(durations, spacing):
     """The spline space grows: whatever was fitted before can still be fitted."""
     instants = np.concatenate([[0.0], np.cumsum(durations)])
-    knots = phase_knots(instants, spacing, 5)
-    fine = refined(knots, instants, 5, within=0.05)
+    knots = phase_knots(instants, spacing)
+    fine = refined(knots, instants, within=0.05)
     assert set(np.unique(knots)) <= set(fine)
     assert np.all(fine[:6] == instants[0])
     assert np.all(fine[-6:] == instants[-1])
@@ -242,19 +259,16 @@ def test_refined_knots_keep_the_old_ones_and_halve_the_spans_at_key_instants(dur
 
 def test_what_is_broken_weighs_more():
     """Scales of the broken requirements become finer, the others stay."""
-    scales = FitScales()
-    changed = with_updated_penalties(
-        scales, frozenset({"min_clearance_m", "max_support_error_m"}), narrow=True
-    )
+    scales, job = FitScales(), FitJob(0.05, penalties=MODULE.PENALTIES, patience=0.005)
+    changed = job.updated(scales, frozenset({"min_clearance_m", "max_support_error_m"}), narrow=True)
     assert changed.clearance < scales.clearance
     assert WholeBodyRequirements().clearance < changed.safe_distance < scales.safe_distance
-    assert (
-        with_updated_penalties(scales, frozenset({"min_clearance_m"})).safe_distance == scales.safe_distance
-    )
+    assert job.updated(scales, frozenset({"min_clearance_m"})).safe_distance == scales.safe_distance
     assert changed.multiplier_rounds > 0
+    assert changed.decrease == 0.005
     for name in ("joint_limit", "joint_velocity", "force", "moment_share", "position", "com"):
         assert getattr(changed, name) == getattr(scales, name)
-    again = with_updated_penalties(changed, frozenset({"max_missing_wrench"}))
+    again = job.updated(changed, frozenset({"max_missing_wrench"}))
     assert again.force < scales.force
     assert again.moment_share < scales.moment_share
     assert again.clearance == changed.clearance

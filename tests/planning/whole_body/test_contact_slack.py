@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from manikin.balance import wrench_polytope
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, grasp, point, sole
-from manikin.planning.whole_body.refine_certificate import contact_slack
+from manikin.planning.whole_body.refine_physics import contact_slack
 
 FEET = [
     sole("left_foot", (0.0, 0.1, 0.0), length=0.28, width=0.12, friction=0.7),

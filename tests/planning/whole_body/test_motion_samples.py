@@ -5,7 +5,7 @@ import pinocchio as pin
 
 from manikin.motion.dynamics import MotionSampler
 from manikin.numerics.banded import SampledBasis
-from manikin.planning.whole_body.fit_targets import phase_knots, sample_times
+from manikin.planning.whole_body.fit_job import phase_knots, sample_times
 
 FRAMES = ("left_foot", "right_hand")
 
@@ -13,7 +13,7 @@ FRAMES = ("left_foot", "right_hand")
 def test_frames_jacobians_and_centre_of_mass(person):
     """To 1e-12: the same quantities from other products."""
     rng = np.random.default_rng(9)
-    knots = phase_knots(np.array([0.0, 0.3]), 0.1, 5)
+    knots = phase_knots(np.array([0.0, 0.3]), 0.1)
     basis = SampledBasis.at(sample_times(knots, 2), knots, 5)
     points = np.tile(person.standing_posture(), (basis.size, 1)) + 0.2 * rng.normal(
         size=(basis.size, person.nq)

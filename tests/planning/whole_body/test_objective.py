@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from manikin.numerics.banded import BlockBandedSystem, SampledBasis
+from manikin.planning.whole_body.fit_job import phase_knots, sample_times
 from manikin.planning.whole_body.fit_objective import MotionObjective
 from manikin.planning.whole_body.fit_scales import FitScales
-from manikin.planning.whole_body.fit_targets import EffectorTarget, FitTargets, phase_knots, sample_times
+from manikin.planning.whole_body.fit_targets import EffectorTarget, FitTargets
 from manikin.scene import Box, Obstacle, Proximity, Scene
 
 OFF = dict.fromkeys(
@@ -24,7 +25,7 @@ OFF = dict.fromkeys(
 @pytest.fixture(scope="module")
 def setup(person):
     rng = np.random.default_rng(7)
-    knots = phase_knots(np.array([0.0, 0.4]), 0.1, 5)
+    knots = phase_knots(np.array([0.0, 0.4]), 0.1)
     time = sample_times(knots, 2)
     n = len(time)
     targets = FitTargets(

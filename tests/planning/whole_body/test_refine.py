@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from manikin.balance import MotionMargin
 from manikin.body import human
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import ContactError, InputError
@@ -15,7 +16,7 @@ from manikin.kinematics import PostureProblem, generate_posture
 from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.spatial import GRAVITY_VECTOR
 from manikin.planning.whole_body import refine_motion
-from manikin.planning.whole_body.refine_certificate import RefineRequirements, certify_refined
+from manikin.planning.whole_body.certificate import certify_refined
 from manikin.planning.whole_body.refine_contacts import contact_variables
 from manikin.planning.whole_body.refine_input import KeyPath, stretched_around, stretched_for_speed
 from manikin.planning.whole_body.refine_measures import RefineObstacles, balance_of, differences, rooms_of
@@ -43,7 +44,7 @@ def climbing(cases):
 def test_a_refined_motion_keeps_every_requirement(name, request):
     _, result = request.getfixturevalue(name)
     assert result.failure is None, result.failure
-    assert result.certificate.table(RefineRequirements()).held
+    assert result.certificate.held
 
 
 @pytest.mark.parametrize("name", ["crouching", "climbing"])
@@ -158,7 +159,7 @@ def test_a_motion_that_is_too_fast_is_slowed_down():
     speed = np.abs(np.diff(motion.q[:, 7:], axis=0)) / np.diff(motion.time)[:, None]
     share = (speed / body.velocity_limit).max()
     assert share <= 1.0
-    assert result.certificate.max_velocity_share == pytest.approx(share, rel=1e-2)
+    assert result.certificate.value("max_velocity_share") == pytest.approx(share, rel=1e-2)
     assert (speed[:, arm - 7] / 2.5).max() > 0.5  # the arm is what takes the time
     for k in (0, -1):
         assert np.linalg.norm(motion.q[k, :3] - q[k, :3]) < 0.01
@@ -191,19 +192,20 @@ def test_the_certificate_catches_a_bad_motion(crouching):
     good, bad = result.motion, case.q[np.searchsorted(case.time, result.motion.time, side="right") - 1]
     shifted = np.array(bad)
     shifted[:, 2] -= 0.03
-    motion = replace(good, q=shifted, margin=np.full(len(bad), -5.0), v=40.0 * np.ones_like(good.v))
+    low = np.full(len(bad), -5.0)
+    motion = replace(good, q=shifted, margin=low, v=40.0 * np.ones_like(good.v))
     obstacles = RefineObstacles(case.body, case.scene, result.schedule, good.time)
     flat = (False,) * len(result.schedule.sequence)
     found = certify_refined(
-        case.body, proximity, result.schedule, obstacles, motion, np.full(len(bad), 7.0), flat
-    )
-    broken = found.table(RefineRequirements()).broken
-    assert broken >= {
+        case.body, proximity, result.schedule, obstacles, motion, np.full(len(bad), 7.0),
+        MotionMargin(low, low, low), flat,
+    )  # fmt: skip
+    assert found.broken >= {
         "max_support_error_m", "max_penetration_m", "max_velocity_share", "max_physics_violation",
         "min_margin",
     }  # fmt: skip
-    assert "support error" in found.table(RefineRequirements()).first_broken.reason
-    assert found.max_support_error_m > 0.029
+    assert "support error" in found.first_broken.reason
+    assert found.value("max_support_error_m") > 0.029
 
 
 def test_an_impossible_contact_is_an_explained_failure(person):

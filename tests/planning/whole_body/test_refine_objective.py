@@ -13,8 +13,8 @@ from manikin.numerics.banded import BlockBandedSystem, SampledBasis
 from manikin.numerics.spatial import rotation_from_yaw, wrench_map
 from manikin.planning.contacts import Task
 from manikin.planning.contacts.efort import efort
+from manikin.planning.whole_body.fit_job import phase_knots, sample_times
 from manikin.planning.whole_body.fit_scales import RefineScales
-from manikin.planning.whole_body.fit_targets import phase_knots, sample_times
 from manikin.planning.whole_body.refine_contacts import LimbDirections, efort_with_derivative
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.refine_measures import physics_violation
@@ -52,7 +52,7 @@ def setup(person, stance):
     schedule = ContactSchedule(
         StanceSequence([Phase(stance), Phase(alone), Phase(stance)]), [0.0, 0.15, 0.35, 0.5]
     )
-    knots = phase_knots(schedule.instants, 0.1, 5)
+    knots = phase_knots(schedule.instants, 0.1)
     basis = SampledBasis.at(sample_times(knots, 2), knots, 5)
     points = np.tile(person.standing_posture(), (basis.size, 1))
     points[:, 3:7] = [0.1, -0.2, 0.3, 0.9]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from manikin.contact import ContactSchedule, StanceSequence
+from manikin.planning.whole_body.certificate import deepest_penetration
 from manikin.planning.whole_body.fit_targets import ignored_pairs
-from manikin.planning.whole_body.whole_body_certificate import deepest_penetration
 from manikin.scene import Proximity
 
 
@@ -53,5 +53,5 @@ def test_what_everything_may_lean_on_is_not_measured(measure, step_motion, step_
 
 def test_the_certificate_tells_it(step_motion, measure, step_com):
     found, time = measure(step_motion.motion, step_com.schedule)
-    assert step_motion.certificate.max_scuff_m == pytest.approx(found, abs=1e-5)
+    assert step_motion.certificate.value("max_scuff_m") == pytest.approx(found, abs=1e-5)
     assert np.isfinite(time)

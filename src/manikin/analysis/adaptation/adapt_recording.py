@@ -1,7 +1,6 @@
-"""A recorded motion planned anew on its own stances, and executed ([Qiu2012]_ 5.3.3 and 7.3).
+"""A recorded motion, or a part of it, re-planned on its own stances and executed ([Qiu2012]_ 5.3.3, 7.3).
 
-Also here. A part of a recording, in time. The centre of mass of a recording, planned anew on its stances by
-either method of [Qiu2012]_ chapter 5.
+The centre of mass is planned by either method of [Qiu2012]_ chapter 5.
 """
 
 from dataclasses import dataclass, replace
@@ -278,7 +277,7 @@ class Replan:
         measured = self.adapted.certificate
         names = ("max_support_error_m", "max_com_error_m", "min_clearance_m", "max_torque_share")
         return {
-            **{name: float(getattr(measured, name)) for name in names},
+            **{name: measured.value(name) for name in names},
             "closest_pair": list(measured.closest_pair),
             "posture_rms_rad": self.adapted.posture_rms,
             "share_positive_margin": float(np.mean(self.adapted.motion.margin > 0.0)),
@@ -307,7 +306,7 @@ def adapt_recording(
     required_margin: float = 0.0,
     friction: float = FRICTION,
 ) -> Replan:
-    """Plan a recorded motion anew on the stances it was recorded on, and execute it if asked to.
+    """Re-plan a recorded motion on the stances it was recorded on, and execute it if asked to.
 
     Args:
         found: The postures, not yet smoothed.

@@ -1,7 +1,4 @@
-"""Stances and surfaces of a recorded person as a planned body can use them.
-
-Also here. Where effectors are in given postures.
-"""
+"""Stances and surfaces of a recorded person as a planned body can use them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -105,8 +102,6 @@ def leaving_with_the_hinge(
     toe segment lies flat up to the end, and would hold the leg back.
 
     Args:
-        schedule: Contacts in time.
-        body: Whose.
         time: (n,) [s], on the schedule's clock.
         q: (n, nq) recorded postures then.
     """
@@ -146,7 +141,6 @@ def rising_at_once(
 
     Args:
         schedule: Contacts in time, a seat at one place.
-        body: Whose.
         time: (n,) [s], on the schedule's clock.
         q: (n, nq) recorded postures then.
     """
@@ -205,7 +199,6 @@ def scene_under(schedule: ContactSchedule, floor: float) -> Scene:
     """A floor, and a block under every contact above it; grasps hold on to nothing that is in the way.
 
     Args:
-        schedule: The contacts.
         floor: Height of the floor [m].
     """
     blocks: list[Obstacle] = []

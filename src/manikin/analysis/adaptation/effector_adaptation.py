@@ -83,8 +83,6 @@ def effector_paths(
     """Adapt the recorded paths of the effectors to their contacts.
 
     Args:
-        body: The body.
-        schedule: Its contacts in time.
         time: (n,) [s].
         q: (n, nq) recorded postures then.
     """

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from manikin.analysis.adaptation.effector_adaptation import effector_paths
+from manikin.analysis.adaptation.effector_adaptation import EffectorPaths, effector_paths
 from manikin.balance import WrenchPolytope
 from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel
@@ -15,28 +15,19 @@ from manikin.motion.dynamics import centroidal_motion
 from manikin.numerics.banded import SampledBasis
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory, RecordedCom
-from manikin.planning.whole_body.fit import MotionFit, spline_through
-from manikin.planning.whole_body.fit_scales import FitScales
-from manikin.planning.whole_body.fit_targets import (
-    EffectorTarget,
-    FitTargets,
-    ignored_pairs,
-    phase_knots,
-    sample_times,
-)
+from manikin.planning.whole_body.certificate import MotionCertificate, certify
+from manikin.planning.whole_body.fit import spline_through
+from manikin.planning.whole_body.fit_job import FitJob
+from manikin.planning.whole_body.fit_objective import MotionObjective
+from manikin.planning.whole_body.fit_scales import FitScales, MotionScales
+from manikin.planning.whole_body.fit_targets import FitTargets, ignored_pairs, lay_toes_flat
+from manikin.planning.whole_body.posture_style import Guide
 from manikin.planning.whole_body.sliding_touchdown import Ignored
-from manikin.planning.whole_body.whole_body_certificate import WholeBodyResiduals, certify
 from manikin.scene import Proximity, Scene
 from manikin.walking.gait.stance_foot import smooth_step
 
-DEGREE = 5
-"""Degree of the whole-body spline."""
-
 KNOT_SPACING = 0.035
-"""Largest distance of its knots [s]."""
-
-SAMPLES = 3
-"""Samples between two knots."""
+"""Largest distance of the spline's knots [s]."""
 
 STEP = 1e-3
 """Distance of the finished motion's samples [s]."""
@@ -56,9 +47,6 @@ ARMS = ("left_shoulder", "left_elbow", "left_wrist", "right_shoulder", "right_el
 END_SHARE = 0.25
 """Share of these deviations of trunk and arms that costs as much at a clip's ends, where a bend of the
 spline is cheap."""
-
-FLAT_TOES = 2e-3
-"""Deviation of toes from lying flat that costs one unit [rad]."""
 
 UNSURE = 0.1
 """Time at both ends in which accelerations of a recording are not known well [s]."""
@@ -83,7 +71,7 @@ class AdaptedMotion:
     """
 
     motion: Motion
-    certificate: WholeBodyResiduals
+    certificate: MotionCertificate
     posture_rms: float
 
 
@@ -98,10 +86,7 @@ def adapt_postures(
     """Fit one smooth motion to contacts and centre of mass that stays near recorded postures.
 
     Args:
-        body: The body.
-        scene: Obstacles and floor.
         trajectory: Centre of mass with the contacts.
-        polytopes: Of its phases.
         recorded: (n,) instants [s] and (n, nq) postures.
         clock: (k,) key instants of the trajectory and the recorded instants that they stand for [s].
     """
@@ -112,8 +97,8 @@ def adapt_postures(
     motion, wrench = full_motion(body, schedule, polytopes, dense, *spline.evaluate(dense))
     ignored = ignored_pairs(body, scene, schedule, dense)
     certificate = certify(body, task.proximity, trajectory, motion, ignored, wrench, polytopes=polytopes)
-    told = [7 + joint for joint in range(body.nq - 7) if joint not in task.toes]
-    away = motion.q[:, told] - _postures(recorded, np.interp(dense, *clock))[:, told]
+    compared = [7 + joint for joint in range(body.nq - 7) if joint not in task.paths.toes]
+    away = motion.q[:, compared] - _postures(recorded, np.interp(dense, *clock))[:, compared]
     return AdaptedMotion(motion, certificate, float(np.sqrt(np.mean(away**2))))
 
 
@@ -122,12 +107,10 @@ def rate_on_contacts(
 ) -> FloatArray:
     """(n, 3) rate of the angular momentum of recorded postures put on exact contacts [N.m].
 
-    Of a recording's samples. Soles that stay in place and land flat make legs swing a little
+    At a recording's samples. Soles that stay in place and land flat make legs swing a little
     otherwise than they were recorded, and with them the rest of the body.
 
     Args:
-        body: The body.
-        scene: Obstacles and floor.
         recording: The recorded centre of mass on the contacts.
         recorded: (n,) instants [s] and (n, nq) postures.
     """
@@ -139,8 +122,9 @@ def rate_on_contacts(
         np.column_stack([np.interp(task.time, recording.time, column) for column in values.T])
         for values in (recording.com, second)
     )
-    spline = task.fit(com, acceleration, np.zeros_like(com), LOOSE)
-    return _turning(body, spline, recording.time)
+    return _angular_momentum_rate(
+        body, task.fit(com, acceleration, np.zeros_like(com), LOOSE), recording.time
+    )
 
 
 def rate_on_plan(
@@ -155,34 +139,40 @@ def rate_on_plan(
     At a recording's samples.
 
     Args:
-        body: The body.
-        scene: Obstacles and floor.
         trajectory: Planned near the recording, at its pace.
         recorded: (n,) instants [s] and (n, nq) postures.
         recording: On whose stances it was planned.
     """
     clock = trajectory.schedule.instants, recording.key_times
     spline = _Task.of(body, scene, trajectory.schedule, recorded, clock).follow(trajectory)
-    return _turning(body, spline, recording.time)
+    return _angular_momentum_rate(body, spline, recording.time)
 
 
-def _turning(body: BodyModel, spline: ConfigurationSpline, time: FloatArray) -> FloatArray:
-    """(n, 3) rate of the angular momentum of a motion [N.m]."""
+def _angular_momentum_rate(body: BodyModel, spline: ConfigurationSpline, time: FloatArray) -> FloatArray:
     return centroidal_motion(body, *spline.evaluate(time)).angular_momentum_rate
 
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """Recorded postures and the contacts to put them on, at the samples of a spline."""
+    """Recorded postures and the contacts to put them on, at the samples of a spline.
+
+    Attributes:
+        job: Knots and samples of the spline.
+        time: (n,) samples [s].
+        reference: (n, nq) recorded postures, with the toes that the contacts need.
+        scale: (n, nv) deviation from them that costs one unit [rad].
+        paths: What effectors and toes do.
+        ignored: Pairs that may touch, per sample.
+    """
 
     body: BodyModel
     proximity: Proximity
+    schedule: ContactSchedule
+    job: FitJob
     time: FloatArray
-    knots: FloatArray
     reference: FloatArray
     scale: FloatArray
-    effectors: dict[str, EffectorTarget]
-    toes: tuple[int, ...]
+    paths: EffectorPaths
     ignored: tuple[Ignored, ...]
 
     @classmethod
@@ -194,18 +184,14 @@ class _Task:
         recorded: tuple[FloatArray, FloatArray],
         clock: tuple[FloatArray, FloatArray],
     ) -> "_Task":
-        knots = phase_knots(schedule.instants, KNOT_SPACING, DEGREE)
-        time = sample_times(knots, SAMPLES)
+        job = FitJob(KNOT_SPACING)
+        time, _ = job.samples(job.knots(schedule))
         reference = _postures(recorded, np.interp(time, *clock))
         paths = effector_paths(body, schedule, time, reference)
         scale = _posture_scale(body, time)
-        for joint, angle in paths.toes.items():
-            reference[:, 7 + joint], scale[:, 6 + joint] = angle, FLAT_TOES
+        lay_toes_flat(paths.toes, reference, scale)
         ignored = ignored_pairs(body, scene, schedule, time)
-        return cls(
-            body, Proximity(body, scene), time, knots, reference, scale, paths.targets, tuple(paths.toes),
-            ignored,
-        )  # fmt: skip
+        return cls(body, Proximity(body, scene), schedule, job, time, reference, scale, paths, ignored)
 
     def follow(self, trajectory: CentroidalTrajectory) -> ConfigurationSpline:
         """Fit to a planned centre of mass and its angular momentum."""
@@ -217,17 +203,36 @@ class _Task:
     def fit(
         self, com: FloatArray, acceleration: FloatArray, turning: FloatArray, scales: FitScales
     ) -> ConfigurationSpline:
-        """Fit to a centre of mass, its acceleration and a rate of angular momentum, (n, 3) each."""
-        time = self.time
-        basis = SampledBasis.at(time, self.knots, DEGREE)
-        start = spline_through(self.reference, basis, self.knots, DEGREE)
+        """Fit to a centre of mass [m], its acceleration and a rate of angular momentum [N.m], (n, 3) each."""
+        return self.job.solve(_Goal(self, com, acceleration, turning), scales)[1].spline
+
+
+@dataclass(frozen=True, eq=False)
+class _Goal:
+    """A centre of mass (n, 3) with its acceleration and a rate of angular momentum for recorded postures."""
+
+    task: _Task
+    com: FloatArray
+    acceleration: FloatArray
+    turning: FloatArray
+
+    @property
+    def schedule(self) -> ContactSchedule:
+        """Contacts in time."""
+        return self.task.schedule
+
+    def objective(self, time: FloatArray, basis: SampledBasis, scales: MotionScales) -> MotionObjective:
+        """Residuals at the task's samples."""
+        del scales
+        task = self.task
+        start = spline_through(task.reference, basis, task.job.knots(task.schedule))
         targets = FitTargets(
-            time=time, effectors=self.effectors, com=com, com_weight=np.ones(len(time)),
-            com_acceleration=acceleration, margin=np.zeros(len(time)), reference=self.reference,
-            reference_scale=self.scale, ignored=self.ignored, turning=turning,
+            time=time, effectors=task.paths.targets, com=self.com, com_weight=np.ones(len(time)),
+            com_acceleration=self.acceleration, margin=np.zeros(len(time)), reference=task.reference,
+            reference_scale=task.scale, ignored=task.ignored, turning=self.turning,
             reference_second=_steady_ends(time, basis.evaluate(start.control_points, 2)),
         )  # fmt: skip
-        return MotionFit(self.body, self.proximity, targets, self.knots, DEGREE, scales).solve(start).spline
+        return MotionObjective(task.body, task.proximity, targets, basis)
 
 
 def _posture_scale(body: BodyModel, time: FloatArray) -> FloatArray:
@@ -252,7 +257,4 @@ def _steady_ends(time: FloatArray, second: FloatArray) -> FloatArray:
 
 def _postures(recorded: tuple[FloatArray, FloatArray], time: FloatArray) -> FloatArray:
     """(n, nq) postures between the recorded ones."""
-    known, q = recorded[0], align_quaternions(np.array(recorded[1]))
-    found = np.column_stack([np.interp(time, known, column) for column in q.T])
-    found[:, 3:7] /= np.linalg.norm(found[:, 3:7], axis=1, keepdims=True)
-    return found
+    return Guide(recorded[0], align_quaternions(np.array(recorded[1])), ()).at(time)

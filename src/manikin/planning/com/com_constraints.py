@@ -185,7 +185,7 @@ class Zone:
         return cls(normals, (points @ normals.T).max(axis=0) + reach, onset)
 
     def share(self, x: Any, y: Any) -> Any:
-        """Share of the zone at (x, y): 1 inside, 0 beyond the onset of any edge, twice differentiable between.
+        """Share of the zone at (x, y): 1 inside, 0 beyond the onset of any edge, smooth between (C2).
 
         The product of the smootherstep ``6 u^5 - 15 u^4 + 10 u^3`` over the edges, of floats, arrays or
         CasADi symbols [m].

@@ -5,10 +5,9 @@ The certificate measures every posture afresh, balance by other means than the s
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -30,6 +29,7 @@ from manikin.contact import (
 from manikin.errors import ContactError
 from manikin.kinematics import touching_pairs
 from manikin.numerics.spatial import FloatArray, frozen_array, skew
+from manikin.runtime.requirement import Requirement, RequirementTable, Sense
 from manikin.scene import Proximity, Scene
 
 _RECTANGLE = np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0]])
@@ -241,36 +241,32 @@ def _least_time(stage: Stage, q: FloatArray, com: FloatArray, hinge_pace: float)
     return max(turn / hinge_pace, float(np.linalg.norm(com - stage.com)) / COM_PACE)
 
 
+_QUANTITIES: tuple[tuple[str, str, str, Sense, float], ...] = (
+    ("max_contact_error_m", "distance of an effector from its contact", "m", "<=", 1.0e-3),
+    ("max_sole_turn_rad", "angle of a sole from its contact", "rad", "<=", 5.0e-3),
+    ("min_clearance_m", "clearance", "m", ">=", 0.0),
+    ("max_range_violation_rad", "joint range violation", "rad", "<=", 1.0e-9),
+    ("min_room_m", "room of the centre of mass", "m", ">=", 0.0),
+    ("max_torque_share", "share of a torque limit at rest", "", "<=", 1.0),
+)
+"""Key, name, unit, sense and limit of what is measured of a plan."""
+
+
 @dataclass(frozen=True)
-class PlanCertificate:
-    """Largest violations of the postures of a plan.
+class PlanCertificate(RequirementTable):
+    """Worst values of the postures of a plan beside their limits; ``where`` names the posture.
+
+    ``min_room_m`` is the least room of the centre of mass on the contacts that stay, see
+    :func:`~manikin.balance.static.static_room`, ``max_torque_share`` the largest share of a torque limit with
+    which the postures can be held at rest, ``min_clearance_m`` the least distance of what does not touch.
 
     Attributes:
         postures: Number of postures: at every change, in the middle of flights, at the goal.
         changes: Largest number of contacts made and broken at one change.
-        max_contact_error_m: Distance of an effector from a contact that it holds [m].
-        max_sole_turn_rad: Angle of a sole from its contact [rad].
-        min_clearance_m: Least distance of what does not touch [m].
-        closest_pair: Names of the shapes at that distance.
-        max_range_violation_rad: Violation of a joint range [rad].
-        min_room_m: Least room of the centre of mass on the contacts that stay, see
-            :func:`~manikin.balance.static.static_room` [m].
-        max_torque_share: Largest share of a torque limit with which the postures can be held at rest.
     """
 
     postures: int
     changes: int
-    max_contact_error_m: float
-    max_sole_turn_rad: float
-    min_clearance_m: float
-    closest_pair: tuple[str, str]
-    max_range_violation_rad: float
-    min_room_m: float
-    max_torque_share: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """The values by name."""
-        return {**asdict(self), "closest_pair": list(self.closest_pair)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,30 +287,42 @@ def certify_plan(
         model: Contact model; with the default cap of the body when omitted.
     """
     model = model or ContactModel.of_body(body.mass)
-    postures = _postures(plan)
-    proximity = Proximity(body, scene)
-    error = turn = beyond = share = 0.0
-    room, nearest, pair = np.inf, np.inf, ("", "")
-    for item in postures:
-        state = Configuration(body, item.q)
-        for contact in item.held:
-            rotation, place = state.effector_placement(contact.effector)
-            error = max(error, float(np.linalg.norm(place - contact.position)))
-            if contact.kind is ContactKind.SOLE:
-                off = rotation.T @ contact.rotation_contact_to_world
-                turn = max(turn, float(np.linalg.norm(pin.log3(off))))
-        touched = [(contact.effector, scene.touched_obstacle(contact)) for contact in item.held]
-        found = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched))
-        if len(found.distance) and found.distance.min() < nearest:
-            nearest, pair = float(found.distance.min()), found.pairs[int(np.argmin(found.distance))]
-        angles = item.q[7:]
-        beyond = max(beyond, float(np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)))
-        stance = Stance(item.carrying, model=model)
-        room = min(room, static_room(stance, body.mass, state.com))
-        share = max(share, static_torque_share(body, item.q, stance))
-    return PlanCertificate(
-        len(postures), _changes(plan), error, turn, nearest, pair, beyond, float(room), share
-    )
+    postures, proximity = _postures(plan), Proximity(body, scene)
+    measured = [_measured(body, scene, proximity, item, model) for item in postures]
+    rows = []
+    for key, name, unit, sense, limit in _QUANTITIES:
+        values = [item[key][0] for item in measured]
+        worst = int(np.argmax(values) if sense == "<=" else np.argmin(values))
+        where = f"posture {worst}{measured[worst][key][1]}"
+        rows.append(Requirement(key, name, unit, values[worst], sense, limit, where=where))
+    return PlanCertificate(tuple(rows), len(postures), _changes(plan))
+
+
+def _measured(
+    body: BodyModel, scene: Scene, proximity: Proximity, item: "_Held", model: ContactModel
+) -> dict[str, tuple[float, str]]:
+    """Value of each quantity in one posture, and the rest of where."""
+    state, angles = Configuration(body, item.q), item.q[7:]
+    error = turn = 0.0
+    for contact in item.held:
+        rotation, position = state.effector_placement(contact.effector)
+        error = max(error, float(np.linalg.norm(position - contact.position)))
+        if contact.kind is ContactKind.SOLE:
+            off = rotation.T @ contact.rotation_contact_to_world
+            turn = max(turn, float(np.linalg.norm(pin.log3(off))))
+    touched = [(contact.effector, scene.touched_obstacle(contact)) for contact in item.held]
+    near = proximity.evaluate(item.q, 0.2, touching_pairs(body, touched))
+    pair = f", {' and '.join(near.pairs[int(np.argmin(near.distance))])}" if len(near.distance) else ""
+    beyond = np.maximum(body.lower - angles, angles - body.upper).max(initial=0.0)
+    stance = Stance(item.carrying, model=model)
+    return {
+        "max_contact_error_m": (error, ""),
+        "max_sole_turn_rad": (turn, ""),
+        "min_clearance_m": (float(near.distance.min(initial=np.inf)), pair),
+        "max_range_violation_rad": (float(beyond), ""),
+        "min_room_m": (float(static_room(stance, body.mass, state.com)), ""),
+        "max_torque_share": (static_torque_share(body, item.q, stance), ""),
+    }
 
 
 def _postures(plan: ContactPlan) -> list[_Held]:

@@ -1,6 +1,13 @@
 """Whole-body motion: swings, their search, and the motion that joins them."""
 
+from manikin.planning.whole_body.certificate import (
+    MotionCertificate,
+    RefineRequirements,
+    WholeBodyFailure,
+    WholeBodyRequirements,
+)
 from manikin.planning.whole_body.fit_scales import FitScales, RefineScales
+from manikin.planning.whole_body.head_clearance import head_segments, measure_passage
 from manikin.planning.whole_body.key_postures import (
     Eligibility,
     KeyPosture,
@@ -9,40 +16,26 @@ from manikin.planning.whole_body.key_postures import (
     find_key_postures,
 )
 from manikin.planning.whole_body.plan_whole_body import WholeBodyResult, WholeBodySettings, plan_whole_body
-from manikin.planning.whole_body.refine import refine_motion
-from manikin.planning.whole_body.refine_certificate import (
-    RefineRequirements,
-    RefineResiduals,
-    RefineResult,
-    RefineSettings,
-)
+from manikin.planning.whole_body.refine import RefineResult, RefineSettings, refine_motion
 from manikin.planning.whole_body.refine_measures import RefineMeasures
 from manikin.planning.whole_body.seated import SeatedContinuation, continue_seated
 from manikin.planning.whole_body.swing_planner import PlannedSwing
-from manikin.planning.whole_body.whole_body_certificate import (
-    WholeBodyFailure,
-    WholeBodyRequirements,
-    WholeBodyResiduals,
-    head_segments,
-    measure_passage,
-)
 
 __all__ = [
     "Eligibility",
     "FitScales",
     "KeyPosture",
     "KeyPostures",
+    "MotionCertificate",
     "PlannedSwing",
     "RefineMeasures",
     "RefineRequirements",
-    "RefineResiduals",
     "RefineResult",
     "RefineScales",
     "RefineSettings",
     "SeatedContinuation",
     "WholeBodyFailure",
     "WholeBodyRequirements",
-    "WholeBodyResiduals",
     "WholeBodyResult",
     "WholeBodySettings",
     "continue_seated",

@@ -119,7 +119,6 @@ class BiRrtResult:
     Attributes:
         path: Timed poses from start to goal, or None.
         hints: What the feasibility check returned at each node of the path.
-        statistics: What the search did.
         failure: None, or the reason.
     """
 
@@ -153,12 +152,9 @@ def plan_flight(
     """Search a path of an effector between two timed poses.
 
     Args:
-        start: Pose at lift-off.
-        goal: Pose at touch-down.
         start_time: Lift-off [s].
         end_time: Touch-down [s].
         feasible: CHECK-PG: whether a posture exists with the effector at a pose and time.
-        rng: Source of all randomness.
         limits: Speed limits, metric and density of the checks.
         zone: Where poses are drawn; around the two ends when omitted.
         iterations: Largest number of random points (n_it).

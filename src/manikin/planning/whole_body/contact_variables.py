@@ -79,7 +79,6 @@ class VariableSamples:
         """Key configurations as if each were at rest.
 
         Args:
-            body: The body.
             names: Effectors that are looked at.
             keys: (m,) times and (m, nq) configurations at which contacts should be held.
             between: (n,) times and (n, nq) configurations at which the body has to be carried.
@@ -106,8 +105,6 @@ class VariableChoice:
     """Chooses the contact variables of a sequence for given motions.
 
     Args:
-        body: The body.
-        scene: The obstacles.
         scales: Those of the refinement: ``missing_wrench``, ``force``, ``approach``, ``slide``, ``margin``.
         tolerance: Distance of an effector from its contact that costs nothing, as the certificate's [m].
         friction_share: Of the friction with which the other contacts have to do.
@@ -127,8 +124,6 @@ class VariableChoice:
         """Variables of every phase, and the contacts without those that are let go.
 
         Args:
-            schedule: The contacts.
-            samples: The motion.
             resting: The input at rest: what the others carry then they need not carry in the motion, which
                 may have been bent towards the very contact that cannot be made.
         """
@@ -217,7 +212,6 @@ def best_variables(
     """Solve the problem of one phase for its variables, all others of the stance being 1.
 
     Args:
-        stance: The contacts.
         wrench: (n, 6) needed, about the world origin [N, N.m].
         errors: ``E`` by effector.
         free: Effectors whose variable is sought.

@@ -24,12 +24,6 @@ from manikin.scene import Proximity
 from manikin.scene.distance import ProximitySamples
 from manikin.scene.distance_bounds import KnownDistances
 
-LEAST_MARGIN = 10.0
-"""Planned margins below this do not make the scale of the moments any finer [N.m]."""
-
-LEAST_FORCE_WEIGHT = 0.25
-"""Importance of the linear momentum's rate where the centre of mass only shows the way."""
-
 _RADIAL_SCALE = 0.05
 """Deviation of a raw quaternion's length from one that costs one unit."""
 
@@ -49,8 +43,6 @@ class FitLinearisation:
         support_error: Largest error of an effector in contact [m].
         support_turn: Largest angle of one that must keep its orientation [rad].
         com_error: Largest error of the centre of mass [m].
-        clearance: Least distance among the close pairs [m].
-        closest: Names of that pair.
     """
 
     sample_cost: FloatArray
@@ -63,8 +55,6 @@ class FitLinearisation:
     support_error: float = 0.0
     support_turn: float = 0.0
     com_error: float = 0.0
-    clearance: float = np.inf
-    closest: tuple[str, str] = ("", "")
 
     @property
     def cost(self) -> float:
@@ -120,17 +110,15 @@ class MotionObjective:
     """Evaluates and linearises the objective of a spline's control points.
 
     Args:
-        body: The body.
         proximity: Distances of the body to the scene and to itself, or None to ignore them.
-        targets: What to do.
         basis: The spline's basis at the targets' times.
     """
 
     def __init__(
         self, body: BodyModel, proximity: Proximity | None, targets: FitTargets, basis: SampledBasis
     ) -> None:
-        self._body, self._proximity, self._targets = body, proximity, targets
-        self._sampler = MotionSampler(body, tuple(targets.effectors), basis)
+        self._body, self._proximity, self.targets, self.basis = body, proximity, targets, basis
+        self._sampler = MotionSampler(body, tuple(targets.effectors), basis, targets.loads)
         self._known = KnownDistances()
         meeting = targets.meeting
         self._ignored = targets.ignored if meeting is None else meeting.without(targets.ignored)
@@ -147,7 +135,6 @@ class MotionObjective:
 
         Args:
             points: (k, nq) control points.
-            scales: Scales of the residuals.
             shift: (n, task_rows) constants added to the scaled task residuals (multipliers).
         """
         motion = self._sampled(points)
@@ -175,7 +162,7 @@ class MotionObjective:
         """Places of the effectors and of the centre of mass."""
         n, nv = motion.com_jacobian.shape[0], motion.com_jacobian.shape[2]
         jacobian, residual = np.zeros((n, self.task_rows, nv)), np.zeros((n, self.task_rows))
-        for number, target in enumerate(self._targets.effectors.values()):
+        for number, target in enumerate(self.targets.effectors.values()):
             rows = slice(6 * number, 6 * number + 6)
             place = motion.frames[:, number]
             by_joints = self._sampler.frame_jacobian(motion, number)
@@ -184,8 +171,8 @@ class MotionObjective:
             out.support_error = max(out.support_error, float(error[target.weight >= 1.0].max(initial=0.0)))
             turn = np.linalg.norm(residual[:, rows][:, 3:], axis=1) * scales.rotation
             out.support_turn = max(out.support_turn, float(turn[_held_rows(target)[:, 3]].max(initial=0.0)))
-        weight = self._targets.com_weight
-        error = motion.com - self._targets.com
+        weight = self.targets.com_weight
+        error = motion.com - self.targets.com
         scaled = self._com_weight(scales)
         jacobian[:, -3:] = scaled[:, None, None] * motion.com_jacobian
         residual[:, -3:] = scaled[:, None] * error
@@ -196,7 +183,7 @@ class MotionObjective:
     def _com_weight(self, scales: MotionScales) -> FloatArray:
         """(n,) weight of the centre of mass's error [1/m]."""
         assert isinstance(scales, FitScales)
-        return self._targets.com_weight / scales.com
+        return self.targets.com_weight / scales.com
 
     def _add_clearance(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> None:
         if self._proximity is None:
@@ -205,11 +192,8 @@ class MotionObjective:
         found = self._proximity.evaluate_placed(motion.shapes, reach, self._ignored, self._known)
         if len(found.distance) == 0:
             return
-        meeting = self._targets.meeting
+        meeting = self.targets.meeting
         met = np.zeros(len(found.distance), dtype=np.bool_) if meeting is None else meeting.rows(found)
-        apart = np.where(met, np.inf, found.distance)
-        worst = int(np.argmin(apart))
-        out.clearance, out.closest = float(apart[worst]), found.pairs[worst]
         # A softened hinge: it also holds back what is about to come too close.
         missing = (self._wanted_distance(found, scales) - found.distance) / scales.softness
         value = scales.softness * np.logaddexp(0.0, missing) / scales.clearance
@@ -228,7 +212,7 @@ class MotionObjective:
 
     def _add_reference(self, out: FitLinearisation, motion: MotionSamples) -> None:
         """Deviation from the reference posture; the pelvis' place does not count."""
-        q, reference, weight = motion.states.q, self._targets.reference, self._reference_weight
+        q, reference, weight = motion.states.q, self.targets.reference, self._reference_weight
         relative = Rotation.from_quat(reference[:, 3:7]).inv() * Rotation.from_quat(q[:, 3:7])
         turn = relative.as_rotvec()
         out.add(
@@ -266,8 +250,8 @@ class MotionObjective:
         out.add_diagonal(1, weight, residual)
 
     def _add_accelerations(self, out: FitLinearisation, second: FloatArray, scales: MotionScales) -> None:
-        if self._targets.reference_second is not None:
-            second = second - self._targets.reference_second
+        if self.targets.reference_second is not None:
+            second = second - self.targets.reference_second
         weight = np.full_like(second, 1.0 / scales.acceleration)
         weight[:, :7] = 1.0 / scales.pelvis_acceleration
         out.add_diagonal(2, weight, weight * second)
@@ -275,12 +259,17 @@ class MotionObjective:
     def _add_dynamics(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> None:
         """Rate of the centroidal momentum against what the planned trajectory needs."""
         assert isinstance(scales, FitScales)
-        targets, momentum = self._targets, motion.momentum
+        targets, momentum = self.targets, motion.momentum
         scale = np.full((len(targets.time), 6), scales.force)
-        scale[:, :3] /= np.maximum(targets.com_weight, LEAST_FORCE_WEIGHT)[:, None]
-        scale[:, 3:] = scales.moment_share * np.maximum(targets.margin, LEAST_MARGIN)[:, None]
+        # Importance of the linear momentum's rate where the centre of mass only shows the way.
+        scale[:, :3] /= np.maximum(targets.com_weight, 0.25)[:, None]
+        # Planned margins below this do not make the scale of the moments any finer [N.m].
+        scale[:, 3:] = scales.moment_share * np.maximum(targets.margin, 10.0)[:, None]
         residual = momentum.value.copy()
         residual[:, :3] -= self._body.mass * targets.com_acceleration
+        for sample, load in enumerate(targets.loads or ()):
+            if load is not None:
+                residual[sample, :3] -= load.mass * targets.com_acceleration[sample]
         if targets.turning is not None:
             residual[:, 3:] -= targets.turning
         first, second, third = (jacobian / scale[:, :, None] for jacobian in momentum.jacobians)
@@ -290,7 +279,7 @@ class MotionObjective:
         out.sample_cost += 0.5 * np.sum(out.momentum.value**2, axis=1)
 
     def _with_strength(
-        self, momentum: MomentumRate, motion: MotionSamples, forces: HeldForces, scales: FitScales
+        self, momentum: MomentumRate, motion: MotionSamples, forces: HeldForces, scales: MotionScales
     ) -> MomentumRate:
         """The momentum's rate with a row for each joint torque beyond the strength."""
         excess = excess_torque(self._body, motion.states, forces, scales.strength_share)

@@ -1,7 +1,4 @@
-"""How much the residuals of every whole-body spline matter, and how long its fit iterates.
-
-Also here. How much each residual of the whole-body fit matters. How much each term of the refinement matters.
-"""
+"""Scales of the residuals of a whole-body spline, planned or refined, and limits of its iteration."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -23,6 +20,8 @@ class MotionScales:
         joint_buffer: Distance kept from the joint ranges [rad].
         joint_velocity: Violation of the velocity limits [rad/s].
         velocity_share: Share of the velocity limits that may be used.
+        torque_share: Share of a joint's strength beyond ``strength_share``, where contact forces are held.
+        strength_share: Share of the strength that may be used.
         acceleration: Joint acceleration [rad/s^2].
         pelvis_acceleration: Linear [m/s^2] and angular [rad/s^2] pelvis acceleration.
         rest: Velocity at both ends [m/s, rad/s].
@@ -45,6 +44,8 @@ class MotionScales:
     joint_buffer: float = 0.03
     joint_velocity: float = 0.1
     velocity_share: float = 0.9
+    torque_share: float = 0.02
+    strength_share: float = 0.93
     acceleration: float = 8.0
     pelvis_acceleration: float = 4.0
     rest: float = 1.0e-3
@@ -84,15 +85,11 @@ class FitScales(MotionScales):
         force: Rate of linear momentum, against the planned one [N].
         moment_share: Rate of angular momentum about the centre of mass that costs one unit, as
             a share of the planned margin: where balance is scarce, the body turns less.
-        torque_share: Share of a joint's strength beyond ``strength_share``.
-        strength_share: Share of the strength that may be used.
     """
 
     com: float = 3.0e-3
     force: float = 20.0
     moment_share: float = 0.15
-    torque_share: float = 0.02
-    strength_share: float = 0.93
 
     def loosened(self, factor: float) -> Self:
         """Return the same scales with contacts and centre of mass ``factor`` times looser."""
@@ -104,9 +101,6 @@ PERSON_ROOT = 0.92
 
 PERSON_MASS = 75.0
 """Mass of that person [kg]."""
-
-LEAST_NEAR = 0.25
-"""Least factor on distances for safety."""
 
 
 @dataclass(frozen=True)
@@ -162,15 +156,13 @@ class RefineScales(MotionScales):
 
         With lengths by ``l`` and masses by ``m``, at the same gravity, forces go by ``m``, moments by ``m l``
         and accelerations of the joints by ``1 / l``. Distances for safety shrink to a quarter at most.
-
-        Args:
-            body: The body.
         """
         plain = cls()
         if body.stature is not None:
             return plain
         length = float(body.standing_posture()[2]) / PERSON_ROOT
-        force, near = body.mass / PERSON_MASS, max(length, LEAST_NEAR)
+        # Least factor on distances for safety.
+        force, near = body.mass / PERSON_MASS, max(length, 0.25)
         return replace(
             plain,
             safe_distance=plain.safe_distance * near, softness=plain.softness * near,

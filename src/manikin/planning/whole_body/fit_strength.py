@@ -46,9 +46,6 @@ class HeldForces:
         """Contact forces of a motion at other times.
 
         Args:
-            body: The body.
-            schedule: The contacts in time.
-            motion: The motion, densely sampled.
             time: (n,) samples of the fit [s].
         """
         rows = np.clip(np.searchsorted(motion.time, time), 0, len(motion.time) - 1)
@@ -91,7 +88,6 @@ def excess_torque(body: BodyModel, states: StateSamples, held: HeldForces, wante
     """Shares of the strength that sampled states take beyond ``wanted`` while contact forces are held.
 
     Args:
-        body: The body.
         states: n states.
         held: The contact forces.
         wanted: Share of the strength that costs nothing.

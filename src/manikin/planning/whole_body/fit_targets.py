@@ -1,9 +1,5 @@
-"""What a whole-body motion has to do, sample by sample.
+"""Targets of a whole-body motion at its samples: effectors, toes, and pairs that may touch."""
 
-Also here. Where the knots and the samples of a whole-body spline lie in time.
-"""
-
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,79 +7,12 @@ import numpy as np
 
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
-from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, SolePart
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown
 from manikin.planning.whole_body.swing_planner import PlannedSwing, hangs, touch_pairs
 from manikin.scene import Scene
-
-SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09, 0.13])
-"""Further knots around a touch-down at speed, from it [s]."""
-
-CLOSEST_KNOTS = 4.0e-3
-"""Knots closer than this are one [s]."""
-
-NEAR_INSTANT = 0.1
-"""Distance from a key instant up to which refined knots lie closer [s]."""
-
-
-def touch_downs_at_speed(schedule: ContactSchedule) -> FloatArray:
-    """(k,) times at which a contact is made that still has to settle [s]."""
-    found = [
-        float(start)
-        for number, (phase, start) in enumerate(zip(schedule.sequence, schedule.instants, strict=False))
-        if any(
-            item.settle > 0.0 and (number == 0 or item.effector not in schedule.sequence[number - 1].stance)
-            for item in phase.stance
-        )
-    ]
-    return np.array(found)
-
-
-def phase_knots(
-    instants: FloatArray, spacing: float, degree: int, sudden: FloatArray | Sequence[float] = ()
-) -> FloatArray:
-    """Clamped knots with every key instant among them and at most ``spacing`` [s] apart.
-
-    Args:
-        instants: (phases + 1,) key instants [s].
-        spacing: Largest distance of two knots [s].
-        degree: Of the spline.
-        sudden: Times around which the knots lie closer, because the motion changes suddenly [s].
-    """
-    fine = np.concatenate([np.zeros(0), *(time + SUDDEN_KNOTS for time in sudden)])
-    breaks = np.unique(np.concatenate([instants, fine[(fine > instants[0]) & (fine < instants[-1])]]))
-    breaks = breaks[np.append(True, np.diff(breaks) > CLOSEST_KNOTS)]
-    inner: list[float] = []
-    for start, end in itertools.pairwise(breaks):
-        count = max(1, int(np.ceil((end - start) / spacing)))
-        inner.extend(np.linspace(start, end, count, endpoint=False))
-    ends = np.full(degree, instants[0]), np.full(degree + 1, instants[-1])
-    return np.concatenate([ends[0], inner, ends[1]])
-
-
-def refined(knots: FloatArray, instants: FloatArray, degree: int, within: float = NEAR_INSTANT) -> FloatArray:
-    """Clamped knots with every span that is near a key instant split in two.
-
-    Args:
-        knots: Clamped knots of a spline of ``degree`` [s].
-        instants: Key instants [s].
-        degree: Of the spline.
-        within: Distance up to which a span's middle is near [s].
-    """
-    breaks = np.unique(knots)
-    middle = 0.5 * (breaks[:-1] + breaks[1:])
-    near = np.abs(middle[:, None] - instants).min(axis=1) < within
-    inner = np.sort(np.concatenate([breaks, middle[near & (np.diff(breaks) > 2.0 * CLOSEST_KNOTS)]]))
-    return np.concatenate([np.full(degree, breaks[0]), inner, np.full(degree, breaks[-1])])
-
-
-def sample_times(knots: FloatArray, per_span: int) -> FloatArray:
-    """Times that split every knot span into equal parts, both ends included."""
-    breaks = np.unique(knots)
-    spans = [np.linspace(a, b, per_span, endpoint=False) for a, b in itertools.pairwise(breaks)]
-    return np.append(np.concatenate(spans), breaks[-1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +56,7 @@ class FitTargets:
             mass, zero.
         reference_second: (n, nq) second derivatives of the reference, from which accelerations count; None
             where any acceleration costs.
+        loads: What is carried at each sample besides the body, or None for nothing.
         forces: Contact forces at which joint torques beyond the strength cost; None where no torque costs.
     """
 
@@ -142,6 +72,7 @@ class FitTargets:
     meeting: SlidingTouchdown | None = None
     turning: FloatArray | None = None
     reference_second: FloatArray | None = None
+    loads: tuple[CarriedLoad | None, ...] | None = None
     forces: HeldForces | None = None
 
 
@@ -221,6 +152,20 @@ def toe_angles(body: BodyModel, swings: Sequence[PlannedSwing], time: FloatArray
     return found
 
 
+FLAT_TOES = 2.0e-3
+"""Deviation of toes from lying flat, or straight, that costs one unit [rad]."""
+
+
+def lay_toes_flat(
+    angles: Mapping[int, FloatArray], reference: FloatArray, scale: FloatArray | None = None
+) -> None:
+    """Set angles (n,) [rad] of joints in reference configurations (n, nq), and their scales (n, nv)."""
+    for joint, values in angles.items():
+        reference[:, 7 + joint] = values
+        if scale is not None:
+            scale[:, 6 + joint] = FLAT_TOES
+
+
 def flat_share(body: BodyModel, schedule: ContactSchedule, time: FloatArray) -> dict[int, FloatArray]:
     """How much (n,) each joint of toes has to be straight, by joint index: wholly while their sole is held.
 
@@ -265,12 +210,10 @@ def settled_share(schedule: ContactSchedule, phase: int, contact: Contact, time:
 def settling_map(contact: Contact, share: FloatArray) -> FloatArray:
     """(n, 3, 3) map of a settling contact's position error: soon whole along the normal, later across it."""
     normal = np.outer(contact.normal, contact.normal)
-    down = np.clip(LANDED_PER_SHARE * share, LEAST_SETTLED, 1.0)[:, None, None]
+    # How much sooner a settling contact is down on its surface than at its place.
+    down = np.clip(10.0 * share, LEAST_SETTLED, 1.0)[:, None, None]
     return down * normal + np.maximum(share, LEAST_SETTLED)[:, None, None] * (np.eye(3) - normal)
 
-
-LANDED_PER_SHARE = 10.0
-"""How much sooner a settling contact is down on its surface than at its place."""
 
 LEAST_SETTLED = 0.01
 """Importance of the place along the surface at the touch-down of a contact that settles."""
@@ -316,10 +259,6 @@ def flight_weight(share: FloatArray, middle: float, leaving: float, landing: flo
     return np.where(blend > 0.0, inside, 1.0)
 
 
-TAKING_HOLD = 0.35
-"""Time before its first contact in which an effector that was free may come close to it [s]."""
-
-
 def ignored_pairs(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
 ) -> tuple[Ignored, ...]:
@@ -343,7 +282,8 @@ def ignored_pairs(
             continue
         if swing.end is not None and swing.start is None:
             end = schedule.swing_interval(swing)[1]
-            landing.append((end - TAKING_HOLD, end, set(touch_pairs(body, scene, swing.end))))
+            # Time before its first contact in which an effector that was free may come close to it [s].
+            landing.append((end - 0.35, end, set(touch_pairs(body, scene, swing.end))))
             continue
         for index in range(swing.first_phase, swing.last_phase + 1):
             for contact in (swing.start, swing.end):

@@ -16,7 +16,7 @@ from scipy.interpolate import BPoly
 
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
-from manikin.contact import Contact, ContactSchedule, SolePart, Swing
+from manikin.contact import ContactSchedule, SolePart, Swing
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.swing_path import Pose
 
@@ -25,16 +25,6 @@ PUSH_OFF_PITCH = float(np.deg2rad(24.0))
 
 HEEL_STRIKE_PITCH = float(np.deg2rad(10.0))
 """Pitch at landing, toes up [rad]."""
-
-PUSH_OFF_RATE = 1.2
-"""Pitch rate at lift-off relative to the mean since the heel rose."""
-
-HEEL_STRIKE_RATE = 1.0
-"""Pitch rate at landing relative to the mean until the sole lies flat."""
-
-TOE_RETURN = 0.6
-"""Share of the flight after which the toes are straight again."""
-
 
 PIVOT_SHIFT = (0.2, 0.85)
 """Shares of the flight between which the point that the curve describes moves from hinge to heel: while
@@ -110,19 +100,22 @@ class FootRoll:
     def _at_lift_off(self) -> list[float]:
         up, off, _, _ = self.instants
         angle = PUSH_OFF_PITCH if off > up else 0.0
-        return [angle, PUSH_OFF_RATE * angle / max(off - up, 1e-9), 0.0]
+        # The pitch rate at lift-off is 1.2 times the mean since the heel rose.
+        return [angle, 1.2 * angle / max(off - up, 1e-9), 0.0]
 
     @cached_property
     def _toe_return(self) -> BPoly:
         _, off, land, _ = self.instants
-        back = off + TOE_RETURN * (land - off)
+        # Share of the flight after which the toes are straight again.
+        back = off + 0.6 * (land - off)
         return BPoly.from_derivatives([off, back], [self._at_lift_off, [0.0, 0.0, 0.0]])
 
     @cached_property
     def _pitch(self) -> BPoly:
         up, off, land, flat = self.instants
         angle = HEEL_STRIKE_PITCH if flat > land else 0.0
-        at_landing = [-angle, HEEL_STRIKE_RATE * angle / max(flat - land, 1e-9), 0.0]
+        # The pitch rate at landing is the mean until the sole lies flat.
+        at_landing = [-angle, angle / max(flat - land, 1e-9), 0.0]
         rest = [0.0, 0.0, 0.0]
         knots = {float(up): rest, float(off): self._at_lift_off}
         knots |= {float(land): at_landing, float(flat): rest}
@@ -141,13 +134,9 @@ def foot_roll(body: BodyModel, schedule: ContactSchedule, swing: Swing) -> FootR
     flat = schedule.instants[swing.last_phase + 2] if end.part is SolePart.HEEL else land
     hinge = np.zeros(3) if toes is None else frame.rotation.T @ (toes.origin - frame.translation)
     return FootRoll(
-        np.array([up, off, land, flat]), _flat_pose(start), _flat_pose(end), hinge,
+        np.array([up, off, land, flat]), Pose.of(start), Pose.of(end), hinge,
         np.array([-0.5 * (body.sole_length or start.length), 0.0, 0.0]),
     )  # fmt: skip
-
-
-def _flat_pose(contact: Contact) -> Pose:
-    return Pose(contact.position, contact.rotation_contact_to_world)
 
 
 def _held(curve: BPoly, ends: FloatArray, time: FloatArray) -> FloatArray:

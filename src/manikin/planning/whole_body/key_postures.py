@@ -1,15 +1,13 @@
-"""Whether a centre-of-mass plan can be done, asked at its key instants ([Qiu2012]_ 7.2.3).
+"""Postures at the key instants of a centre-of-mass plan, and new plans where one fails ([Qiu2012]_ 7.2.3).
 
 Before the whole body is planned, the posture generator looks for a collision-free posture at
 every key instant ``T_0 ... T_n``, on the contacts of both phases that meet there and with the
 planned centre of mass.  Where there is none, it looks for the nearest centre of mass with
 which there is one: that is where a new plan has to pass.
 
-Also here. Plan the centre of mass again where a key posture fails ([Qiu2012]_ 7.2.3).
-
 The thesis goes on with a plan when every key posture is found and otherwise modifies some
-constraints by hand.  Here each failed posture gives the constraint: at its key instant the
-centre of mass must be beyond the plane through the nearest centre of mass with a posture.
+constraints by hand.  Here the centre of mass is planned again, and each failed posture gives a constraint: at
+its key instant the centre of mass must be beyond the plane through the nearest one with a posture.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,11 +24,12 @@ from manikin.kinematics import Placement, PostureProblem, PostureResult, SolverS
 from manikin.motion.configuration_spline import align_quaternions
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyPlane, plan_com
+from manikin.planning.whole_body.certificate import WholeBodyRequirements
 from manikin.planning.whole_body.fit_targets import ignored_pairs
 from manikin.planning.whole_body.foot_roll import FootRoll, foot_roll
 from manikin.planning.whole_body.posture_style import READY, Guide, PostureStyle, reference_motion
 from manikin.planning.whole_body.sliding_touchdown import Ignored
-from manikin.planning.whole_body.whole_body_certificate import WholeBodyRequirements
+from manikin.planning.whole_body.swing_planner import leaning_pairs
 from manikin.scene import Proximity, Scene
 
 SETTINGS = SolverSettings(tolerance=1e-3, clearance_tolerance=2e-3, settled=2e-2, explain=False)
@@ -137,8 +136,6 @@ def find_key_postures(
     """Look for a posture at every key instant until which the trajectory binds.
 
     Args:
-        body: The body.
-        scene: The obstacles and the floor.
         trajectory: Planned centre of mass with its contacts in time.
         manner: How the body carries itself where the task leaves freedom.
         requirements: What the finished motion must keep; the clearance is asked of the postures.
@@ -150,11 +147,11 @@ def find_key_postures(
     """
     instants = trajectory.schedule.instants
     time = instants[trajectory.binds(instants)]
-    search = _Search(body, scene, trajectory, time, manner, requirements or WholeBodyRequirements())
-    search.lean_on(padded)
-    search.range_margin, search.settings = range_margin, replace(SETTINGS, tolerance=tolerance)
-    if known is not None:
-        search.know(align_quaternions(np.array(known[: len(time)])))
+    search = _Search(
+        body, scene, trajectory, time, manner, (requirements or WholeBodyRequirements()).clearance,
+        range_margin, replace(SETTINGS, tolerance=tolerance), leaning_pairs(body, padded),
+        None if known is None else align_quaternions(np.array(known[: len(time)])),
+    )  # fmt: skip
     return KeyPostures(search.run())
 
 
@@ -168,35 +165,33 @@ class _Search:
         trajectory: CentroidalTrajectory,
         time: FloatArray,
         manner: PostureStyle,
-        requirements: WholeBodyRequirements,
+        clearance: float,
+        range_margin: float,
+        settings: SolverSettings,
+        leaning: Ignored,
+        known: FloatArray | None,
     ) -> None:
         self._body, self._schedule, self._time = body, trajectory.schedule, time
         self._proximity = Proximity(body, scene)
-        self._manner, self._clearance = manner, requirements.clearance
+        self._manner, self._clearance = manner, clearance
+        self._range_margin, self._settings = range_margin, settings
         self._com = trajectory.position(time)
         self._rolls = rolls_of(body, trajectory.schedule)
-        self._reference = reference_motion(body, trajectory, time, manner)
-        _extend_toes(body, self._rolls, time, self._reference)
-        self.range_margin, self.settings = 0.0, SETTINGS
-        self._known = False
+        self._is_known = known is not None
+        if known is None:
+            known = reference_motion(body, trajectory, time, manner)
+            _extend_toes(body, self._rolls, time, known)
+        self._reference = known
         self._explained_one = False  # An examination takes seconds; the first is the one that is reported.
-        self._ignored = _ignored(body, scene, trajectory.schedule, time)
-
-    def lean_on(self, padded: Sequence[str]) -> None:
-        """Ask for no clearance to some obstacles."""
-        pairs = frozenset((segment.name, name) for segment in self._body.segments for name in padded)
-        self._ignored = tuple(ignored | pairs for ignored in self._ignored)
-
-    def know(self, postures: FloatArray) -> None:
-        """Start from, and stay near, one posture for each key instant."""
-        self._reference, self._known = postures, True
+        ignored = _ignored(body, scene, trajectory.schedule, time)
+        self._ignored = tuple(pairs | leaning for pairs in ignored)
 
     def run(self) -> tuple[KeyPosture, ...]:
         q, found = self._reference[0], []
         for key in range(len(self._time)):
-            q = self._reference[key] if self._known else q
+            q = self._reference[key] if self._is_known else q
             problem = self._problem(key)
-            result = generate_posture(problem, q, settings=self.settings)
+            result = generate_posture(problem, q, settings=self._settings)
             found.append(self._posture(key, problem, result))
             q = found[-1].q
         return tuple(found)
@@ -207,7 +202,7 @@ class _Search:
             self._body, contacts, placements, com=self._com[key], proximity=self._proximity,
             clearance=self._clearance, self_clearance=self._clearance, ignore=self._ignored[key],
             reference=self._reference[key], preferences=self._manner.preferences,
-            range_margin=self.range_margin,
+            range_margin=self._range_margin,
         )  # fmt: skip
 
     def _posture(self, key: int, problem: PostureProblem, result: PostureResult) -> KeyPosture:
@@ -222,11 +217,11 @@ class _Search:
         """
         near = self._nearest(problem, result.q)
         if near is None:
-            explain = replace(self.settings, explain=not self._explained_one)
+            explain = replace(self._settings, explain=not self._explained_one)
             self._explained_one = True
             result = generate_posture(problem, result.q, settings=explain)
             return replace(posture, reason=result.failure or "posture not found")
-        again = generate_posture(problem, near.q, settings=self.settings)
+        again = generate_posture(problem, near.q, settings=self._settings)
         if again.succeeded:
             return replace(posture, q=again.q)
         com = np.array(Configuration(self._body, near.q).com)
@@ -239,13 +234,13 @@ class _Search:
 
     def _nearest(self, problem: PostureProblem, start: FloatArray) -> PostureResult | None:
         """The posture with the nearest centre of mass; None when there is none with any."""
-        free = generate_posture(replace(problem, com=None), start, settings=self.settings)
+        free = generate_posture(replace(problem, com=None), start, settings=self._settings)
         if not free.succeeded:
             return None
         nearest = free
         for weight in NEARNESS:
             wished = replace(problem, com_weight=weight)
-            found = generate_posture(wished, nearest.q, settings=replace(self.settings, restarts=False))
+            found = generate_posture(wished, nearest.q, settings=replace(self._settings, restarts=False))
             nearest = found if found.succeeded else nearest
         return nearest
 
@@ -269,7 +264,6 @@ def requirements_at(
     pitch of its roll.  A contact that has yet to settle is only wished at its place.
 
     Args:
-        schedule: Contacts in time.
         key: Index of the key instant.
         rolls: Of :func:`rolls_of`.
 
@@ -332,9 +326,6 @@ def _ignored(
     return tuple(one | other for one, other in zip(before, after, strict=True))
 
 
-MOST_REPLANS = 3
-"""Plans tried after the first one."""
-
 ROOM = 0.01
 """Distance that a new plan is kept inside the place where a posture begins to exist [m]."""
 
@@ -382,7 +373,7 @@ class Eligibility:
 def find_eligible_plan(
     first: CentroidalResult, realise: Realise, look: Look, *, replan: bool = True
 ) -> Eligibility:
-    """Test a plan at its key instants; plan again with tightened constraints while that may help.
+    """Test a plan at its key instants; plan again, three times at most, with tightened constraints.
 
     Args:
         first: A plan that succeeded.
@@ -401,7 +392,7 @@ def find_eligible_plan(
             return Eligibility(plan, trajectory, postures, replans, None)
         worst = _most_hopeless(plan.problem, postures.failed)
         tightened = tighten(plan.problem, postures.failed) if replan else None
-        if tightened is None or replans == MOST_REPLANS:
+        if tightened is None or replans == 3:
             failure = IneligiblePlan("wholebody", f"{worst}; {_tried(replans)}", worst)
             return Eligibility(plan, trajectory, postures, replans, failure)
         again, replans = plan_com(tightened), replans + 1
@@ -419,7 +410,6 @@ def tighten(problem: CentroidalProblem, failed: tuple[KeyPosture, ...]) -> Centr
     where the centre of mass is given.
 
     Args:
-        problem: What was planned.
         failed: Key postures that were not found.
     """
     planes = []

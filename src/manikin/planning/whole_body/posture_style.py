@@ -1,7 +1,4 @@
-"""How a body carries itself where the task leaves freedom.
-
-Also here. Postures along the motion that guide the whole-body fit. The posture a person would keep where the
-task leaves freedom.
+"""Postures that guide the whole-body fit, and the style that they keep where the task leaves freedom.
 
 At the key instants and every fraction of a second between them the posture generator finds a
 collision-free posture on the contacts, the swings and the centre of mass.  Like the key
@@ -24,7 +21,6 @@ from manikin.errors import InputError
 from manikin.kinematics import (
     Placement,
     PostureProblem,
-    PostureResult,
     Preferences,
     SolverSettings,
     generate_posture,
@@ -36,9 +32,6 @@ from manikin.planning.whole_body.fit_targets import EffectorTarget, settled_shar
 from manikin.planning.whole_body.sliding_touchdown import Ignored
 from manikin.scene import Proximity
 
-LEAST_WEIGHT = 0.05
-"""Targets of less importance than this are left to the fit."""
-
 
 @dataclass(frozen=True, eq=False)
 class GuideFailure:
@@ -46,12 +39,9 @@ class GuideFailure:
 
     Attributes:
         time: [s].
-        phase: Index of the phase.
-        reason: What it misses, in one line.
     """
 
     time: float
-    phase: int
     reason: str
 
 
@@ -101,9 +91,6 @@ def plan_guide(
     """Find a posture at each time, each one starting from the one before.
 
     Args:
-        body: The body.
-        proximity: Distances of the body to the scene and itself.
-        schedule: Contacts in time.
         time: (k,) [s].
         effectors: Targets at these times.
         com: (k, 3) centre of mass [m]; NaN leaves it free.
@@ -135,11 +122,15 @@ def plan_guide(
         flying = [name for name in placements if effectors[name].weight[k] < 1.0]
         if not result.succeeded and flying:
             # In flight an effector need not pass exactly where its curve does.
-            loose = {n: _loosened(item) if n in flying else item for n, item in placements.items()}
+            loose = {
+                # Weight of the place of a flying effector where it cannot be exact [1/m^2].
+                name: replace(item, position_weight=100.0) if name in flying else item
+                for name, item in placements.items()
+            }
             retry = generate_posture(replace(problem, placements=loose), q, settings=settings)
             result = retry if retry.succeeded else result
         if not result.succeeded:
-            failures.append(_failure(schedule, float(instant), result))
+            failures.append(GuideFailure(float(instant), result.failure or "posture not found"))
         q = result.q
         found.append(q)
     return Guide(np.asarray(time), align_quaternions(np.array(found)), tuple(failures))
@@ -156,7 +147,8 @@ def _requirements(
     settling = {name for name in effectors if schedule.settling(time, name)[0]}
     placements = {}
     for name, target in effectors.items():
-        if name not in held and name not in settling and target.weight[k] >= LEAST_WEIGHT:
+        # Targets of less importance than this are left to the fit.
+        if name not in held and name not in settling and target.weight[k] >= 0.05:
             turn = (
                 target.rotation[k]
                 if target.rotation is not None and target.rotation_weight[k] > 0.5
@@ -172,8 +164,6 @@ def _settling(
     """Places of the contacts that are still settling, on their way from where they touched.
 
     Args:
-        body: The body.
-        schedule: Contacts in time.
         time: [s].
         q: (nq,) posture before.
         touched: Where each of them touched, kept from posture to posture [m].
@@ -190,25 +180,10 @@ def _settling(
             placements[contact.effector] = Placement(
                 start + share * (contact.position - start),
                 contact.rotation_contact_to_world,
-                rotation_weight=SETTLING_TURN,
+                # Weight of the orientation of a settling contact [1/rad^2].
+                rotation_weight=10.0,
             )
     return placements
-
-
-LOOSE_FLIGHT = 100.0
-"""Weight of the place of a flying effector where it cannot be exact [1/m^2]."""
-
-
-def _loosened(placement: Placement) -> Placement:
-    return replace(placement, position_weight=LOOSE_FLIGHT)
-
-
-SETTLING_TURN = 10.0
-"""Weight of its orientation [1/rad^2]."""
-
-
-def _failure(schedule: ContactSchedule, time: float, result: PostureResult) -> GuideFailure:
-    return GuideFailure(time, int(schedule.phase_at(time)), result.failure or "posture not found")
 
 
 @dataclass(frozen=True, eq=False)
@@ -394,8 +369,6 @@ def reference_motion(
     """(n, nq) preferred posture carried along the centre of mass, facing as the feet do.
 
     Args:
-        body: The body.
-        trajectory: Centre of mass and contacts in time.
         time: (n,) [s].
         manner: Preferred posture and swing of the arms.
     """

@@ -2,40 +2,40 @@
 
 The third stage of the thesis hands the contact sequence to a trajectory optimisation (ITOMP) and reports that
 this "is not fully functional"; the optimisation here is our own, with the terms of 7.3.1 and 7.3.2 on the
-machine of the whole-body fit: one quintic spline, analytic Gauss-Newton steps, contacts made exact by
-multipliers.
-
-Also here. The fits of one refinement: other weights, knots, contacts or timing, until nothing is broken.
+whole-body fit: one quintic spline, analytic Gauss-Newton steps, contacts made exact by multipliers.  A fit
+that breaks a requirement is repeated with other weights, knots, contacts or timing.
 """
 
 import time as clock
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from manikin.balance.motion_forces import full_motion
 from manikin.body import BodyModel
-from manikin.contact import ContactSchedule
+from manikin.contact import ContactSchedule, StanceSequence
+from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.motion.configuration_spline import ConfigurationSpline
 from manikin.numerics.banded import SampledBasis
+from manikin.numerics.spatial import FloatArray, finite_number
 from manikin.planning.contacts.efort import Task
-from manikin.planning.whole_body.contact_variables import VariableChoice, Variables, VariableSamples, released
-from manikin.planning.whole_body.fit import FitResult, MotionFit, spline_through, stronger
-from manikin.planning.whole_body.fit_objective import MotionObjective
-from manikin.planning.whole_body.fit_scales import RefineScales
-from manikin.planning.whole_body.fit_targets import phase_knots, refined, sample_times
-from manikin.planning.whole_body.refine_certificate import (
-    Progress,
-    RefineResiduals,
-    RefineResult,
-    RefineSettings,
-    certified_motion,
-    least_slack,
+from manikin.planning.whole_body.certificate import (
+    MotionCertificate,
+    RefineRequirements,
+    WholeBodyFailure,
+    WholeBodyRequirements,
+    certify_refined,
 )
+from manikin.planning.whole_body.contact_variables import VariableChoice, Variables, VariableSamples, released
+from manikin.planning.whole_body.fit import DEGREE, spline_through
+from manikin.planning.whole_body.fit_job import FitAttempt, FitJob, Progress, no_progress
+from manikin.planning.whole_body.fit_objective import MotionObjective
+from manikin.planning.whole_body.fit_scales import MotionScales, RefineScales
+from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.refine_input import (
     ROUNDS,
     KeyPath,
@@ -48,31 +48,21 @@ from manikin.planning.whole_body.refine_input import (
 )
 from manikin.planning.whole_body.refine_measures import (
     STEP,
+    RefineMeasures,
     RefineObstacles,
+    balance_of,
     measure,
     rooms_of,
     sample_uniformly,
 )
-from manikin.planning.whole_body.refine_objective import RefineObjective, RefineTargets, refine_targets
-from manikin.planning.whole_body.refine_physics import MarginCost
-from manikin.planning.whole_body.whole_body_certificate import WholeBodyFailure
+from manikin.planning.whole_body.refine_objective import RefineObjective, refine_targets
+from manikin.planning.whole_body.refine_physics import MarginCost, least_slack
+from manikin.runtime.display import Displayed
 from manikin.runtime.requirement import Requirement, RequirementTable
 from manikin.scene import Proximity, Scene
 
-DEGREE = 5
-"""Degree of the spline: four continuous derivatives."""
-
 REPAIRS = 5
 """Most fits that follow a failed one with other weights, knots or timing."""
-
-SLOWER = 1.3
-"""Factor by which a phase gets longer in which balance or speed is missed again."""
-
-FINEST = 2
-"""How often the spline's knots near the key instants are doubled at most."""
-
-CAUGHT = -0.02
-"""Below this clearance a part of the body is caught on the wrong side of another: the fit begins anew [m]."""
 
 LEAST_SLACK = -1e-6
 """Slack of the contacts' limits below which no contact forces balance the body: 0 but for rounding."""
@@ -80,19 +70,13 @@ LEAST_SLACK = -1e-6
 SPARSE = 0.03
 """Spacing of the samples for which the contact variables are chosen [s]."""
 
-NEARLY = 0.02
-"""An effector this near its contact is meant to be there: that it is so exactly is for the repairs [m]."""
-
-PATIENT = 0.004
-"""Relative decrease of the objective below which a repair stops."""
-
-_SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin", "max_torque_share"})
+_SLOWED = frozenset({"max_velocity_share", "max_physics_violation", "min_margin"})
 """Broken requirements that a slower motion may keep."""
 
 _EXACT = frozenset({"max_support_error_m", "max_support_turn_rad"})
 """Broken requirements that a spline with more knots may keep."""
 
-_SCALES = MappingProxyType(
+PENALTIES = MappingProxyType(
     {
         "max_support_error_m": ("tolerance", "position", "rotation"),
         "max_support_turn_rad": ("turn_tolerance", "position", "rotation"),
@@ -102,242 +86,294 @@ _SCALES = MappingProxyType(
         "max_velocity_share": ("joint_velocity",),
         "max_physics_violation": ("missing_wrench", "margin_violation"),
         "min_margin": ("margin_violation", "missing_wrench"),
-        "max_torque_share": ("force",),
+        "max_torque_share": (),
     }
 )
-"""Scales that decide each field of the certificate."""
+"""Scales that decide each residual of the certificate."""
+
+
+@dataclass(frozen=True)
+class RefineSettings:
+    """Options of :func:`refine_motion`.
+
+    Attributes:
+        knot_spacing: Largest distance of the spline's knots [s].
+        samples_per_span: Samples between two knots.
+        sampling: Spacing of the finished motion's samples, at which it is certified [s].
+        scales: Weights and limits of the fit.
+        requirements: What the finished motion must keep.
+        retime: Whether the motion may be slowed down.
+        friction_share: Share of the friction with which the margin is wanted; the certificate has all of it.
+        contact_variables: Whether contacts that the motion does not need, and whose effectors are not there,
+            are let go; else all contacts of the sequence are held.
+        speed_share: Share of the velocity limits up to which phases are shortened, as far as every
+            requirement is kept; None leaves them as they are.
+    """
+
+    knot_spacing: float = 0.1
+    samples_per_span: int = 3
+    sampling: float = 5.0e-3
+    scales: RefineScales = field(default_factory=RefineScales)
+    requirements: WholeBodyRequirements = field(default_factory=RefineRequirements)
+    retime: bool = True
+    friction_share: float = 0.8
+    contact_variables: bool = True
+    speed_share: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.speed_share is not None:
+            share = finite_number(self.speed_share, "refinement speed_share", above=0.0)
+            if share > 1.0:
+                raise InputError(f"refinement speed_share is {share:g}; valid: at most 1")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RefineResult(Displayed):
+    """A refined motion, or the best attempt and what it breaks.
+
+    Attributes:
+        motion: Densely sampled; its time begins where the input's does.
+        schedule: The contacts in the motion's own time, without those that were let go.
+        before: The input at the motion's own timing, joined by interpolation.
+        smoothed: The spline through the input from which the optimisation begins.
+        after: The refined motion.
+        certificate: Measured on the samples of the motion.
+        requirements: What the certificate and the contacts' limits were held against.
+        contact_slack: Room that all limits of the contacts have in common, the least at samples 10 ms
+            apart, by linear programs, see :func:`.contact_slack` [N, N.m].
+        variables: Of each phase, the contact variable of each contact of the input's sequence, in [0, 1].
+        released: Phases and effectors of the contacts that were let go.
+        stretch: Duration of the motion relative to the input's.
+        iterations: Gauss-Newton steps.
+    """
+
+    motion: Motion
+    spline: ConfigurationSpline
+    schedule: ContactSchedule
+    before: RefineMeasures
+    smoothed: RefineMeasures
+    after: RefineMeasures
+    certificate: MotionCertificate
+    requirements: RequirementTable
+    contact_slack: float
+    failure: WholeBodyFailure | None
+    variables: Variables
+    released: tuple[tuple[int, str], ...]
+    stretch: float
+    iterations: int
+    wall_time: float
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether every requirement is kept."""
+        return self.failure is None
 
 
 @dataclass(frozen=True, eq=False)
-class _Attempt:
-    """One fit with its measured motion.
+class _Goal:
+    """Keys and contacts at one timing.
 
     Attributes:
-        path: The input at the motion's timing.
-        schedule: Its contacts.
-        fit: What was solved.
-        spline: What it found.
-        motion: Its samples.
-        certificate: Measured on them.
+        job: The refinement that it belongs to.
+        forces: Motion whose contact forces are held where its torques are beyond the strength.
     """
 
+    job: "Refinement"
     path: KeyPath
     schedule: ContactSchedule
-    fit: MotionFit
-    spline: ConfigurationSpline
-    motion: Motion
-    certificate: RefineResiduals
+    forces: Motion | None = None
+
+    def objective(self, time: FloatArray, basis: SampledBasis, scales: MotionScales) -> MotionObjective:
+        """Residuals at times (n,) [s]."""
+        assert isinstance(scales, RefineScales)
+        job = self.job
+        targets = refine_targets(
+            job.body, job.scene, self.path, self.schedule, time, scales, job.task, job.padded, job.variables
+        )
+        if self.forces is not None:
+            held = HeldForces.of(job.body, self.schedule, self.forces, time)
+            targets = replace(targets, fit=replace(targets.fit, forces=held))
+        wanted = job.rooms(self.schedule, job.settings.friction_share)
+        return RefineObjective(job.body, job.proximity, targets, basis, wanted)
+
+    def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
+        """Sample a motion and certify it."""
+        job, schedule, rooms = self.job, self.schedule, self.job.rooms(self.schedule)
+        time = sample_uniformly(schedule, job.settings.sampling)
+        polytopes = [room.polytope for room in rooms]
+        motion, wrench = full_motion(job.body, schedule, polytopes, time, *spline.evaluate(time))
+        balance, violation = balance_of(schedule, rooms, time, wrench, motion.com)
+        obstacles = RefineObstacles(job.body, job.scene, schedule, time, job.padded)
+        return motion, certify_refined(
+            job.body, job.proximity, schedule, obstacles, motion, violation, balance,
+            [room.is_flat for room in rooms], job.settings.requirements,
+        )  # fmt: skip
+
+    def at_rest(self) -> VariableSamples:
+        """What the keys say about the contacts, before there is a motion."""
+        time = sample_uniformly(self.schedule, SPARSE)
+        return VariableSamples.at_rest(
+            self.job.body, self.schedule.sequence.effectors, (self.path.time, self.path.q),
+            (time, self.path.at(time)),
+        )  # fmt: skip
+
+    def moving(self, spline: ConfigurationSpline) -> VariableSamples:
+        """What a motion says about the contacts."""
+        time = sample_uniformly(self.schedule, SPARSE)
+        names = self.schedule.sequence.effectors
+        return VariableSamples.of_motion(self.job.body, names, time, spline.evaluate(time))
 
 
 class Refinement:
-    """One job, with what its steps share."""
+    """One job, with what its attempts share.
+
+    Args:
+        padded: Obstacles that any part of the body may lean on.
+
+    Attributes:
+        variables: Of each phase, the contact variables of its effectors, as chosen last.
+    """
 
     def __init__(
         self,
         body: BodyModel,
         scene: Scene,
-        path: KeyPath,
-        schedule: ContactSchedule,
         settings: RefineSettings,
         task: Task | None,
         padded: tuple[str, ...],
     ) -> None:
-        self.body, self.scene, self.path, self.schedule = body, scene, path, schedule
-        self.settings, self.task, self.padded = settings, task, padded
+        self.body, self.scene, self.settings, self.task, self.padded = body, scene, settings, task, padded
         self.proximity = Proximity(body, scene)
-        self.given = schedule
-        self.variables: Variables = tuple(
-            dict.fromkeys(phase.stance.effectors, 1.0) for phase in schedule.sequence
-        )
-        self.iterations = 0
+        self.variables: Variables = ()
+        self._rooms: dict[tuple[StanceSequence, float], tuple[MarginCost, ...]] = {}
+        self._job = FitJob(
+            # Relative decrease of the objective below which a repair stops.
+            settings.knot_spacing, settings.samples_per_span, penalties=PENALTIES, patience=0.004,
+            by_count=True, rescaled=True,
+        )  # fmt: skip
+        self._choice = VariableChoice(
+            # An effector this near its contact is meant to be there: exactness is for the repairs [m].
+            body, scene, settings.scales, max(settings.requirements.support_error, 0.02),
+            settings.friction_share,
+        )  # fmt: skip
 
-    def run(self, began: float, progress: Progress) -> RefineResult:
+    def run(self, path: KeyPath, schedule: ContactSchedule, began: float, progress: Progress) -> RefineResult:
         """Fit, repair and measure.
 
         Args:
             began: Reading of the clock from which the wall time counts [s].
-            progress: Told the share of the fits that are done.
+            progress: Called with the share of the fits that are done.
         """
-        given = self.path.duration
+        goal = _Goal(self, path, schedule)
+        self.variables = tuple(dict.fromkeys(phase.stance.effectors, 1.0) for phase in schedule.sequence)
         if self.settings.retime:
             share = self.settings.scales.velocity_share
-            self.path, self.schedule = stretched_for_speed(self.body, self.path, self.schedule, share)
+            goal = _Goal(self, *stretched_for_speed(self.body, path, schedule, share))
         if self.settings.contact_variables:
-            self._choose(self._at_rest())
-        scales, fine = self.settings.scales, 0
-        best = last = self._attempt(scales, fine)
-        for number in range(REPAIRS):
-            progress((number + 1) / (REPAIRS + 1))
-            broken = last.certificate.table(self.settings.requirements).broken
-            if not broken:
-                break
-            if self.settings.contact_variables and self._choose(self._moving(last), self._at_rest()):
-                last = self._attempt(scales, fine)
-                best = self._better(best, last)
-                continue
-            if last.certificate.min_clearance_m < CAUGHT:
-                scales = _reweighed(scales, broken & {"min_clearance_m"})
-                last = self._attempt(scales, fine)
-                best = self._better(best, last)
-                continue
-            scales = _reweighed(scales, broken)
-            slower = number > 0 and self.settings.retime and bool(broken & _SLOWED)
-            finer = fine < FINEST and bool(broken & _EXACT)
-            if slower or finer:
-                fine += finer
-                near = self._slow_down(last, broken) if slower else last.spline
-                last = self._attempt(scales, fine, near)
-            else:
-                last = self._improved(last, scales)
-            best = self._better(best, last)
-            if best is not last and best.schedule.sequence is last.schedule.sequence:
-                last, self.path, self.schedule = best, best.path, best.schedule
-        if (
-            self.settings.speed_share is not None
-            and not best.certificate.table(self.settings.requirements).broken
-        ):
-            best = self._hurried(best, scales, fine, self.settings.speed_share)
-        progress(1.0)
-        return self._result(best, given, began)
+            goal = self._chosen(goal, goal.at_rest())
 
-    def _hurried(self, best: _Attempt, scales: RefineScales, fine: int, share: float) -> _Attempt:
+        def remedy(number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal]:
+            progress((number + 1) / (REPAIRS + 1))
+            return self._remedy(number, last)
+
+        best = self._job.repair(self._job.attempt(goal, self.settings.scales), remedy, REPAIRS)
+        if self.settings.speed_share is not None and not best.broken:
+            best = self._hurried(best, self.settings.speed_share)
+        progress(1.0)
+        return self._result(best, path.duration, schedule, began)
+
+    def rooms(self, schedule: ContactSchedule, friction_share: float = 1.0) -> tuple[MarginCost, ...]:
+        """Wrench polytope of each phase, with a share of the friction."""
+        key = schedule.sequence, friction_share
+        if key not in self._rooms:
+            self._rooms[key] = rooms_of(schedule, friction_share)
+        return self._rooms[key]
+
+    def _remedy(self, number: int, last: FitAttempt[_Goal]) -> FitAttempt[_Goal]:
+        """The next fit after one that breaks requirements: other contacts, weights, timing or knots."""
+        goal, job, broken = replace(last.goal, forces=None), self._job, last.broken
+        if self.settings.contact_variables:
+            chosen = self._chosen(goal, goal.moving(last.result.spline), goal.at_rest())
+            if chosen is not goal:
+                return job.attempt(chosen, last.scales, last.fine)
+        if last.is_caught:
+            return job.restart(replace(last, goal=goal), last.fine)
+        scales = job.updated(last.scales, broken)
+        weak = "max_torque_share" in broken
+        slower = number > 0 and self.settings.retime and not weak and bool(broken & _SLOWED)
+        # How often the spline's knots near the key instants are doubled at most.
+        fine = last.fine + (last.fine < 2 and bool(broken & _EXACT))
+        if weak:
+            return job.attempt(replace(goal, forces=last.motion), scales, fine, last.result.spline)
+        if not slower and fine == last.fine:
+            return job.improve(last, scales)
+        near = last.result.spline
+        if slower:
+            goal = self._slower(last)
+            near = _retimed(near, last.goal.schedule, goal.schedule)
+        return job.attempt(goal, scales, fine, near)
+
+    def _hurried(self, best: FitAttempt[_Goal], share: float) -> FitAttempt[_Goal]:
         """Shorten phases round by round; what breaks a requirement is taken back where it does."""
         settled = frozenset[int]()
         for _ in range(ROUNDS):
-            factors = shortening(self.body, best.motion, best.schedule, share, settled)
+            goal = best.goal
+            factors = shortening(self.body, best.motion, goal.schedule, share, settled)
             if np.all(factors == 1.0):
                 break
-            self.path, self.schedule = shortened(best.path, best.schedule, factors)
-            trial = self._attempt(scales, fine, self._retimed(best.spline, best.schedule))
-            broken = trial.certificate.table(self.settings.requirements).broken
-            if broken:
-                blamed = (around(trial.schedule, trial.certificate.worst_times_s[name]) for name in broken)
-                settled = settled.union(*blamed)
-                self.path, self.schedule = best.path, best.schedule
+            shorter = _Goal(self, *shortened(goal.path, goal.schedule, factors))
+            near = _retimed(best.result.spline, goal.schedule, shorter.schedule)
+            trial = self._job.attempt(shorter, best.scales, best.fine, near)
+            if trial.broken:
+                times = (trial.certificate[key].time_s or 0.0 for key in trial.broken)
+                settled = settled.union(*(around(shorter.schedule, time) for time in times))
             else:
                 best = trial
         return best
 
-    def _retimed(self, spline: ConfigurationSpline, before: ContactSchedule) -> ConfigurationSpline:
-        """A spline in the time of the present schedule."""
-        knots = np.interp(spline.knots, before.instants, self.schedule.instants)
-        return ConfigurationSpline(knots, spline.control_points, DEGREE)
-
-    def _attempt(self, scales: RefineScales, fine: int, near: ConfigurationSpline | None = None) -> _Attempt:
-        knots = phase_knots(self.schedule.instants, self.settings.knot_spacing, DEGREE)
-        for _ in range(fine):
-            knots = refined(knots, self.schedule.instants, DEGREE)
-        time = sample_times(knots, self.settings.samples_per_span)
-        targets = refine_targets(
-            self.body,
-            self.scene,
-            self.path,
-            self.schedule,
-            time,
-            scales,
-            self.task,
-            self.padded,
-            self.variables,
-        )
-        fit = MotionFit(
-            self.body, self.proximity, targets.fit, knots, DEGREE, scales, self._objective(targets)
-        )
-        start = fit.initial_spline(targets.fit.reference if near is None else near.evaluate(time).q)
-        found = fit.solve(start) if near is None else fit.improve(start, scales)
-        return self._judged(fit, found)
-
-    def _improved(self, last: _Attempt, scales: RefineScales) -> _Attempt:
-        """Go on with other weights."""
-        last.fit.rescale(scales)
-        return self._judged(last.fit, last.fit.improve(last.spline, scales))
-
-    def _judged(self, fit: MotionFit, found: FitResult) -> _Attempt:
-        self.iterations += found.iterations
-        motion, certificate = certified_motion(
-            self.body, self.scene, self.proximity, self.schedule, self.rooms, found.spline,
-            self.settings.sampling, self.padded,
-        )  # fmt: skip
-        return _Attempt(self.path, self.schedule, fit, found.spline, motion, certificate)
-
-    def _objective(self, targets: RefineTargets) -> Callable[..., MotionObjective]:
-        def make(
-            body: BodyModel, proximity: Proximity | None, _: object, basis: SampledBasis
-        ) -> MotionObjective:
-            return RefineObjective(body, proximity, targets, basis, self.wanted_rooms)
-
-        return make
-
-    @cached_property
-    def rooms(self) -> tuple[MarginCost, ...]:
-        """Wrench polytope of each phase."""
-        return rooms_of(self.schedule)
-
-    @cached_property
-    def wanted_rooms(self) -> tuple[MarginCost, ...]:
-        """The same with the share of the friction with which the margin is wanted."""
-        return rooms_of(self.schedule, self.settings.friction_share)
-
-    @cached_property
-    def _choice(self) -> VariableChoice:
-        tolerance = max(self.settings.requirements.support_error, NEARLY)
-        return VariableChoice(
-            self.body, self.scene, self.settings.scales, tolerance, self.settings.friction_share
-        )
-
-    def _at_rest(self) -> VariableSamples:
-        """What the keys say about the contacts, before there is a motion."""
-        path, names = self.path, self.schedule.sequence.effectors
-        time = sample_uniformly(self.schedule, SPARSE)
-        return VariableSamples.at_rest(self.body, names, (path.time, path.q), (time, path.at(time)))
-
-    def _moving(self, attempt: _Attempt) -> VariableSamples:
-        """What a motion says about them."""
-        time = sample_uniformly(attempt.schedule, SPARSE)
-        names = attempt.schedule.sequence.effectors
-        return VariableSamples.of_motion(self.body, names, time, attempt.spline.evaluate(time))
-
-    def _choose(self, samples: VariableSamples, resting: VariableSamples | None = None) -> bool:
-        """Choose the contact variables for a motion; whether a contact was let go."""
-        chosen, kept = self._choice.choose(self.schedule, samples, resting)
+    def _chosen(self, goal: _Goal, samples: VariableSamples, resting: VariableSamples | None = None) -> _Goal:
+        """Choose the contact variables for a motion; another goal where a contact was let go."""
+        chosen, kept = self._choice.choose(goal.schedule, samples, resting)
         self.variables = tuple({**old, **new} for old, new in zip(self.variables, chosen, strict=True))
-        if kept is self.schedule:
-            return False
-        self.schedule = kept
-        for name in ("rooms", "wanted_rooms"):
-            self.__dict__.pop(name, None)
-        return True
+        return goal if kept is goal.schedule else replace(goal, schedule=kept)
 
-    def _slow_down(self, last: _Attempt, broken: frozenset[str]) -> ConfigurationSpline:
-        """Give the worst phase more time; the last spline at the new timing."""
-        before = self.schedule
-        for name in sorted(broken & _SLOWED):
-            when = last.certificate.worst_times_s[name]
-            when = float(np.interp(when, before.instants, self.schedule.instants))
-            self.path, self.schedule = stretched_around(self.path, self.schedule, when, SLOWER)
-        return self._retimed(last.spline, before)
+    def _slower(self, last: FitAttempt[_Goal]) -> _Goal:
+        """Give the worst phase more time."""
+        before, path, schedule = last.goal.schedule, last.goal.path, last.goal.schedule
+        for name in sorted(last.broken & _SLOWED):
+            worst = last.certificate[name].time_s or 0.0
+            when = float(np.interp(worst, before.instants, schedule.instants))
+            # Factor by which a phase gets longer in which balance or speed is missed again.
+            path, schedule = stretched_around(path, schedule, when, 1.3)
+        return _Goal(self, path, schedule)
 
-    def _better(self, first: _Attempt, second: _Attempt) -> _Attempt:
-        """The one that breaks fewer requirements; of two alike, the later one."""
-        required = self.settings.requirements
-        fewer = len(first.certificate.table(required).broken) < len(second.certificate.table(required).broken)
-        return first if fewer else second
+    def _result(
+        self, found: FitAttempt[_Goal], duration: float, given: ContactSchedule, began: float
+    ) -> RefineResult:
+        """Measures of the input, of a spline through it and of the motion, and the verdict.
 
-    def _result(self, found: _Attempt, given: float, began: float) -> RefineResult:
-        schedule, path, rooms = found.schedule, found.path, rooms_of(found.schedule)
+        Args:
+            found: The best attempt.
+            duration: Of the input [s].
+            given: Contacts of the input.
+            began: Reading of the clock from which the wall time counts [s].
+        """
+        schedule, path, spline = found.goal.schedule, found.goal.path, found.result.spline
         time = sample_uniformly(schedule, STEP)
         obstacles = RefineObstacles(self.body, self.scene, schedule, time, self.padded)
-        knots = phase_knots(schedule.instants, self.settings.knot_spacing, DEGREE)
-        input_samples = path.at(time)
-        fitted = sample_times(knots, self.settings.samples_per_span)
-        basis = SampledBasis.at(fitted, knots, DEGREE)
-        smoothed = spline_through(path.at(fitted), basis, knots, DEGREE).evaluate(time).q
+        knots = self._job.knots(schedule)
+        fitted, basis = self._job.samples(knots)
+        smoothed = spline_through(path.at(fitted), basis, knots)
         before, start, after = (
-            measure(self.body, self.proximity, obstacles, path, schedule, rooms, time, samples, self.task)
-            for samples in (input_samples, smoothed, found.spline.evaluate(time).q)
-        )
-        slack, when = least_slack(self.body, schedule, found.spline, time)
+            measure(
+                self.body, self.proximity, obstacles, path, schedule, self.rooms(schedule), time, samples,
+                self.task,
+            )
+            for samples in (path.at(time), smoothed.evaluate(time).q, spline.evaluate(time).q)
+        )  # fmt: skip
+        slack, when = least_slack(self.body, schedule, spline, time)
         table = RequirementTable((
-            *found.certificate.table(self.settings.requirements),
+            *found.certificate.required,
             Requirement("min_contact_slack", "least slack of the contacts' limits", "N, N.m", slack, ">=",
                         0.0, when, tolerance=-LEAST_SLACK),
         ))  # fmt: skip
@@ -345,15 +381,18 @@ class Refinement:
         if broken is not None:
             failure = WholeBodyFailure.at(schedule, broken.time_s or 0.0, broken.reason)
         return RefineResult(
-            found.motion, found.spline, schedule, before, start, after, found.certificate, table, slack,
-            failure, self.variables, tuple(released(self.given, schedule)), path.duration / given,
-            self.iterations, clock.perf_counter() - began,
+            found.motion, spline, schedule, before, start, after, found.certificate, table, slack, failure,
+            self.variables, tuple(released(given, schedule)), path.duration / duration,
+            self._job.iterations, clock.perf_counter() - began,
         )  # fmt: skip
 
 
-def _reweighed(scales: RefineScales, broken: frozenset[str]) -> RefineScales:
-    """Scales at which the broken requirements weigh more, and more patience."""
-    return replace(stronger(scales, broken, _SCALES), decrease=PATIENT)
+def _retimed(
+    spline: ConfigurationSpline, before: ContactSchedule, after: ContactSchedule
+) -> ConfigurationSpline:
+    """A spline in the time of another schedule."""
+    knots = np.interp(spline.knots, before.instants, after.instants)
+    return ConfigurationSpline(knots, spline.control_points, DEGREE)
 
 
 def refine_motion(
@@ -371,12 +410,9 @@ def refine_motion(
     """Turn key configurations and their contacts into a smooth motion in balance and without collision.
 
     Args:
-        body: The body.
-        scene: The obstacles and the floor.
         time: (n,) times of the key configurations [s].
         q: (n, nq) key configurations, joined by interpolation.
         schedule: Which effector holds which contact when, over the same interval; full soles only.
-        settings: Options.
         task: Direction of EFORT; the pelvis' displacement in each phase when omitted (7.9).
         padded: Obstacles that any part of the body may lean on.
         progress: Called now and then with the share done.
@@ -392,17 +428,7 @@ def refine_motion(
     began = clock.perf_counter()
     path = KeyPath(time, q)
     check_input(body, path, schedule)
-    job = Refinement(
-        body,
-        scene,
-        path,
-        schedule,
-        settings or RefineSettings(scales=RefineScales.of(body)),
-        task,
-        tuple(padded),
+    settings = settings or RefineSettings(scales=RefineScales.of(body))
+    return Refinement(body, scene, settings, task, tuple(padded)).run(
+        path, schedule, began, progress or no_progress
     )
-    return job.run(began, progress or _silent)
-
-
-def _silent(share: float) -> None:
-    del share

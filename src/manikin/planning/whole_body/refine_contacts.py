@@ -5,9 +5,7 @@ flight, with a smooth ramp on the way.  The term is ``c (|e|^2 + |e'|^2)``: the 
 relative to its contact, and its speed.  The contacts are known here, so the variables are given and not
 unknowns; where ``c`` is 1 the place is met exactly by multipliers.
 
-Also here. The EFORT term: contacts keep the posture in which their limb presses well ([Tonneau2015]_
-7.8-7.9).
-
+The EFORT term ([Tonneau2015]_ 7.8-7.9) keeps contacts in postures in which their limb presses well:
 ``C = c / alpha`` for each limb in contact, with ``alpha = f_T (v . n)``.  As printed, the cost is
 singular or negative where the surface would have to pull (``alpha <= 0``), and 7.9 drops the contact
 variable and the unit length of the direction; here ``alpha`` is clamped to :data:`LEAST`, ``c`` is kept,
@@ -59,9 +57,6 @@ def limb_directions(
     Without a task the direction is that of the pelvis' displacement in the phase, as 7.9 wants.
 
     Args:
-        body: The body.
-        path: The input.
-        schedule: Contacts in time.
         time: (n,) [s].
         task: Direction of the task and the limbs that act on an object, or None.
     """
@@ -111,13 +106,6 @@ def efort_with_derivative(
     return alpha, derivative
 
 
-RAMP = 0.15
-"""Longest time before and after a contact in which its variable is above 0 [s]."""
-
-RAMP_SHARE = 0.25
-"""The same as a share of the flight."""
-
-
 def contact_variables(schedule: ContactSchedule, time: FloatArray) -> dict[str, FloatArray]:
     """(n,) contact variable of every effector of the sequence at each time, in [0, 1]."""
     held = schedule.support(time, schedule.sequence.effectors)
@@ -127,7 +115,8 @@ def contact_variables(schedule: ContactSchedule, time: FloatArray) -> dict[str, 
     for swing in schedule.sequence.swings():
         start, end = schedule.swing_interval(swing)
         rows = (time >= start) & (time < end)
-        ramp = min(RAMP, RAMP_SHARE * (end - start))
+        # Time before and after a contact in which its variable is above 0 [s].
+        ramp = min(0.15, 0.25 * (end - start))
         for contact, away in ((swing.start, time - start), (swing.end, end - time)):
             if contact is not None:
                 near = np.clip(1.0 - away[rows] / ramp, 0.0, 1.0)
@@ -142,7 +131,6 @@ def contact_targets(
     """Where the contact variables want every effector.
 
     Args:
-        schedule: Contacts in time.
         time: (n,) [s].
         variables: Those of :func:`contact_variables`.
         approach: Weight of the distance to a contact's normal in flight, relative to that of a held

@@ -1,7 +1,4 @@
-"""What the refinement begins with: key configurations joined by interpolation, and their contacts in time.
-
-Also here. When a refined motion changes its contacts: phases that are slower than they have to be are
-shortened.
+"""Input of the refinement: key configurations joined by interpolation, their contacts, and their timing.
 
 The times of a contact sequence are a guess at an easy pace; [Tonneau2015]_ retimes by the joints' speed
 limits alone (4.4.2).  A phase whose joints stay far below their limits may be shorter; how much, balance and
@@ -129,9 +126,6 @@ def stretched_for_speed(
     :data:`PEAK`, because a smooth motion is faster in the middle than on average.
 
     Args:
-        body: The body.
-        path: Key configurations.
-        schedule: Contacts in time.
         share: Of the velocity limits that may be used.
     """
     nodes = np.union1d(path.time, schedule.instants)
@@ -148,8 +142,6 @@ def stretched_around(
     """Slow down the phase at a time, and half as much the ones beside it.
 
     Args:
-        path: Key configurations.
-        schedule: Contacts in time.
         time: [s].
         factor: By which the phase gets longer.
     """
@@ -179,9 +171,7 @@ def shortening(
     """(phases,) factor on the duration of each phase, in [:data:`SHORTER`, 1].
 
     Args:
-        body: The body.
         motion: Its motion at the present timing.
-        schedule: Contacts in time.
         share: Of the velocity limits that the fastest joint of each phase should come up to.
         settled: Phases that stay as long as they are.
     """

@@ -1,20 +1,15 @@
 """Every term of the refinement, measured on samples of a motion without its spline or solver.
 
 Velocities and accelerations are differences of the sampled configurations, so that the input, whose
-velocity jumps at its keys, and the refined motion are measured with the same yardstick.
-
-Also here. Obstacles in the refinement: what may touch, and how far an effector in flight keeps off its
-supports.
-
-An effector may touch what it holds, and that alone.  In flight it begins and ends at distance zero from
-its supports; in between it has to keep off them like everything else.
+velocity jumps at its keys, and the refined motion are measured in the same way.  An effector may touch what
+it holds, and that alone.  In flight it begins and ends at distance zero from its supports; in between it has
+to keep off them like everything else.
 """
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 
-import daqp
 import numpy as np
 import pinocchio as pin
 
@@ -23,6 +18,7 @@ from manikin.body import BodyModel
 from manikin.body.limbs import end_segments
 from manikin.contact import ContactKind, ContactSchedule, Stance
 from manikin.motion.dynamics import centroidal_motion
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, wrench_map
 from manikin.planning.contacts.efort import Task
 from manikin.planning.whole_body.refine_contacts import (
@@ -34,15 +30,9 @@ from manikin.planning.whole_body.refine_contacts import (
 from manikin.planning.whole_body.refine_input import KeyPath
 from manikin.planning.whole_body.refine_physics import MarginCost, centre_of
 from manikin.planning.whole_body.sliding_touchdown import Ignored
-from manikin.planning.whole_body.swing_planner import touch_pairs
+from manikin.planning.whole_body.swing_planner import leaning_pairs, touch_pairs
 from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint, segment_of
-
-RISE = 0.3
-"""Share of a flight in which the wanted clearance to what was left, or is to be reached, rises or falls."""
-
-HELD_SHARE = 0.4
-"""Share of the wanted clearance that an effector in contact has to keep from other obstacles."""
 
 GRASPED = -0.05
 """Distance at which a hand that holds on to something begins to be pushed off it [m]."""
@@ -67,9 +57,6 @@ class RefineObstacles:
     """What may be near what, at samples of a motion.
 
     Args:
-        body: The body.
-        scene: The obstacles.
-        schedule: Contacts in time.
         time: (n,) [s].
         padded: Obstacles that any part of the body may touch.
 
@@ -88,7 +75,7 @@ class RefineObstacles:
         time: FloatArray,
         padded: Sequence[str] = (),
     ) -> None:
-        leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
+        leaning = leaning_pairs(body, padded)
         held = [
             leaning.union(*(touch_pairs(body, scene, contact) for contact in phase.stance))
             for phase in schedule.sequence
@@ -106,7 +93,9 @@ class RefineObstacles:
             rows = (time >= start) & (time < end)
             for contact, gone in ((swing.start, time - start), (swing.end, end - time)):
                 if contact is not None:
-                    share = np.clip(gone / (RISE * (end - start)), 0.0, 1.0)
+                    # Share of a flight in which the wanted clearance to what was left, or is to be reached,
+                    # rises or falls.
+                    share = np.clip(gone / (0.3 * (end - start)), 0.0, 1.0)
                     away = np.where(rows, share**2 * (3.0 - 2.0 * share), 1.0)
                     self._near[swing.effector] = np.minimum(self._near[swing.effector], away)
                     grasped = contact.kind is ContactKind.GRASP
@@ -146,7 +135,8 @@ class RefineObstacles:
         named = np.array([(segment_of(shape), segment_of(other)) for shape, other in found.pairs])
         for name, ends in self._ends.items():
             rows = np.isin(named[:, 0], ends) & np.isin(named[:, 1], self._obstacles)
-            share = np.maximum(self._near[name][found.sample[rows]], HELD_SHARE)
+            # Share of the wanted clearance that an effector in contact has to keep from other obstacles.
+            share = np.maximum(self._near[name][found.sample[rows]], 0.4)
             wanted[rows] = np.minimum(wanted[rows], share * safe)
         for side in self._sides:
             rows = np.zeros(len(wanted), dtype=bool)
@@ -160,9 +150,6 @@ class RefineObstacles:
 
 STEP = 0.01
 """Spacing of the samples that are measured [s]."""
-
-_GRAM = 1e-3
-"""Margin below which the missing wrench is computed [N.m]; above, it is zero."""
 
 
 @dataclass(frozen=True)
@@ -206,13 +193,6 @@ class RefineMeasures:
         """The measures by name."""
         return asdict(self)
 
-    def table(self, other: "RefineMeasures") -> str:
-        """Lines ``name  this -> other``."""
-        return "\n".join(
-            f"{item.name:32s}{getattr(self, item.name):12.4g} -> {getattr(other, item.name):12.4g}"
-            for item in fields(self)
-        )
-
 
 def sample_uniformly(schedule: ContactSchedule, step: float) -> FloatArray:
     """Times from the first to the last instant, both included, at most ``step`` apart [s]."""
@@ -238,17 +218,15 @@ def physics_violation(room: MarginCost, stance_wrench: FloatArray) -> FloatArray
     The polytope holds what all admissible contact forces can supply; the nearest point of it is found
     by a quadratic program for each wrench outside.
     """
-    H, h = np.array(room.polytope.H), room.polytope.h
+    H, h = room.polytope.H, room.polytope.h
     missing = np.zeros(len(stance_wrench))
     # Around the wrench itself, in units of the body's weight, the program is well scaled.
-    for k in np.flatnonzero(room.polytope.margin(stance_wrench) < -_GRAM):
+    # Above this margin [N.m] the missing wrench is zero.
+    for k in np.flatnonzero(room.polytope.margin(stance_wrench) < -1e-3):
         unit = max(1.0, float(np.abs(stance_wrench[k]).max()))
         bound = (h - H @ stance_wrench[k]) / unit
-        found, _, flag, _ = daqp.solve(
-            np.eye(6), np.zeros(6), H, bound, np.full(len(h), -1e30),
-            np.zeros(len(h), dtype=np.int32),
-        )  # fmt: skip
-        missing[k] = unit * np.linalg.norm(found) if flag > 0 else max(0.0, -bound.min() * unit)
+        nearest = solve_qp(np.eye(6), np.zeros(6), H, None, bound)
+        missing[k] = unit * np.linalg.norm(nearest.x) if nearest.solved else max(0.0, -bound.min() * unit)
     return missing
 
 
@@ -295,11 +273,8 @@ def measure(
     """Measure every term.
 
     Args:
-        body: The body.
-        proximity: Distances of the body to the scene and to itself.
         obstacles: What may touch at the samples.
         path: The input, for the directions of EFORT.
-        schedule: Contacts in time.
         rooms: Wrench polytope of each phase.
         time: (n,) samples at a constant step [s].
         q: (n, nq) configurations.

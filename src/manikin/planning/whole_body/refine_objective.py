@@ -44,9 +44,6 @@ from manikin.scene.distance import ProximitySamples, moves_by_joint
 KNEE = "knee_flexion"
 """How the names of knees end."""
 
-_LEAST_CURVATURE = 1e-12
-"""Added to the curvature of the wrench's cost, relative to its largest element, to factorise it."""
-
 
 @dataclass(frozen=True, eq=False)
 class RefineTargets:
@@ -58,7 +55,6 @@ class RefineTargets:
         load: (n, effectors) readiness of each to carry load, in the order of ``fit.effectors``.
         limbs: Directions of EFORT of the limbs, by effector.
         obstacles: What may touch, and how far flights keep off.
-        schedule: Contacts in time.
     """
 
     fit: FitTargets
@@ -135,9 +131,7 @@ class RefineObjective(MotionObjective):
     """Evaluates and linearises the objective of a spline's control points.
 
     Args:
-        body: The body.
         proximity: Distances of the body to the scene and to itself, or None to ignore them.
-        targets: What to do.
         basis: The spline's basis at the targets' times.
         rooms: Wrench polytope of each phase.
     """
@@ -198,7 +192,7 @@ class RefineObjective(MotionObjective):
 
     def _com_weight(self, scales: MotionScales) -> FloatArray:
         del scales
-        return self._targets.com_weight  # zero: there is no planned centre of mass
+        return self.targets.com_weight  # zero: there is no planned centre of mass
 
     def _add_dynamics(self, out: FitLinearisation, motion: MotionSamples, scales: MotionScales) -> None:
         """Physics violation and balance, which depend on the wrench that the whole body needs."""
@@ -211,10 +205,14 @@ class RefineObjective(MotionObjective):
         # With the curvature L L^T, the rows L^T db and the residual L^-1 gradient have its gradient
         # and its Gauss-Newton matrix.
         size = np.abs(cost.curvature).max(axis=(1, 2))
-        root = np.linalg.cholesky(cost.curvature + (_LEAST_CURVATURE * size)[:, None, None] * np.eye(6))
+        # Added to the curvature of the wrench's cost, relative to its largest element, to factorise it.
+        root = np.linalg.cholesky(cost.curvature + (1e-12 * size)[:, None, None] * np.eye(6))
         residual = np.linalg.solve(root, cost.gradient[:, :, None])[:, :, 0]
         first, second, third = (root.transpose(0, 2, 1) @ part for part in wrench.jacobians)
         out.momentum = MomentumRate(residual, (first, second, third))
+        if self.targets.forces is not None:
+            out.momentum = self._with_strength(out.momentum, motion, self.targets.forces, scales)
+            out.sample_cost += 0.5 * np.sum(out.momentum.value[:, 6:] ** 2, axis=1)
 
     def wrench_cost(self, wrench: FloatArray, com: FloatArray, scales: RefineScales) -> WrenchCost:
         """Physics violation and missing balance of wrenches (n, 6) about the world origin, CoM (n, 3)."""
@@ -265,7 +263,7 @@ class RefineObjective(MotionObjective):
 
     def _add_place(self, out: FitLinearisation, motion: MotionSamples, scales: RefineScales) -> None:
         """Carry the pelvis about where the input does, and begin and end there."""
-        raw, reference = motion.raw[0], self._targets.reference
+        raw, reference = motion.raw[0], self.targets.reference
         weight = np.zeros_like(raw)
         weight[:, :3] = 1.0 / scales.guide_position
         weight[[0, -1]] = 1.0 / scales.end_angle

@@ -35,10 +35,6 @@ CLEARANCES = (0.02, 0.0105)
 last one."""
 
 
-LONGEST_SHARE = 2.0
-"""Longest duration of the seated part, in sums of its shortest phases."""
-
-
 @dataclass(frozen=True, eq=False)
 class SeatedContinuation:
     """The part of a motion after the body has sat down.
@@ -62,8 +58,6 @@ def continue_seated(
     """Plan the phases in which the body sits and join them to the trajectory that led there.
 
     Args:
-        body: The body.
-        scene: The obstacles.
         trajectory: Centre of mass up to the touch of the seat.
         phases: The phases after it.
     """
@@ -81,7 +75,8 @@ def continue_seated(
         goal_acceleration=np.zeros(3),
         degree=trajectory.spline.degree,
         weights=WEIGHTS,
-        max_duration=LONGEST_SHARE * sum(phase.min_duration for phase in phases),
+        # Longest duration of the seated part, in sums of its shortest phases.
+        max_duration=2.0 * sum(phase.min_duration for phase in phases),
     )
     result = plan_com(problem)
     if result.trajectory is None:

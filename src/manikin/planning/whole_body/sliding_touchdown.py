@@ -24,9 +24,6 @@ Ignored = frozenset[tuple[str, str]]
 SITTING_DOWN = 0.15
 """Time before a seat is touched in which the trunk may come close to it [s]."""
 
-_BLEND = 3.0e-3
-"""Difference of two distances at which the farther shape matters little [m]."""
-
 _REACH = 0.1
 """Distances beyond this are not measured [m]."""
 
@@ -72,7 +69,8 @@ class SlidingTouchdown:
         sample, distance = found.sample[rows], found.distance[rows]
         least = np.full(len(self.near), np.inf)
         np.minimum.at(least, sample, distance)
-        share = np.exp((least[sample] - distance) / _BLEND)
+        # Difference of two distances at which the farther shape matters little [m].
+        share = np.exp((least[sample] - distance) / 3.0e-3)
         total = np.zeros(len(self.near))
         np.add.at(total, sample, share)
         touching = np.where(self.sliding[sample], np.sqrt(share / total[sample]), 0.0)
@@ -87,9 +85,6 @@ def sliding_touchdown_at(
     """What is met at speed, from shortly before the touch until it has settled.
 
     Args:
-        body: The body.
-        scene: The obstacles.
-        schedule: Contacts in time.
         time: (n,) [s].
 
     Returns:
@@ -114,7 +109,6 @@ def sliding_touchdown_errors(
     """(n,) depth of what meets at speed in its surface, or its distance where it should touch [m].
 
     Args:
-        proximity: Distances to the scene.
         meeting: What is met, at the samples of the motion.
         motion: The planned motion, with n samples.
     """

@@ -8,13 +8,13 @@ clearance, the control points of the best one are moved by sequential quadratic 
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-import daqp
 import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.errors import InputError
+from manikin.numerics.qp import solve_qp
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.planning.whole_body.swing_curve import (
     RESTING,
@@ -25,19 +25,6 @@ from manikin.planning.whole_body.swing_curve import (
     jerk_energy,
 )
 from manikin.planning.whole_body.swing_path import Pose
-
-__all__ = [
-    "Clearance",
-    "SwingCheck",
-    "SwingCurve",
-    "SwingLimits",
-    "SwingPlan",
-    "SwingState",
-    "check_swing",
-    "plan_swing",
-    "required_clearance",
-]
-
 
 Clearance = Callable[[float, Pose], float]
 """Signed distance [m] of an effector at a pose and a time [s] to everything it must not touch."""
@@ -50,9 +37,6 @@ LATERALS = (0.0, 0.10, -0.10, 0.20, -0.20)
 
 APEXES = (0.5, 0.4, 0.6)
 """Shares of the duration at which the apex is passed that are tried."""
-
-COARSE = 13
-"""Instants at which a curve of the family is looked at before it is checked densely."""
 
 
 @dataclass(frozen=True)
@@ -117,14 +101,11 @@ class SwingPlan:
         curve: The curve found, or the best attempt when none keeps the limits.
         check: How it stands against the limits.
         candidates: Curves of the family that were tried.
-        refinements: Iterations of the optimisation.
     """
 
     curve: SwingCurve
     check: SwingCheck
     candidates: int = 0
-    refinements: int = 0
-    limits: SwingLimits = field(default_factory=SwingLimits)
 
     @property
     def succeeded(self) -> bool:
@@ -155,12 +136,9 @@ def plan_swing(
     """Find a smooth flight from ``start`` to ``goal`` that keeps clear.
 
     Args:
-        start: Pose at lift-off.
-        goal: Pose at touch-down.
         start_time: Lift-off [s].
         end_time: Touch-down [s].
         clearance: Signed distance of the effector at a time and pose [m].
-        limits: What to keep.
         start_normal: (3,) normal of the surface that is left.
         end_normal: (3,) normal of the surface that is reached.
         pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
@@ -189,8 +167,7 @@ def plan_swing(
         for height, lateral, apex in _choices(heights)
     )  # fmt: skip
     best, best_check, tried = _first_clear(family, clearance, limits)
-    best, best_check, iterations = _refine(best, best_check, clearance, limits, normals, refine)
-    return SwingPlan(best, best_check, tried, iterations, limits)
+    return SwingPlan(*_refine(best, best_check, clearance, limits, normals, refine), tried)
 
 
 def check_swing(
@@ -199,9 +176,7 @@ def check_swing(
     """Measure a curve against its limits, densely in time.
 
     Args:
-        curve: The flight.
         clearance: Signed distance of the effector at a time and pose [m].
-        limits: What to keep.
         instants: How many instants to look at; every ``limits.time_step`` when omitted.
     """
     state = curve.evaluate(_instants(curve, limits, instants))
@@ -219,23 +194,11 @@ def check_swing(
             f"[{place}]; required {required[worst]:.4f} m"
         )
     else:
-        failure = _hurry(curve, limits)
+        failure = curve.haste(limits.speed, limits.angular_speed)
     return SwingCheck(
         float(slack[worst - 1]), float(state.time[worst]), smallest,
         curve.peak_speed, curve.peak_angular_speed, failure,
     )  # fmt: skip
-
-
-def _hurry(curve: SwingCurve, limits: SwingLimits) -> str | None:
-    """Which speed is above its limit, if one is."""
-    if curve.peak_speed > limits.speed:
-        return f"speed reaches {curve.peak_speed:.2f} m/s; limit {limits.speed:.2f} m/s"
-    if curve.peak_angular_speed > limits.angular_speed:
-        return (
-            f"angular speed reaches {curve.peak_angular_speed:.2f} rad/s; "
-            f"limit {limits.angular_speed:.2f} rad/s"
-        )
-    return None
 
 
 def _first_clear(
@@ -247,11 +210,12 @@ def _first_clear(
     it. Instants at which curves were given up are looked at first.
     """
     best, least, tried = None, -np.inf, 0
-    coarse, dense = _Slack(clearance, limits, COARSE), _Slack(clearance, limits)
+    # Instants at which a curve of the family is looked at before it is checked densely.
+    coarse, dense = _Slack(clearance, limits, 13), _Slack(clearance, limits)
     for curve in family:
         tried += 1
         slack = coarse.least(curve, least)
-        if slack >= -TOLERANCE and _hurry(curve, limits) is None:
+        if slack >= -TOLERANCE and curve.haste(limits.speed, limits.angular_speed) is None:
             slack = dense.least(curve, least)
             if slack >= -TOLERANCE:
                 return curve, check_swing(curve, clearance, limits), tried
@@ -266,7 +230,6 @@ class _Slack:
 
     Args:
         clearance: Signed distance of the effector at a time and pose [m].
-        limits: What to keep.
         count: Of the instants; every ``limits.time_step`` when omitted.
     """
 
@@ -343,13 +306,11 @@ def _refine(
     limits: SwingLimits,
     normals: tuple[FloatArray, FloatArray],
     iterations: int,
-) -> tuple[SwingCurve, SwingCheck, int]:
+) -> tuple[SwingCurve, SwingCheck]:
     """Move the control points until the curve keeps clear, at the least squared jerk."""
     n = len(best.control_position)
-    free = _free_directions(normals, n)
-    curve, done = best, 0
-    while done < iterations:
-        done += 1
+    free, curve = _free_directions(normals, n), best
+    for _ in range(iterations):
         step = _best_step(curve, clearance, limits, free)
         moved = curve.control_position + (free @ step).reshape(n, 3)
         curve = SwingCurve(curve.start_time, curve.end_time, moved, curve.control_rotation)
@@ -358,7 +319,7 @@ def _refine(
             best, best_check = curve, check
         if np.abs(step).max() < (SETTLED if check.kept else STATIONARY):
             break
-    return best, best_check, done
+    return best, best_check
 
 
 def _rank(curve: SwingCurve, check: SwingCheck) -> tuple[bool, float]:
@@ -378,14 +339,8 @@ def _free_directions(normals: tuple[FloatArray, FloatArray], n: int) -> FloatArr
     return np.hstack(columns)
 
 
-UNIT_JERK = 720.0
-"""Least integral of squared jerk of a rest-to-rest flight of 1 m in 1 s: the unit of effort."""
-
 TRUST = 0.05
 """Largest change of a control coordinate in one iteration [m]."""
-
-ROW_STEP = 0.012
-"""Spacing of the instants at which the optimisation linearises the distances [s]."""
 
 SETTLED = 0.004
 """Change of the control coordinates below which the optimisation stops [m]."""
@@ -401,9 +356,10 @@ BUFFER = 0.003
 
 
 def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, free: FloatArray) -> FloatArray:
-    """One quadratic programme: least squared jerk under linearised distances and speeds."""
+    """One quadratic program: least squared jerk under linearised distances and speeds."""
     n = len(curve.control_position)
-    energy = block_rows(jerk_energy(n) / UNIT_JERK)
+    # Least integral of squared jerk of a rest-to-rest flight of 1 m in 1 s: the unit of effort.
+    energy = block_rows(jerk_energy(n) / 720.0)
     distance_rows, distance_lower = _distance_rows(curve, clearance, limits)
     speed_rows, speed_lower = _speed_rows(curve, limits)
     rows = np.vstack([distance_rows, speed_rows]) @ free
@@ -415,24 +371,17 @@ def _best_step(curve: SwingCurve, clearance: Clearance, limits: SwingLimits, fre
     hessian[count, count] = 1.0
     gradient = np.concatenate([free.T @ (energy @ curve.control_position.ravel()), [1e3]])
     matrix = np.hstack([rows, np.ones((len(rows), 1))])
-    bounds_upper = np.concatenate([np.full(count, TRUST), [1e3]])
-    bounds_lower = np.concatenate([np.full(count, -TRUST), [0.0]])
-    solution, _, flag, _ = daqp.solve(
-        np.ascontiguousarray(hessian),
-        gradient,
-        np.ascontiguousarray(matrix),
-        np.concatenate([bounds_upper, np.full(len(rows), 1e30)]),
-        np.concatenate([bounds_lower, lower]),
-        np.zeros(count + 1 + len(rows), dtype=np.int32),
-    )
-    return np.asarray(solution[:count]) if flag > 0 else np.zeros(count)
+    bounds = np.append(np.full(count, -TRUST), 0.0), np.append(np.full(count, TRUST), 1e3)
+    solution = solve_qp(hessian, gradient, matrix, lower, None, bounds)
+    return solution.x[:count] if solution.solved else np.zeros(count)
 
 
 def _distance_rows(
     curve: SwingCurve, clearance: Clearance, limits: SwingLimits
 ) -> tuple[FloatArray, FloatArray]:
     """Rows G and bounds l of ``G dx >= l`` from the distances near the required ones."""
-    state = curve.evaluate(_instants(curve, limits, max(33, int(curve.duration / ROW_STEP))))
+    # Spacing of the instants at which the optimisation linearises the distances [s].
+    state = curve.evaluate(_instants(curve, limits, max(33, int(curve.duration / 0.012))))
     distance = _distances(state, clearance)
     required = _required(curve, state, (float(distance[0]), float(distance[-1])), limits)
     weights = basis((state.time - curve.start_time) / curve.duration, len(curve.control_position))

@@ -103,8 +103,6 @@ class SwingCurve:
         The rotation follows the shortest turn with the timing of a straight flight.
 
         Args:
-            start: Pose at lift-off.
-            goal: Pose at touch-down.
             start_time: Lift-off [s].
             end_time: Touch-down [s].
             via: Points to pass: share of the duration in (0, 1) and (3,) position [m].
@@ -148,8 +146,6 @@ class SwingCurve:
         """Curve over one apex.
 
         Args:
-            start: Pose at lift-off.
-            goal: Pose at touch-down.
             start_time: Lift-off [s].
             end_time: Touch-down [s].
             height: Of the apex above the higher end, along the mean normal [m].
@@ -247,6 +243,16 @@ class SwingCurve:
     def peak_angular_speed(self) -> float:
         """Largest angular speed [rad/s], sampled at 1 % of the flight."""
         return float(np.linalg.norm(self._dense.angular_velocity, axis=1).max())
+
+    def haste(self, speed: float, angular_speed: float) -> str | None:
+        """Which peak speed is above its limit [m/s, rad/s], or None."""
+        if self.peak_speed > speed:
+            return f"speed reaches {self.peak_speed:.2f} m/s; limit {speed:.2f} m/s"
+        if self.peak_angular_speed > angular_speed:
+            return (
+                f"angular speed reaches {self.peak_angular_speed:.2f} rad/s; limit {angular_speed:.2f} rad/s"
+            )
+        return None
 
     @cached_property
     def peak_acceleration(self) -> float:

@@ -1,10 +1,8 @@
-"""A path of one effector in configuration-time space: a polyline of timed poses.
+"""Poses of one flying effector in time, and its distance from the scene and the standing limbs.
 
-Also here. How far a flying effector is from the scene and from the limbs that stand.
-
-Used while the rest of the posture is still unknown: the effector's own segments are exact, a
-standing limb is its end segments at their contact and its next segment pointing towards the
-centre of mass.
+A path is a polyline of timed poses.  Distances are measured while the rest of the posture is still
+unknown: the effector's own segments are exact, a standing limb is its end segments at their contact and
+its next segment pointing towards the centre of mass.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from manikin.body import BodyModel
+from manikin.body import BodyModel, Configuration
 from manikin.body.limbs import hanging_segment
 from manikin.body.segments import Segment
 from manikin.contact import Contact
@@ -42,6 +40,17 @@ class Pose(NamedTuple):
 
     position: FloatArray
     rotation: FloatArray
+
+    @classmethod
+    def of(cls, contact: Contact) -> "Pose":
+        """Placement of an effector in contact."""
+        return cls(contact.position, contact.rotation_contact_to_world)
+
+    @classmethod
+    def in_posture(cls, body: BodyModel, q: FloatArray, effector: str) -> "Pose":
+        """Placement of an effector in a posture (nq,)."""
+        rotation, position = Configuration(body, q).effector_placement(effector)
+        return cls(np.array(position), np.array(rotation))
 
 
 def make_pose(position: ArrayLike, rotation: ArrayLike | None = None, name: str = "pose") -> Pose:
@@ -161,15 +170,11 @@ Placed = tuple[Any, Any]
 _ENDLESS = 1.0e9
 """Half the extent of what has no end (a floor) [m]."""
 
-_LIMB_SHARE = 0.75
-"""Share of the standing limb's last long segment that is kept clear of."""
-
 
 class EffectorClearance:
     """Callable ``(time, pose) -> signed distance [m]`` for one flying effector.
 
     Args:
-        body: The body.
         scene: The obstacles, the floor included.
         effector: Name of the flying effector.
         standing: Contacts of the other effectors during the flight.
@@ -358,4 +363,5 @@ def _last_long_segment(body: BodyModel, contact: Contact) -> _StandingLimb | Non
         return None
     frame = body.effector(contact.effector)
     joint = contact.position - contact.rotation_contact_to_world @ frame.rotation.T @ frame.translation
-    return _StandingLimb(joint, max(radii), _LIMB_SHARE * length)
+    # Share of the standing limb's last long segment that is kept clear of.
+    return _StandingLimb(joint, max(radii), 0.75 * length)

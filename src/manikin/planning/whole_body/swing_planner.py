@@ -1,10 +1,9 @@
 """A curve for every flight of a motion: smooth curves first, the Bi-RRT where they fail.
 
-Also here. Postures inside the flights of effectors: along a curve that is clear, not swung around.
-
-The key postures of a contact plan lie at the changes of contact, at most with one between.  Joined by
-lines they drag an effector through what it leaves, reaches or passes, and an optimisation that pushes it
-out may as well swing the limb aside as bend it, or be caught on the wrong side.
+Key postures of a contact plan get further postures along such curves.  They lie at the changes of contact,
+at most with one between; joined by lines they drag an effector through what it leaves, reaches or passes,
+and an optimisation that pushes it out may as well swing the limb aside as bend it, or be caught on the
+wrong side.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,35 +34,11 @@ SHARES = (0.25, 0.5, 0.75)
 SAME_TIME = 0.01
 """A given posture this near to a new one is replaced by it [s]."""
 
-DEPARTURE = 0.1
-"""Distance that a given path has to gain per metre from a contact to count as clear."""
-
-LOOKS = 13
-"""Instants at which the given path is looked at: a flight that is clear already needs no curve."""
-
-TIME_STEP = 0.02
-"""Spacing of the instants at which a curve is checked [s]: it is a beginning, not the motion."""
-
-SEARCHES = 600
-"""Most random poses of a search for a way around."""
-
 ROOM = 0.01
 """Distance that such a way keeps in addition, so that rounding its corners stays clear [m]."""
 
-REFINEMENTS = 20
-"""Most steps by which a curve is improved."""
-
-TURN_WEIGHT = 0.3
-"""Weight of the effector's attitude on its curve, which is wished, not required [1/rad^2]."""
-
-COM_WEIGHT = 30.0
-"""Weight of a centre of mass between those at both ends [1/m^2]."""
-
 SETTINGS = SolverSettings(tolerance=1e-3, explain=False)
 """A flight without such a posture needs no reason, and a guess no exact contacts."""
-
-POSTURE_SHARE = 0.75
-"""Share of the wanted distance that such a posture keeps from everything that is not touched."""
 
 
 def with_mid_flights(
@@ -72,9 +47,6 @@ def with_mid_flights(
     """Add postures along a clear curve inside each flight from a contact to another one.
 
     Args:
-        body: The body.
-        scene: The obstacles and the floor.
-        schedule: Contacts in time.
         path: Key configurations at least at both ends of each flight.
         padded: Obstacles that any part of the body may lean on.
 
@@ -82,8 +54,8 @@ def with_mid_flights(
         The path with the postures that were found; a flight for which there is none stays as it is.
     """
     proximity, distance = Proximity(body, scene), RefineScales.of(body).safe_distance
-    limits = SwingLimits(clearance=distance, time_step=TIME_STEP)
-    leaning = frozenset((segment.name, name) for segment in body.segments for name in padded)
+    # Spacing of the instants at which a curve is checked [s]: it is a beginning, not the motion.
+    limits = SwingLimits(clearance=distance, time_step=0.02)
     keys = dict(zip(path.time.tolist(), path.q, strict=True))
     for swing in schedule.sequence.swings():
         if swing.start is None or swing.end is None or not hangs(body, swing.effector):
@@ -91,7 +63,7 @@ def with_mid_flights(
         curve = _curve(body, scene, schedule, path, swing, limits)
         if curve is None:
             continue
-        touched = leaning.union(
+        touched = leaning_pairs(body, padded).union(
             *(touch_pairs(body, scene, item) for item in standing_during(schedule, swing))
         )
         for share in SHARES:
@@ -100,9 +72,12 @@ def with_mid_flights(
             com = Configuration(body, guess).com
             problem = PostureProblem(
                 body, tuple(schedule.stance_at(time)),
-                {swing.effector: Placement(pose.position, pose.rotation, TURN_WEIGHT)},
-                com=np.array([com[0], com[1], np.nan]), com_weight=COM_WEIGHT,
-                proximity=proximity, clearance=POSTURE_SHARE * distance, ignore=touched, reference=guess,
+                {swing.effector: Placement(pose.position, pose.rotation, 0.3)},
+                # The effector's attitude and a centre of mass between those at both ends are wished, not
+                # required.
+                com=np.array([com[0], com[1], np.nan]), com_weight=30.0,
+                # Share of the wanted distance that the posture keeps from everything that is not touched.
+                proximity=proximity, clearance=0.75 * distance, ignore=touched, reference=guess,
             )  # fmt: skip
             found = generate_posture(problem, guess, settings=SETTINGS)
             if found.succeeded:
@@ -124,7 +99,8 @@ def _curve(
     assert swing.start is not None
     assert swing.end is not None
     start, end = schedule.swing_interval(swing)
-    times = np.linspace(start, end, LOOKS)
+    # A flight that is clear already at these instants needs no curve.
+    times = np.linspace(start, end, 13)
     given = path.at(times)
     coms = np.array([Configuration(body, q).com for q in given])
 
@@ -132,14 +108,15 @@ def _curve(
         return np.array([np.interp(time, times, column) for column in coms.T])
 
     clearance = EffectorClearance(body, scene, swing.effector, standing_during(schedule, swing), com)
-    first, last = (Pose(item.position, item.rotation_contact_to_world) for item in (swing.start, swing.end))
-    is_clear = ClearFlight(clearance, first, last, start, end, replace(limits, departure=DEPARTURE))
+    first, last = Pose.of(swing.start), Pose.of(swing.end)
+    # Distance that a given path has to gain per metre from a contact to count as clear.
+    is_clear = ClearFlight(clearance, first, last, start, end, replace(limits, departure=0.1))
     between = zip(times[1:-1].tolist(), given[1:-1], strict=True)
-    if all(is_clear(time, _mid_flights_pose(body, q, swing)) for time, q in between):
+    if all(is_clear(time, Pose.in_posture(body, q, swing.effector)) for time, q in between):
         return None
     plan = plan_swing(
         first, last, start, end, clearance, limits=limits,
-        start_normal=swing.start.normal, end_normal=swing.end.normal, refine=REFINEMENTS,
+        start_normal=swing.start.normal, end_normal=swing.end.normal,
     )  # fmt: skip
     return plan.curve if plan.succeeded else _searched(clearance, first, last, (start, end), limits)
 
@@ -157,35 +134,14 @@ def _searched(
 
         return feasible
 
-    found = search_swing(
-        first, last, *interval, check(0.0), np.random.default_rng(0), roomy=check(ROOM), iterations=SEARCHES
-    )
+    rng = np.random.default_rng(0)
+    found = search_swing(first, last, *interval, check(0.0), rng, roomy=check(ROOM), iterations=600)
     return found.curve
 
-
-def _mid_flights_pose(body: BodyModel, q: FloatArray, swing: Swing) -> Pose:
-    rotation, position = Configuration(body, q).effector_placement(swing.effector)
-    return Pose(np.array(position), np.array(rotation))
-
-
-LEVEL_BEHIND = 0.08
-"""A foot this far behind the centre of mass at lift-off is still swung level [m]."""
-
-PITCH_PER_METRE = 3.0
-"""Further behind than that, its toes are turned down by this much [rad/m]."""
-
-MOST_PITCH = 0.9
-"""Largest such turn [rad]."""
 
 REACHING_TIME = 0.7
 """A free hand begins to reach for its grasp this long before [s], and is put away as slowly."""
 
-
-ROLLING_CLEARANCE = 0.6
-"""Clearance of a rolling foot relative to that of a level one: people lift their toes by 1.5 cm."""
-
-ROLLING_DEPARTURE = 0.4
-"""Clearance it gains per metre, relative to that of a level one: it turns before it rises."""
 
 ROLLING_HEIGHTS = (0.02, 0.03, 0.04, 0.05, 0.06, 0.07, 0.08, *HEIGHTS[1:])
 """Apex heights of the point about which a rolling foot tilts: the ankle is lifted by the tilt already [m]."""
@@ -196,8 +152,6 @@ class PlannedSwing:
     """A flight and the curve found for it.
 
     Attributes:
-        swing: The flight.
-        curve: Its curve, or the best attempt.
         method: ``"smooth"``, ``"bi-rrt"``, or ``"reach"`` for an effector that is free at one end.
         failure: None, or what the best attempt does not keep.
         roll: How the foot pitches; the curve is then that of the point it tilts about.
@@ -219,9 +173,6 @@ class FlightPlanner:
     """Plans the flights of one motion.
 
     Args:
-        body: The body.
-        scene: The obstacles.
-        trajectory: Centre of mass and contacts in time.
         limits: What a smooth swing must keep.
         rng: Source of all randomness of the search.
         reference: (time) -> (nq,) preferred posture, for the posture checks.
@@ -260,7 +211,7 @@ class FlightPlanner:
         if roll is not None:
             return self._plan_rolling(swing, roll)
         plan = plan_swing(
-            _pose(swing.start), _pose(swing.end), start, end, self._clearance(swing), limits=self._limits,
+            Pose.of(swing.start), Pose.of(swing.end), start, end, self._clearance(swing), limits=self._limits,
             start_normal=swing.start.normal, end_normal=swing.end.normal, pitch=self._pitch(swing, start),
         )  # fmt: skip
         smooth = PlannedSwing(swing, plan.curve, "smooth", plan.failure)
@@ -280,7 +231,9 @@ class FlightPlanner:
         contact = swing.end or swing.start
         assert contact is not None
         first, last = (
-            self._free_pose(swing.effector, time) if held is None else _pose(held)
+            Pose.in_posture(self._body, self._reference(time), swing.effector)
+            if held is None
+            else Pose.of(held)
             for held, time in ((swing.start, start), (swing.end, end))
         )
         plan = plan_swing(
@@ -288,10 +241,6 @@ class FlightPlanner:
             start_normal=contact.normal, end_normal=contact.normal, refine=0,
         )  # fmt: skip
         return PlannedSwing(swing, plan.curve, "reach")
-
-    def _free_pose(self, effector: str, time: float) -> Pose:
-        rotation, position = Configuration(self._body, self._reference(time)).effector_placement(effector)
-        return Pose(np.array(position), np.array(rotation))
 
     def _plan_rolling(self, swing: Swing, roll: FootRoll) -> PlannedSwing:
         """Find a smooth curve of the point about which the foot tilts."""
@@ -311,8 +260,10 @@ class FlightPlanner:
         start, end = self.schedule.swing_interval(swing)
         limits = replace(
             self._limits,
-            clearance=ROLLING_CLEARANCE * self._limits.clearance,
-            departure=ROLLING_DEPARTURE * self._limits.departure,
+            # Relative to a level foot: people lift their toes by 1.5 cm, and the foot turns before it
+            # rises.
+            clearance=0.6 * self._limits.clearance,
+            departure=0.4 * self._limits.departure,
         )
         plan = plan_swing(
             *roll.pivots, start, end, clearance, limits=limits,
@@ -325,7 +276,7 @@ class FlightPlanner:
         assert swing.start is not None
         assert swing.end is not None
         start, end = self.schedule.swing_interval(swing)
-        ends = _pose(swing.start), _pose(swing.end)
+        ends = Pose.of(swing.start), Pose.of(swing.end)
         clearance = self._clearance(swing)
 
         def check(extra: float) -> PostureCheck:
@@ -350,7 +301,8 @@ class FlightPlanner:
         yaw = swing.start.yaw
         away = self._trajectory.position(lift_off) - swing.start.position
         behind = float(np.cos(yaw) * away[0] + np.sin(yaw) * away[1])
-        return float(np.clip(PITCH_PER_METRE * (behind - LEVEL_BEHIND), 0.0, MOST_PITCH))
+        # Toes turn down [rad/m] where the foot is further behind the centre of mass than 0.08 m.
+        return float(np.clip(3.0 * (behind - 0.08), 0.0, 0.9))
 
     def _clearance(self, swing: Swing, bend: Callable[[float], float] | None = None) -> EffectorClearance:
         return EffectorClearance(
@@ -389,11 +341,12 @@ def standing_during(schedule: ContactSchedule, swing: Swing) -> tuple[Contact, .
     return tuple(found.values())
 
 
+def leaning_pairs(body: BodyModel, padded: Sequence[str]) -> frozenset[tuple[str, str]]:
+    """Pairs of every segment with every obstacle that any part of the body may lean on."""
+    return frozenset((segment.name, name) for segment in body.segments for name in padded)
+
+
 def touch_pairs(body: BodyModel, scene: Scene, contact: Contact) -> frozenset[tuple[str, str]]:
     """Pairs of end segment and obstacle that a contact brings together."""
     obstacle = scene.touched_obstacle(contact, tolerance=0.02)
     return frozenset((segment, obstacle) for segment in end_segments(body, contact.effector))
-
-
-def _pose(contact: Contact) -> Pose:
-    return Pose(contact.position, contact.rotation_contact_to_world)

@@ -1,9 +1,7 @@
-"""The second way to move a flying effector: search, shorten, smooth ([Qiu2012]_ 6.2.3-6.2.5).
+"""Flights of an effector found by search, shortened and smoothed ([Qiu2012]_ 6.2.3-6.2.5).
 
 CHECK-PG asks two questions of a pose at an instant, the cheap one first: does the effector keep
 clear of everything, and does the posture generator find a whole-body posture with it there?
-
-Also here. Shorten a found path at random and turn it into a smooth swing ([Qiu2012]_ 6.2.5).
 """
 
 import itertools
@@ -94,7 +92,6 @@ def smooth_path(
     Args:
         path: Path to shorten; its nodes are taken to be feasible.
         feasible: CHECK-PG, as for the search.
-        rng: Source of all randomness.
         limits: Speed limits, metric and density of the checks, as for the search.
         hints: Hints at the nodes of the path, for warm starts.
         iterations: How many replacements are tried.
@@ -195,10 +192,9 @@ def _curve_failure(
     curve: SwingCurve, checker: EdgeChecker, limits: FlightLimits, hint: Any, time_step: float
 ) -> str | None:
     """What a curve does not keep, or None."""
-    if curve.peak_speed > limits.speed:
-        return f"speed reaches {curve.peak_speed:.2f} m/s; limit {limits.speed:.2f} m/s"
-    if curve.peak_angular_speed > limits.angular_speed:
-        return f"angular speed reaches {curve.peak_angular_speed:.2f} rad/s; limit {limits.angular_speed:.2f}"
+    haste = curve.haste(limits.speed, limits.angular_speed)
+    if haste is not None:
+        return haste
     count = max(2, int(np.ceil(curve.duration / time_step)))
     state = curve.evaluate(np.linspace(curve.start_time, curve.end_time, count + 1))
     for k, time in enumerate(state.time):
@@ -262,8 +258,6 @@ class ClearFlight:
 
     Args:
         clearance: Signed distance of the effector at a time and pose [m].
-        start: Pose at lift-off.
-        goal: Pose at touch-down.
         start_time: Lift-off [s].
         end_time: Touch-down [s].
         limits: Clearance in flight and how it is gained near the contacts.
@@ -300,7 +294,6 @@ class SwingSearch:
     Attributes:
         curve: A smooth curve with a posture at every checked instant, or None.
         path: The shortened path it follows, or None when no path was found.
-        statistics: What the search did.
         failure: None, or why there is no curve.
     """
 
@@ -313,10 +306,6 @@ class SwingSearch:
     def succeeded(self) -> bool:
         """Whether a curve was found."""
         return self.curve is not None
-
-
-PATH_SPEED_SHARE = 0.65
-"""Share of the speed limits left to the path: a flight from rest to rest is faster in its middle."""
 
 
 def search_swing(
@@ -337,12 +326,9 @@ def search_swing(
     """Search a path with the Bi-RRT, shorten it and turn it into a smooth swing.
 
     Args:
-        start: Pose at lift-off.
-        goal: Pose at touch-down.
         start_time: Lift-off [s].
         end_time: Touch-down [s].
         feasible: CHECK-PG for the curve.
-        rng: Source of all randomness.
         roomy: Stricter CHECK-PG for the path, so that rounding its corners stays feasible;
             ``feasible`` itself when omitted.
         limits: Speed limits of the curve, metric and density of the checks.
@@ -352,47 +338,20 @@ def search_swing(
         attempts: How many paths are searched when no smooth curve follows one.
     """
     limits = limits or FlightLimits()
-    slower = replace(
-        limits, speed=PATH_SPEED_SHARE * limits.speed, angular_speed=PATH_SPEED_SHARE * limits.angular_speed
-    )
-    result: SwingSearch | None = None
+    # Speeds left to the path: a flight from rest to rest is faster in its middle.
+    slower = replace(limits, speed=0.65 * limits.speed, angular_speed=0.65 * limits.angular_speed)
+    roomy = roomy or feasible
     for _ in range(max(1, attempts)):
-        result = _search_once(
-            start, goal, start_time, end_time, feasible, roomy or feasible, rng, limits, slower, zone,
-            iterations, shortcuts,
-        )  # fmt: skip
-        if result.succeeded or result.path is None:
-            break
-    assert result is not None  # there is at least one attempt
-    return result
-
-
-def _search_once(
-    start: Pose,
-    goal: Pose,
-    start_time: float,
-    end_time: float,
-    feasible: Feasible,
-    roomy: Feasible,
-    rng: np.random.Generator,
-    limits: FlightLimits,
-    slower: FlightLimits,
-    zone: SamplingZone | None,
-    iterations: int,
-    shortcuts: int,
-) -> SwingSearch:
-    found = plan_flight(
-        start, goal, start_time, end_time, roomy, rng, limits=slower, zone=zone, iterations=iterations
-    )
-    if found.path is None:
-        return SwingSearch(None, None, found.statistics, found.failure)
-    shorter = smooth_path(found.path, roomy, rng, limits=slower, hints=found.hints, iterations=shortcuts)
-    failure = None
-    for path in (shorter.path, found.path):
-        curve = smooth_curve(path, feasible, limits=limits, hint=found.hints[0])
-        if curve.curve is not None:
-            return SwingSearch(curve.curve, path, found.statistics)
-        failure = failure or curve.failure
-    return SwingSearch(
-        None, shorter.path, found.statistics, f"a path was found but no smooth curve: {failure}"
-    )
+        found = plan_flight(
+            start, goal, start_time, end_time, roomy, rng, limits=slower, zone=zone, iterations=iterations
+        )
+        if found.path is None:
+            return SwingSearch(None, None, found.statistics, found.failure)
+        shorter = smooth_path(found.path, roomy, rng, limits=slower, hints=found.hints, iterations=shortcuts)
+        curves = []
+        for path in (shorter.path, found.path):
+            curves.append(smooth_curve(path, feasible, limits=limits, hint=found.hints[0]))
+            if curves[-1].curve is not None:
+                return SwingSearch(curves[-1].curve, path, found.statistics)
+    failure = f"a path was found but no smooth curve: {curves[0].failure}"
+    return SwingSearch(None, shorter.path, found.statistics, failure)

@@ -1,0 +1,406 @@
+"""Certificates of whole-body motions: every quantity measured afresh on dense samples, beside its limit.
+
+Nothing here comes from the solver: placements, centre of mass, distances and dynamics are
+computed again from the samples of the finished motion, planned or refined.
+
+Feet and hands in flight begin and end at distance zero from their supports, which does not count as
+clearance; how deep they go into them is measured apart.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+import pinocchio as pin
+
+from manikin.balance import MotionMargin, WrenchPolytope, motion_margin
+from manikin.body import BodyModel
+from manikin.body.limbs import end_segments, hanging_segment
+from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.motion import Motion
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.com import CentroidalTrajectory
+from manikin.planning.whole_body.refine_measures import RefineObstacles
+from manikin.planning.whole_body.sliding_touchdown import Ignored, SlidingTouchdown, sliding_touchdown_errors
+from manikin.runtime.requirement import Requirement, RequirementTable, Sense, requirement_table
+from manikin.scene import Proximity
+from manikin.scene.distance import segment_of
+
+
+@dataclass(frozen=True)
+class WholeBodyRequirements:
+    """Limits that a whole-body motion must keep to count as a success, as far as it is measured.
+
+    Attributes:
+        support_error: Largest distance of an effector from its contact [m].
+        support_turn: Largest angle of a sole from its contact [rad].
+        meeting_error: Largest depth in its surface, or distance from it, of what is made at speed [m].
+        com_error: Largest distance of the centre of mass from its plan [m].
+        clearance: Least distance to obstacles and between body parts [m].
+        penetration: Largest depth of anything in anything but what it holds on to, flights included [m].
+        joint_limit: Largest violation of a joint range [rad].
+        velocity_share: Largest share of a joint's velocity limit.
+        missing_wrench: Largest part of the dynamics left without a contact force [N, N.m].
+        physics_violation: Largest wrench that no admissible contact force supplies [N].
+        margin: Least margin of the whole body's wrench, where the stance's wrenches fill a volume [N.m].
+        torque_share: Largest share of a joint's torque limit.
+    """
+
+    support_error: float = 1.0e-3
+    support_turn: float = 5.0e-3
+    meeting_error: float = 2.0e-3
+    com_error: float = 2.0e-3
+    clearance: float = 0.01
+    penetration: float = 1.0e-3
+    joint_limit: float = 1.0e-9
+    velocity_share: float = 1.0
+    missing_wrench: float = 1.0
+    physics_violation: float = 1.0
+    margin: float = 0.0
+    torque_share: float = 1.0
+
+
+@dataclass(frozen=True)
+class RefineRequirements(WholeBodyRequirements):
+    """The same of a refined motion, whose clearance includes flights away from their supports."""
+
+    clearance: float = 0.0
+
+
+QUANTITIES: Mapping[str, tuple[str, str, Sense, str]] = MappingProxyType(
+    {
+        "max_support_error_m": ("support error", "m", "<=", "support_error"),
+        "max_support_turn_rad": ("support turn", "rad", "<=", "support_turn"),
+        "max_meeting_error_m": (
+            "distance of a sliding contact from its surface", "m", "<=", "meeting_error",
+        ),
+        "max_com_error_m": ("centre-of-mass error", "m", "<=", "com_error"),
+        "min_clearance_m": ("clearance", "m", ">=", "clearance"),
+        "max_scuff_m": ("depth of a flight in what it leaves or reaches", "m", "<=", ""),
+        "max_penetration_m": ("penetration", "m", "<=", "penetration"),
+        "max_joint_limit_violation_rad": ("joint range violation", "rad", "<=", "joint_limit"),
+        "max_velocity_share": ("share of a velocity limit", "", "<=", "velocity_share"),
+        "max_missing_wrench": ("missing wrench", "N, N.m", "<=", "missing_wrench"),
+        "max_physics_violation": ("wrench without contact force", "N", "<=", "physics_violation"),
+        "min_margin": ("margin of the whole body", "N.m", ">=", "margin"),
+        "max_torque_share": ("share of a torque limit", "", "<=", "torque_share"),
+    }
+)  # fmt: skip
+"""Quantities of a certificate in the order in which they are reported: name, unit, sense of the limit, and
+the field of :class:`WholeBodyRequirements` that has it; none where nothing is required."""
+
+
+@dataclass(frozen=True)
+class WholeBodyFailure:
+    """Why no whole-body motion was found.
+
+    Attributes:
+        reason: What could not be met, in one line.
+        time: When [s].
+        where: The phase and what it stands on.
+    """
+
+    reason: str
+    time: float
+    where: str
+
+    @classmethod
+    def at(cls, schedule: ContactSchedule, time: float, reason: str) -> "WholeBodyFailure":
+        """Failure at a time [s], with the phase that lasts then."""
+        index = int(schedule.phase_at(time))
+        held = ", ".join(schedule.sequence[index].stance.effectors) or "no contact"
+        return cls(reason, time, f"phase {index} on {held}")
+
+
+@dataclass(frozen=True)
+class Impact:
+    """A contact that is made at speed.
+
+    Attributes:
+        effector: What touches down.
+        time_s: When [s].
+        torque_share: Largest share of a joint's torque limit in the :data:`IMPACT` after it.
+        joint: Name of that joint.
+        at_s: When that share is reached [s].
+    """
+
+    effector: str
+    time_s: float
+    torque_share: float
+    joint: str
+    at_s: float
+
+
+@dataclass(frozen=True)
+class MotionCertificate(RequirementTable):
+    """The worst value of every quantity of :data:`QUANTITIES` that was measured, beside its limit.
+
+    ``max_missing_wrench`` is the part of the dynamics that the planned contact forces leave,
+    ``max_physics_violation`` the wrench that no admissible force supplies, about the stance's mean contact
+    point with 1 m. ``min_margin`` is about the CoM, over the stances whose wrenches fill a volume, and
+    infinite without any.
+
+    Attributes:
+        closest_pair: Names of the shapes at the least clearance.
+        min_force_at_com_N: Smallest force at the CoM that would end balance; None where none does [N].
+        min_zmp_distance_m: Least distance of the ZMP to the edge of the support polygon, negative
+            outside; of the phases whose contacts lie in one plane, None without any [m].
+        impacts: Largest share of a torque limit just after each contact that is made at speed; they count in
+            ``max_torque_share`` like any other instant.
+    """
+
+    closest_pair: tuple[str, str]
+    min_force_at_com_N: float | None
+    min_zmp_distance_m: float | None
+    impacts: tuple[Impact, ...] = ()
+
+    @property
+    def required(self) -> RequirementTable:
+        """The quantities that have a limit here: margins on stances with a volume, contacts met at speed."""
+        return requirement_table(
+            row
+            for row in self
+            if not (row.key == "max_meeting_error_m" and row.measured == 0.0)
+            and not (row.key == "min_margin" and row.measured == np.inf)
+        )
+
+
+Worst = dict[str, tuple[float, float]]
+"""Worst value of each quantity and when it was measured [s], by key."""
+
+
+def certify(
+    body: BodyModel,
+    proximity: Proximity,
+    trajectory: CentroidalTrajectory,
+    motion: Motion,
+    ignored: tuple[Ignored, ...],
+    wrench: FloatArray,
+    meeting: SlidingTouchdown | None = None,
+    polytopes: Sequence[WrenchPolytope] | None = None,
+    requirements: WholeBodyRequirements | None = None,
+) -> MotionCertificate:
+    """Measure a motion against its contacts, centre of mass, limits and obstacles.
+
+    Args:
+        ignored: Pairs that may touch, per sample.
+        wrench: (n, 6) pseudo-wrench of the whole body about the world origin, per sample.
+        meeting: What is met at speed, at the motion's samples.
+        polytopes: Of the phases, where they are known.
+    """
+    schedule = trajectory.schedule
+    com = np.linalg.norm(motion.com - trajectory.position(motion.time), axis=1)
+    worst = _worst(motion, {
+        **_kinematic_series(body, schedule, motion),
+        "max_com_error_m": np.where(trajectory.binds(motion.time), com, 0.0),
+        "max_meeting_error_m": sliding_touchdown_errors(proximity, meeting, motion),
+        "max_missing_wrench": np.linalg.norm(motion.tau[:, :6], axis=1),
+    })  # fmt: skip
+    worst["max_scuff_m"] = deepest_penetration(body, proximity, schedule, motion, ignored)
+    stances = [phase.stance for phase in schedule.sequence]
+    phases = schedule.phase_at(motion.time)
+    balance = motion_margin(stances, phases, wrench, motion.com, polytopes=polytopes)
+    return _certificate(
+        body, proximity, schedule, motion, ignored, worst, balance, requirements or WholeBodyRequirements()
+    )
+
+
+def certify_refined(
+    body: BodyModel,
+    proximity: Proximity,
+    schedule: ContactSchedule,
+    obstacles: RefineObstacles,
+    motion: Motion,
+    violation: FloatArray,
+    balance: MotionMargin,
+    flat: Sequence[bool],
+    requirements: WholeBodyRequirements | None = None,
+) -> MotionCertificate:
+    """Measure a refined motion against its contacts, limits and obstacles.
+
+    Args:
+        obstacles: What may touch at the motion's samples.
+        violation: (n,) its physics violation [N].
+        flat: Of each phase, whether its stance's wrenches fill no volume: margins do not count there.
+    """
+    series = {**_kinematic_series(body, schedule, motion), "max_physics_violation": violation}
+    worst = _worst(motion, series)
+    without = np.array(flat)[schedule.phase_at(motion.time)]
+    margin = np.where(without, np.inf, motion.margin)
+    lowest = int(np.argmin(margin))
+    worst["min_margin"] = float(margin[lowest]), float(motion.time[lowest])
+    flying = proximity.minimum_over(motion.q, obstacles.touching(), tolerance=1e-5)
+    worst["max_penetration_m"] = max(0.0, -float(flying.distance)), float(motion.time[flying.sample])
+    balance = replace(balance, force=np.where(without, np.inf, balance.force))
+    return _certificate(
+        body, proximity, schedule, motion, obstacles.during_flights(), worst, balance,
+        requirements or RefineRequirements(),
+    )  # fmt: skip
+
+
+def _kinematic_series(body: BodyModel, schedule: ContactSchedule, motion: Motion) -> dict[str, FloatArray]:
+    """(n,) errors of contacts and use of the joints' ranges, speeds and torques."""
+    support, turn = support_errors(body, schedule, motion)
+    angles = motion.q[:, 7:]
+    return {
+        "max_support_error_m": support,
+        "max_support_turn_rad": turn,
+        "max_joint_limit_violation_rad": np.maximum(body.lower - angles, angles - body.upper).max(
+            axis=1, initial=0.0
+        ),
+        "max_velocity_share": (np.abs(motion.v[:, 6:]) / body.velocity_limit).max(axis=1, initial=0.0),
+        "max_torque_share": body.torque_share(motion.tau[:, 6:]).max(axis=1, initial=0.0),
+    }
+
+
+def _worst(motion: Motion, series: Mapping[str, FloatArray]) -> Worst:
+    return {
+        key: (float(values.max()), float(motion.time[int(np.argmax(values))]))
+        for key, values in series.items()
+    }
+
+
+def _certificate(
+    body: BodyModel,
+    proximity: Proximity,
+    schedule: ContactSchedule,
+    motion: Motion,
+    ignored: tuple[Ignored, ...],
+    worst: Worst,
+    balance: MotionMargin,
+    requirements: WholeBodyRequirements,
+) -> MotionCertificate:
+    """The table of what was measured, with the clearance and the impacts."""
+    closest = proximity.minimum_over(motion.q, ignored, tolerance=1e-5)
+    pair = closest.pair or ("", "")
+    worst["min_clearance_m"] = float(closest.distance), float(motion.time[closest.sample])
+    share = body.torque_share(motion.tau[:, 6:])
+    tightest = body.joint_names[int(np.argmax(share.max(axis=0)))]
+    where = {"min_clearance_m": " and ".join(pair), "max_torque_share": tightest}
+    rows = tuple(
+        Requirement(
+            key, name, unit, worst[key][0], sense, getattr(requirements, field) if field else np.inf,
+            worst[key][1], where.get(key, ""),
+        )
+        for key, (name, unit, sense, field) in QUANTITIES.items() if key in worst
+    )  # fmt: skip
+    return MotionCertificate(
+        rows, pair, balance.min_force, balance.min_zmp_distance,
+        _impacts(body, schedule, motion.time, share),
+    )  # fmt: skip
+
+
+IMPACT = 0.03
+"""Time after a touch-down at speed whose torques are listed as those of the impact [s]."""
+
+
+def _impacts(
+    body: BodyModel, schedule: ContactSchedule, time: FloatArray, share: FloatArray
+) -> tuple[Impact, ...]:
+    """Torques just after each contact that is made at speed, in time.
+
+    Args:
+        time: (n,) [s].
+        share: (n, nv - 6) shares of the torque limits.
+    """
+    found = []
+    for name in schedule.sequence.effectors:
+        settling = schedule.settling(time, name)
+        for first in np.flatnonzero(settling & ~np.append(False, settling[:-1])):
+            rows = np.arange(first, int(np.searchsorted(time, time[first] + IMPACT)))
+            sample, joint = np.unravel_index(int(np.argmax(share[rows])), share[rows].shape)
+            largest = float(share[rows][sample, joint])
+            at = float(time[rows[sample]])
+            found.append(Impact(name, float(time[first]), largest, body.joint_names[joint], at))
+    return tuple(sorted(found, key=lambda impact: impact.time_s))
+
+
+def support_errors(
+    body: BodyModel, schedule: ContactSchedule, motion: Motion
+) -> tuple[FloatArray, FloatArray]:
+    """(n,) largest position [m] and orientation [rad] error of the effectors in contact.
+
+    Of a contact that is still settling, what it is below its surface counts.
+    """
+    model, data = body.pinocchio, body.pinocchio.createData()
+    position, turn = np.zeros(len(motion.time)), np.zeros(len(motion.time))
+    phases = schedule.phase_at(motion.time)
+    settling = {name: schedule.settling(motion.time, name) for name in schedule.sequence.effectors}
+    for k, q in enumerate(motion.q):
+        pin.forwardKinematics(model, data, q)
+        pin.updateFramePlacements(model, data)
+        for contact in schedule.sequence[int(phases[k])].stance:
+            measure = _placement_error if contact.part is SolePart.FULL else _part_error
+            moved, turned = measure(body, data, contact)
+            if settling[contact.effector][k]:
+                place = data.oMf[body.effector_frame(contact.effector)].translation
+                moved, turned = -float(contact.normal @ (place - contact.position)), 0.0
+            position[k], turn[k] = max(position[k], moved), max(turn[k], turned)
+    return position, turn
+
+
+def _placement_error(body: BodyModel, data: pin.Data, contact: Contact) -> tuple[float, float]:
+    """Distance [m] and, of a sole, angle [rad] of an effector from its contact."""
+    placement = data.oMf[body.effector_frame(contact.effector)]
+    moved = float(np.linalg.norm(placement.translation - contact.position))
+    if contact.kind is not ContactKind.SOLE:
+        return moved, 0.0
+    return moved, float(np.linalg.norm(pin.log3(contact.rotation_contact_to_world.T @ placement.rotation)))
+
+
+def _part_error(body: BodyModel, data: pin.Data, contact: Contact) -> tuple[float, float]:
+    """Largest distance of a point of a part from where it touches [m]; tilts show in it too."""
+    effector = body.effector(contact.effector)
+    hanging = hanging_segment(body, effector.segment)
+    moved = 0.0
+    for local, wanted in zip(contact.points, contact.points_in_world, strict=True):
+        inside = effector.translation + effector.rotation @ local
+        segment = effector.segment
+        if contact.part is SolePart.TOES and hanging is not None:
+            segment, inside = hanging.name, inside - hanging.origin
+        actual = data.oMf[body.segment_frame(segment)].act(inside)
+        moved = max(moved, float(np.linalg.norm(actual - wanted)))
+    return moved, 0.0
+
+
+def deepest_penetration(
+    body: BodyModel,
+    proximity: Proximity,
+    schedule: ContactSchedule,
+    motion: Motion,
+    ignored: Sequence[Ignored],
+) -> tuple[float, float]:
+    """Measure every flight at every sample.
+
+    Args:
+        ignored: Pairs of segment and obstacle that may touch, per sample; what every segment may
+            touch is padded, and not measured.
+
+    Returns:
+        Largest depth [m], zero where nothing goes in, and its time [s].
+    """
+    deepest, worst = 0.0, float(motion.time[0])
+    for swing in schedule.sequence.swings():
+        start, end = schedule.swing_interval(swing)
+        rows = np.flatnonzero((motion.time >= start) & (motion.time < end))
+        ends = frozenset(end_segments(body, swing.effector))
+        obstacles = _supports(body, ends, [ignored[row] for row in rows.tolist()])
+        if not obstacles:
+            continue
+        others = frozenset(
+            (shape, other) for shape, other in proximity.pairs
+            if segment_of(shape) not in ends or segment_of(other) not in obstacles
+        )  # fmt: skip
+        found = proximity.minimum_over(motion.q[rows], others, tolerance=1e-5)
+        if -found.distance > deepest:
+            deepest, worst = -float(found.distance), float(motion.time[rows[found.sample]])
+    return deepest, worst
+
+
+def _supports(body: BodyModel, ends: frozenset[str], ignored: Sequence[Ignored]) -> frozenset[str]:
+    """Obstacles that the segments may touch at some time, those apart that every segment may touch."""
+    pairs = frozenset[tuple[str, str]]().union(*ignored)
+    near = {obstacle for segment, obstacle in pairs if segment in ends}
+    padded = {name for name in near if all((segment.name, name) in pairs for segment in body.segments)}
+    return frozenset(near - padded)

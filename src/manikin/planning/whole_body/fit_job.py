@@ -1,0 +1,283 @@
+"""The fit of one whole-body spline: knots, samples, repairs of what it misses, the better attempt.
+
+The motion along a planned centre of mass, the refinement of key configurations and the adaptation of a
+recording are three goals of the same job; each gives its objective, and the first two measure the result.
+"""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+
+from manikin.contact import ContactSchedule
+from manikin.motion import Motion
+from manikin.motion.configuration_spline import ConfigurationSpline
+from manikin.numerics.banded import SampledBasis
+from manikin.numerics.spatial import FloatArray
+from manikin.planning.whole_body.certificate import MotionCertificate
+from manikin.planning.whole_body.fit import DEGREE, FitResult, MotionFit, spline_through
+from manikin.planning.whole_body.fit_objective import MotionObjective
+from manikin.planning.whole_body.fit_scales import MotionScales
+
+CAUGHT = -0.02
+"""Below this clearance a part of the body is caught on the wrong side of another, and no small step leads
+out: the fit begins again from its first guess, with more weight on clearance [m]."""
+
+CLEARANCE = frozenset({"min_clearance_m"})
+"""Key of the clearance in a certificate."""
+
+STRONGER = 0.5
+"""Factor of the scales of what was missed."""
+
+NEARER = 0.75
+"""Factor of the wanted clearance where the required one is missed."""
+
+LEAST_SAFE_DISTANCE = 0.014
+"""Wanted clearance that this leaves [m]: more than the required one."""
+
+SUDDEN_KNOTS = np.array([-0.09, -0.06, -0.035, -0.015, 0.015, 0.035, 0.06, 0.09, 0.13])
+"""Further knots around a touch-down at speed, from it [s]."""
+
+CLOSEST_KNOTS = 4.0e-3
+"""Knots closer than this are one [s]."""
+
+NEAR_INSTANT = 0.1
+"""Distance from a key instant up to which refined knots lie closer [s]."""
+
+S = TypeVar("S", bound=MotionScales)
+
+
+Progress = Callable[[float], None]
+"""Takes the share of the work that is done, in [0, 1]."""
+
+
+def no_progress(share: float) -> None:
+    """Ignore the share of the work that is done."""
+    del share
+
+
+class FitGoal(Protocol):
+    """What a spline is fitted to."""
+
+    @property
+    def schedule(self) -> ContactSchedule:
+        """Contacts in time."""
+        ...
+
+    def objective(self, time: FloatArray, basis: SampledBasis, scales: MotionScales) -> MotionObjective:
+        """Residuals at times (n,) [s] of a spline with this basis there."""
+        ...
+
+
+class MeasuredGoal(FitGoal, Protocol):
+    """What a spline is fitted to and measured against."""
+
+    def measure(self, spline: ConfigurationSpline) -> tuple[Motion, MotionCertificate]:
+        """Dense samples of a motion, and what was measured on them."""
+        ...
+
+
+G = TypeVar("G", bound=MeasuredGoal)
+
+
+@dataclass(frozen=True, eq=False)
+class FitAttempt(Generic[G]):
+    """One fit with its measured motion.
+
+    Attributes:
+        fine: How often the knots near the key instants were doubled.
+        continued: Whether it went on from an earlier spline.
+        fit: The solver, with its multipliers and damping.
+        motion: Dense samples.
+        certificate: Measured on them, beside its limits.
+    """
+
+    goal: G
+    scales: MotionScales
+    fine: int
+    continued: bool
+    fit: MotionFit
+    result: FitResult
+    motion: Motion
+    certificate: MotionCertificate
+
+    @property
+    def broken(self) -> frozenset[str]:
+        """Keys of the requirements that do not hold."""
+        return self.certificate.broken
+
+    @property
+    def is_caught(self) -> bool:
+        """Whether a part of the body is on the wrong side of another or of an obstacle."""
+        return self.certificate.value("min_clearance_m") < CAUGHT
+
+
+@dataclass(eq=False)
+class FitJob:
+    """Fits splines to goals, repairs what they miss and chooses the better attempt.
+
+    Attributes:
+        knot_spacing: Largest distance of the spline's knots [s].
+        samples_per_span: Samples between two knots.
+        sudden: Whether knots lie closer around touch-downs at speed.
+        penalties: Names of the scales that decide each residual, by the residual's key.
+        patience: Relative decrease of the objective below which a repair stops.
+        by_count: Whether the attempt that breaks the fewest requirements is the better one, of two alike the
+            later, and is gone on from; else only a success replaces the first attempt.
+        rescaled: Whether multipliers keep their forces when a repair changes the scales.
+        iterations: Gauss-Newton steps of all fits so far.
+    """
+
+    knot_spacing: float
+    samples_per_span: int = 3
+    sudden: bool = False
+    penalties: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    patience: float = 0.0
+    by_count: bool = False
+    rescaled: bool = False
+    iterations: int = 0
+
+    def knots(self, schedule: ContactSchedule, fine: int = 0) -> FloatArray:
+        """Clamped knots [s] for contacts in time, those near the key instants doubled ``fine`` times."""
+        sudden = touch_downs_at_speed(schedule) if self.sudden else ()
+        knots = phase_knots(schedule.instants, self.knot_spacing, sudden)
+        for _ in range(fine):
+            knots = refined(knots, schedule.instants)
+        return knots
+
+    def samples(self, knots: FloatArray) -> tuple[FloatArray, SampledBasis]:
+        """Times (n,) [s] at which residuals count, and the basis of a spline there."""
+        time = sample_times(knots, self.samples_per_span)
+        return time, SampledBasis.at(time, knots, DEGREE)
+
+    def solve(
+        self, goal: FitGoal, scales: MotionScales, fine: int = 0, near: ConfigurationSpline | None = None
+    ) -> tuple[MotionFit, FitResult]:
+        """Fit a spline, from the objective's reference or from an earlier spline."""
+        knots = self.knots(goal.schedule, fine)
+        time, basis = self.samples(knots)
+        objective = goal.objective(time, basis, scales)
+        fit = MotionFit(objective, knots, scales)
+        guess = objective.targets.reference if near is None else near.evaluate(time).q
+        start = spline_through(guess, basis, knots)
+        return fit, fit.solve(start) if near is None else fit.improve(start, scales)
+
+    def attempt(
+        self, goal: G, scales: MotionScales, fine: int = 0, near: ConfigurationSpline | None = None
+    ) -> FitAttempt[G]:
+        """Fit a spline as :meth:`solve` does, and measure it."""
+        return self._measured(goal, scales, fine, near is not None, *self.solve(goal, scales, fine, near))
+
+    def restart(self, last: FitAttempt[G], fine: int = 0) -> FitAttempt[G]:
+        """Begin again from the first guess, with more weight on clearance."""
+        return self.attempt(last.goal, self.updated(last.scales, last.broken & CLEARANCE), fine)
+
+    def improve(self, last: FitAttempt[G], scales: MotionScales) -> FitAttempt[G]:
+        """Go on with other scales on the same knots."""
+        if self.rescaled:
+            last.fit.rescale(scales)
+        result = last.fit.improve(last.result.spline, scales)
+        return self._measured(last.goal, scales, last.fine, True, last.fit, result)
+
+    def repair(
+        self, first: FitAttempt[G], remedy: Callable[[int, FitAttempt[G]], FitAttempt[G]], most: int
+    ) -> FitAttempt[G]:
+        """Repeat a remedy until every requirement is kept.
+
+        Args:
+            first: The attempt that may break requirements.
+            remedy: Makes the next attempt from the number of remedies tried and the last attempt.
+            most: Most remedies.
+
+        Returns:
+            The best attempt, with the scales and the fineness of the last one.
+        """
+        best = last = first
+        for number in range(most):
+            if not last.broken:
+                break
+            last = remedy(number, last)
+            best = self.better(best, last)
+            same = best.goal.schedule.sequence is last.goal.schedule.sequence
+            if self.by_count and last.continued and best is not last and same:
+                last = replace(best, scales=last.scales, fine=last.fine)
+        return replace(best, scales=last.scales, fine=last.fine)
+
+    def better(self, first: FitAttempt[G], second: FitAttempt[G]) -> FitAttempt[G]:
+        """The better of two attempts, see :attr:`by_count`."""
+        if self.by_count:
+            return first if len(first.broken) < len(second.broken) else second
+        return second if first.broken and not second.broken else first
+
+    def updated(self, scales: S, broken: frozenset[str], narrow: bool = False) -> S:
+        """Scales at which broken requirements weigh more.
+
+        Args:
+            scales: Those of the fit before.
+            broken: Keys of the certificate.
+            narrow: Whether to count on less room where clearance is missed.
+        """
+        if narrow and broken & CLEARANCE:  # What is far enough no longer pushes.
+            safe = max(NEARER * scales.safe_distance, LEAST_SAFE_DISTANCE)
+            scales = replace(scales, safe_distance=safe, softness=NEARER * scales.softness)
+        names = {name for key in broken for name in self.penalties.get(key, ())}
+        smaller = {name: STRONGER * getattr(scales, name) for name in sorted(names)}
+        return replace(scales, **smaller, decrease=self.patience)
+
+    def _measured(
+        self, goal: G, scales: MotionScales, fine: int, continued: bool, fit: MotionFit, result: FitResult
+    ) -> FitAttempt[G]:
+        self.iterations += result.iterations
+        return FitAttempt(goal, scales, fine, continued, fit, result, *goal.measure(result.spline))
+
+
+def touch_downs_at_speed(schedule: ContactSchedule) -> FloatArray:
+    """(k,) times at which a contact is made that still has to settle [s]."""
+    times = [
+        float(start)
+        for number, (phase, start) in enumerate(zip(schedule.sequence, schedule.instants, strict=False))
+        if any(
+            item.settle > 0.0 and (number == 0 or item.effector not in schedule.sequence[number - 1].stance)
+            for item in phase.stance
+        )
+    ]
+    return np.array(times)
+
+
+def phase_knots(
+    instants: FloatArray, spacing: float, sudden: FloatArray | Sequence[float] = ()
+) -> FloatArray:
+    """Clamped knots with every key instant among them and at most ``spacing`` apart [s].
+
+    Args:
+        instants: (phases + 1,) key instants [s].
+        spacing: Largest distance of two knots [s].
+        sudden: Times around which the knots lie closer, because the motion changes suddenly [s].
+    """
+    fine = np.concatenate([np.zeros(0), *(time + SUDDEN_KNOTS for time in sudden)])
+    breaks = np.unique(np.concatenate([instants, fine[(fine > instants[0]) & (fine < instants[-1])]]))
+    breaks = breaks[np.append(True, np.diff(breaks) > CLOSEST_KNOTS)]
+    inner: list[float] = []
+    for start, end in itertools.pairwise(breaks):
+        count = max(1, int(np.ceil((end - start) / spacing)))
+        inner.extend(np.linspace(start, end, count, endpoint=False))
+    ends = np.full(DEGREE, instants[0]), np.full(DEGREE + 1, instants[-1])
+    return np.concatenate([ends[0], inner, ends[1]])
+
+
+def refined(knots: FloatArray, instants: FloatArray, within: float = NEAR_INSTANT) -> FloatArray:
+    """Clamped knots [s] with every span split in two whose middle is near a key instant, ``within`` [s]."""
+    breaks = np.unique(knots)
+    middle = 0.5 * (breaks[:-1] + breaks[1:])
+    near = np.abs(middle[:, None] - instants).min(axis=1) < within
+    inner = np.sort(np.concatenate([breaks, middle[near & (np.diff(breaks) > 2.0 * CLOSEST_KNOTS)]]))
+    return np.concatenate([np.full(DEGREE, breaks[0]), inner, np.full(DEGREE, breaks[-1])])
+
+
+def sample_times(knots: FloatArray, per_span: int) -> FloatArray:
+    """Times that split every knot span into ``per_span`` equal parts, both ends included [s]."""
+    breaks = np.unique(knots)
+    spans = [np.linspace(a, b, per_span, endpoint=False) for a, b in itertools.pairwise(breaks)]
+    return np.append(np.concatenate(spans), breaks[-1])
