@@ -66,8 +66,6 @@ def crop(
     """Cut a reconstruction and its supports, so that the first instant left is 0 on both clocks.
 
     Args:
-        found: The postures.
-        supports: Found from all of them.
         start: On the clock of the supports [s].
         end: The last instant left [s].
 
@@ -130,7 +128,6 @@ def plan_recorded_com(
         mass: [kg].
         recording: Samples, key frames and stances.
         velocity: (2, 3) of the recorded centre of mass at both ends, kept by the timing-free method [m/s].
-        method: See :data:`Method`.
         required_margin: To keep all along [N.m].
     """
     if method == "keyframes":
@@ -200,13 +197,10 @@ class Replan:
 
     Attributes:
         method: Of the centre of mass.
-        body: Who moves.
         scene: A floor, and blocks under what stands or sits higher.
         recording: The recorded centre of mass on the stances.
         recorded: The recorded motion, smoothed, its time 0 at the first instant.
-        com: The planned centre of mass.
         adapted: The recorded postures on the planned centre of mass.
-        execution: In the physics engine.
     """
 
     method: Method
@@ -310,8 +304,6 @@ def adapt_recording(
 
     Args:
         found: The postures, not yet smoothed.
-        supports: Found from them.
-        method: How the centre of mass is planned.
         execute: Whether the recorded postures are adapted to the plan and executed.
         rolling: Whether a foot may stand on its toes alone; without, it stands on its whole sole.
         required_margin: Of the planned point mass, to keep all along [N.m].

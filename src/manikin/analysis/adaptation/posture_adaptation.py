@@ -65,7 +65,6 @@ class AdaptedMotion:
 
     Attributes:
         motion: Every millisecond, with forces, torques and whole-body margin.
-        certificate: Measured on its samples.
         posture_rms: Root mean square deviation of all joints from the recorded postures [rad]; without
             toes, which lie flat and which no marker told.
     """
@@ -86,7 +85,6 @@ def adapt_postures(
     """Fit one smooth motion to contacts and centre of mass that stays near recorded postures.
 
     Args:
-        trajectory: Centre of mass with the contacts.
         recorded: (n,) instants [s] and (n, nq) postures.
         clock: (k,) key instants of the trajectory and the recorded instants that they stand for [s].
     """
@@ -157,11 +155,9 @@ class _Task:
     """Recorded postures and the contacts to put them on, at the samples of a spline.
 
     Attributes:
-        job: Knots and samples of the spline.
         time: (n,) samples [s].
         reference: (n, nq) recorded postures, with the toes that the contacts need.
         scale: (n, nv) deviation from them that costs one unit [rad].
-        paths: What effectors and toes do.
         ignored: Pairs that may touch, per sample.
     """
 

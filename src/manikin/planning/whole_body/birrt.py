@@ -117,9 +117,7 @@ class BiRrtResult:
     """Path found, or why none was.
 
     Attributes:
-        path: Timed poses from start to goal, or None.
         hints: What the feasibility check returned at each node of the path.
-        failure: None, or the reason.
     """
 
     path: EffectorPath | None

@@ -118,10 +118,8 @@ class Impact:
     """A contact that is made at speed.
 
     Attributes:
-        effector: What touches down.
         time_s: When [s].
         torque_share: Largest share of a joint's torque limit in the :data:`IMPACT` after it.
-        joint: Name of that joint.
         at_s: When that share is reached [s].
     """
 

@@ -90,7 +90,6 @@ class FitAttempt(Generic[G]):
         fine: How often the knots near the key instants were doubled.
         continued: Whether it went on from an earlier spline.
         fit: The solver, with its multipliers and damping.
-        motion: Dense samples.
         certificate: Measured on them, beside its limits.
     """
 
@@ -120,7 +119,6 @@ class FitJob:
 
     Attributes:
         knot_spacing: Largest distance of the spline's knots [s].
-        samples_per_span: Samples between two knots.
         sudden: Whether knots lie closer around touch-downs at speed.
         penalties: Names of the scales that decide each residual, by the residual's key.
         patience: Relative decrease of the objective below which a repair stops.

@@ -85,11 +85,7 @@ class KeyPosture:
 
 @dataclass(frozen=True, eq=False)
 class KeyPostures:
-    """Postures at the key instants of a plan.
-
-    Attributes:
-        postures: In order of time.
-    """
+    """Postures at the key instants of a plan, in order of time."""
 
     postures: tuple[KeyPosture, ...]
 
@@ -136,7 +132,6 @@ def find_key_postures(
     """Look for a posture at every key instant until which the trajectory binds.
 
     Args:
-        trajectory: Planned centre of mass with its contacts in time.
         manner: How the body carries itself where the task leaves freedom.
         requirements: What the finished motion must keep; the clearance is asked of the postures.
         range_margin: Angle that the postures keep from the ends of the hinge ranges [rad].
@@ -342,7 +337,6 @@ class IneligiblePlan:
 
     Attributes:
         stage: ``"wholebody"``, or ``"centroidal"`` when no plan keeps the tightened constraints.
-        reason: In one line.
         posture: The first key posture that fails.
     """
 
@@ -377,8 +371,6 @@ def find_eligible_plan(
 
     Args:
         first: A plan that succeeded.
-        realise: Completes a plan.
-        look: Finds key postures.
         replan: Whether its problem may be solved again; a recorded centre of mass is what it is.
     """
     plan, replans = first, 0
@@ -408,9 +400,6 @@ def tighten(problem: CentroidalProblem, failed: tuple[KeyPosture, ...]) -> Centr
 
     It cannot where there is no posture with any centre of mass, nor at the start and the goal,
     where the centre of mass is given.
-
-    Args:
-        failed: Key postures that were not found.
     """
     planes = []
     for posture in failed:

@@ -97,10 +97,7 @@ class RefineSettings:
 
     Attributes:
         knot_spacing: Largest distance of the spline's knots [s].
-        samples_per_span: Samples between two knots.
         sampling: Spacing of the finished motion's samples, at which it is certified [s].
-        scales: Weights and limits of the fit.
-        requirements: What the finished motion must keep.
         retime: Whether the motion may be slowed down.
         friction_share: Share of the friction with which the margin is wanted; the certificate has all of it.
         contact_variables: Whether contacts that the motion does not need, and whose effectors are not there,
@@ -135,15 +132,12 @@ class RefineResult(Displayed):
         schedule: The contacts in the motion's own time, without those that were let go.
         before: The input at the motion's own timing, joined by interpolation.
         smoothed: The spline through the input from which the optimisation begins.
-        after: The refined motion.
-        certificate: Measured on the samples of the motion.
         requirements: What the certificate and the contacts' limits were held against.
         contact_slack: Room that all limits of the contacts have in common, the least at samples 10 ms
             apart, by linear programs, see :func:`.contact_slack` [N, N.m].
         variables: Of each phase, the contact variable of each contact of the input's sequence, in [0, 1].
-        released: Phases and effectors of the contacts that were let go.
+        released: Phase and effector of every contact that was let go.
         stretch: Duration of the motion relative to the input's.
-        iterations: Gauss-Newton steps.
     """
 
     motion: Motion
@@ -170,11 +164,7 @@ class RefineResult(Displayed):
 
 @dataclass(frozen=True, eq=False)
 class _Goal:
-    """Keys and contacts at one timing.
-
-    Attributes:
-        job: The refinement that it belongs to.
-    """
+    """Keys and contacts at one timing."""
 
     job: "Refinement"
     path: KeyPath

@@ -171,7 +171,6 @@ def shortening(
     """(phases,) factor on the duration of each phase, in [:data:`SHORTER`, 1].
 
     Args:
-        motion: Its motion at the present timing.
         share: Of the velocity limits that the fastest joint of each phase should come up to.
         settled: Phases that stay as long as they are.
     """

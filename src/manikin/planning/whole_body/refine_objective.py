@@ -53,7 +53,6 @@ class RefineTargets:
         fit: Contacts, reference and obstacles as the whole-body fit knows them.
         variables: (n,) contact variable of each effector of the sequence.
         load: (n, effectors) readiness of each to carry load, in the order of ``fit.effectors``.
-        limbs: Directions of EFORT of the limbs, by effector.
         obstacles: What may touch, and how far flights keep off.
     """
 

@@ -106,12 +106,7 @@ def sliding_touchdown_at(
 def sliding_touchdown_errors(
     proximity: Proximity, meeting: SlidingTouchdown | None, motion: Motion
 ) -> FloatArray:
-    """(n,) depth of what meets at speed in its surface, or its distance where it should touch [m].
-
-    Args:
-        meeting: What is met, at the samples of the motion.
-        motion: The planned motion, with n samples.
-    """
+    """(n,) depth of what meets at speed in its surface, or its distance where it should touch [m]."""
     errors = np.zeros(len(motion.time))
     if meeting is None:
         return errors

@@ -99,7 +99,6 @@ class SwingPlan:
 
     Attributes:
         curve: The curve found, or the best attempt when none keeps the limits.
-        check: How it stands against the limits.
         candidates: Curves of the family that were tried.
     """
 
@@ -143,7 +142,6 @@ def plan_swing(
         end_normal: (3,) normal of the surface that is reached.
         pitch: Extra turn about the effector's own y axis in early flight, toes down when positive [rad].
         refine: Largest number of iterations of the optimisation; 0 tries the family only.
-        controls: Number of control poses of the curves.
         heights: Apex heights above the higher end that are tried [m].
 
     Returns:

@@ -110,7 +110,6 @@ class SwingCurve:
             end_normal: (3,) surface normal along which it arrives, reversed.
             pitch: Extra turn about the effector's own y axis in early flight, toes down when
                 positive [rad], as of a foot whose heel comes up first.
-            controls: Number of control poses.
 
         Raises:
             InputError: If a via-point or a time is not usable or there are too many via-points.
@@ -154,7 +153,6 @@ class SwingCurve:
             start_normal: (3,) surface normal at lift-off.
             end_normal: (3,) surface normal at touch-down.
             pitch: As for :meth:`through` [rad].
-            controls: Number of control poses.
         """
         up, left = _flight_axes(start.position, goal.position, start_normal, end_normal)
         share = 0.5 + 0.6 * (apex - 0.5)  # where along the way: close to the middle even for early apexes

@@ -176,7 +176,6 @@ class EffectorClearance:
 
     Args:
         scene: The obstacles, the floor included.
-        effector: Name of the flying effector.
         standing: Contacts of the other effectors during the flight.
         com: Planned centre of mass, which the standing limbs point to.
         bend: Angle of the hanging segment (toes) at a time [rad]; straight when omitted.
@@ -274,14 +273,13 @@ class EffectorClearance:
         return coal.distance(*mine, *other, self._request, self._result)
 
 
-@dataclass(frozen=True, eq=False)
-class _Hinge:
-    """Hinge of the segment that hangs on an effector's own.
+class _Hinge(NamedTuple):
+    """Hinge of the segment that hangs on an effector's own, in the effector frame.
 
     Attributes:
         first: Number of shapes before those of the hanging segment.
-        place: (3,) in the effector frame [m].
-        axis: (3,) unit axis in the effector frame.
+        place: (3,) [m].
+        axis: (3,) unit axis.
     """
 
     first: int

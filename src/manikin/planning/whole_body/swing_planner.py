@@ -173,8 +173,6 @@ class FlightPlanner:
     """Plans the flights of one motion.
 
     Args:
-        limits: What a smooth swing must keep.
-        rng: Source of all randomness of the search.
         reference: (time) -> (nq,) preferred posture, for the posture checks.
     """
 

@@ -57,7 +57,6 @@ class SmoothCurve:
     """Result of :func:`smooth_curve`.
 
     Attributes:
-        curve: A curve that was checked, or None.
         controls: Control poses of the last curve tried.
         checks: Calls of the feasibility check.
         failure: None, or what the last curve tried does not keep, and when.
@@ -91,8 +90,6 @@ def smooth_path(
 
     Args:
         path: Path to shorten; its nodes are taken to be feasible.
-        feasible: CHECK-PG, as for the search.
-        limits: Speed limits, metric and density of the checks, as for the search.
         hints: Hints at the nodes of the path, for warm starts.
         iterations: How many replacements are tried.
     """
@@ -125,8 +122,6 @@ def smooth_curve(
     (smoothest) one that keeps the speed limits and has a posture everywhere is returned.
 
     Args:
-        path: A feasible path.
-        feasible: CHECK-PG, as for the search.
         limits: Speed limits; a rest-to-rest curve is faster in the middle than the path's average.
         hint: Hint at the start of the path.
         time_step: Spacing of the checked instants [s].
@@ -215,7 +210,6 @@ class PostureCheck:
     """CHECK-PG: whether a posture exists with the effector at a pose, its posture as the hint.
 
     Args:
-        effector: Name of the flying effector.
         problem_at: What else must hold at a time [s]: contacts, centre of mass, scene.
         screen: Cheap test of pose and time that is asked first, such as :class:`ClearFlight`.
         rotation_weight: None to require the rotation too; otherwise it is only wished, with
@@ -294,7 +288,6 @@ class SwingSearch:
     Attributes:
         curve: A smooth curve with a posture at every checked instant, or None.
         path: The shortened path it follows, or None when no path was found.
-        failure: None, or why there is no curve.
     """
 
     curve: SwingCurve | None
@@ -332,7 +325,6 @@ def search_swing(
         roomy: Stricter CHECK-PG for the path, so that rounding its corners stays feasible;
             ``feasible`` itself when omitted.
         limits: Speed limits of the curve, metric and density of the checks.
-        zone: Where poses are drawn.
         iterations: Largest number of random points.
         shortcuts: How many replacements are tried on the path.
         attempts: How many paths are searched when no smooth curve follows one.
