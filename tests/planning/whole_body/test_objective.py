@@ -37,7 +37,7 @@ def setup(person):
                 np.ones(n),
                 np.ones(n),
                 np.tile(np.eye(3), (n, 1, 1)),
-            )  # fmt: skip
+            )
             for name in ("left_foot", "right_hand")
         },
         com=rng.normal(size=(n, 3)),
