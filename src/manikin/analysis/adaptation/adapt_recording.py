@@ -79,11 +79,11 @@ def crop(
             f"window from {start:g} to {end:g} s leaves {len(rows)} frames; valid: at least {LEAST_FRAMES} "
             f"between {time[0]:g} and {time[-1]:g} s"
         )
-    begin, last, told = float(time[rows[0]]), float(time[rows[-1]]), found.targets
-    seen = np.flatnonzero(np.any(np.isfinite(told.positions[rows, :, 0]), axis=0))
+    begin, last, known = float(time[rows[0]]), float(time[rows[-1]]), found.targets
+    seen = np.flatnonzero(np.any(np.isfinite(known.positions[rows, :, 0]), axis=0))
     targets = PointTargets(
-        tuple(told.names[k] for k in seen), tuple(told.segments[k] for k in seen), told.points[seen],
-        told.positions[np.ix_(rows, seen)], told.weights[seen],
+        tuple(known.names[k] for k in seen), tuple(known.segments[k] for k in seen), known.points[seen],
+        known.positions[np.ix_(rows, seen)], known.weights[seen],
     )  # fmt: skip
     part = replace(
         found, time=found.time[rows] - found.time[rows[0]], q=found.q[rows], targets=targets,
@@ -112,11 +112,11 @@ Method = Literal["keyframes", "timing-free"]
 METHODS: tuple[Method, ...] = get_args(Method)
 
 SHORTEST, LONGEST = 0.5, 2.0
-"""Bounds of a phase that is planned timing-free, as shares of its recorded duration: nobody swings a leg in
-no time, and phases of a walk are no places to stay."""
+"""Bounds of a phase that is planned timing-free, as shares of its recorded duration: a leg needs time to
+swing, and phases of a walk are no places to stay."""
 
 HEIGHT_ROOM = 0.1
-"""Beyond the recorded heights of the centre of mass, for a plan that is timing-free [m]."""
+"""Room beyond the recorded heights of the centre of mass, for a plan that is timing-free [m]."""
 
 
 def plan_recorded_com(
@@ -187,8 +187,8 @@ def _free_durations(recording: RecordedCom) -> StanceSequence:
 
 
 SETTINGS = ControlSettings(weights=TaskWeights(posture=60.0))
-"""Of the execution. A recorded posture is worth more than one that was only preferred: six times the usual
-weight keeps arms off the trunk while they make up for what the contacts do not give."""
+"""Settings of the execution. A recorded posture is worth six times as much as one that was only preferred:
+that keeps arms off the trunk while they make up for what the contacts do not give."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +230,7 @@ class Replan:
 
     @property
     def content(self) -> MotionFile:
-        """What a motion file holds of it."""
+        """Content of its motion file."""
         return MotionFile(self.planned, self.executed, self.body, self.scene, self.schedule)
 
     @cached_property
@@ -338,10 +338,10 @@ def _with_turning(
     recorded: tuple[FloatArray, FloatArray],
     margin: float,
 ) -> RecordedCom:
-    """The same with a rate of the angular momentum that the body can follow.
+    """Recording with a rate of the angular momentum that the body can follow.
 
     First that of the recorded postures on their contacts; and then that of the postures which are fitted to
-    the plan it leads to, for the fit gives way between both.
+    the plan it leads to, for the fit compromises between both.
     """
     recording = recording.with_angular_momentum_rate(rate_on_contacts(body, scene, recording, recorded))
     com = plan_near_recorded_com(body.mass, recording, margin)

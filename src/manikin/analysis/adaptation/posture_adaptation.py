@@ -36,7 +36,7 @@ POSTURE = 0.06
 """Deviation of a hinge or of the pelvis' turn from the recording that costs one unit [rad]."""
 
 TRUNK_POSTURE = 0.04
-"""The same of the pelvis' turn, trunk and head: nobody throws them about [rad]."""
+"""Deviation of the pelvis' turn, trunk and head that costs one unit [rad]."""
 
 TRUNK = ("lumbar", "thorax", "neck")
 """First words of the hinges of trunk and head."""
@@ -52,11 +52,11 @@ UNSURE = 0.1
 """Time at both ends in which accelerations of a recording are not known well [s]."""
 
 SCALES = FitScales(rest=1e6, force=8.0, moment_share=0.25, acceleration=16.0, pelvis_acceleration=8.0)
-"""Of the fit: a recording need not begin or end at rest, and a rate of angular momentum of 5 N.m costs one
-unit, for the centre of mass is planned as that of a point mass."""
+"""Scales of the fit. A recording need not begin or end at rest, and a rate of angular momentum of 5 N.m
+costs one unit, for the centre of mass is planned as that of a point mass."""
 
 LOOSE = replace(SCALES, moment_share=1e3, force=1e3, com=0.01)
-"""Of a fit without dynamics."""
+"""Scales of a fit without dynamics."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class AdaptedMotion:
     Attributes:
         motion: Every millisecond, with forces, torques and whole-body margin.
         posture_rms: Root mean square deviation of all joints from the recorded postures [rad]; without
-            toes, which lie flat and which no marker told.
+            toes, which lie flat and which no marker shows.
     """
 
     motion: Motion

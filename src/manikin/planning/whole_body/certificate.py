@@ -63,7 +63,7 @@ class WholeBodyRequirements:
 
 @dataclass(frozen=True)
 class RefineRequirements(WholeBodyRequirements):
-    """The same of a refined motion, whose clearance includes flights away from their supports."""
+    """Limits of a refined motion, whose clearance includes flights away from their supports."""
 
     clearance: float = 0.0
 
@@ -93,7 +93,7 @@ the field of :class:`WholeBodyRequirements` that has it; none where nothing is r
 
 @dataclass(frozen=True)
 class WholeBodyFailure:
-    """Why no whole-body motion was found.
+    """Reason why no whole-body motion was found.
 
     Attributes:
         reason: What could not be met, in one line.

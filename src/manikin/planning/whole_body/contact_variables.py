@@ -43,7 +43,7 @@ TOUCHING = 0.02
 """Distance to a surface up to which a contact counts as lying on it [m]."""
 
 Variables = tuple[Mapping[str, float], ...]
-"""Of each phase, the variable of each effector in contact."""
+"""Contact variable of each effector in contact, for each phase."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from manikin.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class EffectorTarget:
-    """Where an effector has to be at each sample.
+    """Placement of an effector at each sample, with its importance.
 
     Attributes:
         position: (n, 3) in the world [m].
@@ -48,7 +48,7 @@ class EffectorTarget:
 
 @dataclass(frozen=True, eq=False)
 class FitTargets:
-    """What the motion has to do.
+    """Targets of the whole-body fit at its samples.
 
     Attributes:
         time: (n,) [s].
@@ -169,7 +169,7 @@ def lay_toes_flat(
 
 
 def flat_share(body: BodyModel, schedule: ContactSchedule, time: FloatArray) -> dict[int, FloatArray]:
-    """How much (n,) each joint of toes has to be straight, by joint index: wholly while their sole is held.
+    """Importance (n,) of straight toes, by joint index: 1 while their sole is held.
 
     What a foot stands on does not count as an obstacle: nothing else keeps its toes out of it.
     """
@@ -241,10 +241,10 @@ POSITION_RAMP = 0.2
 """Longest time near the ends of a flight in which the position matters more [s]."""
 
 ROTATION_RAMP = 0.12
-"""The same for the orientation before the landing [s]."""
+"""Longest time before a landing in which the orientation matters more [s]."""
 
 LEAVING_RAMP = 0.04
-"""The same for the orientation after the lift-off to a long flight: the foot may roll off at once [s]."""
+"""Longest such time after the lift-off to a long flight: the foot may roll off at once [s]."""
 
 
 def _reach_weight(share: FloatArray, ramp: float) -> FloatArray:

@@ -65,7 +65,7 @@ FIRST_DECREASE = 0.02
 """Relative decrease of the objective below which the first repair stops."""
 
 LATER_DECREASE = 0.005
-"""The same where that did not help, or a fit begins again: the harder, the more patience."""
+"""Relative decrease below which a later repair, or a fit that begins again, stops."""
 
 INEXACT = frozenset({"max_support_error_m", "max_support_turn_rad", "max_com_error_m"})
 """Broken requirements that a spline with more knots may keep."""
@@ -223,7 +223,7 @@ class _Goal:
         return motion, certificate
 
     def failure(self, certificate: MotionCertificate) -> WholeBodyFailure | None:
-        """Why a motion to this goal is no success, or None."""
+        """Reason why a motion to this goal is no success, or None."""
         broken = certificate.first_broken
         if broken is None:
             return None

@@ -194,7 +194,7 @@ class _Goal:
         )  # fmt: skip
 
     def at_rest(self) -> VariableSamples:
-        """What the keys say about the contacts, before there is a motion."""
+        """Samples of the keys at rest, for the choice of the contacts."""
         time = sample_uniformly(self.schedule, SPARSE)
         return VariableSamples.at_rest(
             self.job.body, self.schedule.sequence.effectors, (self.path.time, self.path.q),
@@ -202,7 +202,7 @@ class _Goal:
         )  # fmt: skip
 
     def moving(self, spline: ConfigurationSpline) -> VariableSamples:
-        """What a motion says about the contacts."""
+        """Samples of a motion, for the choice of the contacts."""
         time = sample_uniformly(self.schedule, SPARSE)
         names = self.schedule.sequence.effectors
         return VariableSamples.of_motion(self.job.body, names, time, spline.evaluate(time))

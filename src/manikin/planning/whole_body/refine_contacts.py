@@ -36,7 +36,7 @@ STILL = 1.0e-3
 
 @dataclass(frozen=True, eq=False)
 class LimbDirections:
-    """What EFORT is about, for one limb.
+    """Joints and directions of one limb's EFORT.
 
     Attributes:
         joints: (m,) velocity indices of the limb's hinges, from its root to its effector.
@@ -127,7 +127,7 @@ def contact_variables(schedule: ContactSchedule, time: FloatArray) -> dict[str, 
 def contact_targets(
     schedule: ContactSchedule, time: FloatArray, variables: dict[str, FloatArray], approach: float
 ) -> dict[str, EffectorTarget]:
-    """Where the contact variables want every effector.
+    """Targets of every effector by the contact variables.
 
     Args:
         time: (n,) [s].

@@ -76,7 +76,7 @@ class KeyPath:
         return align_quaternions(out)
 
     def retimed(self, before: FloatArray, after: FloatArray) -> "KeyPath":
-        """The same keys at other times: ``before`` (k,) becomes ``after`` (k,), linear in between."""
+        """Path with its keys at other times: ``before`` (k,) becomes ``after`` (k,), linear in between."""
         return KeyPath(np.interp(self.time, before, after), self.q)
 
 

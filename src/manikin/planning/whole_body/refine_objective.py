@@ -42,12 +42,12 @@ from manikin.scene import Proximity, Scene
 from manikin.scene.distance import ProximitySamples, moves_by_joint
 
 KNEE = "knee_flexion"
-"""How the names of knees end."""
+"""End of the names of knee joints."""
 
 
 @dataclass(frozen=True, eq=False)
 class RefineTargets:
-    """What the refinement does at its samples.
+    """Targets of the refinement at its samples.
 
     Attributes:
         fit: Contacts, reference and obstacles as the whole-body fit knows them.

@@ -30,7 +30,7 @@ _REACH = 0.1
 
 @dataclass(frozen=True, eq=False)
 class SlidingTouchdown:
-    """Which shapes meet which obstacles at speed.
+    """Shapes that meet obstacles at speed.
 
     Attributes:
         pairs: Pairs of segment and obstacle that may touch but not go into each other.
@@ -82,7 +82,7 @@ class SlidingTouchdown:
 def sliding_touchdown_at(
     body: BodyModel, scene: Scene, schedule: ContactSchedule, time: FloatArray
 ) -> SlidingTouchdown | None:
-    """What is met at speed, from shortly before the touch until it has settled.
+    """Contacts made at speed, from shortly before the touch until they have settled.
 
     Args:
         time: (n,) [s].

@@ -41,7 +41,7 @@ APEXES = (0.5, 0.4, 0.6)
 
 @dataclass(frozen=True)
 class SwingLimits:
-    """What a swing must keep.
+    """Limits that a swing must keep.
 
     Attributes:
         clearance: Distance to everything once the effector is away from its two contacts [m].
@@ -69,7 +69,7 @@ class SwingLimits:
 
 @dataclass(frozen=True)
 class SwingCheck:
-    """How a curve stands against its limits.
+    """Measures of a curve beside its limits.
 
     Attributes:
         slack: Smallest distance minus the distance required there [m]; negative is too close.
@@ -113,7 +113,7 @@ class SwingPlan:
 
     @property
     def failure(self) -> str | None:
-        """What the best attempt does not keep, or None."""
+        """Limit that the best attempt breaks, or None."""
         return self.check.failure
 
 
@@ -344,7 +344,7 @@ SETTLED = 0.004
 """Change of the control coordinates below which the optimisation stops [m]."""
 
 STATIONARY = 1e-5
-"""The same where no curve keeps the limits: another iteration would lead to the same curve [m]."""
+"""Change below which it stops where no curve keeps the limits: the next would be the same curve [m]."""
 
 TOLERANCE = 1e-5
 """Accuracy expected of measured distances [m]."""

@@ -231,7 +231,7 @@ class EffectorClearance:
         ]
         smallest = min((self._distance(mine, limb) for limb in self._placed_limbs(time) for mine in own),
                        default=np.inf)  # fmt: skip
-        # Far obstacles are told by the box around them and the ball around the own shape.
+        # Far obstacles are ruled out by the box around them and the ball around the own shape.
         centres = pose.position + self._centres @ pose.rotation.T
         slack = 0.0 if local is self._own else self._reach
         beyond = np.maximum(np.maximum(self._low - centres[:, None], centres[:, None] - self._high), 0.0)

@@ -186,7 +186,7 @@ def _spliced(path: EffectorPath, edge: EffectorPath, first: int, second: int) ->
 def _curve_failure(
     curve: SwingCurve, checker: EdgeChecker, limits: FlightLimits, hint: Any, time_step: float
 ) -> str | None:
-    """What a curve does not keep, or None."""
+    """Limit or check that a curve does not keep, or None."""
     haste = curve.haste(limits.speed, limits.angular_speed)
     if haste is not None:
         return haste
