@@ -156,10 +156,7 @@ class VariableChoice:
         return found
 
     def _of_phase(
-        self,
-        stance: Stance,
-        motions: Sequence[tuple[FloatArray, FloatArray]],
-        errors: Mapping[str, float],
+        self, stance: Stance, motions: Sequence[tuple[FloatArray, FloatArray]], errors: Mapping[str, float]
     ) -> tuple[dict[str, float], Stance]:
         wrench, _ = motions[0]
         kept, needed, chosen = stance, set[str](), dict[str, float]()

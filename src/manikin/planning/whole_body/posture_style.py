@@ -18,13 +18,7 @@ from manikin.body import BodyModel
 from manikin.body.configuration import Configuration
 from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.errors import InputError
-from manikin.kinematics import (
-    Placement,
-    PostureProblem,
-    Preferences,
-    SolverSettings,
-    generate_posture,
-)
+from manikin.kinematics import Placement, PostureProblem, Preferences, SolverSettings, generate_posture
 from manikin.motion.configuration_spline import align_quaternions
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.com import CentroidalTrajectory

@@ -73,7 +73,6 @@ class SwingCheck:
 
     Attributes:
         slack: Smallest distance minus the distance required there [m]; negative is too close.
-        slack_time: When [s].
         clearance: Smallest distance while away from the two contacts [m].
         speed: Peak speed [m/s].
         angular_speed: Peak angular speed [rad/s].
@@ -81,7 +80,6 @@ class SwingCheck:
     """
 
     slack: float
-    slack_time: float
     clearance: float
     speed: float
     angular_speed: float
@@ -184,19 +182,14 @@ def check_swing(
     worst = int(np.argmin(slack)) + 1
     in_flight = required >= limits.clearance
     smallest = float(distance[in_flight].min() if np.any(in_flight) else distance[1:-1].min())
-    failure = None
+    failure = curve.haste(limits.speed, limits.angular_speed)
     if slack[worst - 1] < -TOLERANCE:
-        place = ", ".join(f"{x:.3f}" for x in state.position[worst])
+        position = ", ".join(f"{x:.3f}" for x in state.position[worst])
         failure = (
             f"clearance is {distance[worst]:.4f} m at t = {state.time[worst]:.3f} s with the effector at "
-            f"[{place}]; required {required[worst]:.4f} m"
+            f"[{position}]; required {required[worst]:.4f} m"
         )
-    else:
-        failure = curve.haste(limits.speed, limits.angular_speed)
-    return SwingCheck(
-        float(slack[worst - 1]), float(state.time[worst]), smallest,
-        curve.peak_speed, curve.peak_angular_speed, failure,
-    )  # fmt: skip
+    return SwingCheck(float(slack[worst - 1]), smallest, curve.peak_speed, curve.peak_angular_speed, failure)
 
 
 def _first_clear(

@@ -57,14 +57,10 @@ class SmoothCurve:
     """Result of :func:`smooth_curve`.
 
     Attributes:
-        controls: Control poses of the last curve tried.
-        checks: Calls of the feasibility check.
         failure: None, or what the last curve tried does not keep, and when.
     """
 
     curve: SwingCurve | None
-    controls: int
-    checks: int
     failure: str | None = None
 
     @property
@@ -129,22 +125,17 @@ def smooth_curve(
     finite_number(time_step, "smooth_curve time_step [s]", above=0.0)
     limits = limits or FlightLimits()
     checker = EdgeChecker(feasible, limits)
-    failure, controls = None, 0
+    failure = None
     for controls, sharpening in itertools.product(CONTROLS, SHARPENINGS):
         curve = SwingCurve.along(path, controls, sharpening)
         failure = _curve_failure(curve, checker, limits, hint, time_step)
         if failure is None:
-            return SmoothCurve(curve, controls, checker.checks)
-    return SmoothCurve(None, controls, checker.checks, failure)
+            return SmoothCurve(curve)
+    return SmoothCurve(None, failure)
 
 
 def _shortcut(
-    path: EffectorPath,
-    hints: list[Any],
-    first: int,
-    second: int,
-    shares: FloatArray,
-    checker: EdgeChecker,
+    path: EffectorPath, hints: list[Any], first: int, second: int, shares: FloatArray, checker: EdgeChecker
 ) -> tuple[EffectorPath, list[Any]] | None:
     """The path with a straight edge from a point of segment ``first`` to one of segment ``second``."""
     steps = np.diff(path.time)
