@@ -26,7 +26,7 @@ from manikin.planning.guide import (
     root_pose,
 )
 from manikin.planning.guide.steering import LocalPlanner
-from manikin.scene import Box, Mesh, Obstacle, Scene
+from manikin.scene import Box, Mesh, Obstacle, Scene, load_mesh
 
 TRUCK = Path(__file__).parents[2] / "shared/data/scenes/hpp_environments/truck.stl"
 LEGS = ("left_leg", "right_leg")
@@ -96,7 +96,7 @@ def truck(creature):
     """Out of the truck of the thesis through its windscreen; its mesh is not part of this repository."""
     if not TRUCK.exists():
         pytest.skip(f"{TRUCK} is not there")
-    scene = Scene([Obstacle.from_file("truck", TRUCK)], floor_height=0.0)
+    scene = Scene([Obstacle("truck", load_mesh(TRUCK))], floor_height=0.0)
     region = SamplingRegion((-1.8, -1.2, 0.2), (3.2, 1.4, 2.4), (-0.8, 0.8), (-0.5, 1.7), (-0.4, 0.4))
     task = GuideTask(root_pose((-0.6, -0.22, 1.08)), root_pose((2.9, -0.4, 0.87)))
     return GuideWorld(scene, creature, region, Condition.limbs(at_least=2)), task

@@ -8,16 +8,18 @@ import sys
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from manikin.body.human_parts import HUMAN_HINGES
 from manikin.body.joint_volume import JointVolume, volume_of
-from manikin.body.natural_range import FILE, save_volumes
+from manikin.body.natural_range import FILE, FORMAT, UNIT
 from manikin.numerics.spatial import FloatArray
 from manikin.recordings import Recording, read_recording
 from manikin.recordings.reconstruction.anatomy import BALL_SEGMENTS, anatomy_of, ball_joint_angles
+from manikin.runtime.files import atomic_path
 
 HERE = Path(__file__).parent
 UPRIGHT = "Male1_A1_Stand.bvh"
@@ -56,6 +58,18 @@ def learn(clips: Iterable[Mapping[str, FloatArray]]) -> dict[str, JointVolume]:
     """Volumes of clips' angles, by segment."""
     kept = list(clips)
     return {part: volume_of(np.concatenate([clip[part] for clip in kept])) for part in BALL_SEGMENTS}
+
+
+def save_volumes(path: str | Path, volumes: Mapping[str, JointVolume], acknowledgement: str) -> None:
+    """Write volumes by segment into a NumPy archive, distances to 1e-4 rad, with their acknowledgement."""
+    arrays: dict[str, Any] = {}
+    for name, volume in volumes.items():
+        arrays[f"{name}/origin"], arrays[f"{name}/step"] = volume.origin, np.array(volume.step)
+        arrays[f"{name}/distances"] = np.rint(volume.distances / UNIT).astype(np.int16)
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(
+            file, format=np.array(FORMAT), acknowledgement=np.array(acknowledgement), **arrays
+        )
 
 
 def figure(volumes: Mapping[str, JointVolume]) -> Figure:

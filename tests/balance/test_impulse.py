@@ -1,13 +1,21 @@
 """Predicted impulses against closed forms for a body that stands, and for one whose support changes."""
 
+import importlib.util
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from manikin.balance.zmp import predict_impulse
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, sole
 from manikin.errors import InputError
 from manikin.motion import Motion
 from manikin.numerics.spatial import GRAVITY
+
+SPEC = importlib.util.spec_from_file_location("pushed", Path(__file__).parents[2] / "docs/pushed.py")
+sys.modules["pushed"] = module = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(module)
+predict_impulse = module.predict_impulse
 
 MASS, HEIGHT = 70.0, 0.9
 OMEGA = np.sqrt(GRAVITY / HEIGHT)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from manikin.balance import pseudo_wrench, zero_moment_point
-from manikin.balance.zmp import contact_plane, contact_wrench, zmp_path
+from manikin.balance.zmp import contact_wrench, projection_plane, zmp_path
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence, grasp, point, sole
 from manikin.motion import Motion
 from manikin.numerics.spatial import rotation_from_normal
@@ -31,33 +31,33 @@ def at_rest(com, mass=70.0):
 
 @given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))
 def test_on_level_ground_it_is_the_classical_one(x, y, ax, ay):
-    plane = contact_plane(Stance(feet(), 1000.0))
+    plane = projection_plane(Stance(feet(), 1000.0))
     assert plane.decisive
     wrench = pseudo_wrench(70.0, [[x, y, 0.9]], [[ax, ay, 0.0]])
-    found = plane.origin + plane.zero_moment_point(wrench) @ plane.axes[:, :2].T
+    found = plane.in_world(plane.zero_moment_point(wrench))
     np.testing.assert_allclose(found[0, :2], zero_moment_point(wrench)[0], atol=1e-9)
 
 
 @given(st.floats(-0.5, 0.5), st.floats(0.0, 0.3), st.floats(-0.1, 0.1))
 def test_at_rest_on_a_slope_it_lies_where_the_plumb_line_meets_the_slope(tilt, x, y):
     """Friction carries the part of the weight along the slope; the moment is still that of gravity."""
-    plane = contact_plane(Stance(feet(tilt=tilt), 1000.0))
+    plane = projection_plane(Stance(feet(tilt=tilt), 1000.0))
     assert plane.decisive
     com = np.array([x, y, 0.9])
-    found = (plane.origin + plane.zero_moment_point(at_rest(com)) @ plane.axes[:, :2].T)[0]
+    found = plane.in_world(plane.zero_moment_point(at_rest(com)))[0]
     np.testing.assert_allclose(found, [x, y, x * np.tan(tilt)], atol=1e-9)
 
 
 def test_feet_at_two_heights_and_grasps_do_not_decide():
-    assert not contact_plane(Stance(feet(lift=0.2), 1000.0)).decisive
+    assert not projection_plane(Stance(feet(lift=0.2), 1000.0)).decisive
     bar = grasp("right_hand", (0.4, -0.3, 1.0), max_force=100.0)
-    assert not contact_plane(Stance([*feet(), bar], 1000.0)).decisive
-    assert contact_plane(Stance([bar])) is None
+    assert not projection_plane(Stance([*feet(), bar], 1000.0)).decisive
+    assert projection_plane(Stance([bar])) is None
 
 
 def test_walls_have_no_zmp():
     wall = rotation_from_normal([1.0, 0.0, 0.0])
-    assert contact_plane(Stance([sole("left_foot", (0, 0, 1), rotation=wall, **SIZE)], 500.0)) is None
+    assert projection_plane(Stance([sole("left_foot", (0, 0, 1), rotation=wall, **SIZE)], 500.0)) is None
 
 
 def test_on_a_line_of_contacts_nothing_is_inside():

@@ -5,7 +5,7 @@ import pytest
 
 from manikin.body import Configuration, human
 from manikin.motion import Motion
-from manikin.motion.motion import centre_of_pressure, com_velocity, effector_positions, phases_of
+from manikin.motion.motion import com_velocity, effector_positions, phases_of
 
 
 def standing(body, n, **changes):
@@ -18,27 +18,6 @@ def standing(body, n, **changes):
         "contact_names": ("left_foot", "right_foot"), "joint_names": body.joint_names,
     }  # fmt: skip
     return Motion(**{**values, **changes})
-
-
-def test_centre_of_pressure_of_corner_forces():
-    """The resultant of point forces at known places presses at their weighted mean."""
-    body = human()
-    left, right = (Configuration(body, body.standing_posture()).effector_placement(f"{side}_foot")[1]
-                   for side in ("left", "right"))  # fmt: skip
-    rng = np.random.default_rng(0)
-    points = np.array([left, left, right]) + np.c_[rng.uniform(-0.1, 0.1, (3, 2)), np.zeros(3)]
-    forces = np.c_[rng.uniform(-30, 30, (3, 2)), rng.uniform(100, 400, 3)]
-    contact = np.zeros((1, 2, 6))
-    for point, force, number, origin in zip(points, forces, (0, 0, 1), (left, left, right), strict=True):
-        contact[0, number] += np.r_[force, np.cross(point - origin, force)]
-    found = centre_of_pressure(body, standing(body, 1, contact_force=contact))[0]
-    expected = forces[:, 2] @ points / forces[:, 2].sum()
-    np.testing.assert_allclose(found[:2], expected[:2], atol=1e-12)
-
-
-def test_nothing_presses_in_the_air():
-    body = human()
-    assert np.isnan(centre_of_pressure(body, standing(body, 2))).all()
 
 
 def test_phases_follow_the_support_table():

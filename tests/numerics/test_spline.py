@@ -1,6 +1,5 @@
 """Clamped B-splines: basis, derivatives, end conditions and their published evaluation."""
 
-import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,7 +14,6 @@ from manikin.numerics.spline import (
     clamped_knots,
     derivative_matrix,
     end_control_points,
-    span_basis,
     start_control_points,
 )
 
@@ -87,32 +85,6 @@ def test_half_open_spans_belong_to_their_right_end_only_at_the_last_knot():
     """At an inner knot the basis of degree 0 is that of the span beginning there."""
     knots = clamped_knots(0, [0.0, 1.0, 3.0])
     assert np.array_equal(basis_matrix(0, knots, [0.0, 1.0, 3.0]), [[1, 0], [0, 1], [0, 1]])
-
-
-@given(splines())
-def test_span_basis_agrees_with_the_matrix_for_numbers_and_for_symbols(spline: BSpline):
-    k, knots = spline.degree, spline.knots
-    span = int(np.flatnonzero(np.diff(knots) > 0)[-1])
-    t = knots[span] + 0.3 * (knots[span + 1] - knots[span])
-    expected = basis_matrix(k, knots, t)[0, span - k : span + 1]
-    assert np.allclose(span_basis(k, knots, span, t), expected, atol=ROUNDING)
-    symbols, time = ca.SX.sym("knots", len(knots)), ca.SX.sym("t")
-    basis = ca.vertcat(*span_basis(k, ca.vertsplit(symbols), span, time))
-    function = ca.Function("basis", [symbols, time], [basis])
-    assert np.allclose(np.asarray(function(knots, t)).ravel(), expected, atol=ROUNDING)
-
-
-def test_symbolic_knots_have_the_derivative_of_the_basis_with_respect_to_a_knot():
-    """The derivative with respect to an inner knot is the limit of differences."""
-    k, knots, t = 5, clamped_knots(5, [0.0, 0.2, 0.5, 1.0]), 0.37
-    symbols = ca.SX.sym("knots", len(knots))
-    basis = ca.vertcat(*span_basis(k, ca.vertsplit(symbols), k + 1, t))
-    jacobian = np.asarray(ca.Function("j", [symbols], [ca.jacobian(basis, symbols)])(knots))
-    step = 1e-6
-    moved = [span_basis(k, knots + sign * step * np.eye(len(knots))[k + 2], k + 1, t) for sign in (1, -1)]
-    differences = (np.array(moved[0]) - np.array(moved[1])) / (2 * step)
-    # Second-order differences of a smooth function of order one with a step of 1e-6.
-    assert np.allclose(jacobian[:, k + 2], differences, atol=1e-8)
 
 
 @given(splines(min_degree=2), st.integers(0, 2**16))

@@ -12,7 +12,19 @@ from scipy.optimize import minimize_scalar
 from manikin.body import human, random_configuration
 from manikin.errors import SceneError
 from manikin.numerics.spatial import rotation_from_rpy
-from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Proximity, Scene, Sphere
+from manikin.scene import (
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Obstacle,
+    Plane,
+    Proximity,
+    Scene,
+    Sphere,
+    load_mesh,
+)
 from manikin.scene.collision import ClosedSurface, triangle_geometry
 from manikin.scene.covering import winding_inside
 from manikin.scene.distance_bounds import KnownDistances
@@ -402,7 +414,7 @@ def test_bad_configurations_and_pairs_are_refused(person, near, free_body):
 
 
 def test_a_real_truck_is_cleared_above_and_hit_inside(scene_files, free_body, pose):
-    truck = Obstacle.from_file("truck", scene_files / "hpp_environments/truck.stl")
+    truck = Obstacle("truck", load_mesh(scene_files / "hpp_environments/truck.stl"))
     near = Proximity(free_body(coal.Sphere(0.2)), Scene([truck], None))
     low, high = truck.bounds
     top = np.append((low + high)[:2] / 2, high[2])

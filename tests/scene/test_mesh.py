@@ -172,5 +172,5 @@ def _closed(*meshes):
     ],
 )
 def test_real_meshes_come_in_metres(scene_files, file, extent):
-    low, high = Obstacle.from_file("real", scene_files / file).bounds
+    low, high = Obstacle("real", load_mesh(scene_files / file)).bounds
     assert np.allclose(high - low, extent, atol=0.01)

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from manikin.contact import Stance, grasp, point, sole
+from manikin.contact import grasp, point, sole
 from manikin.errors import ContactError, SceneError
 from manikin.numerics.spatial import rotation_from_rpy
 from manikin.scene import Box, Capsule, Obstacle, Scene, Sphere
@@ -93,10 +93,9 @@ def test_grasps_need_a_surface_near_their_point_and_round_bars_are_found_by_dist
     hand = grasp("right_hand", (0.02, 0.0, 1.2), max_force=100.0)
     assert scene.nearest(hand.position)[0] == "bar"
     assert scene.nearest((0.12, 0.0, 1.2))[1] == pytest.approx(0.1)
-    stance = Stance([hand, sole("left_foot", (0.5, 0.0, 0.2), **FOOT)])
-    pairs = scene.resting_pairs(stance, {"left_foot": ("left_foot", "left_toes")})
-    assert pairs == {("right_hand", "bar"), ("left_foot", "platform"), ("left_toes", "platform")}
+    assert scene.touched_obstacle(hand) == "bar"
+    assert scene.touched_obstacle(sole("left_foot", (0.5, 0.0, 0.2), **FOOT)) == "platform"
     with pytest.raises(ContactError):
-        scene.resting_pairs(Stance([sole("left_foot", (0.5, 0.0, 0.5), **FOOT)]))
+        scene.touched_obstacle(sole("left_foot", (0.5, 0.0, 0.5), **FOOT))
     with pytest.raises(SceneError, match="empty"):
         Scene([], None).nearest((0, 0, 0))

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from manikin.numerics.spatial import rotation_from_rpy
-from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene
+from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, load_mesh
 from manikin.scene.surface import surfaces_of
 
 
@@ -61,6 +61,6 @@ def test_distance_in_space_combines_height_and_overhang():
 
 
 def test_real_stairs_have_a_tread_per_step(scene_files):
-    scene = Scene([Obstacle.from_file("stairs", scene_files / "hpp_environments/stairs.stl")], None)
+    scene = Scene([Obstacle("stairs", load_mesh(scene_files / "hpp_environments/stairs.stl"))], None)
     heights = {round(float(s.centre[2]), 3) for s in scene.surfaces_facing((0, 0, 1), 0.05) if s.area > 0.1}
     assert sorted(heights) == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6], abs=1e-3)

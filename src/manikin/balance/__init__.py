@@ -34,39 +34,14 @@ from manikin.balance.zmp import SupportPlane, least_zmp_distance, support_plane
 from manikin.runtime.display import make_callable
 
 __all__ = [
-    "BalanceReport",
-    "ContactLimits",
-    "GroundPoint",
-    "LimitKind",
-    "LimitShare",
-    "LimitingConstraint",
-    "MotionMargin",
-    "StabilityMargins",
-    "StaticRegion",
-    "SupportPlane",
-    "WrenchPolytope",
-    "admissible_com_polygon",
-    "admissible_zmp_polygon",
-    "center_of_pressure",
-    "centroidal_moment_pivot",
-    "contact_limits",
-    "evaluate_balance",
-    "foot_rotation_indicator",
-    "force_space",
-    "least_zmp_distance",
-    "moment_space",
-    "motion_margin",
-    "pseudo_wrench",
-    "stability_margins",
-    "static_room",
-    "static_torque_share",
-    "support_height",
-    "support_plane",
-    "support_polygon",
-    "wrench_polytope",
-    "wrench_polytopes",
-    "zero_moment_point",
-]
+    "BalanceReport", "ContactLimits", "GroundPoint", "LimitKind", "LimitShare", "LimitingConstraint",
+    "MotionMargin", "StabilityMargins", "StaticRegion", "SupportPlane", "WrenchPolytope",
+    "admissible_com_polygon", "admissible_zmp_polygon", "center_of_pressure", "centroidal_moment_pivot",
+    "contact_limits", "evaluate_balance", "foot_rotation_indicator", "force_space", "least_zmp_distance",
+    "moment_space", "motion_margin", "pseudo_wrench", "stability_margins", "static_room",
+    "static_torque_share", "support_height", "support_plane", "support_polygon", "wrench_polytope",
+    "wrench_polytopes", "zero_moment_point",
+]  # fmt: skip
 
 
 make_callable(__name__)

@@ -63,7 +63,7 @@ class ContactGenerators:
         """Generators of all contacts of a stance in its friction model.
 
         Args:
-            stance: The contacts with their contact model.
+            stance: The contacts.
             points: Of each contact, (k, 3) points of the contact frame that carry force [m]; those of the
                 contact when omitted.
             grasp_moments: Whether grasps may use their moments.
@@ -76,26 +76,22 @@ class ContactGenerators:
                 upper = np.tile(np.repeat([contact.max_force, contact.max_moment * grasp_moments], 3), 2)
                 wrench, upper = wrench[upper > 0.0], upper[upper > 0.0]
                 force, couple, normal = wrench[:, :3], wrench[:, 3:], np.zeros(len(wrench))
-                place = np.tile(contact.position, (len(wrench), 1))
+                point = np.tile(contact.position, (len(wrench), 1))
             else:
                 rotation = contact.rotation_contact_to_world
                 edges = pyramid_edges(contact, stance.friction_model) @ rotation.T
                 force = np.tile(edges, (len(local), 1))
-                place = np.repeat(contact.position + local @ rotation.T, len(edges), axis=0)
+                point = np.repeat(contact.position + local @ rotation.T, len(edges), axis=0)
                 couple, normal = np.zeros(force.shape), np.ones(len(force))
                 upper = np.full(len(force), np.inf)
-            parts.append((place, force, couple, np.full(len(force), number), normal, upper))
+            parts.append((point, force, couple, np.full(len(force), number), normal, upper))
         if not parts:
             nothing = np.zeros((0, 3))
             return cls(nothing, nothing, nothing, np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
         return cls(*(np.concatenate(part) for part in zip(*parts, strict=True)))  # type: ignore[arg-type]
 
     def about(self, reference: FloatArray) -> FloatArray:
-        """(6, g) wrenches of unit magnitudes in world axes.
-
-        Args:
-            reference: (3,) or (g, 3) point of the moments [m].
-        """
+        """(6, g) wrenches of unit magnitudes in world axes about a point (3,) or points (g, 3) [m]."""
         return np.vstack([self.force.T, (cross(self.point - reference, self.force) + self.couple).T])
 
 
@@ -145,15 +141,15 @@ def share(
     rest = np.arange(len(wrench))
     for _ in range(STEPS):
         system[rest], aim = problem.newton(rest, free[rest], full[rest])
-        there = problem.step(rest, multiplier[rest], aim, error[rest])
-        wanted = problem.wanted(rest, there)
+        reached = problem.step(rest, multiplier[rest], aim, error[rest])
+        wanted = problem.wanted(rest, reached)
         now_full = wanted >= upper
         now_free = (wanted > 0.0) & ~now_full
         same = np.all((now_free == free[rest]) & (now_full == full[rest]), axis=1)
-        free[rest], full[rest], multiplier[rest] = now_free, now_full, there
+        free[rest], full[rest], multiplier[rest] = now_free, now_full, reached
         magnitude[rest] = np.clip(wanted, 0.0, upper)
-        error[rest] = problem.error(rest, there)
-        done = same & np.all(there == aim, axis=1)
+        error[rest] = problem.error(rest, reached)
+        done = same & np.all(reached == aim, axis=1)
         done |= error[rest] <= SOLVED * (1.0 + np.linalg.norm(wrench[rest], axis=1))
         rest = rest[~done]
         if len(rest) == 0:
@@ -190,14 +186,14 @@ class _Program:
         self, rows: NDArray[np.int64], start: FloatArray, aim: FloatArray, error: FloatArray
     ) -> FloatArray:
         """(k, 6) multipliers as far towards the aim as the error falls."""
-        there, length = aim.copy(), np.ones(len(aim))
+        reached, length = aim.copy(), np.ones(len(aim))
         for _ in range(HALVINGS):
-            worse = self.error(rows, there) > (1.0 - 1e-4 * length) * error
+            worse = self.error(rows, reached) > (1.0 - 1e-4 * length) * error
             if not worse.any():
                 break
             length[worse] *= 0.5
-            there[worse] = (start + length[:, None] * (aim - start))[worse]
-        return there
+            reached[worse] = (start + length[:, None] * (aim - start))[worse]
+        return reached
 
     def wanted(self, rows: NDArray[np.int64], multiplier: FloatArray) -> FloatArray:
         """(k, g) magnitudes before they are clipped."""
@@ -220,13 +216,13 @@ class _Program:
 
 @dataclass(frozen=True)
 class FrictionUse:
-    """Largest use of friction along a motion.
+    """Largest use of friction along a motion, by whom and when.
 
     Attributes:
         model: Friction model that the use is measured in.
-        share: Largest share of the pyramid; 1 is on one of its sides, 0 without soles and points.
-        time: When [s].
-        effector: Whose.
+        share: Of the pyramid; 1 is on one of its sides, 0 without soles and points.
+        time: [s].
+        effector: Its name.
     """
 
     model: FrictionModel
@@ -242,14 +238,9 @@ class FrictionUse:
 
 
 def friction_share(contact: Contact, contact_force: FloatArray, friction_model: FrictionModel) -> FloatArray:
-    """(n,) share of its friction pyramid that the force of a sole or point uses; 1 is on a side of it.
+    """(n,) share of its friction pyramid that the force (n, 3) [N] of a sole or point uses, in world axes.
 
-    A normal force below :data:`LEAST_NORMAL` counts as that much.
-
-    Args:
-        contact: A sole or point.
-        contact_force: (n, 3) in world axes [N].
-        friction_model: The pyramid.
+    1 is on a side of the pyramid. A normal force below :data:`LEAST_NORMAL` counts as that much.
     """
     local = contact_force @ contact.rotation_contact_to_world
     sides = pyramid_sides(contact, friction_model)
@@ -279,8 +270,6 @@ def friction_use(
             shares = friction_share(contact, force, phase.stance.friction_model)
             worst = int(np.argmax(shares))
             if shares[worst] > most.share:
-                most = FrictionUse(
-                    phase.stance.friction_model, float(shares[worst]), float(time[rows[worst]]),
-                    contact.effector,
-                )  # fmt: skip
+                at, model = float(time[rows[worst]]), phase.stance.friction_model
+                most = FrictionUse(model, float(shares[worst]), at, contact.effector)
     return most

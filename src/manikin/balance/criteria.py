@@ -15,11 +15,7 @@ from manikin.numerics.spatial import GRAVITY, FloatArray, finite_number, frozen_
 
 
 def support_polygon(stance: Stance) -> FloatArray:
-    """Vertical projection of the hull of all soles' corners and points.
-
-    Returns:
-        (k, 2) counter-clockwise [m]; grasps do not count.
-    """
+    """(k, 2) hull of all soles' corners and points from above, counter-clockwise, without grasps [m]."""
     points = [c.points_in_world[:, :2] for c in stance if c.kind is not ContactKind.GRASP]
     return convex_polygon(np.vstack([np.zeros((0, 2)), *points]))
 
@@ -33,43 +29,28 @@ def support_height(stance: Stance) -> float:
 def zero_moment_point(
     wrench: ArrayLike, plane_height: float = 0.0, reference: ArrayLike | None = None
 ) -> FloatArray:
-    """Point of a horizontal plane about which the contacts' moment is vertical.
+    """(..., 2) point of a level plane about which the contacts' moment is vertical [m]; NaN without load.
 
-    General form of [Qiu2012]_ 4.43-4.44, any CoM height and rate of angular momentum,
-    from the pseudo-wrench ``w``: ``x = o + (r_z f_x - tau_y) / f_z`` with
-    ``r_z = plane_height - o_z``. With all contacts in that plane it is the CoP.
+    General form of [Qiu2012]_ 4.43-4.44, any CoM height and rate of angular momentum, from the pseudo-wrench:
+    ``x = o + (r_z f_x - tau_y) / f_z`` with ``r_z = plane_height - o_z``. With all contacts in that plane it
+    is the CoP.
 
     Args:
         wrench: (..., 6) pseudo-wrench [N, N.m].
         plane_height: [m].
-        reference: (..., 3) point of the wrench's moments [m]; the world origin when omitted.
-
-    Returns:
-        (..., 2) [m]; not a number where the vertical force vanishes.
+        reference: (..., 3) point ``o`` of the wrench's moments [m]; the world origin when omitted.
     """
     w = np.asarray(wrench, dtype=np.float64)
     o = np.zeros(3) if reference is None else np.asarray(reference, dtype=np.float64)
     drop = plane_height - o[..., 2]
     vertical = np.where(np.abs(w[..., 2]) > 0, w[..., 2], np.nan)
-    return np.stack(
-        [
-            o[..., 0] + (drop * w[..., 0] - w[..., 4]) / vertical,
-            o[..., 1] + (drop * w[..., 1] + w[..., 3]) / vertical,
-        ],
-        axis=-1,
-    )
+    x = o[..., 0] + (drop * w[..., 0] - w[..., 4]) / vertical
+    y = o[..., 1] + (drop * w[..., 1] + w[..., 3]) / vertical
+    return np.stack([x, y], axis=-1)
 
 
 def center_of_pressure(points: ArrayLike, normal_forces: ArrayLike) -> FloatArray:
-    """Mean of contact points weighted by their normal forces.
-
-    Args:
-        points: (n, d) of one surface [m].
-        normal_forces: (..., n), not negative [N].
-
-    Returns:
-        (..., d) [m]; not a number where nothing presses.
-    """
+    """(..., d) mean of contact points (n, d) [m] weighted by normal forces (..., n) [N]; NaN without load."""
     f = np.asarray(normal_forces, dtype=np.float64)
     total = f.sum(axis=-1, keepdims=True)
     return f @ np.asarray(points, dtype=np.float64) / np.where(total > 0, total, np.nan)
@@ -81,38 +62,23 @@ def foot_rotation_indicator(
     foot_wrench: ArrayLike | None = None,
     reference: ArrayLike | None = None,
 ) -> FloatArray:
-    """Where the ground would have to push to keep the supporting foot still (Goswami 1999).
+    """(..., 2) point at which the ground would have to push to keep the foot still (Goswami 1999) [m].
 
-    It is the ZMP of the body with its supporting foot held at rest, and may leave the sole:
-    by how much and where tells how the foot starts to rotate. Single support only.
-
-    Args:
-        wrench: (..., 6) pseudo-wrench of the whole body [N, N.m].
-        plane_height: Height of the sole [m].
-        foot_wrench: (..., 6) rate of change of the supporting foot's own momentum, about
-            the same reference; 0 (a foot at rest, as planned) when omitted.
-        reference: (..., 3) point of the moments [m].
-
-    Returns:
-        (..., 2) [m].
+    It is the ZMP of the body with its supporting foot held at rest, and may leave the sole: by how much and
+    where tells how the foot starts to rotate. Single support only. ``foot_wrench`` (..., 6) is the rate of
+    change of the supporting foot's own momentum, 0 for a foot at rest; the other arguments are those of
+    :func:`zero_moment_point`.
     """
-    own = 0.0 if foot_wrench is None else np.asarray(foot_wrench, dtype=np.float64)
-    return zero_moment_point(np.asarray(wrench, dtype=np.float64) - own, plane_height, reference)
+    foot = 0.0 if foot_wrench is None else np.asarray(foot_wrench, dtype=np.float64)
+    return zero_moment_point(np.asarray(wrench, dtype=np.float64) - foot, plane_height, reference)
 
 
 def centroidal_moment_pivot(force: ArrayLike, com: ArrayLike, plane_height: float = 0.0) -> FloatArray:
-    """Where the line along the contact force through the CoM meets the plane (CMP).
+    """(..., 2) point where the line along the force through the CoM meets the plane [m]; NaN without load.
 
-    It is also the ZRAM point (Goswami and Kallem 2004): a contact force acting there would
-    leave the angular momentum as it is. Its distance to the ZMP is |Ldot| / f_z.
-
-    Args:
-        force: (..., 3) pseudo-force ``m (a - g)`` [N].
-        com: (..., 3) [m].
-        plane_height: [m].
-
-    Returns:
-        (..., 2) [m]; not a number where the vertical force vanishes.
+    This CMP is also the ZRAM point (Goswami and Kallem 2004): a contact force acting there would leave the
+    angular momentum as it is. Its distance to the ZMP is |Ldot| / f_z. The force ``m (a - g)`` is (..., 3)
+    [N], as is the CoM [m].
     """
     f, x = np.asarray(force, dtype=np.float64), np.asarray(com, dtype=np.float64)
     vertical = np.where(np.abs(f[..., 2:]) > 0, f[..., 2:], np.nan)
@@ -122,16 +88,9 @@ def centroidal_moment_pivot(force: ArrayLike, com: ArrayLike, plane_height: floa
 def admissible_com_polygon(
     W: WrenchPolytope, mass: float, acceleration: ArrayLike = (0.0, 0.0, 0.0), height: float = 0.0
 ) -> FloatArray:
-    """Where the CoM may stand above the ground ([Qiu2012]_ 4.41), exactly.
+    """(k, 2) corners of the ground below admissible CoM positions, counter-clockwise ([Qiu2012]_ 4.41) [m].
 
-    Args:
-        W: Wrench polytope.
-        mass: [kg].
-        acceleration: (3,) of the CoM; at rest when omitted, then the height does not matter.
-        height: Of the CoM [m].
-
-    Returns:
-        (k, 2) vertices counter-clockwise [m]; none when the stance cannot carry the body.
+    There are none when the stance cannot carry the body. At rest the height of the CoM does not matter.
 
     Raises:
         InputError: If the polygon is unbounded (free fall, ``acceleration = g``).
@@ -150,10 +109,10 @@ def admissible_zmp_polygon(
     vertical_acceleration: float = 0.0,
     plane_height: float = 0.0,
 ) -> FloatArray:
-    """Where the ZMP may be for a given CoM position, exactly ([Qiu2012]_ 4.43-4.45).
+    """(k, 2) corners of the admissible ZMP positions, counter-clockwise ([Qiu2012]_ 4.43-4.45) [m].
 
-    The horizontal accelerations that W_p admits, carried to the ZMP by the (linear) ZMP
-    formula; no angular momentum. Friction makes it smaller than the support polygon.
+    The horizontal accelerations that W_p admits, carried to the ZMP by the (linear) ZMP formula; no angular
+    momentum. Friction makes it smaller than the support polygon; without admissible acceleration it is empty.
 
     Args:
         W: Wrench polytope.
@@ -161,9 +120,6 @@ def admissible_zmp_polygon(
         com: (3,) [m], above or below the plane.
         vertical_acceleration: Of the CoM [m/s^2], above ``-g``.
         plane_height: [m].
-
-    Returns:
-        (k, 2) vertices counter-clockwise [m]; none when no acceleration is admissible.
 
     Raises:
         InputError: If the CoM lies in the plane or falls freely: its ZMP is then fixed or undefined.

@@ -1,6 +1,4 @@
-"""Friction cones: their edges and sides, and the wrenches a frictional contact generates.
-
-Also here. The limits of one contact as named inequalities on its wrench.
+"""Friction cones, the wrenches of a frictional contact, and the limits of a contact as named inequalities.
 
 All rows act on ``[force; moment]`` in the contact frame (x forward, y left, z the normal),
 moments about its origin; they are of unit length, with alpha = 1 m.
@@ -54,14 +52,12 @@ Row = tuple[list[float], float, LimitKind, str]
 def contact_limits(contact: Contact, friction_model: FrictionModel = "outer") -> ContactLimits:
     """Limits of a sole, point or grasp.
 
-    A sole without ``torsion_limit`` has the 16 rows equivalent to four corner points with
-    friction pyramids: friction, CoP, and the yaw moment those forces allow (closed form of
-    the sole's wrench cone, our own derivation, checked against the corner forces); under the
-    friction model ``cone`` the rows of the yaw moment are those facets of the cone over the corner
-    forces that bound it. With a
-    ``torsion_limit`` the yaw rows are the safe eight-row form ``|n tau| + mu |s tau| +
-    mu |t tau| <= limit`` ([Qiu2012]_ 4.21 corrected), beside friction on the whole
-    force (4.20) and CoP (4.14).
+    A sole without ``torsion_limit`` has the 16 rows equivalent to four corner points with friction pyramids:
+    friction, CoP, and the yaw moment those forces allow (closed form of the sole's wrench cone, our own
+    derivation, checked against the corner forces); under the friction model ``cone`` the rows of the yaw
+    moment are those facets of the cone over the corner forces that bound it. With a ``torsion_limit`` the yaw
+    rows are the safe eight-row form ``|n tau| + mu |s tau| + mu |t tau| <= limit`` ([Qiu2012]_ 4.21
+    corrected), beside friction on the whole force (4.20) and CoP (4.14).
 
     A part of a sole is taken about the middle of its points; an edge resists no moment about itself.
 
@@ -79,12 +75,10 @@ def contact_limits(contact: Contact, friction_model: FrictionModel = "outer") ->
             rows.append(
                 ([0, 0, 1, 0, 0, 0], cap, LimitKind.NORMAL_FORCE_CAP, f"normal force cap of {cap:g} N")
             )
-    A = np.array([row for row, *_ in rows], dtype=np.float64)
-    b = np.array([bound for _, bound, *_ in rows])
+    normals, bounds, kinds, phrases = zip(*rows, strict=True)
+    A, b = np.array(normals, dtype=np.float64), np.array(bounds)
     length = np.linalg.norm(A, axis=1)
-    return ContactLimits(
-        A / length[:, None], b / length, tuple(r[2] for r in rows), tuple(r[3] for r in rows)
-    )
+    return ContactLimits(A / length[:, None], b / length, kinds, phrases)
 
 
 def _friction_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
@@ -100,29 +94,22 @@ def _friction_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]
 def _pressure_rows(contact: Contact) -> list[Row]:
     """CoP inside the rectangle ([Qiu2012]_ 4.14): x = -tau_y / f_z, y = tau_x / f_z."""
     half_length, half_width = contact.length / 2, contact.width / 2
-    left, right = _side_names(contact.effector)
+    sides = {"left": ("outer", "inner"), "right": ("inner", "outer")}
+    left, right = sides.get(contact.effector.split("_")[0], ("left", "right"))
     tip = LimitKind.TIPPING
-    if half_length == 0.0:
-        return [
-            ([0, 0, 0, 0, -1, 0], 0.0, tip, "rolling forward over its edge"),
-            ([0, 0, 0, 0, 1, 0], 0.0, tip, "rolling backward over its edge"),
-            ([0, 0, -half_width, 1, 0, 0], 0.0, tip, f"tipping over its {left} end"),
-            ([0, 0, -half_width, -1, 0, 0], 0.0, tip, f"tipping over its {right} end"),
-        ]
+    edge = half_length == 0.0
+    ahead, behind = (
+        ("rolling forward over its edge", "rolling backward over its edge")
+        if edge
+        else ("tipping over its front edge", "tipping over its rear edge")
+    )
+    end = "end" if edge else "edge"
     return [
-        ([0, 0, -half_length, 0, -1, 0], 0.0, tip, "tipping over its front edge"),
-        ([0, 0, -half_length, 0, 1, 0], 0.0, tip, "tipping over its rear edge"),
-        ([0, 0, -half_width, 1, 0, 0], 0.0, tip, f"tipping over its {left} edge"),
-        ([0, 0, -half_width, -1, 0, 0], 0.0, tip, f"tipping over its {right} edge"),
+        ([0, 0, -half_length, 0, -1, 0], 0.0, tip, ahead),
+        ([0, 0, -half_length, 0, 1, 0], 0.0, tip, behind),
+        ([0, 0, -half_width, 1, 0, 0], 0.0, tip, f"tipping over its {left} {end}"),
+        ([0, 0, -half_width, -1, 0, 0], 0.0, tip, f"tipping over its {right} {end}"),
     ]
-
-
-def _side_names(effector: str) -> tuple[str, str]:
-    if effector.startswith("left"):
-        return "outer", "inner"
-    if effector.startswith("right"):
-        return "inner", "outer"
-    return "left", "right"
 
 
 def _turning_rows(contact: Contact, friction_model: FrictionModel) -> list[Row]:
@@ -199,10 +186,7 @@ def pyramid_friction(contact: Contact, friction_model: FrictionModel) -> float:
 
 
 def pyramid_edges(contact: Contact, friction_model: FrictionModel = "outer") -> FloatArray:
-    """Forces along the pyramid's edges with unit normal force, in the contact frame.
-
-    Returns:
-        (k, 3): 4 edges, 8 of the friction model ``cone``.
+    """(k, 3) forces along the pyramid's edges, 4 or with ``cone`` 8, with unit normal force, contact frame.
 
     Raises:
         ContactError: If the model is unknown.
@@ -215,10 +199,9 @@ def pyramid_edges(contact: Contact, friction_model: FrictionModel = "outer") -> 
 
 
 def pyramid_sides(contact: Contact, friction_model: FrictionModel = "outer") -> FloatArray:
-    """Rows ``[n_x, n_y, -slope]`` of the pyramid's sides: a force ``f`` is inside where ``sides @ f <= 0``.
+    """(k, 3) sides ``[n_x, n_y, -slope]`` of the pyramid: a force ``f`` is inside where ``sides @ f <= 0``.
 
-    Returns:
-        (k, 3) in the contact frame; ``(n_x, n_y)`` is of unit length.
+    Both are in the contact frame; ``(n_x, n_y)`` is of unit length.
 
     Raises:
         ContactError: If the model is unknown.
@@ -233,12 +216,9 @@ def pyramid_sides(contact: Contact, friction_model: FrictionModel = "outer") -> 
 
 
 def edge_wrenches(contact: Contact, friction_model: FrictionModel = "outer") -> FloatArray:
-    """Wrenches of the pyramid edges at the contact's points, unit normal force each.
+    """(n, 6) wrenches of the pyramid edges point by point, unit normal force each, in the contact frame.
 
     The cone over them is the set of wrenches a sole or point can apply ([Qiu2012]_ 4.25).
-
-    Returns:
-        (n, 6) in the contact frame, moments about its origin, point by point.
     """
     edges = pyramid_edges(contact, friction_model)
     wrenches = np.empty((len(contact.points), len(edges), 6))
@@ -248,13 +228,7 @@ def edge_wrenches(contact: Contact, friction_model: FrictionModel = "outer") -> 
 
 
 def contact_to_world(contact: Contact, wrenches: FloatArray, reference: FloatArray) -> FloatArray:
-    """Wrenches in world axes, moments about ``reference``.
-
-    Args:
-        contact: Gives frame and position.
-        wrenches: (n, 6) in the contact frame, moments about its origin.
-        reference: (3,) in the world [m].
-    """
+    """(n, 6) wrenches of a contact's frame in world axes, moments about ``reference`` (3,) [m]."""
     rotation = contact.rotation_contact_to_world
     force = wrenches[:, :3] @ rotation.T
     moment = wrenches[:, 3:] @ rotation.T + cross((contact.position - reference)[None], force)

@@ -1,6 +1,6 @@
-"""Force and moment spaces of W_p and the three stability margins ([Qiu2012]_ 4.2.7, 4.2.9).
+"""Force and moment spaces of W_p, the three stability margins, and a report on one stance and CoM state.
 
-Also here. Everything about the balance of one stance and one CoM state, in one report.
+Sources: [Qiu2012]_ 4.2.7, 4.2.9.
 """
 
 from dataclasses import dataclass
@@ -50,31 +50,16 @@ class StabilityMargins:
 
 
 def force_space(W: WrenchPolytope, com: ArrayLike) -> Polytope:
-    """F_p: forces at the CoM, without angular momentum, that W_p admits ([Qiu2012]_ 4.38).
-
-    Args:
-        W: Wrench polytope.
-        com: (3,) in the world [m].
-
-    Returns:
-        A polytope of dimension 3 in ``m (a - g)`` [N].
-    """
+    """F_p: forces ``m (a - g)`` (3,) at a CoM (3,) [m], without angular momentum ([Qiu2012]_ 4.38) [N]."""
     arm = frozen_array(com, "com [m]", (3,)) - W.reference
     return W.preimage(np.vstack([np.eye(3), skew(arm)]))
 
 
 def moment_space(W: WrenchPolytope, force: ArrayLike) -> Polytope:
-    """T_p: moments about the reference that W_p admits beside a fixed force.
+    """T_p: moments (3,) about the reference [N.m] that W_p admits beside a force ``m (a - g)`` (3,) [N].
 
     The thesis projects F_p (4.39), which is flat; a perturbing moment leaves the force
     alone, so the right set is the slice ``{tau : H2 tau <= h - H1 f}``.
-
-    Args:
-        W: Wrench polytope.
-        force: (3,) pseudo-force ``m (a - g)`` [N].
-
-    Returns:
-        A polytope of dimension 3 [N.m].
     """
     f = frozen_array(force, "force [N]", (3,))
     return W.preimage(np.vstack([np.zeros((3, 3)), np.eye(3)]), np.concatenate([f, np.zeros(3)]))
@@ -100,21 +85,16 @@ def stability_margins(W: WrenchPolytope, wrench: ArrayLike, com: ArrayLike) -> S
     shape = np.broadcast_shapes(w.shape[:-1], x.shape[:-1])
     w = np.broadcast_to(w, (*shape, 6)).reshape(-1, 6)
     x = np.broadcast_to(x, (*shape, 3)).reshape(-1, 3)
-    found = np.empty((4, len(w)))
+    margins = np.empty((4, len(w)))
     step = max(1, _BLOCK // max(1, len(W)))
     for start in range(0, len(w), step):
         part = slice(start, start + step)
-        found[:, part] = _margins(W, w[part], x[part] - W.reference)
-    return StabilityMargins(*(row.reshape(shape) for row in found))
+        margins[:, part] = _margins(W, w[part], x[part] - W.reference)
+    return StabilityMargins(*(row.reshape(shape) for row in margins))
 
 
 def force_levers(H: FloatArray, arm: FloatArray) -> FloatArray:
-    """(n, m) ``|H1 + H2 arm^|``: change of each row per newton at points ``arm`` (n, 3) from the reference.
-
-    Args:
-        H: (m, 6) rows over force and moment.
-        arm: (n, 3) from the point of the rows' moments [m].
-    """
+    """(n, m) ``|H1 + H2 arm^|``: change of rows (m, 6) per newton at ``arm`` (n, 3) off the reference [m]."""
     force, (x, y, z) = H[:, :3], H[:, 3:].T
     zero = np.zeros_like(x)
     squares = np.zeros((len(arm), len(H)))
@@ -124,12 +104,7 @@ def force_levers(H: FloatArray, arm: FloatArray) -> FloatArray:
 
 
 def wrench_levers(H: FloatArray, arm: FloatArray) -> FloatArray:
-    """(n, m) lengths that rows have with moments about points ``arm`` (n, 3) from the reference.
-
-    Args:
-        H: (m, 6) rows over force and moment.
-        arm: (n, 3) from the point of the rows' moments [m].
-    """
+    """(n, m) lengths of rows (m, 6) with moments about points ``arm`` (n, 3) from the reference [m]."""
     return np.hypot(force_levers(H, arm), np.linalg.norm(H[:, 3:], axis=1))
 
 
@@ -138,14 +113,12 @@ def _margins(W: WrenchPolytope, wrench: FloatArray, arm: FloatArray) -> FloatArr
     distances = W.distances(wrench)
     moment_lever = np.linalg.norm(W.H[:, 3:], axis=1)
     force_lever = force_levers(W.H, arm)
-    return np.stack(
-        [
-            _smallest(distances, force_lever),
-            _smallest(distances, moment_lever),
-            distances.min(axis=1),
-            _smallest(distances, np.hypot(force_lever, moment_lever)),
-        ]
-    )
+    return np.stack([
+        _smallest(distances, force_lever),
+        _smallest(distances, moment_lever),
+        distances.min(axis=1),
+        _smallest(distances, np.hypot(force_lever, moment_lever)),
+    ])  # fmt: skip
 
 
 def _smallest(distances: FloatArray, lever: FloatArray) -> FloatArray:
@@ -291,6 +264,8 @@ def evaluate_balance(
     polygon = support_polygon(stance)
     height = support_height(stance) if plane_height is None else plane_height
     zmp = zero_moment_point(wrench, height, W.reference)
+    fri = foot_rotation_indicator(wrench, height, None, W.reference)
+    single = len(stance) == 1 and stance.contacts[0].kind is ContactKind.SOLE
     return BalanceReport(
         W=W,
         wrench=wrench,
@@ -307,15 +282,9 @@ def evaluate_balance(
         plane_height=height,
         com_projection=_point(x[:2], polygon),
         zmp=_point(zmp, polygon),
-        fri=_point(foot_rotation_indicator(wrench, height, None, W.reference), polygon)
-        if _single(stance)
-        else None,
+        fri=_point(fri, polygon) if single else None,
         cmp=_point(centroidal_moment_pivot(wrench[:3], x, height), polygon),
     )
-
-
-def _single(stance: Stance) -> bool:
-    return len(stance) == 1 and stance.contacts[0].kind is ContactKind.SOLE
 
 
 def _static_polygon(W: WrenchPolytope, mass: float) -> FloatArray:

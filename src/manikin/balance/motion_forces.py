@@ -4,9 +4,6 @@ The generalised forces of inverse dynamics leave a six-dimensional wrench that t
 must supply.  It is shared among the force-carrying points with the least squared force along
 the edges of their friction pyramids, in the friction model of each stance; contacts that have
 just been made, or are about to be left, cost more, so that load passes smoothly from one to the next.
-
-Also here. A motion complete with forces, torques, centre of mass and margin, from its states and contacts. A
-motion that is there already, made with a load in the hands.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,8 +23,8 @@ from manikin.body.limbs import carrying_segment, hinge_line
 from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart, Stance
 from manikin.errors import InputError
 from manikin.motion import Motion
-from manikin.motion.dynamics import FreeDynamics, centroidal_motion
-from manikin.numerics.spatial import FloatArray
+from manikin.motion.dynamics import CarriedForces, FreeDynamics, centroidal_motion
+from manikin.numerics.spatial import FloatArray, wrench_about
 from manikin.scene.distance import moves_by_joint
 
 
@@ -54,37 +51,35 @@ def full_motion(
     Returns:
         The motion, and (n, 6) its whole-body pseudo-wrench about the world origin.
     """
-    found = centroidal_motion(body, q, v, a)
+    needed, load = centroidal_motion(body, q, v, a), CarriedForces.of(body, schedule, time, q, v, a)
+    if load is not None:
+        needed = replace(needed, wrench=needed.wrench + load.wrench)
     forces = plan_forces(body, schedule, time, q, v, a)
     stances = [phase.stance for phase in schedule.sequence]
-    margin = motion_margin(stances, schedule.phase_at(time), found.wrench, found.com, polytopes=polytopes)
+    margin = motion_margin(stances, schedule.phase_at(time), needed.wrench, needed.com, polytopes=polytopes)
     names = schedule.sequence.effectors
     motion = Motion(
-        time=time, q=q, v=v, a=a, tau=forces.tau, com=found.com, angular_momentum=found.angular_momentum,
+        time=time, q=q, v=v, a=a, tau=forces.tau, com=needed.com, angular_momentum=needed.angular_momentum,
         margin=margin.margin, support=schedule.support(time, names),
         contact_force=forces.contact_force, contact_names=names, joint_names=body.joint_names,
     )  # fmt: skip
-    return motion, found.wrench
+    return motion, needed.wrench
 
 
 def carried_motion(
     body: BodyModel, motion: Motion, schedule: ContactSchedule, mass: float, hand: str = "both"
 ) -> tuple[BodyModel, Motion]:
-    """The same postures with a load in the hands: what they need of contacts and joints is computed anew.
+    """The loaded body, and the same postures on the same contacts with a load [kg] in its hands.
 
     Centre of mass, momentum, contact forces, torques and the margin (about the centre of mass) are those of
-    the loaded body on the planned contacts. Nothing is planned again: a negative margin says that nobody
-    would move so with that load.
+    the loaded body. Nothing is planned again: a negative margin means that the load forbids the motion.
 
     Args:
-        body: Who moves, with empty hands.
+        body: With empty hands.
         motion: Its motion.
         schedule: Its contacts in time.
         mass: Of the load [kg].
         hand: ``"left"``, ``"right"`` or ``"both"``.
-
-    Returns:
-        The body with the load, and the motion.
 
     Raises:
         InputError: If the body carries something already, or has no such hand.
@@ -140,43 +135,36 @@ class ContactForces:
 
 
 @dataclass(frozen=True, eq=False)
-class _Generators:
-    """Force directions of one stance.
+class _Generators(ContactGenerators):
+    """Force directions of one stance and the joints that carry them; contacts count among the contact names.
 
     Attributes:
-        point: (g, 3) where each acts [m].
-        direction: (g, 3) unit normal force plus friction.
-        contact: (g,) index into the contact names.
-        carrier: (g,) joint of the segment that it acts on.
+        carrier: (g,) joint of the segment that each acts on.
         cost: (g,) cost of its magnitude, more where it bends the toes.
-        limit: (g,) largest magnitude: the force limit of a grasp, infinite for the others [N].
         moves: (joints, nv) 1 where a velocity coordinate moves a joint, else 0.
     """
 
-    point: FloatArray
-    direction: FloatArray
-    contact: np.ndarray
     carrier: np.ndarray
     cost: FloatArray
-    limit: FloatArray
     moves: FloatArray
 
     @cached_property
     def wrenches(self) -> FloatArray:
         """(6, g) wrench of each unit magnitude about the world origin."""
-        return np.vstack([self.direction.T, np.cross(self.point, self.direction).T])
+        return self.about(np.zeros(3))
 
     @cached_property
     def balance(self) -> tuple[FloatArray, FloatArray]:
         """Mean contact point (3,) and the (6, g) wrenches about it, moments in units of force."""
         centre = self.point.mean(axis=0)
-        moment = np.cross(self.point - centre, self.direction) / _ARM
-        return centre, np.vstack([self.direction.T, moment.T])
+        wrenches = self.about(centre)
+        wrenches[3:] /= _ARM
+        return centre, wrenches
 
     def settling(
         self, number: int, contact: Contact, position: FloatArray, rotation: FloatArray
     ) -> "_Generators":
-        """The same forces with those of one contact where its effector is now, most of them where it is low.
+        """The same forces with those of a settling contact where its effector is now, cheapest where low.
 
         Args:
             number: Index of the contact's effector among the contact names.
@@ -216,17 +204,10 @@ def plan_forces(
     v: FloatArray,
     a: FloatArray,
 ) -> ContactForces:
-    """Distribute the contact forces of a motion and compute its joint torques.
-
-    Args:
-        body: The body.
-        schedule: Its contacts in time.
-        time: (n,) [s].
-        q: (n, nq) configurations.
-        v: (n, nv) velocities.
-        a: (n, nv) accelerations.
-    """
-    dynamics = FreeDynamics.of(body, q, v, a)
+    """Distribute the contact forces of a motion and compute its joint torques, see :func:`full_motion`."""
+    dynamics, load = FreeDynamics.of(body, q, v, a), CarriedForces.of(body, schedule, time, q, v, a)
+    if load is not None:
+        dynamics = dynamics.carrying(load)
     names = schedule.sequence.effectors
     shares = load_shares(schedule, time, names)
     tau = np.zeros((len(time), body.nv))
@@ -241,7 +222,7 @@ def plan_forces(
         magnitude = share(matrix, target, cost**-2.0, _MISSING_COST).magnitude
         tau[rows] = part.needed - _apply(part.jacobians, generators, magnitude)
         over = np.any(body.torque_share(tau[rows, 6:]) > 1.0, axis=1)
-        over |= np.any(magnitude > generators.limit, axis=1)
+        over |= np.any(magnitude > generators.upper, axis=1)
         for k in np.flatnonzero(over):
             joint_map = _joint_map(part.jacobians[k], generators)
             other = _share_within_limits(
@@ -273,8 +254,8 @@ def _alike(
             for index, name in enumerate(names):
                 if settling[name][k]:
                     pin.forwardKinematics(body.pinocchio, data, q[k])
-                    place = pin.updateFramePlacement(body.pinocchio, data, body.effector_frame(name))
-                    moved = moved.settling(index, phase.stance[name], place.translation, place.rotation)
+                    frame = pin.updateFramePlacement(body.pinocchio, data, body.effector_frame(name))
+                    moved = moved.settling(index, phase.stance[name], frame.translation, frame.rotation)
             yield np.array([k]), moved, phase.stance
 
 
@@ -298,32 +279,27 @@ def load_shares(schedule: ContactSchedule, time: FloatArray, names: tuple[str, .
 
 def _generators(body: BodyModel, stance: Stance, names: tuple[str, ...]) -> _Generators:
     points = [_force_points(body, contact) for contact in stance]
-    found = ContactGenerators.of(stance, points, grasp_moments=False)
-    contacts = [names.index(contact.effector) for contact in stance]
+    forces = ContactGenerators.of(stance, points, grasp_moments=False)
+    contacts = np.array([names.index(contact.effector) for contact in stance], dtype=np.int64)
     carriers, costs = [], []
     for number, contact in enumerate(stance):
-        count = int(np.sum(found.contact == number)) // len(points[number])
+        count = int(np.sum(forces.contact == number)) // len(points[number])
         for local in points[number]:
             segment = carrying_segment(body, contact.effector, local)
             hanging = segment != body.effector(contact.effector).segment
             carriers += [body.pinocchio.frames[body.segment_frame(segment)].parentJoint] * count
             costs += [_HANGING_COST if hanging else 1.0] * count
     return _Generators(
-        found.point, found.force, np.array(contacts, dtype=np.int64)[found.contact], np.array(carriers),
-        np.array(costs), found.upper, moves_by_joint(body.pinocchio),
+        forces.point, forces.force, forces.couple, contacts[forces.contact], forces.normal, forces.upper,
+        np.array(carriers), np.array(costs), moves_by_joint(body.pinocchio),
     )  # fmt: skip
 
 
 def _force_points(body: BodyModel, contact: Contact) -> FloatArray:
     """(k, 3) points of the contact frame that carry force: corners, and the ends of the toes' hinge."""
     line = hinge_line(body, contact.effector)
-    inside = line is not None and abs(line) < 0.5 * contact.length
-    if (
-        contact.kind is not ContactKind.SOLE
-        or contact.part is not SolePart.FULL
-        or line is None
-        or not inside
-    ):
+    full = contact.kind is ContactKind.SOLE and contact.part is SolePart.FULL
+    if not full or line is None or abs(line) >= 0.5 * contact.length:
         return contact.points
     half = 0.5 * contact.width
     return np.vstack([contact.points, [[line, half, 0.0], [line, -half, 0.0]]])
@@ -335,8 +311,9 @@ def _centred(generators: _Generators, wrench: FloatArray) -> tuple[FloatArray, F
     In units of force, for conditioning.
     """
     centre, matrix = generators.balance
-    force, moment = wrench[:, :3], wrench[:, 3:]
-    return matrix, np.hstack([force, (moment - np.cross(centre, force)) / _ARM])
+    target = wrench_about(wrench, centre)
+    target[:, 3:] /= _ARM
+    return matrix, target
 
 
 def _share_within_limits(
@@ -363,7 +340,7 @@ def _share_within_limits(
     """
     cost = cost**2
     count = len(cost)
-    limit = np.where(np.isfinite(generators.limit), generators.limit, 1e6)
+    limit = np.where(np.isfinite(generators.upper), generators.upper, 1e6)
     solution, _, flag, _ = daqp.solve(
         np.diag(cost / cost.mean()),
         np.zeros(count),
@@ -401,7 +378,5 @@ def _by_contact(
     out = np.zeros((len(magnitude), len(names), 6))
     for contact in stance:
         index = names.index(contact.effector)
-        resultant = magnitude @ generators.by_contact[index].T
-        out[:, index, :3] = resultant[:, :3]
-        out[:, index, 3:] = resultant[:, 3:] - np.cross(contact.position, resultant[:, :3])
+        out[:, index] = wrench_about(magnitude @ generators.by_contact[index].T, contact.position)
     return out

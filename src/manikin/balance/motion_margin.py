@@ -1,7 +1,7 @@
 """Margin along a motion: how far every sample is from losing balance, in what its stance can give.
 
-The one place where a series of wrenches is held against the stances of its phases: planned, executed,
-recorded, of a point mass or of a whole body. All of it is independent of the world's origin and axes.
+Wrenches of planned, executed and recorded motions, of a point mass or of a whole body, are measured in the
+stances of their phases. The results do not depend on the world's origin and axes.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from manikin.balance.margin import stability_margins
 from manikin.balance.wrench import WrenchPolytope, wrench_polytopes
-from manikin.balance.zmp import LEAST_LOAD, support_plane
+from manikin.balance.zmp import support_plane
 from manikin.contact import Stance
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, wrench_about
@@ -100,8 +100,8 @@ def motion_margin(
             force[rows] = -np.linalg.norm(about_com[:, :3], axis=1)
             continue
         polytope = known[number]
-        found = stability_margins(polytope, wrench_about(w[rows], polytope.reference), x[rows])
-        margin[rows], force[rows] = found.wrench_about_com, found.force
+        margins = stability_margins(polytope, wrench_about(w[rows], polytope.reference), x[rows])
+        margin[rows], force[rows] = margins.wrench_about_com, margins.force
         zmp[rows] = _zmp_distances(stances[number], w[rows])
     for values in (margin, force, zmp):
         values.setflags(write=False)
@@ -112,8 +112,7 @@ def _zmp_distances(stance: Stance, wrench: FloatArray) -> FloatArray:
     plane = support_plane(stance)
     if plane is None or len(plane.polygon) < 3:
         return np.full(len(wrench), np.nan)
-    pressing = wrench[:, :3] @ plane.rotation_plane_to_world[:, 2]
-    return np.where(pressing < LEAST_LOAD, np.nan, plane.zmp_distance(wrench))
+    return np.where(plane.carries(wrench), plane.zmp_distance(wrench), np.nan)
 
 
 def _series(
@@ -140,5 +139,5 @@ def _polytopes(
     known = {} if given is None else {number: given[number] for number in held}
     missing = [number for number in held if known.get(number) is None]
     computed = wrench_polytopes([stances[number] for number in missing])
-    found = {number: polytope for number, polytope in known.items() if polytope is not None}
-    return found | dict(zip(missing, computed, strict=True))
+    ready = {number: polytope for number, polytope in known.items() if polytope is not None}
+    return ready | dict(zip(missing, computed, strict=True))

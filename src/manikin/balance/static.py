@@ -1,9 +1,8 @@
 """Contact forces that hold a posture at rest, by one linear program ([Bretl2008]_'s test, with grasps).
 
 Unlike the wrench polytope it knows the posture, and with it the torques of the joints; it costs a few
-milliseconds and shares no code with the polytope.
-
-Also here. Where the centre of mass may stand still on a stance.
+milliseconds and shares no code with the polytope. The region where the centre of mass may rest comes from
+the polytope.
 """
 
 from dataclasses import dataclass
@@ -33,12 +32,7 @@ class StaticRegion:
 
     @classmethod
     def of(cls, stance: Stance, mass: float) -> "StaticRegion":
-        """Region of a stance ([Qiu2012]_ 4.41); a stance without caps has the default one of the body.
-
-        Args:
-            stance: The contacts, with their contact model.
-            mass: Of the body [kg].
-        """
+        """Region of a stance ([Qiu2012]_ 4.41), without caps with the default one of a body's mass [kg]."""
         return cls(admissible_com_polygon(wrench_polytope(stance.bounded(mass)), mass))
 
     @property
@@ -47,11 +41,9 @@ class StaticRegion:
         return len(self.polygon) < 3
 
     def nearest(self, point: FloatArray, inset: float) -> FloatArray | None:
-        """(2,) nearest place to a (2,) point that keeps a distance to the region's edges, or None.
+        """(2,) nearest point to a (2,) point [m] with a distance to the region's edges, or None.
 
-        Args:
-            point: [m].
-            inset: Distance to keep [m]; half of what is possible where the region is too narrow for it.
+        The distance is ``inset`` [m], or half or a quarter of it where the region is too narrow.
         """
         for distance in (inset, 0.5 * inset, 0.25 * inset):
             inner = self._inset(distance)
@@ -77,8 +69,8 @@ def _onto(polygon: FloatArray, point: FloatArray) -> FloatArray:
     shares = np.einsum("ni,ni->n", point - polygon, edges) / np.maximum(
         np.einsum("ni,ni->n", edges, edges), 1e-18
     )
-    places = polygon + np.clip(shares, 0.0, 1.0)[:, None] * edges
-    return places[int(np.argmin(np.linalg.norm(places - point, axis=1)))]
+    points = polygon + np.clip(shares, 0.0, 1.0)[:, None] * edges
+    return points[int(np.argmin(np.linalg.norm(points - point, axis=1)))]
 
 
 def static_room(stance: Stance, mass: float, com: FloatArray, directions: int = 8) -> float:
@@ -135,8 +127,8 @@ def static_torque_share(body: BodyModel, q: FloatArray, stance: Stance) -> float
     if not len(stance):
         return np.inf
     generators, state = ContactGenerators.of(stance), Configuration(body, q)
-    places = np.array([contact.position for contact in stance])[generators.contact]
-    wrenches = generators.about(places).T
+    origins = np.array([contact.position for contact in stance])[generators.contact]
+    wrenches = generators.about(origins).T
     model = body.pinocchio
     gravity = pin.computeGeneralizedGravity(model, model.createData(), np.asarray(q))
     jacobians = [state.effector_jacobian(contact.effector) for contact in stance]

@@ -1,15 +1,13 @@
 """The admissible pseudo-wrench space W_p of a stance and the pseudo-wrench itself.
 
-W_p is the sum over the contacts of the wrenches each can apply, under their own caps and
-the stance's cap on the sum of normal forces. It is found from generators: every edge of a
-friction pyramid (every vertex, for a sole with a torsion limit) is a ray of one cone whose
-slice at the caps is W_p, and every axis of a grasp box is a segment added to it.
+W_p is the sum over the contacts of the wrenches each can apply, under their own caps and the stance's cap
+on the sum of normal forces. It is found from generators: every edge of a friction pyramid (every vertex,
+for a sole with a torsion limit) is a ray of one cone whose slice at the caps is W_p, and every axis of a
+grasp box is a segment added to it. Each facet is explained by the contacts and limits met on it.
 
-A stance with few contacts has a flat W_p (a point contact can give no moment about
-itself). Such a W_p carries each equality as a pair of opposite rows at the end of H: the
-margin of a wrench is then 0 at best, and negative as soon as the equality is broken.
-
-Also here. Which contact and which of its limits a facet of W_p stands for.
+A stance with few contacts has a flat W_p (a point contact can give no moment about itself). Such a W_p
+carries each equality as a pair of opposite rows at the end of H: the margin of a wrench is then 0 at best,
+and negative as soon as the equality is broken.
 """
 
 from __future__ import annotations
@@ -35,7 +33,15 @@ from manikin.contact import Contact, ContactKind, FrictionModel, Stance
 from manikin.errors import ContactError
 from manikin.numerics.facet_enumeration import fan_of_generators
 from manikin.numerics.polytope import Polytope, facet_rows, vertices_around
-from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, finite_number, frozen_array
+from manikin.numerics.spatial import (
+    GRAVITY_VECTOR,
+    FloatArray,
+    cross,
+    finite_number,
+    frozen_array,
+    rows_about,
+    wrench_about,
+)
 from manikin.runtime.display import Displayed
 
 NEGLIGIBLE = 1e-6
@@ -49,7 +55,7 @@ class LimitShare:
     Attributes:
         effector: Whose limit; ``"stance"`` for the cap on the sum of normal forces.
         kind: What gives way.
-        phrase: How.
+        phrase: How the contact moves.
         share: Growth of the margin per unit of relaxation of this limit (alpha = 1 m).
     """
 
@@ -86,38 +92,6 @@ class LimitingConstraint:
     shares: tuple[LimitShare, ...]
 
 
-def limiting_constraint(
-    W: WrenchPolytope, wrench: ArrayLike, about: ArrayLike | None = None
-) -> LimitingConstraint:
-    """Explain the facet of W_p that gives the margin of a wrench.
-
-    The facet's normal is a combination, with multipliers >= 0, of the limits met on it
-    (linear-programming duality); the multiplier of a limit is how much the margin grows
-    when that limit is relaxed, and the largest one names the constraint. Contacts that
-    carry no force on the facet are lifting off: they are named only when no other is.
-
-    Args:
-        W: The polytope.
-        wrench: (6,) about ``W.reference``.
-        about: (3,) point of the margin's moments, in general the CoM [m]; ``W.reference`` when omitted.
-
-    Raises:
-        ContactError: If the wrench is not six finite numbers.
-    """
-    w = frozen_array(wrench, "wrench", (6,), ContactError)
-    if about is not None:
-        point = frozen_array(about, "point of the moments [m]", (3,), ContactError)
-        moment = w[3:] - np.cross(point - W.reference, w[:3])
-        return limiting_constraint(W.at_reference(point), np.concatenate([w[:3], moment]))
-    distances = W.distances(w)
-    row = int(np.argmin(distances))
-    shares = facet_shares(W, row)
-    first = shares[0]
-    return LimitingConstraint(
-        row, first.effector, first.kind, str(first), W.H[row], float(distances[row]), shares
-    )
-
-
 def facet_shares(W: WrenchPolytope, row: int) -> tuple[LimitShare, ...]:
     """Every limit met on one facet, the weightiest first, lifting contacts last."""
     if not len(W.stance):
@@ -147,21 +121,23 @@ def _merged(shares: list[LimitShare]) -> list[LimitShare]:
 def _contact_shares(contact: Contact, W: WrenchPolytope, normal: FloatArray, cap: float) -> list[LimitShare]:
     limits = contact_limits(contact, W.friction_model)
     if contact.kind is ContactKind.GRASP:
-        return _grasp_shares(contact, limits, _twist_at(contact.position - W.reference, normal))
-    rotation = contact.rotation_contact_to_world
-    contact = _centred(contact)
-    in_world = _twist_at(contact.position - W.reference, normal)
-    twist = np.concatenate([rotation.T @ in_world[:3], rotation.T @ in_world[3:]])
-    twist[2] -= cap
-    size = float(np.linalg.norm(twist[:3] if contact.kind is ContactKind.POINT else twist))
-    if size < NEGLIGIBLE:
-        return []
-    if (
-        contact.torsion_limit is None
-        and (edge_wrenches(contact, W.friction_model) @ twist).max() < -NEGLIGIBLE
-    ):
-        return [LimitShare(contact.effector, LimitKind.LIFTING, "lifting off", size)]
-    weights = _multipliers(limits, twist, 3 if contact.kind is ContactKind.POINT else 6)
+        weights = np.maximum(limits.A @ _twist_at(contact.position - W.reference, normal), 0.0)
+        if contact.max_moment == 0:
+            weights[[kind is LimitKind.GRASP_MOMENT for kind in limits.kinds]] = 0.0
+    else:
+        rotation = contact.rotation_contact_to_world
+        contact = _centred(contact)
+        in_world = _twist_at(contact.position - W.reference, normal)
+        twist = np.concatenate([rotation.T @ in_world[:3], rotation.T @ in_world[3:]])
+        twist[2] -= cap
+        components = 3 if contact.kind is ContactKind.POINT else 6
+        size = float(np.linalg.norm(twist[:components]))
+        if size < NEGLIGIBLE:
+            return []
+        edges = edge_wrenches(contact, W.friction_model)
+        if contact.torsion_limit is None and (edges @ twist).max() < -NEGLIGIBLE:
+            return [LimitShare(contact.effector, LimitKind.LIFTING, "lifting off", size)]
+        weights = _multipliers(limits, twist, components)
     return [
         LimitShare(contact.effector, limits.kinds[i], limits.phrases[i], float(weights[i]))
         for i in np.flatnonzero(weights > NEGLIGIBLE)
@@ -179,16 +155,6 @@ def _centred(contact: Contact) -> Contact:
 def _twist_at(arm: FloatArray, normal: FloatArray) -> FloatArray:
     """A facet normal, as a twist, at a point ``arm`` away from the reference (world axes)."""
     return np.concatenate([normal[:3] + np.cross(normal[3:], arm), normal[3:]])
-
-
-def _grasp_shares(contact: Contact, limits: ContactLimits, twist: FloatArray) -> list[LimitShare]:
-    weights = np.maximum(limits.A @ twist, 0.0)
-    if contact.max_moment == 0:
-        weights[[kind is LimitKind.GRASP_MOMENT for kind in limits.kinds]] = 0.0
-    return [
-        LimitShare(contact.effector, limits.kinds[i], limits.phrases[i], float(weights[i]))
-        for i in np.flatnonzero(weights > NEGLIGIBLE)
-    ]
 
 
 def _multipliers(limits: ContactLimits, twist: FloatArray, components: int) -> FloatArray:
@@ -225,20 +191,13 @@ class WrenchPolytope(Displayed, Polytope):
         }  # fmt: skip
 
     def __init__(
-        self,
-        H: ArrayLike,
-        h: ArrayLike,
-        stance: Stance,
-        reference: ArrayLike,
-        stance_cap_multipliers: ArrayLike,
+        self, H: ArrayLike, h: ArrayLike, stance: Stance, reference: ArrayLike, cap_multipliers: ArrayLike
     ) -> None:
         length = np.linalg.norm(np.asarray(H, dtype=np.float64), axis=1)
         super().__init__(H, h)
         object.__setattr__(self, "stance", stance)
         object.__setattr__(self, "reference", frozen_array(reference, "reference [m]", (3,), ContactError))
-        multipliers = frozen_array(
-            np.asarray(stance_cap_multipliers) / length, "stance_cap_multipliers", (len(self.h),)
-        )
+        multipliers = frozen_array(np.asarray(cap_multipliers) / length, "cap_multipliers", (len(self.h),))
         object.__setattr__(self, "stance_cap_multipliers", multipliers)
 
     @property
@@ -252,18 +211,35 @@ class WrenchPolytope(Displayed, Polytope):
         The margin changes with the reference ([Qiu2012]_ 4.2.9, remark 2).
         """
         point = frozen_array(reference, "reference [m]", (3,), ContactError)
-        H = _moved(self.H, self.reference, point)
+        H = rows_about(self.H, point - self.reference)
         return WrenchPolytope(H, self.h, self.stance, point, self.stance_cap_multipliers)
 
     def limiting(self, wrench: ArrayLike, about: ArrayLike | None = None) -> LimitingConstraint:
-        """Name the contact and the limit that the facet of W_p with the margin stands for.
+        """Explain the facet of W_p that gives the margin of a wrench.
+
+        The facet's normal is a combination, with multipliers >= 0, of the limits met on it
+        (linear-programming duality); the multiplier of a limit is how much the margin grows
+        when that limit is relaxed, and the largest one names the constraint. Contacts that
+        carry no force on the facet are lifting off: they are named only when no other is.
 
         Args:
             wrench: (6,) pseudo-wrench about :attr:`reference`.
-            about: (3,) point of the margin's moments, in general the CoM [m]; :attr:`reference` when
-                omitted.
+            about: (3,) point of the margin's moments, in general the CoM [m]; :attr:`reference` when omitted.
+
+        Raises:
+            ContactError: If the wrench is not six finite numbers.
         """
-        return limiting_constraint(self, wrench, about)
+        w = frozen_array(wrench, "wrench", (6,), ContactError)
+        if about is not None:
+            point = frozen_array(about, "point of the moments [m]", (3,), ContactError)
+            return self.at_reference(point).limiting(wrench_about(w, point - self.reference))
+        distances = self.distances(w)
+        row = int(np.argmin(distances))
+        shares = facet_shares(self, row)
+        first = shares[0]
+        return LimitingConstraint(
+            row, first.effector, first.kind, str(first), self.H[row], float(distances[row]), shares
+        )
 
 
 def pseudo_wrench(
@@ -306,10 +282,8 @@ def wrench_polytope(
 ) -> WrenchPolytope:
     """Facets of W_p, each once ([Qiu2012]_ 4.36; ours are found from generators).
 
-    Args:
-        stance: Contacts with their contact model; none at all (flight) gives the single point 0.
-        friction_model: Replaces that of the stance.
-        reference: (3,) point of the moments [m].
+    Without any contact (flight) it is the single point 0. A ``friction_model`` replaces that of the stance;
+    ``reference`` (3,) is the point of the moments [m].
 
     Raises:
         ContactError: If the normal force of a contact is bounded by no cap.
@@ -325,25 +299,21 @@ def wrench_polytope(
     fan = fan.plus_segments(np.vstack([np.zeros((0, 6)), *segments]))
     H, h, multipliers = facet_rows(fan, max(1.0, float(np.abs(generators).max(initial=0.0))))
     of_stance = np.zeros(len(h)) if caps.total is None else multipliers[:, -1] / caps.total
-    return WrenchPolytope(_moved(H, local, origin), h, stance, origin, of_stance)
+    return WrenchPolytope(rows_about(H, origin - local), h, stance, origin, of_stance)
 
 
 def wrench_polytopes(
-    stances: Sequence[Stance],
-    *,
-    reference: ArrayLike | None = None,
+    stances: Sequence[Stance], *, reference: ArrayLike | None = None
 ) -> tuple[WrenchPolytope, ...]:
     """W_p of several stances; a stance that is an earlier one moved elsewhere is not computed again.
 
-    Args:
-        stances: Contacts with their contact models.
-        reference: (3,) point of all moments [m]; of each stance the middle of its own contacts when omitted.
+    ``reference`` (3,) is the point of all moments [m]; when omitted, the middle of each stance's contacts.
 
     Raises:
         ContactError: If the normal force of a contact is bounded by no cap.
     """
     known: dict[tuple[Any, ...], WrenchPolytope] = {}
-    found = []
+    polytopes = []
     for stance in stances:
         centre = _middle(stance)
         shape = _shape_of(stance, centre)
@@ -351,12 +321,12 @@ def wrench_polytopes(
             known[shape] = wrench_polytope(stance, reference=centre)
         like = known[shape]
         local = WrenchPolytope(like.H, like.h, stance, centre, like.stance_cap_multipliers)
-        found.append(local if reference is None else local.at_reference(reference))
-    return tuple(found)
+        polytopes.append(local if reference is None else local.at_reference(reference))
+    return tuple(polytopes)
 
 
 def _middle(stance: Stance) -> FloatArray:
-    """Mean of the contacts' origins; the world origin without any [m]."""
+    """(3,) mean of the contacts' origins; the world origin without any [m]."""
     return np.mean([contact.position for contact in stance] or [np.zeros(3)], axis=0)
 
 
@@ -468,12 +438,3 @@ def _grasp_segments(contact: Contact, reference: FloatArray) -> FloatArray:
     if contact.max_moment == 0:
         return forces
     return np.vstack([forces, np.hstack([np.zeros((3, 3)), contact.max_moment * np.eye(3)])])
-
-
-def _moved(H: FloatArray, old: FloatArray, new: FloatArray) -> FloatArray:
-    """Rows on wrenches about ``old`` rewritten for wrenches about ``new``.
-
-    ``H1 f + H2 (tau + (new - old) ^ f)`` with the moment ``tau`` about ``new``.
-    """
-    arm = (new - old)[None]
-    return np.hstack([H[:, :3] + cross(H[:, 3:], np.broadcast_to(arm, (len(H), 3))), H[:, 3:]])

@@ -32,11 +32,7 @@ class Configuration:
         self.update(body.standing_posture() if q is None else q, v)
 
     def update(self, q: ArrayLike, v: ArrayLike | None = None) -> Self:
-        """Move to another state.
-
-        Args:
-            q: (nq,) configuration.
-            v: (nv,) velocity; zero when left out.
+        """Move to another configuration (nq,) and velocity (nv,), zero when left out.
 
         Raises:
             BodyError: If a vector has another length.
@@ -51,10 +47,6 @@ class Configuration:
     # when needed, because making them takes longer than placing the frames.
     @cached_property
     def _dynamics(self) -> pin.Data:
-        return self.body.pinocchio.createData()
-
-    @cached_property
-    def _second_order(self) -> pin.Data:
         return self.body.pinocchio.createData()
 
     def _once(self, key: Any, compute: Callable[[], Any]) -> Any:
@@ -86,35 +78,15 @@ class Configuration:
         return self._once("com_jacobian", lambda: self.centroidal_map[:3] / self.body.mass)
 
     @property
-    def com_bias(self) -> FloatArray:
-        """(3,) acceleration of the centre of mass when ``a = 0``: ``Jdot v`` [m/s^2]."""
-        return self._once("com_bias", lambda: self.centroidal_bias[:3] / self.body.mass)
-
-    @property
     def centroidal_map(self) -> FloatArray:
         """(6, nv): linear momentum and angular momentum about the centre of mass, per ``v``."""
         model = self.body.pinocchio
         return self._once("centroidal_map", lambda: pin.computeCentroidalMap(model, self._dynamics, self.q))
 
     @property
-    def linear_momentum(self) -> FloatArray:
-        """(3,) [kg.m/s]."""
-        return self._once("linear_momentum", lambda: self.centroidal_map[:3] @ self.v)
-
-    @property
     def angular_momentum(self) -> FloatArray:
         """(3,) about the centre of mass [kg.m^2/s]."""
         return self._once("angular_momentum", lambda: self.centroidal_map[3:] @ self.v)
-
-    @property
-    def centroidal_bias(self) -> FloatArray:
-        """(6,) rate of the centroidal momentum when ``a = 0``: ``d(map)/dt v`` [N, N.m]."""
-        return self._once("centroidal_bias", self._compute_centroidal_bias)
-
-    def _compute_centroidal_bias(self) -> FloatArray:
-        model, data = self.body.pinocchio, self._second_order
-        pin.computeCentroidalMomentumTimeVariation(model, data, self.q, self.v, self._zero)
-        return np.array(data.dhg.vector)
 
     # --- frames ------------------------------------------------------------------------------
 
@@ -133,18 +105,6 @@ class Configuration:
     def segment_jacobian(self, name: str) -> FloatArray:
         """(6, nv) linear, then angular velocity of the segment frame in world axes, per ``v``."""
         return self._jacobian(self.body.segment_frame(name))
-
-    def effector_velocity(self, name: str) -> FloatArray:
-        """(6,) linear, then angular velocity of the effector in world axes [m/s, rad/s]."""
-        return self.effector_jacobian(name) @ self.v
-
-    def effector_bias(self, name: str) -> FloatArray:
-        """(6,) ``Jdot v``: acceleration of the effector in world axes when ``a = 0``."""
-        return self._bias(self.body.effector_frame(name))
-
-    def segment_bias(self, name: str) -> FloatArray:
-        """(6,) ``Jdot v``: acceleration of the segment frame in world axes when ``a = 0``."""
-        return self._bias(self.body.segment_frame(name))
 
     def point(self, segment: str, offset: ArrayLike) -> FloatArray:
         """(3,) world position of a point fixed to a segment at ``offset`` (3,) in its axes [m]."""
@@ -168,19 +128,6 @@ class Configuration:
             ("jacobian", frame), lambda: pin.getFrameJacobian(model, self._frames, frame, _WORLD_ALIGNED)
         )
 
-    def _bias(self, frame: int) -> FloatArray:
-        self._once("second_order", self._second_order_kinematics)
-        return self._once(("bias", frame), lambda: self._frame_acceleration(frame))
-
-    def _second_order_kinematics(self) -> bool:
-        pin.forwardKinematics(self.body.pinocchio, self._second_order, self.q, self.v, self._zero)
-        return True
-
-    def _frame_acceleration(self, frame: int) -> FloatArray:
-        model = self.body.pinocchio
-        acceleration = pin.getFrameClassicalAcceleration(model, self._second_order, frame, _WORLD_ALIGNED)
-        return np.array(acceleration.vector)
-
     # --- dynamics ----------------------------------------------------------------------------
 
     @property
@@ -200,21 +147,6 @@ class Configuration:
         return self._once(
             "nonlinear_effects", lambda: pin.nonLinearEffects(model, self._dynamics, self.q, self.v)
         )
-
-    def inverse_dynamics(self, acceleration: ArrayLike) -> FloatArray:
-        """(nv,) generalised forces that give ``acceleration`` (nv,) without contacts [N, N.m]."""
-        a = _vector(acceleration, self.body.nv, "acceleration")
-        return np.array(pin.rnea(self.body.pinocchio, self._dynamics, self.q, self.v, a))
-
-    @property
-    def kinetic_energy(self) -> float:
-        """[J]."""
-        return 0.5 * float(self.v @ self.mass_matrix @ self.v)
-
-    @property
-    def potential_energy(self) -> float:
-        """[J], zero at height 0."""
-        return -float(self.body.mass * self.body.pinocchio.gravity.linear @ self.com)
 
 
 # --- the manifold of configurations ----------------------------------------------------------
@@ -238,13 +170,7 @@ def interpolate(body: BodyModel, start: ArrayLike, end: ArrayLike, share: float)
 
 
 def random_configuration(body: BodyModel, rng: np.random.Generator, spread: float = 1.0) -> FloatArray:
-    """(nq,) random configuration: hinges uniform within their ranges, root anyhow.
-
-    Args:
-        body: The body.
-        rng: Source of randomness.
-        spread: Half-width of the box for the root's position [m].
-    """
+    """(nq,) random configuration: hinges uniform in their ranges, the root within ``spread`` [m] of 0."""
     quaternion = rng.standard_normal(4)
     angles = rng.uniform(body.lower, body.upper)
     position = rng.uniform(-spread, spread, 3)

@@ -57,11 +57,11 @@ def creature_from_urdf(
 ) -> BodyModel:
     """Make a body from a URDF file.
 
-    The root floats; massless links above it, such as a world, are left out. Revolute joints become hinges
-    of their limits, continuous ones with half a turn either way; prismatic, planar and mimicking joints are
-    refused. Spheres, capsules and boxes stand for all
-    shapes, see :mod:`manikin.body.urdf`. Segments that overlap in the zero or the standing posture are
-    not checked against each other. Limbs that are reflections of each other are found.
+    The root floats; massless links above it, such as a world, are left out. Revolute joints become hinges of
+    their limits, continuous ones with half a turn either way; prismatic, planar and mimicking joints are
+    refused. Spheres, capsules and boxes stand for all shapes, see :mod:`manikin.body.urdf`. Segments that
+    overlap in the zero or the standing posture are not checked against each other. Limbs that are reflections
+    of each other are found.
 
     Args:
         path: The file.
@@ -241,16 +241,16 @@ class _Tree:
 
     def _shapes(self, segment: str) -> list[Shape]:
         origin = self.members[segment].place
-        found = []
-        for name in self._links(segment):
-            member = self.members[name]
-            for number, shape in enumerate(self.robot.links[name].shapes):
-                found.append(Shape(
-                    f"{name}_{number}", shape.kind, shape.size,
-                    member.place - origin + member.rotation @ shape.translation,
-                    _orthonormal(member.rotation @ shape.rotation),
-                ))  # fmt: skip
-        return found
+        return [
+            Shape(
+                f"{name}_{number}", shape.kind, shape.size,
+                member.place - origin + member.rotation @ shape.translation,
+                _orthonormal(member.rotation @ shape.rotation),
+            )
+            for name in self._links(segment)
+            for member in (self.members[name],)
+            for number, shape in enumerate(self.robot.links[name].shapes)
+        ]  # fmt: skip
 
     # --- limbs -----------------------------------------------------------------------------------
 

@@ -1,23 +1,22 @@
-"""The person of 15 rigid segments and 34 joint angles of [Kudoh2002]_ 2.2.
+"""Bodies beside the human: Kudoh's 15 segments, an insect, a point mass.
 
-Masses, lengths and the widths of shoulders and hips are printed ([Kudoh2002]_ Table 3.1 and 3.2), and so
-is which joints are pins and which are balls. All else is ours: inertias are those of cylinders of the
-density of water (3.2 says "approximation cylinder" and no radius), the foot stands on a sole as long as
-itself, and axes, ranges and speeds are those of :mod:`manikin.body.human_parts`, carried by
-the joints that this body has: the waist bends as far as lumbar and thorax together, the wrist turns as the
-forearm does, and the ankle as the shank. The thesis prints no torque limits (2.31-2.33 name them only);
-:data:`TORQUES` are ours, symmetric, and larger than people's, so that its printed pushes can be held.
+:func:`kudoh` is the person of 15 rigid segments and 34 joint angles of [Kudoh2002]_ 2.2. Masses, lengths and
+the widths of shoulders and hips are printed ([Kudoh2002]_ Table 3.1 and 3.2), and so is which joints are pins
+and which are balls. All else is ours: inertias are those of cylinders of the density of water (3.2 says
+"approximation cylinder" and no radius), the foot stands on a sole as long as itself, and axes, ranges and
+speeds are those of :mod:`manikin.body.human_parts`, carried by the joints that this body has: the waist bends
+as far as lumbar and thorax together, the wrist turns as the forearm does, and the ankle as the shank. The
+thesis prints no torque limits (2.31-2.33 name them only); :data:`TORQUES` are ours, symmetric, and larger
+than people's, so that its printed pushes can be held.
 
-Also here. An insect of six legs, to try creatures other than the human. A body without limbs: all its mass in
-one small ball, on feet that weigh nothing ([Qiu2012]_ 5.4.4).
+:func:`insect`: [Tonneau2015]_ prints 4 degrees of freedom per leg and 33 in all in one place and 5 per leg in
+another; 33 fits neither with a free root. We take the insect of the results: six legs of five hinges and a
+free root, 36 degrees of freedom (Fig. 8.1). It prints no dimension, so proportions, ranges, speeds and
+strengths are our own choice.
 
-The thesis prints 4 degrees of freedom per leg and 33 in all in one place and 5 per leg in another;
-33 fits neither with a free root. We take the insect of the results: six legs of five hinges and a
-free root, 36 degrees of freedom ([Tonneau2015]_ Fig. 8.1). It prints no dimension, so proportions,
-ranges, speeds and strengths are our own choice.
-
-It can be planned for, but has no joints to move and nothing to execute.  Its feet are where
-the contact schedule has them, see :func:`manikin.motion.motion.foot_positions`.
+:func:`point_mass`: a body without limbs, all its mass in one small ball, on feet that weigh nothing
+([Qiu2012]_ 5.4.4). It can be planned for, but has no joints to move and nothing to execute. Its feet are
+where the contact schedule has them, see :func:`manikin.motion.motion.foot_positions`.
 """
 
 from collections.abc import Mapping
@@ -70,19 +69,12 @@ _STANDING_DEG = {"lift": 25.0, "knee": 105.0, "ankle": 10.0}
 
 
 def insect(length: float = 0.4, mass: float = 2.0) -> BodyModel:
-    """Make an insect: a trunk and six legs of five hinges each.
+    """Make an insect of a trunk length [m] > 0 and a mass [kg] > 0 with six legs of five hinges each.
 
     Segment frames are parallel to the world in the zero posture, in which all legs point straight
     to the side. A hip sweeps backward, lifts and twists about the leg; knee and ankle bend
     down. Effectors ``left_front_tip`` ... ``right_rear_tip`` are the ends of the tarsi, their z
     axes along the tarsus towards the body; limbs are ``left_front_leg`` ... ``right_rear_leg``.
-
-    Args:
-        length: Of the trunk [m], > 0.
-        mass: Of the whole insect [kg], > 0.
-
-    Raises:
-        BodyError: If a value is not positive.
     """
     length = finite_number(length, "insect length [m]", above=0.0, error=BodyError)
     mass = finite_number(mass, "insect mass [kg]", above=0.0, error=BodyError)
@@ -111,11 +103,11 @@ def _insect_trunk(length: float, mass: float) -> Segment:
 def _insect_leg(name: str, pair: str, sign: float, length: float, mass: float) -> list[Segment]:
     """Femur, tibia and tarsus, each along y in the zero posture."""
     origin = np.array([_HIP_X[pair] * length, sign * _HIP_Y * length, 0.0])
-    parent, found = "trunk", []
+    parent, parts = "trunk", []
     for part, share in _LENGTHS.items():
         reach = np.array([0.0, sign * share * length, 0.0])
         part_mass, radius = _MASS_SHARES[part] * mass, _RADII[part] * length
-        found.append(
+        parts.append(
             Segment(
                 f"{name}_{part}", parent, origin, _insect_hinges(name, part, sign, 9.81 * mass * length),
                 part_mass, 0.5 * reach, _rod(part_mass, radius, share * length, axis=1),
@@ -123,7 +115,7 @@ def _insect_leg(name: str, pair: str, sign: float, length: float, mass: float) -
             )
         )  # fmt: skip
         parent, origin = f"{name}_{part}", reach
-    return found
+    return parts
 
 
 def _insect_hinges(name: str, part: str, sign: float, strength: float) -> tuple[Hinge, ...]:
@@ -178,26 +170,11 @@ RADIUS = 0.1
 
 
 def point_mass(mass: float) -> BodyModel:
-    """Make a point mass.
-
-    Args:
-        mass: [kg], > 0.
-
-    Raises:
-        BodyError: If the mass is not a positive number.
-    """
+    """Make a point mass [kg] > 0."""
     mass = finite_number(mass, "mass [kg]", above=0.0, error=BodyError)
     ball = Shape("ball", ShapeKind.SPHERE, np.array([RADIUS]), np.zeros(3), np.eye(3))
-    root = Segment(
-        name="body",
-        parent=None,
-        origin=np.zeros(3),
-        hinges=(),
-        mass=mass,
-        com=np.zeros(3),
-        inertia=0.4 * mass * RADIUS**2 * np.eye(3),
-        shapes=(ball,),
-    )
+    inertia = 0.4 * mass * RADIUS**2 * np.eye(3)
+    root = Segment("body", None, np.zeros(3), (), mass, np.zeros(3), inertia, (ball,))
     return BodyModel(name="point mass", segments=(root,), effectors={}, nominal_mass=mass)
 
 
@@ -382,15 +359,9 @@ def _hanging(side: str, name: str, parent: str, origin: FloatArray) -> Segment:
     radius = min(part.radius, 0.49 * part.length)
     start = -radius if name == "hand" else 0.0
     shape = upright_capsule(name, radius, (0.0, 0.0, start), (0.0, 0.0, radius - part.length))
+    com = 0.5 * _below(name)
     return Segment(
-        f"{side}_{name}",
-        parent,
-        origin,
-        _joint(name, side),
-        part.mass,
-        0.5 * _below(name),
-        part.inertia,
-        (shape,),
+        f"{side}_{name}", parent, origin, _joint(name, side), part.mass, com, part.inertia, (shape,)
     )
 
 
@@ -400,16 +371,9 @@ def _foot(side: str) -> Segment:
     middle = np.array([(0.5 - ANKLE_FROM_HEEL) * part.length, 0.0, -0.5 * ANKLE_HEIGHT])
     box = np.array([part.length, SOLE_WIDTH, 0.75 * ANKLE_HEIGHT])
     sole = Shape("sole", ShapeKind.BOX, box, (middle[0], 0.0, 0.5 * box[2] - ANKLE_HEIGHT))
-    inertia = ALONG_X @ part.inertia @ ALONG_X.T
+    inertia, hinges = ALONG_X @ part.inertia @ ALONG_X.T, _joint("foot", side)
     return Segment(
-        f"{side}_foot",
-        f"{side}_shank",
-        _below("shank"),
-        _joint("foot", side),
-        part.mass,
-        middle,
-        inertia,
-        (sole,),
+        f"{side}_foot", f"{side}_shank", _below("shank"), hinges, part.mass, middle, inertia, (sole,)
     )
 
 
@@ -417,7 +381,7 @@ def _foot(side: str) -> Segment:
 
 
 def _effectors() -> list[Effector]:
-    found = [
+    effectors = [
         Effector("pelvis", "loins", np.zeros(3)),
         Effector("head", "head", np.array([0.0, 0.0, PARTS["head"].length])),
     ]
@@ -425,6 +389,6 @@ def _effectors() -> list[Effector]:
     for side, sign in _SIDES:
         sole = np.array([(0.5 - ANKLE_FROM_HEEL) * PARTS["foot"].length, 0.0, -ANKLE_HEIGHT])
         palm = np.array([0.0, -sign * hand.radius, -0.5 * hand.length])
-        found.append(Effector(f"{side}_foot", f"{side}_foot", sole))
-        found.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
-    return found
+        effectors.append(Effector(f"{side}_foot", f"{side}_foot", sole))
+        effectors.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
+    return effectors

@@ -115,9 +115,7 @@ def human(
     Raises:
         BodyError: If a value is out of its range.
     """
-    size = Anthropometry(
-        stature, mass, sex, sole_length=sole_length, sole_width=sole_width, lengths=lengths
-    )  # fmt: skip
+    size = Anthropometry(stature, mass, sex, sole_length=sole_length, sole_width=sole_width, lengths=lengths)
     check_strength(age, strength)
     builder = _HumanBuilder(size, off_axis_masses, age, strength)
     return BodyModel(
@@ -140,7 +138,7 @@ def human(
 
 
 def body_from_signature(signature: Mapping[str, object]) -> BodyModel:
-    """Make the body again that :meth:`BodyModel.signature` described.
+    """Make the body that :meth:`BodyModel.signature` described.
 
     Raises:
         BodyError: If the model is unknown or a value is missing or out of its range.
@@ -209,15 +207,11 @@ class _Inertia:
 
 
 class _HumanBuilder:
-    """Turns dimensions into segments; the only state is the dimensions and the strength."""
+    """Segments and effectors of given dimensions and strength."""
 
     def __init__(self, size: Anthropometry, off_axis_masses: bool, age: float, strength: float) -> None:
-        self.size = size
-        self.age = age
-        self.strength = strength
-        self.off_axis_masses = off_axis_masses
-        self.stature = size.stature
-        self.girth = size.girth
+        self.size, self.off_axis_masses, self.age, self.strength = size, off_axis_masses, age, strength
+        self.stature, self.girth = size.stature, size.girth
 
     def segments(self) -> tuple[Segment, ...]:
         trunk = [self._pelvis(), self._lumbar(), self._thorax(), *self._neck_and_head()]
@@ -228,17 +222,17 @@ class _HumanBuilder:
     def effectors(self) -> list[Effector]:
         size = self.size
         head_length = (1.0 - NECK_LENGTH_SHARE) * size.length("head_and_neck")
-        found = [
+        effectors = [
             Effector("pelvis", "pelvis", np.zeros(3)),
             Effector("head", "head", np.array([0.0, 0.0, head_length])),
             Effector("buttocks", "pelvis", np.array([self._seat_x, 0.0, -SEAT_DEPTH * self.stature])),
         ]
         for side, sign in (("left", 1.0), ("right", -1.0)):
             sole = np.array([(0.5 - ANKLE_FROM_HEEL) * size.sole_length, 0.0, -size.ankle_height])
-            found.append(Effector(f"{side}_foot", f"{side}_foot", sole))
+            effectors.append(Effector(f"{side}_foot", f"{side}_foot", sole))
             palm = np.array([0.0, -sign * 0.5 * self._hand_thickness, -0.8 * size.knuckle_distance])
-            found.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
-        return found
+            effectors.append(Effector(f"{side}_hand", f"{side}_hand", palm, palm_rotation(sign)))
+        return effectors
 
     def _strength(self, hinge: str) -> tuple[float, float]:
         size = self.size
@@ -369,16 +363,13 @@ class _HumanBuilder:
 
     def _leg(self, side: str) -> list[Segment]:
         size = self.size
+        thigh_radius, shank_radius = (share * self.stature * self.girth for share in (0.038, 0.029))
         sign = 1.0 if side == "left" else -1.0
         thigh, shank = size.length("thigh"), size.length("shank")
         hip = (0.0, 0.5 * sign * size.hip_distance, 0.0)
-        thigh_shape = upright_capsule(
-            "thigh", 0.038 * self.stature * self.girth, (0.0, 0.0, 0.0), (0.0, 0.0, -thigh)
-        )
+        thigh_shape = upright_capsule("thigh", thigh_radius, (0.0, 0.0, 0.0), (0.0, 0.0, -thigh))
         ankle_end = 0.012 * self.stature - shank
-        shank_shape = upright_capsule(
-            "shank", 0.029 * self.stature * self.girth, (0.0, 0.0, 0.0), (0.0, 0.0, ankle_end)
-        )
+        shank_shape = upright_capsule("shank", shank_radius, (0.0, 0.0, 0.0), (0.0, 0.0, ankle_end))
         return [
             self._limb(side, "thigh", "pelvis", "thigh", hip, (thigh_shape,)),
             self._limb(side, "leg", f"{side}_thigh", "shank", (0.0, 0.0, -thigh), (shank_shape,)),
@@ -401,11 +392,8 @@ class _HumanBuilder:
         bare_toes = (1.0 - TOE_HINGE_FROM_HEEL) * bare_length
         toe_mass = TOES_MASS_SHARE * both.mass
         toe_com = np.array([bare_heel + bare_length - 0.5 * bare_toes, 0.0, hinge[2]])
-        toes = _Inertia(
-            toe_mass,
-            toe_com,
-            cuboid_inertia(toe_mass, np.array([bare_toes, 0.05 * self.stature, toe_height])),
-        )
+        toe_extents = np.array([bare_toes, 0.05 * self.stature, toe_height])
+        toes = _Inertia(toe_mass, toe_com, cuboid_inertia(toe_mass, toe_extents))
         foot = both.without(toes)
 
         toe_box = np.array([tip - hinge_x, size.sole_width, toe_height])
@@ -425,20 +413,10 @@ class _HumanBuilder:
         ]  # fmt: skip
 
     def _limb(
-        self,
-        side: str,
-        name: str,
-        parent: str,
-        row: str,
-        origin: ArrayLike,
-        shapes: tuple[Shape, ...],
+        self, side: str, name: str, parent: str, row: str, origin: ArrayLike, shapes: tuple[Shape, ...],
         sideways: bool = False,
-    ) -> Segment:
-        """Limb part hanging down from its joint.
-
-        Args:
-            sideways: Palms inward instead of forward: the table's fore-aft axis is our y.
-        """
+    ) -> Segment:  # fmt: skip
+        """Limb part hanging down from its joint; ``sideways``, the table's fore-aft axis is our y."""
         size = self.size
         sagittal, transverse, longitudinal = size.moments(row)
         x, y = (transverse, sagittal) if sideways else (sagittal, transverse)

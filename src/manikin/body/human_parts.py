@@ -1,39 +1,28 @@
-"""Shapes, inertias, axes and limbs that the parts of human bodies have in common.
+"""Shapes, inertias, axes, ranges and limbs that the parts of human bodies have in common.
 
-Also here. How far the masses of segments lie off the lines between joints. Joint axes, ranges and speeds of
-the human body.
+De Leva's table places each segment's mass on the line from joint to joint. Tables measured in three
+dimensions have the masses of thighs, shanks, trunk and head a little behind that line, which moves the
+centre of mass of the whole body back by a good centimetre. Source of these offsets: Dumas, Chèze and
+Verriest, "Adjustments to McConville et al. and Young et al. body segment inertial parameters", J. Biomech.
+40(3), 2007, Table 2, the anterior and lateral parts only. Arms, hands and feet have none: theirs move the
+body by less than a millimetre. The reference lines of the trunk end at the lumbosacral joint and at C7/T1,
+ours at the hips and at C7; the pelvis, whose offset is given from the lumbosacral joint alone, has none.
 
-The scans behind de Leva's table give one number a segment, a place on the line from joint to joint. Tables
-measured in three dimensions say that thighs, shanks, trunk and head have their masses a little behind that
-line: together they move the centre of mass of the whole body back by a good centimetre, which a force plate
-sees.
+Ranges follow the normal values of the American Academy of Orthopaedic Surgeons ("Joint Motion: Method of
+Measuring and Recording", 1965), Boone and Azen (J. Bone Joint Surg. 61-A, 1979) and, for the spine, Kapandji
+("The Physiology of the Joints", vol. 3). They were widened where a deep squat needs more than a clinician's
+passive test of a lying subject (our choice): knee flexion 150 deg, ankle dorsiflexion 40 deg under body
+weight. Speed limits are our choice: round numbers above those of brisk everyday movement, below sprinting.
 
-Source: Dumas, Chèze and Verriest, "Adjustments to McConville et al. and Young et al. body segment inertial
-parameters", J. Biomech. 40(3), 2007, Table 2, the anterior and lateral parts only; along the segments de
-Leva's places are kept. Arms, hands and feet are left as they are: their offsets move the body by less than a
-millimetre. The reference lines of the trunk end at the lumbosacral joint and at C7/T1, ours at the hips and
-at C7; the pelvis, whose offset is told from the lumbosacral joint alone, keeps its mass on the line.
-
-Ranges follow the normal values of the American Academy of Orthopaedic Surgeons ("Joint Motion:
-Method of Measuring and Recording", 1965), Boone and Azen (J. Bone Joint Surg. 61-A, 1979) and,
-for the spine, Kapandji ("The Physiology of the Joints", vol. 3). They were widened where a deep
-squat needs more than a clinician's passive test of a lying subject (our choice): knee flexion
-150 deg, ankle dorsiflexion 40 deg under body weight.
-
-Strengths: :mod:`manikin.body.strength`.
-
-Speed limits are our choice: round numbers above those of brisk everyday movement, below sprinting.
-
-Axes are those of the **left** side and of the trunk, in the segment frame (x forward, y left,
-z up); the right side is the mirror image, so equal angles mean mirrored postures. The order of a
-joint's hinges keeps the middle angle of every ball joint away from 90 degrees:
+Axes are those of the **left** side and of the trunk, in the segment frame (x forward, y left, z up); the
+right side is the mirror image, so equal angles mean mirrored postures. The order of a joint's hinges keeps
+the middle angle of every ball joint away from 90 degrees:
 
 * hip, neck and spine: flexion, then abduction or side bend, then rotation;
-* shoulder: the same, but the axes of flexion and abduction are turned by 30 degrees about the
-  vertical: positive flexion lifts the arm forward and 30 degrees outward (near the plane of the
-  scapula), and abduction then moves it sideways and backwards. The two directions in which the
-  first and the third axis coincide are then sideways-backwards and across the chest, at the ends
-  of the reach, instead of straight to the side or forward.
+* shoulder: the same, but the axes of flexion and abduction are turned by 30 degrees about the vertical:
+  positive flexion lifts the arm forward and 30 degrees outward (near the plane of the scapula), and abduction
+  then moves it sideways and backwards. The two directions in which the first and the third axis coincide are
+  then sideways-backwards and across the chest, at the ends of the reach.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -251,12 +240,7 @@ def cuboid_inertia(mass: float, extents: FloatArray) -> FloatArray:
 
 
 def arms_and_legs(arm: Sequence[str], leg: Sequence[str]) -> tuple[Limb, ...]:
-    """Limbs of both sides; a hand presses with its palm, unless a grasp is asked for.
-
-    Args:
-        arm: Segments of an arm from the trunk outward, without their side.
-        leg: Of a leg.
-    """
+    """Limbs of both sides, of segments from the trunk outward without their side; palms press."""
     chains = (("arm", "hand", arm, ContactKind.POINT), ("leg", "foot", leg, ContactKind.SOLE))
     return tuple(
         Limb(

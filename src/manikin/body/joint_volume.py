@@ -5,11 +5,9 @@ One interval for each angle either holds postures that nobody can take or forbid
 do take. The thesis therefore takes the non-convex hull of recorded angles, which it then treats as a
 polytope; a polytope, though, is convex. We keep the hull as the signed distance to its surface, on a grid.
 
-The hull: all places of angle space within ``closing`` of a recorded one, then drawn in by ``closing``
+The hull: all points of angle space within ``closing`` of a recorded one, then drawn in by ``closing``
 minus ``margin``. So gaps between recordings narrower than twice ``closing`` are filled, hollows that are
-wider stay, and every recorded place is about ``margin`` inside. Only its largest connected part is kept.
-
-Also here. Three hinges through one point as a ball joint: rotations to angles.
+wider stay, and every recorded point is about ``margin`` inside. Only its largest connected part is kept.
 """
 
 from dataclasses import dataclass
@@ -20,30 +18,26 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt, label
 
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, finite_number, frozen_array, skew
 
 
 def ball_rotation(axes: ArrayLike, angles: ArrayLike) -> FloatArray:
-    """Rotation of a segment to its parent: the product of its hinges, the first leftmost.
+    """(..., 3, 3) rotations of a segment to its parent: the product of its three hinges, the first leftmost.
 
     Args:
         axes: (3, 3) unit axes, one a row.
         angles: (..., 3) [rad].
-
-    Returns:
-        (..., 3, 3).
     """
     q = np.asarray(angles, dtype=np.float64)
     total = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
-    for number, (x, y, z) in enumerate(np.asarray(axes, dtype=np.float64)):
-        cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    for number, cross in enumerate(skew(axes)):
         sine, cosine = np.sin(q[..., number])[..., None, None], np.cos(q[..., number])[..., None, None]
         total = total @ (np.eye(3) + sine * cross + (1.0 - cosine) * cross @ cross)
     return np.array(total)
 
 
 def ball_angles(axes: ArrayLike, rotations: ArrayLike, middle: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
-    """Angles of three hinges that give rotations; the inverse of :func:`ball_rotation`.
+    """(..., 3) angles of three hinges that give rotations [rad]; the inverse of :func:`ball_rotation`.
 
     The second angle is within 90 degrees of 0. At its ends only the sum or the difference of the
     others is defined, and nearby they are sensitive.
@@ -52,9 +46,6 @@ def ball_angles(axes: ArrayLike, rotations: ArrayLike, middle: ArrayLike = (0.0,
         axes: (3, 3) unit axes, one a row, each perpendicular to the next.
         rotations: (..., 3, 3).
         middle: (3,) the first and the third angle are within half a turn of these [rad].
-
-    Returns:
-        (..., 3) [rad].
 
     Raises:
         BodyError: If the axes are not perpendicular.
@@ -81,8 +72,9 @@ CLOSING = float(np.deg2rad(30.0))
 """Half the width of the gaps between recorded angles that are filled [rad]; our choice."""
 
 MARGIN = float(np.deg2rad(10.0))
-"""How far beyond recorded angles the volume reaches [rad]; our choice, because our recordings are of
-everyday movement and not, as those of the thesis, of the largest that the subject could do."""
+"""How far beyond recorded angles the volume reaches [rad]; our choice, for recordings of everyday movement.
+
+Those of the thesis are of the largest movement that the subject could do."""
 
 FEWEST = 2
 """Frames with which a cell of the fine grid counts as seen; our choice, against single wrong frames."""
@@ -125,8 +117,7 @@ class JointVolume:
     def distance(self, angles: ArrayLike) -> FloatArray:
         """(...) distance of (..., 3) angles to the surface, negative outside [rad].
 
-        Linear between the grid's points, whose distances differ by no more than they are apart. Off
-        the grid it is that of the nearest place on it, less the distance to there.
+        Linear between the grid's points; off the grid that of its nearest point, less the distance to it.
         """
         x, beyond = self._on_grid(angles)
         cell, share = self._cell(x)

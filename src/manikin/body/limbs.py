@@ -1,13 +1,10 @@
-"""The limbs of a body: which joints move an effector, and where the chain begins.
+"""The limbs of a body: which joints move an effector, where the chain begins and ends, and its reflection.
 
-Also here. The end of a limb: the segment of an effector and what hangs on it, as toes on a foot. Reflection
-of postures in the sagittal plane: left becomes right. Knees, elbows and the pelvis as further contacts of a
-human ([Tonneau2015]_ 5.4.1, left open there). The frame of a body's root, for tasks that place it.
-
-The places are on the segments that exist: the knee in front of the origin of the lower leg, the
-elbow behind that of the forearm, each on the thickest shape that meets there. Their z axes, the
-normals of contacts, point through the joint, backwards and forwards. What a human sits on, the
-effector ``buttocks``, belongs to the root: no joint moves it, so its limb has none and goes with the root.
+Knees, elbows and the pelvis are further contacts of a human ([Tonneau2015]_ 5.4.1, left open there). They are
+on the segments that exist: the knee in front of the origin of the lower leg, the elbow behind that of the
+forearm, each on the thickest shape that meets there. Their z axes, the normals of contacts, point through the
+joint, backwards and forwards. What a human sits on, the effector ``buttocks``, belongs to the root: no joint
+moves it, so its limb has none.
 """
 
 from collections.abc import Collection
@@ -24,34 +21,9 @@ from manikin.contact import ContactKind
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray
 
-__all__ = [
-    "FURTHER",
-    "PELVIS",
-    "REFLECTION",
-    "Limb",
-    "are_mirrored",
-    "carrying_segment",
-    "end_segments",
-    "hanging_segment",
-    "hinge_line",
-    "limb_hinges",
-    "limb_named",
-    "limb_origin",
-    "limb_placement",
-    "limb_slots",
-    "limbs_of",
-    "mirrored",
-    "mirrored_hinges",
-    "mirrored_name",
-    "parent_segment",
-    "with_further_contacts",
-    "with_knees_and_elbows",
-    "with_root",
-]
-
 
 def hanging_segment(body: BodyModel, segment: str) -> Segment | None:
-    """Return the last segment of a limb when it hangs on ``segment``, as toes on a foot, or None."""
+    """Last segment of a limb when it hangs on ``segment``, as toes on a foot, or None."""
     children = [candidate for candidate in body.segments if candidate.parent == segment]
     if len(children) != 1 or not children[0].hinges:
         return None
@@ -67,7 +39,7 @@ def end_segments(body: BodyModel, effector: str) -> tuple[str, ...]:
 
 
 def hinge_line(body: BodyModel, effector: str) -> float | None:
-    """Return where the hinge of the hanging segment crosses the effector's x axis [m], or None."""
+    """Where the hinge of the hanging segment crosses the effector's x axis [m], or None."""
     frame = body.effector(effector)
     hanging = hanging_segment(body, frame.segment)
     return None if hanging is None else float((frame.rotation.T @ (hanging.origin - frame.translation))[0])
@@ -95,11 +67,9 @@ def mirrored_name(name: str) -> str:
 
 
 def mirrored_hinges(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray]:
-    """Where each hinge finds its angle in the mirrored posture, and the factor of the angle.
+    """Hinges on the other side (nv - 6,) and factors (nv - 6,), 1 or -1, of the mirrored posture.
 
-    Returns:
-        (nv - 6,) indices of hinges on the other side and (nv - 6,) factors, 1 or -1: ``mirrored =
-        factors * angles[..., indices]``.
+    They are such that ``mirrored = factors * angles[..., indices]``.
 
     Raises:
         BodyError: If a hinge has no counterpart with a reflected axis.
@@ -120,14 +90,7 @@ def mirrored_hinges(body: BodyModel) -> tuple[NDArray[np.int64], FloatArray]:
 
 
 def mirrored(body: BodyModel, q: ArrayLike) -> FloatArray:
-    """Postures reflected in the world's plane y = 0, for a body of two equal sides.
-
-    Args:
-        body: The body.
-        q: (..., nq) postures.
-
-    Returns:
-        (..., nq).
+    """(..., nq) postures reflected in the world's plane y = 0, for a body of two equal sides.
 
     Raises:
         BodyError: If the shape does not fit or the body's sides differ.
@@ -136,11 +99,10 @@ def mirrored(body: BodyModel, q: ArrayLike) -> FloatArray:
     if posture.ndim == 0 or posture.shape[-1] != body.nq:
         raise BodyError(f"posture has shape {posture.shape}; valid: (..., {body.nq})")
     indices, factors = mirrored_hinges(body)
-    found = posture.copy()
-    found[..., 1] *= -1.0
-    found[..., [3, 5]] *= -1.0
-    found[..., 7:] = factors * posture[..., 7:][..., indices]
-    return found
+    reflected = posture.copy()
+    reflected[..., [1, 3, 5]] *= -1.0
+    reflected[..., 7:] = factors * posture[..., 7:][..., indices]
+    return reflected
 
 
 _BACKWARD = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
@@ -184,11 +146,7 @@ def with_further_contacts(body: BodyModel, kinds: Collection[str] = FURTHER) -> 
 
 
 def with_knees_and_elbows(body: BodyModel) -> BodyModel:
-    """Give a human the effectors and limbs ``left_knee``, ``right_knee``, ``left_elbow``, ``right_elbow``.
-
-    Raises:
-        BodyError: If the body has no arms and legs like those of :func:`manikin.body.human`.
-    """
+    """Give a human the effectors and limbs ``left_knee``, ``right_knee``, ``left_elbow``, ``right_elbow``."""
     return with_further_contacts(body, ("knees", "elbows"))
 
 
@@ -291,9 +249,8 @@ def are_mirrored(body: BodyModel, first: Limb, second: Limb, tolerance: float = 
     Both must hang on the same segment and have reflected origins, axes and effectors and equal
     ranges. An axis of rotation keeps its y component and changes the sign of the others.
     """
-    if len(first.segments) != len(second.segments):
-        return False
-    if parent_segment(body, first) != parent_segment(body, second):
+    same_parent = parent_segment(body, first) == parent_segment(body, second)
+    if len(first.segments) != len(second.segments) or not same_parent:
         return False
     pairs = zip(first.segments, second.segments, strict=True)
     one, other = body.effector(first.effector), body.effector(second.effector)

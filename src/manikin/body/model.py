@@ -178,14 +178,7 @@ class BodyModel(Displayed):
         return frozen_array([hinge.torque_upper for hinge in self.hinges], "torque_upper")
 
     def torque_share(self, torque: ArrayLike) -> FloatArray:
-        """Share of the strength that torques take, each of the limit in its own direction.
-
-        Args:
-            torque: (..., nv - 6) hinge torques [N.m].
-
-        Returns:
-            (..., nv - 6), at least 0; 1 at a limit.
-        """
+        """(..., nv - 6) hinge torques [N.m] over the limits in their directions: at least 0, 1 at a limit."""
         given = np.asarray(torque, dtype=np.float64)
         return np.maximum(given / self.torque_upper, given / self.torque_lower)
 
@@ -194,27 +187,15 @@ class BodyModel(Displayed):
         return segments_by_name(self.segments)
 
     def segment(self, name: str) -> Segment:
-        """Segment by name.
-
-        Raises:
-            BodyError: If there is none.
-        """
+        """Segment by name; BodyError if there is none."""
         return _look_up(self._segment_index, name, "segment")
 
     def effector(self, name: str) -> Effector:
-        """Effector by name.
-
-        Raises:
-            BodyError: If there is none.
-        """
+        """Effector by name; BodyError if there is none."""
         return _look_up(self.effectors, name, "effector")
 
     def joint_index(self, name: str) -> int:
-        """Position of a hinge among the ``nv - 6`` hinges; add 7 for ``q`` and 6 for ``v``.
-
-        Raises:
-            BodyError: If there is none.
-        """
+        """Position of a hinge among the ``nv - 6`` hinges; add 7 for ``q`` and 6 for ``v``."""
         return _look_up(self._joint_index, name, "hinge")
 
     @cached_property
@@ -250,30 +231,18 @@ class BodyModel(Displayed):
         return {s.name: self.pinocchio.getFrameId(f"segment/{s.name}") for s in self.segments}
 
     def effector_frame(self, name: str) -> int:
-        """Pinocchio frame id of an effector.
-
-        Raises:
-            BodyError: If there is none.
-        """
+        """Pinocchio frame id of an effector; BodyError if there is none."""
         return _look_up(self._effector_frames, name, "effector")
 
     def segment_frame(self, name: str) -> int:
-        """Pinocchio frame id of a segment.
-
-        Raises:
-            BodyError: If there is none.
-        """
+        """Pinocchio frame id of a segment; BodyError if there is none."""
         return _look_up(self._segment_frames, name, "segment")
 
     # --- self-collision --------------------------------------------------------------------
 
     @cached_property
     def segment_pairs(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of segments that must not touch.
-
-        All pairs but a segment and its parent, which overlap at their joint, and
-        :attr:`soft_pairs`.
-        """
+        """Segments that must not touch: all but those that overlap at a joint, and :attr:`soft_pairs`."""
         names = [segment.name for segment in self.segments]
         parents = {frozenset((s.name, s.parent)) for s in self.segments if s.parent is not None}
         skipped = parents | self.soft_pairs
@@ -298,11 +267,7 @@ class BodyModel(Displayed):
         return q
 
     def posture(self, angles: Mapping[str, float]) -> FloatArray:
-        """(nq,) root at the world's origin, the named hinges at the given angles [rad], others 0.
-
-        Raises:
-            BodyError: If a hinge is unknown.
-        """
+        """(nq,) root at the world's origin, the named hinges at the given angles [rad], others 0."""
         q = self.zero_posture()
         for name, angle in angles.items():
             q[7 + self.joint_index(name)] = angle
@@ -383,11 +348,7 @@ def _attachment(model: Any, segment: Segment, frame_of: Mapping[str, int]) -> An
 def _add_joints(
     model: Any, segment: Segment, attachment: Any, joint_of: Mapping[str, int]
 ) -> tuple[int, Any]:
-    """Add the segment's hinges as a chain of massless links.
-
-    Returns:
-        The joint that carries the segment and the segment's placement in it.
-    """
+    """Add the segment's hinges as a chain of massless links; its carrying joint and placement in that."""
     if segment.parent is None:
         return model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root"), pin.SE3.Identity()
     joint = joint_of[segment.parent]

@@ -1,13 +1,9 @@
 """How far a limb's posture is from violating its range of motion ([Tonneau2015]_ 4.3.3).
 
-Hips and shoulders of the human have learnt volumes, see :mod:`manikin.body.natural_range`; every other
-hinge has its interval.
-
-Also here. The ranges of motion of the human hip and shoulder, learnt from recordings.
-
-The file holds computed distances and no recorded data. The recordings are everyday and some less everyday
-movements (walks, turns, runs, steps, climbing, crouching, crawling, sitting, lifting) of the following
-sources; ``docs/ranges_of_motion.py`` makes it again from them.
+Hips and shoulders of the human have volumes that were learnt from recordings; every other hinge has its
+interval. The file of the volumes holds computed distances and no recorded data. The recordings are everyday
+and some less everyday movements (walks, turns, runs, steps, climbing, crouching, crawling, sitting, lifting)
+of the following sources; ``docs/ranges_of_motion.py`` makes the file again from them.
 
 * "The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with funding
   from NSF EIA-0196217."
@@ -19,30 +15,29 @@ behind the back.
 """
 
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from manikin.body.human_parts import human_hinges
 from manikin.body.joint_volume import JointVolume
-from manikin.body.limbs import limb_hinges
+from manikin.body.limbs import limb_hinges, limb_slots
 from manikin.body.model import BodyModel
 from manikin.body.segments import Hinge, Limb, Segment
 from manikin.errors import BodyError
 from manikin.numerics.spatial import FloatArray, frozen_array
-from manikin.runtime.files import atomic_path
 
 FILE = Path(__file__).with_name("human_volumes.npz")
 """Where the shipped volumes are."""
 
 FORMAT = "manikin-joint-volumes-1"
-_DIGIT = 1e-4
+UNIT = 1e-4
+"""Unit of the distances in the file [rad]."""
 
 
 @cache
@@ -51,29 +46,8 @@ def human_volumes() -> Mapping[str, JointVolume]:
     return MappingProxyType(load_volumes(FILE))
 
 
-def save_volumes(path: str | Path, volumes: Mapping[str, JointVolume], acknowledgement: str) -> None:
-    """Write volumes into a NumPy archive, distances to 1e-4 rad.
-
-    Args:
-        path: Where to; its folder must exist.
-        volumes: By segment, without its side.
-        acknowledgement: Whose recordings they were learnt from.
-
-    Raises:
-        OSError: If the folder cannot be written to.
-    """
-    arrays: dict[str, Any] = {}
-    for name, volume in volumes.items():
-        arrays[f"{name}/origin"], arrays[f"{name}/step"] = volume.origin, np.array(volume.step)
-        arrays[f"{name}/distances"] = np.rint(volume.distances / _DIGIT).astype(np.int16)
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(
-            file, format=np.array(FORMAT), acknowledgement=np.array(acknowledgement), **arrays
-        )
-
-
 def load_volumes(path: str | Path) -> dict[str, JointVolume]:
-    """Read volumes that :func:`save_volumes` wrote.
+    """Read volumes by segment, without its side, from a NumPy archive with distances in :data:`UNIT`.
 
     Raises:
         BodyError: If the file is missing or holds none.
@@ -86,15 +60,15 @@ def load_volumes(path: str | Path) -> dict[str, JointVolume]:
             return {
                 name: JointVolume(
                     archive[f"{name}/origin"], float(archive[f"{name}/step"]),
-                    _DIGIT * archive[f"{name}/distances"],
+                    UNIT * archive[f"{name}/distances"],
                 )
                 for name in names
             }  # fmt: skip
     except FileNotFoundError:
-        raise BodyError(f"{path}: there is no such file; valid: a file of save_volumes") from None
+        raise BodyError(f"{path}: there is no such file; valid: a file of joint volumes") from None
     except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         reason = " ".join(str(error).split())[:100]
-        raise BodyError(f"{path}: cannot be read ({reason}); valid: a file of save_volumes") from None
+        raise BodyError(f"{path}: cannot be read ({reason}); valid: a file of joint volumes") from None
 
 
 _SIDES = ("left", "right")
@@ -125,13 +99,12 @@ class BallRange:
 class NaturalRange:
     """Normalised distance of a limb's angles to a violation of its range of motion.
 
-    Of a ball joint with a volume, it is the distance in the space of its three angles to the surface of
-    the volume or to the end of a hinge's interval, whichever is nearer, divided by the radius of the
-    largest ball inside. Of a hinge without one it is the distance to the nearer end of its interval,
-    divided by half the interval. Of a limb it is the least of its joints. So it is 0 at a violation,
-    negative beyond, and 1 only where every joint is as far from its limits as it can be, always where
-    there is none; 0.1 rad in one angle change it by no more than 0.1 rad over that radius
-    (over half the interval), times the square root of 3 at worst where the grid of the volume is coarse.
+    Of a ball joint with a volume, it is the distance in the space of its three angles to the surface of the
+    volume or to the end of a hinge's interval, whichever is nearer, divided by the radius of the largest ball
+    inside. Of any other hinge it is the distance to the nearer end of its interval, divided by half the
+    interval. Of a limb it is the least of its joints: 0 at a violation, negative beyond, and 1 only where
+    every joint is as far from its limits as it can be. 0.1 rad in one angle change it by no more than 0.1 rad
+    over that radius (over half the interval), times the square root of 3 at worst where the grid is coarse.
 
     Attributes:
         limb: The limb.
@@ -144,7 +117,11 @@ class NaturalRange:
         hinges = limb_hinges(body, limb)
         self.lower = np.array([hinge.lower for hinge in hinges])
         self.upper = np.array([hinge.upper for hinge in hinges])
-        self.balls: tuple[tuple[slice, BallRange], ...] = tuple(_balls(body, limb))
+        places = (limb_slots(body, limb) - 7).tolist()
+        self.balls: tuple[tuple[slice, BallRange], ...] = tuple(
+            (slice(start := places.index(joint.hinges.start), start + 3), joint.range)
+            for joint in learnt_joints(body, [body.segment(name) for name in limb.segments])
+        )
         taken = {column for where, _ in self.balls for column in range(where.start, where.stop)}
         self.columns = np.array([c for c in range(len(hinges)) if c not in taken], dtype=np.int64)
 
@@ -154,19 +131,11 @@ class NaturalRange:
         return bool(self.balls)
 
     def normalised(self, angles: ArrayLike) -> FloatArray:
-        """(n,) normalised distance of (n, k) angles, negative outside.
-
-        Raises:
-            BodyError: If the angles are not (n, k).
-        """
-        return self._least(self._checked(angles), lambda q: self._of_hinges(q))
+        """(n,) normalised distance of (n, k) angles, negative outside."""
+        return self._least(self._checked(angles), self._of_hinges)
 
     def volume_distance(self, angles: ArrayLike) -> FloatArray:
-        """(n,) the same of the ball joints with volumes alone; infinite without one.
-
-        Raises:
-            BodyError: If the angles are not (n, k).
-        """
+        """(n,) the same of the ball joints with volumes alone; infinite without one."""
         return self._least(self._checked(angles), lambda q: np.full(len(q), np.inf))
 
     def contains(self, angles: ArrayLike) -> NDArray[np.bool_]:
@@ -184,10 +153,10 @@ class NaturalRange:
         return np.concatenate(parts)[:count]
 
     def _least(self, q: FloatArray, others: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        found = others(q)
+        least = others(q)
         for columns, ball in self.balls:
-            found = np.minimum(found, ball.normalised(q[:, columns]))
-        return found
+            least = np.minimum(least, ball.normalised(q[:, columns]))
+        return least
 
     def _of_hinges(self, q: FloatArray) -> FloatArray:
         if not len(self.columns):
@@ -220,52 +189,20 @@ class LearntJoint:
     range: BallRange
 
 
-def learnt_joints(body: BodyModel) -> tuple[LearntJoint, ...]:
-    """Hips and shoulders of a body with the human's hinges; none of other bodies."""
-    found: list[LearntJoint] = []
-    for segment in body.segments:
+def learnt_joints(body: BodyModel, segments: Sequence[Segment] | None = None) -> tuple[LearntJoint, ...]:
+    """Hips and shoulders of a body with the human's hinges, or of some segments; none of other bodies."""
+    joints: list[LearntJoint] = []
+    for segment in body.segments if segments is None else segments:
         part = _learnt_part(segment)
         if part is not None:
             first = body.joint_index(segment.hinges[0].name)
             ends = tuple((hinge.lower, hinge.upper) for hinge in segment.hinges)
-            found.append(LearntJoint(segment.name, slice(first, first + 3), _learnt_range(part, ends)))
-    return tuple(found)
-
-
-def learnt_distance(body: BodyModel, q: ArrayLike) -> FloatArray:
-    """(n,) distance of the worst hip or shoulder to the surface of its learnt volume, negative outside [rad].
-
-    Args:
-        body: The body; infinite where it has no learnt joint.
-        q: (n, nq) configurations.
-    """
-    angles = np.asarray(q, dtype=np.float64)[:, 7:]
-    found = np.full(len(angles), np.inf)
-    for joint in learnt_joints(body):
-        found = np.minimum(found, joint.range.volume.distance(angles[:, joint.hinges]))
-    return found
-
-
-def _balls(body: BodyModel, limb: Limb) -> list[tuple[slice, BallRange]]:
-    """Columns and ranges of the limb's ball joints that have a volume."""
-    found, start = [], 0
-    for name in limb.segments:
-        segment = body.segment(name)
-        part = _learnt_part(segment)
-        if part is not None:
-            ends = tuple((hinge.lower, hinge.upper) for hinge in segment.hinges)
-            found.append((slice(start, start + 3), _learnt_range(part, ends)))
-        start += len(segment.hinges)
-    return found
+            joints.append(LearntJoint(segment.name, slice(first, first + 3), _learnt_range(part, ends)))
+    return tuple(joints)
 
 
 def ball_range(volume: JointVolume, lower: ArrayLike, upper: ArrayLike) -> BallRange:
-    """Volume within the intervals of three hinges.
-
-    Args:
-        volume: The volume.
-        lower: (3,) smallest angles [rad].
-        upper: (3,) largest angles [rad].
+    """Volume within the intervals of three hinges from ``lower`` to ``upper``, (3,) each [rad].
 
     Raises:
         BodyError: If nothing of the volume is within them.

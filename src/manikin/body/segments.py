@@ -1,12 +1,7 @@
 """Neutral description of a body: segments, hinges, shapes, effectors and limbs.
 
-Every engine model (Pinocchio, Coal, MuJoCo) is built from these values and from
-nothing else, so that the engines cannot disagree about what the body is.
-
-In the zero posture all segment frames are parallel to the world: x forward, y to
-the left, z up.
-
-Also here. Triangles of the body's collision shapes.
+Every engine model (Pinocchio, Coal, MuJoCo) is built from these values and from nothing else. In the zero
+posture all segment frames are parallel to the world: x forward, y to the left, z up.
 """
 
 from collections.abc import Mapping
@@ -47,7 +42,7 @@ class Shape:
         kind: Sphere, capsule or box.
         size: (1,), (2,) or (3,) dimensions [m], see :class:`ShapeKind`.
         translation: (3,) centre of the shape in the segment frame [m].
-        rotation: (3, 3) rotation from the shape's axes to the segment's.
+        rotation: (3, 3) from the shape's axes to the segment's.
     """
 
     name: str
@@ -195,10 +190,8 @@ class Limb:
 
     Its joints are those of its segments, in order; its frame has the origin of its first segment
     and the axes of that segment's parent. The effector's z axis is the normal of the contact, from
-    the scene into the body.
-
-    A contact of the trunk, as of a pelvis on a seat, is a limb without joints: its one segment is the
-    root, whose frame is the limb's own, and the effector goes where the root goes.
+    the scene into the body. A contact of the trunk, as of a pelvis on a seat, is a limb without joints:
+    its one segment is the root, whose frame is the limb's own.
 
     Attributes:
         name: Unique among the limbs.
@@ -221,11 +214,7 @@ class Limb:
 def check_limbs(
     limbs: tuple[Limb, ...], segments: Mapping[str, Segment], effectors: Mapping[str, Effector]
 ) -> None:
-    """Refuse limbs that are no chains, lack hinges, or name what does not exist.
-
-    Raises:
-        BodyError: Naming the limb and what would be valid.
-    """
+    """Raise a BodyError for limbs that are no chains, lack hinges, or name what does not exist."""
     names = [limb.name for limb in limbs]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
@@ -260,10 +249,7 @@ def _check_chain(limb: Limb, segments: Mapping[str, Segment]) -> None:
 
 
 def end_of(segment: Segment) -> FloatArray:
-    """(3,) end of a segment that carries no other, in its frame [m]: twice as far as its centre of mass.
-
-    A head ends straight above its joint, wherever its mass is.
-    """
+    """(3,) end of a last segment in its frame [m]: twice its centre of mass, of a head straight above."""
     end = 2.0 * segment.com
     return end * [0.0, 0.0, 1.0] if segment.name == "head" else end
 
@@ -302,12 +288,7 @@ def segments_by_name(segments: tuple[Segment, ...]) -> Mapping[str, Segment]:
 
 
 def segment_triangles(segment: Segment, rounds: int = 24) -> tuple[FloatArray, np.ndarray] | None:
-    """Vertices (n, 3) [m] and faces (m, 3) of all shapes in the segment's frame, or None.
-
-    Args:
-        segment: The segment.
-        rounds: Corners of the round cross-section of a capsule.
-    """
+    """Vertices (n, 3) [m] and faces (m, 3) of all shapes, capsules of ``rounds`` corners around, or None."""
     parts = [_placed(shape, rounds) for shape in segment.shapes]
     if not parts:
         return None

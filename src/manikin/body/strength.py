@@ -213,10 +213,6 @@ def age_factor(sex: str, age: float) -> float:
 
     Men lose linearly from 25 years on and have 54 to 89 % at 75, women from 40 years on and have 48 to 92 %
     at 75, by joint; here the middle of these.
-
-    Args:
-        sex: ``"male"`` or ``"female"``.
-        age: [years].
     """
     start, left = (40.0, 0.5 * (0.48 + 0.92)) if sex == "female" else (25.0, 0.5 * (0.54 + 0.89))
     return 1.0 - (1.0 - left) * max(0.0, age - start) / (75.0 - start)
@@ -225,24 +221,15 @@ def age_factor(sex: str, age: float) -> float:
 def hinge_strength(
     name: str, mass: float, stature: float, sex: str, age: float = DEFAULT_AGE
 ) -> tuple[float, float]:
-    """Torques of a hinge against and along its positive direction, both as sizes [N.m].
+    """Torques of a hinge, a key of :data:`HUMAN_STRENGTH`, against and along its positive direction [N.m].
 
-    Args:
-        name: Key of :data:`HUMAN_STRENGTH`.
-        mass: [kg].
-        stature: [m].
-        sex: ``"male"`` or ``"female"``.
-        age: [years].
+    Both are sizes, of a person of a mass [kg], a stature [m], a sex ("male", "female") and an age [years].
     """
     against, along = HUMAN_STRENGTH[name]
     return against.torque(mass, stature, sex, age), along.torque(mass, stature, sex, age)
 
 
 def check_strength(age: float, strength: float) -> None:
-    """Refuse an age or a multiple of the strength that no person has.
-
-    Raises:
-        BodyError: If one is out of its range.
-    """
+    """Raise a BodyError for an age [years] or a multiple of the strength out of its range."""
     finite_number(age, "age [years]", at_least=AGE_RANGE[0], at_most=AGE_RANGE[1], error=BodyError)
     finite_number(strength, "strength", above=0.0, error=BodyError)

@@ -1,7 +1,4 @@
-"""Robot description files (URDF) as plain values, checked.
-
-Also here. What collides in a robot description, as spheres, capsules and boxes. Numbers, vectors and
-placements in the attributes of XML elements.
+"""Robot description files (URDF) as plain, checked values, with spheres, capsules and boxes as shapes.
 
 A cylinder becomes the capsule of its radius and length, rounded at the ends, or a box where it is shorter
 than wide. A mesh becomes the smallest of a box, a capsule and a sphere that hold it.
@@ -26,14 +23,7 @@ _THINNEST = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class UrdfShape:
-    """A collision shape in the frame of its link.
-
-    Attributes:
-        kind: Sphere, capsule or box.
-        size: (1,), (2,) or (3,) as in :class:`manikin.body.ShapeKind` [m].
-        rotation: (3, 3) from the shape's axes to the link's.
-        translation: (3,) of its centre [m].
-    """
+    """A collision shape in the frame of its link, as :class:`manikin.body.Shape`."""
 
     kind: ShapeKind
     size: FloatArray
@@ -42,12 +32,7 @@ class UrdfShape:
 
 
 def read_shapes(link: Element, where: str, folder: Path) -> tuple[UrdfShape, ...]:
-    """Shapes of a ``<link>``; what is only visual is left out.
-
-    Args:
-        link: The element.
-        where: For messages.
-        folder: Where its file is.
+    """Collision shapes of a ``<link>`` in a file of a folder; ``where`` is for messages.
 
     Raises:
         BodyError: If a shape is not understood, not positive, or its mesh cannot be read.
@@ -59,11 +44,11 @@ def _shape(element: Element, link: str, folder: Path) -> UrdfShape:
     where = f"{link} collision"
     rotation, translation = placement(element.find("origin"), where)
     geometry = element.find("geometry")
-    found = [] if geometry is None else list(geometry)
-    if len(found) != 1 or found[0].tag not in ("box", "sphere", "cylinder", "capsule", "mesh"):
-        tags = [item.tag[:40] for item in found]
+    items = [] if geometry is None else list(geometry)
+    if len(items) != 1 or items[0].tag not in ("box", "sphere", "cylinder", "capsule", "mesh"):
+        tags = [item.tag[:40] for item in items]
         raise BodyError(f"{where} has geometry {tags}; valid: box, sphere, cylinder, capsule or mesh")
-    kind, size, turn, centre = _primitive(found[0], where, folder)
+    kind, size, turn, centre = _primitive(items[0], where, folder)
     if np.any(size <= 0.0):
         raise BodyError(f"{where} size is {size.tolist()}; valid: metres > 0")
     return UrdfShape(kind, size, rotation @ turn, translation + rotation @ centre)
@@ -166,16 +151,10 @@ def _capsule(local: FloatArray, along: int) -> tuple[float, float]:
 
 
 def number(element: Element, key: str, where: str, default: float | None = None) -> float:
-    """A finite number.
-
-    Args:
-        element: The element.
-        key: Its attribute.
-        where: For the message.
-        default: Value without the attribute; None if it is needed.
+    """Finite number in an attribute, or its default; ``where`` is for the message.
 
     Raises:
-        BodyError: If it is missing or no finite number.
+        BodyError: If it is missing without a default, or no finite number.
     """
     text = element.get(key)
     if text is None and default is not None:
@@ -184,11 +163,7 @@ def number(element: Element, key: str, where: str, default: float | None = None)
 
 
 def vector(element: Element, key: str, where: str, default: FloatArray | None = None) -> FloatArray:
-    """(3,) finite numbers, as :func:`number`.
-
-    Raises:
-        BodyError: If they are missing or not three finite numbers.
-    """
+    """(3,) finite numbers in an attribute, as :func:`number`."""
     text = element.get(key)
     if text is None and default is not None:
         return default
@@ -196,11 +171,7 @@ def vector(element: Element, key: str, where: str, default: FloatArray | None = 
 
 
 def placement(origin: Element | None, where: str) -> tuple[FloatArray, FloatArray]:
-    """Rotation (3, 3) and translation (3,) [m] of an ``<origin>``; the identity without one.
-
-    Raises:
-        BodyError: If a number is missing or not finite.
-    """
+    """Rotation (3, 3) and translation (3,) [m] of an ``<origin>``; the identity without one."""
     if origin is None:
         return np.eye(3), np.zeros(3)
     roll, pitch, yaw = vector(origin, "rpy", f"{where} origin", np.zeros(3))
@@ -227,14 +198,9 @@ CONTINUOUS = float(np.pi)
 
 @dataclass(frozen=True, eq=False)
 class UrdfLink:
-    """A link.
+    """A link; the inertia (3, 3) is about the centre of mass (3,) [m] in its axes [kg.m^2].
 
-    Attributes:
-        name: Unique.
-        mass: [kg], 0 without an ``<inertial>``.
-        com: (3,) in the link's frame [m].
-        inertia: (3, 3) about the centre of mass, in the link's axes [kg.m^2].
-        shapes: What collides.
+    Without an ``<inertial>`` the mass is 0.
     """
 
     name: str

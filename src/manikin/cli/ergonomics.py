@@ -83,8 +83,11 @@ def ergonomics(
     body, moved = _body(content, source), content.motions[which]
     if load_kg:
         body, moved = _loaded(content, source, moved, load_kg, load_hand)
+    phases = () if content.schedule is None else content.schedule.sequence
+    carried = sum(body.loads.values())
+    carried += max((phase.load.mass for phase in phases if phase.load is not None), default=0.0)
     given = Circumstances(
-        sum(body.loads.values()), load_pattern, coupling, static, repeated, rapid, raised, supported,
+        carried, load_pattern, coupling, static, repeated, rapid, raised, supported,
         neck_upright_deg=neck,
     )  # fmt: skip
     with stdout_kept_clean():

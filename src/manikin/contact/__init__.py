@@ -15,27 +15,19 @@ from manikin.contact.contact import (
     sole_part,
     soles_overlap,
 )
-from manikin.contact.stance import ContactSchedule, Phase, Rolling, Stance, StanceSequence, Swing, roll_feet
+from manikin.contact.stance import (
+    CarriedLoad,
+    ContactSchedule,
+    Phase,
+    Rolling,
+    Stance,
+    StanceSequence,
+    Swing,
+    roll_feet,
+)
 
 __all__ = [
-    "BODY_WEIGHTS_CAP",
-    "FRICTION_MODELS",
-    "Contact",
-    "ContactKind",
-    "ContactModel",
-    "ContactSchedule",
-    "FrictionModel",
-    "Phase",
-    "Rolling",
-    "SolePart",
-    "Stance",
-    "StanceSequence",
-    "Swing",
-    "default_normal_force_cap",
-    "grasp",
-    "point",
-    "roll_feet",
-    "sole",
-    "sole_part",
-    "soles_overlap",
-]
+    "BODY_WEIGHTS_CAP", "FRICTION_MODELS", "CarriedLoad", "Contact", "ContactKind", "ContactModel",
+    "ContactSchedule", "FrictionModel", "Phase", "Rolling", "SolePart", "Stance", "StanceSequence", "Swing",
+    "default_normal_force_cap", "grasp", "point", "roll_feet", "sole", "sole_part", "soles_overlap",
+]  # fmt: skip

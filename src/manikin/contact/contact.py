@@ -1,7 +1,4 @@
-"""One contact between an effector and the scene: a sole, a point or a grasp.
-
-Also here. Contact model: what every contact of a stance may carry, as one value that travels with the stance.
-"""
+"""One contact between an effector and the scene (sole, point or grasp), and the contact model of a stance."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -41,11 +38,7 @@ BODY_WEIGHTS_CAP = 3.0
 
 
 def default_normal_force_cap(mass: float) -> float:
-    """Cap on the sum of normal forces of a body where nothing else is given [N].
-
-    Args:
-        mass: Of the body [kg].
-    """
+    """Cap on the sum of normal forces of a body of a mass [kg] where nothing else is given [N]."""
     return BODY_WEIGHTS_CAP * mass * GRAVITY
 
 
@@ -88,12 +81,7 @@ class ContactModel:
 
     @classmethod
     def of_body(cls, mass: float, friction: FrictionModel = "outer") -> "ContactModel":
-        """Model with the default cap of a body.
-
-        Args:
-            mass: Of the body [kg].
-            friction: Friction model.
-        """
+        """Model with the default cap of a body of a mass [kg]."""
         return cls(friction, default_normal_force_cap(mass))
 
 
@@ -192,13 +180,9 @@ class Contact(Displayed):
 
     def same_place(self, other: "Contact", tolerance: float = 1e-9) -> bool:
         """Whether ``other`` is the same effector at the same pose, whatever its limits."""
-        return (
-            self.effector == other.effector
-            and bool(np.abs(self.position - other.position).max() <= tolerance)
-            and bool(
-                np.abs(self.rotation_contact_to_world - other.rotation_contact_to_world).max() <= tolerance
-            )
-        )
+        turn = self.rotation_contact_to_world - other.rotation_contact_to_world
+        apart = max(np.abs(self.position - other.position).max(), np.abs(turn).max())
+        return self.effector == other.effector and bool(apart <= tolerance)
 
 
 def sole(
@@ -236,18 +220,16 @@ def sole(
     where = f"sole '{effector}'"
     half_length = finite_number(length, f"{where} length", above=0.0, error=ContactError) / 2
     half_width = finite_number(width, f"{where} width", above=0.0, error=ContactError) / 2
-    corners = [
-        [half_length, half_width, 0.0],
-        [half_length, -half_width, 0.0],
-        [-half_length, -half_width, 0.0],
-        [-half_length, half_width, 0.0],
-    ]
+    signs = ((1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0))
+    corners = [[a * half_length, b * half_width, 0.0] for a, b in signs]
     made = _frictional(
-        where, effector, ContactKind.SOLE, position, corners, yaw, friction, normal, rotation,
-        normal_force_cap, torsion_limit,
-    )  # fmt: skip
-    settle = finite_number(settle, f"{where} settle [s]", at_least=0.0, error=ContactError)
-    return replace(made, settle=settle) if settle else made
+        ContactKind.SOLE, effector, position, corners, yaw, friction, normal, rotation, normal_force_cap
+    )
+    return replace(
+        made,
+        torsion_limit=_optional_limit(torsion_limit, f"{where} torsion_limit [N.m]"),
+        settle=finite_number(settle, f"{where} settle [s]", at_least=0.0, error=ContactError),
+    )
 
 
 def point(
@@ -259,24 +241,11 @@ def point(
     rotation: ArrayLike | None = None,
     normal_force_cap: float | None = None,
 ) -> Contact:
-    """Make a frictional point contact.
-
-    Args:
-        effector: Name of the effector.
-        position: (3,) in the world [m].
-        friction: Coulomb coefficient, > 0.
-        normal: (3,) surface normal; up when omitted.
-        rotation: (3, 3) contact-to-world rotation; replaces ``normal``.
-        normal_force_cap: Largest normal force [N].
-
-    Raises:
-        ContactError: If a value is not finite or out of its range.
-    """
-    where = f"point '{effector}'"
+    """Make a frictional point contact at a position (3,) [m]; other arguments as of :func:`sole`."""
+    points = [[0.0, 0.0, 0.0]]
     return _frictional(
-        where, effector, ContactKind.POINT, position, [[0.0, 0.0, 0.0]], 0.0, friction, normal, rotation,
-        normal_force_cap, None,
-    )  # fmt: skip
+        ContactKind.POINT, effector, position, points, 0.0, friction, normal, rotation, normal_force_cap
+    )
 
 
 def grasp(
@@ -337,32 +306,21 @@ def sole_part(contact: Contact, part: SolePart, hinge: float) -> Contact:
     line = finite_number(
         hinge, f"{where} hinge [m]", above=-half_length, at_most=half_length, error=ContactError
     )
-    tip, rear = (
-        [[x, y, 0.0] for x, y in ((half_length, half_width), (half_length, -half_width))],
-        -half_length,
-    )
     if part is SolePart.TOES:
+        tip = [[half_length, half_width, 0.0], [half_length, -half_width, 0.0]]
         points = [*tip, [line, -half_width, 0.0], [line, half_width, 0.0]]
     else:
-        points = [[rear, -half_width, 0.0], [rear, half_width, 0.0]]
+        points = [[-half_length, -half_width, 0.0], [-half_length, half_width, 0.0]]
     return replace(
         contact, points=frozen_array(points, f"{where} points", (None, 3)), part=part, torsion_limit=None
     )
 
 
 def _frictional(
-    where: str,
-    effector: str,
-    kind: ContactKind,
-    position: ArrayLike,
-    points: ArrayLike,
-    yaw: float,
-    friction: float,
-    normal: ArrayLike | None,
-    rotation: ArrayLike | None,
-    normal_force_cap: float | None,
-    torsion_limit: float | None,
-) -> Contact:
+    kind: ContactKind, effector: str, position: ArrayLike, points: ArrayLike, yaw: float, friction: float,
+    normal: ArrayLike | None, rotation: ArrayLike | None, normal_force_cap: float | None,
+) -> Contact:  # fmt: skip
+    where = f"{kind} '{effector}'"
     heading = finite_number(yaw, f"{where} yaw [rad]", error=ContactError)
     if rotation is not None:
         frame = check_rotation(rotation, f"{where} rotation", ContactError)
@@ -378,7 +336,6 @@ def _frictional(
         points=frozen_array(points, f"{where} points", (None, 3), ContactError),
         friction=finite_number(friction, f"{where} friction", above=0.0, error=ContactError),
         normal_force_cap=_optional_limit(normal_force_cap, f"{where} normal_force_cap [N]"),
-        torsion_limit=_optional_limit(torsion_limit, f"{where} torsion_limit [N.m]"),
     )
 
 
@@ -389,19 +346,16 @@ def _optional_limit(value: float | None, name: str) -> float | None:
 def soles_overlap(first: Contact, second: Contact, thickness: float = 0.03) -> bool:
     """Whether two soles would be in the same place (separating axes of their rectangles).
 
-    Args:
-        first: A contact.
-        second: Another one; what is no sole overlaps nothing.
-        thickness: Soles farther apart than this along the normal do not meet [m].
+    Contacts that are no soles, and soles farther apart along the normal than ``thickness`` [m], do not.
     """
     if first.kind is not ContactKind.SOLE or second.kind is not ContactKind.SOLE:
         return False
     axes = (*first.rotation_contact_to_world[:, :2].T, *second.rotation_contact_to_world[:, :2].T)
-    one, other = first.points_in_world, second.points_in_world
-    if np.abs((other - first.position) @ first.normal).min() > thickness:
+    corners, others = first.points_in_world, second.points_in_world
+    if np.abs((others - first.position) @ first.normal).min() > thickness:
         return False
     for axis in axes:
-        a, b = one @ axis, other @ axis
+        a, b = corners @ axis, others @ axis
         if a.max() <= b.min() or b.max() <= a.min():
             return False
     return True

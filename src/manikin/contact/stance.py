@@ -1,16 +1,13 @@
-"""A stance: the contacts that hold the body at one time.
+"""Stances, their sequences and schedules, and the rolling of feet over heel, full sole and toes.
 
-Also here. A sequence of stances with the bounds of their durations. When each stance of a sequence is held.
-Feet that roll: each support of a foot as heel, full sole and toes ([Qiu2012]_ 7.4.2, left open there).
-
-The expansion is our own. A foot lands on the edge of its heel while the other one still stands
-on its full sole, and rises onto its toes when the other one already does: the admissible wrenches
-of such a phase contain those of the full sole alone, so rolling never costs margin against
-single support.
+Rolling feet are left open in [Qiu2012]_ 7.4.2; the expansion is our own. A foot lands on the edge of its heel
+while the other one still stands on its full sole, and rises onto its toes when the other one already does:
+the admissible wrenches of such a phase contain those of the full sole alone, so rolling never costs margin
+against single support.
 """
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,13 +55,7 @@ class Stance(Displayed):
         *,
         model: ContactModel | None = None,
     ) -> None:
-        """Make a stance.
-
-        Args:
-            contacts: One per effector.
-            normal_force_cap: Of the contact model [N].
-            friction_model: Of the contact model.
-            model: The contact model as a whole; replaces the two.
+        """Make a stance of one contact per effector, with a contact model or its two values.
 
         Raises:
             ContactError: If an effector is held twice or the contact model is not usable.
@@ -118,17 +109,32 @@ class Stance(Displayed):
         return Stance(self.contacts, model=replace(self.model, friction=friction))
 
     def bounded(self, mass: float) -> "Stance":
-        """The stance itself, or with the default cap of a body where a normal force has no cap.
-
-        Args:
-            mass: Of the body [kg].
-        """
+        """The stance itself, with the default cap of a body's mass [kg] where a normal force has none."""
         if self.normal_force_cap is not None or all(
             contact.kind is ContactKind.GRASP or contact.normal_force_cap is not None for contact in self
         ):
             return self
         cap = default_normal_force_cap(mass)
         return Stance(self.contacts, model=replace(self.model, normal_force_cap=cap))
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedLoad:
+    """Point masses that effectors carry during a phase, rigidly held at the origins of their frames.
+
+    Attributes:
+        masses: [kg] by the name of the effector.
+        offset: (3,) from the body's CoM to the masses' common centre, world axes [m]: an estimate, for plans
+            that know no posture.
+    """
+
+    masses: Mapping[str, float]
+    offset: FloatArray
+
+    @property
+    def mass(self) -> float:
+        """Of all effectors [kg]."""
+        return float(sum(self.masses.values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,11 +145,13 @@ class Phase:
         stance: The contacts held during the phase.
         min_duration: Lower bound [s], > 0.
         max_duration: Upper bound [s], or None.
+        load: What is carried during the phase and is no part of the body, or None.
     """
 
     stance: Stance
     min_duration: float = 0.1
     max_duration: float | None = None
+    load: CarriedLoad | None = None
 
     def __post_init__(self) -> None:
         finite_number(self.min_duration, "phase min_duration [s]", above=0.0, error=ContactError)
@@ -211,10 +219,8 @@ class StanceSequence(Displayed):
 
     def swings(self) -> tuple[Swing, ...]:
         """Every flight of every effector, ordered by its first phase."""
-        found: list[Swing] = []
-        for effector in self.effectors:
-            found.extend(self._swings_of(effector))
-        return tuple(sorted(found, key=lambda swing: (swing.first_phase, swing.effector)))
+        swings = (swing for effector in self.effectors for swing in self._swings_of(effector))
+        return tuple(sorted(swings, key=lambda swing: (swing.first_phase, swing.effector)))
 
     def _swings_of(self, effector: str) -> Iterator[Swing]:
         held = [effector in phase.stance for phase in self.phases]
@@ -261,11 +267,7 @@ class ContactSchedule(Displayed):
         return np.diff(self.instants)
 
     def phase_at(self, time: ArrayLike) -> NDArray[np.int64]:
-        """Index of the phase at each time; the half-open ``[start, end)``, the last one closed.
-
-        Args:
-            time: Scalar or (n,) [s]; times outside are given the first or the last phase.
-        """
+        """Index of the phase ``[start, end)`` at each time [s]; outside, that of the first or the last."""
         index = np.searchsorted(self.instants, time, side="right") - 1
         return np.clip(index, 0, len(self.sequence) - 1)
 
@@ -329,10 +331,8 @@ def roll_feet(sequence: StanceSequence, hinge: float, rolling: Rolling | None = 
         rolling: Least durations of the parts.
     """
     rolling = rolling or Rolling()
-    phases: list[Phase] = []
-    for index in range(len(sequence)):
-        phases.extend(_split(sequence, index, hinge, rolling))
-    return StanceSequence(phases)
+    parts = (_split(sequence, index, hinge, rolling) for index in range(len(sequence)))
+    return StanceSequence([phase for split in parts for phase in split])
 
 
 def _split(sequence: StanceSequence, index: int, hinge: float, rolling: Rolling) -> Iterator[Phase]:
@@ -342,7 +342,7 @@ def _split(sequence: StanceSequence, index: int, hinge: float, rolling: Rolling)
     taken = (rolling.heel if landing else 0.0) + (rolling.toes if leaving else 0.0)
     if landing:
         stance = _with_part(phase.stance, landing, SolePart.HEEL, hinge)
-        yield Phase(stance, rolling.heel, rolling.stretch * rolling.heel)
+        yield Phase(stance, rolling.heel, rolling.stretch * rolling.heel, phase.load)
     if landing or leaving:
         least = max(phase.min_duration - taken, rolling.flat)
         most = None if phase.max_duration is None else max(phase.max_duration - taken, least)
@@ -351,7 +351,7 @@ def _split(sequence: StanceSequence, index: int, hinge: float, rolling: Rolling)
         yield phase
     if leaving:
         stance = _with_part(phase.stance, leaving, SolePart.TOES, hinge)
-        yield Phase(stance, rolling.toes, rolling.stretch * rolling.toes)
+        yield Phase(stance, rolling.toes, rolling.stretch * rolling.toes, phase.load)
 
 
 def _changing(stance: Stance, other: Stance) -> tuple[str, ...]:

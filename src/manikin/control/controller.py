@@ -132,7 +132,11 @@ class Controller:
         self._geometry = _geometries(body, schedule, self.settings.supports.sole_inset)
         self._along = {key: points_along(body, geometry) for key, geometry in self._geometry.items()}
         self._hanging = {name: _hanging_joints(body, name) for name in self._switch.effectors}
-        frames = {name: body.effector_frame(name) for name in (*self._switch.effectors, self._root)}
+        carriers = {
+            name for phase in schedule.sequence if phase.load is not None for name in phase.load.masses
+        }
+        named = dict.fromkeys((*self._switch.effectors, self._root, *sorted(carriers)))
+        frames = {name: body.effector_frame(name) for name in named}
         segments = {
             segment_key(segment): body.segment_frame(segment)
             for geometry in self._geometry.values()
@@ -161,7 +165,7 @@ class Controller:
         waited = self.clock.waited
         time = self.clock.at(time)
         supports = self._switch.update(time, touching)
-        state = self._dynamics.evaluate(q, v)
+        state = self._dynamics.evaluate(q, v, self._carried_at(time))
         reference, deviation = self._where(time, state, supports)
         problem = self.problem(state, reference, supports, time, deviation)
         solution, fallback = self._solve(problem)
@@ -182,6 +186,11 @@ class Controller:
             iterations=0 if solution is None else solution.iterations,
             waited=waited,
         )
+
+    def _carried_at(self, time: float) -> Mapping[str, float]:
+        """Point masses [kg] that effectors carry at a time of the plan [s]."""
+        load = self.schedule.sequence[int(self.schedule.phase_at(time))].load
+        return {} if load is None else load.masses
 
     def _where(
         self, time: float, state: DynamicsState, supports: Mapping[str, SupportState]

@@ -1,12 +1,14 @@
 """Mass matrix, bias forces, Jacobians and their drifts at one state of the body."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
 
 from manikin.body import BodyModel
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray
 
 _WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -77,8 +79,14 @@ class Dynamics:
         self._rest = np.zeros(self._model.nv)
         self._mass = float(pin.computeTotalMass(self._model))
 
-    def evaluate(self, q: FloatArray, v: FloatArray) -> DynamicsState:
-        """Compute all terms at the configuration ``q`` (nq,) and the velocity ``v`` (nv,)."""
+    def evaluate(
+        self, q: FloatArray, v: FloatArray, carried: Mapping[str, float] = MappingProxyType({})
+    ) -> DynamicsState:
+        """Compute all terms at the configuration ``q`` (nq,) and the velocity ``v`` (nv,).
+
+        Point masses ``carried`` [kg] at the origins of frames, by their names, are in the mass matrix and the
+        bias; mass, centre of mass and momentum stay the body's.
+        """
         model, data = self._model, self._data
         mass_matrix = pin.crba(model, data, q).copy()
         bias = pin.nonLinearEffects(model, data, q, v).copy()
@@ -89,6 +97,10 @@ class Dynamics:
         pin.computeCentroidalMomentumTimeVariation(model, data, q, v, self._rest)
         momentum_drift, com = data.dhg.vector.copy(), data.com[0].copy()
         frames = {name: self._frame(index) for name, index in self._frames.items()}
+        for name, mass in carried.items():
+            jacobian = frames[name].jacobian[:3]
+            mass_matrix += mass * jacobian.T @ jacobian
+            bias += mass * jacobian.T @ (frames[name].drift[:3] - GRAVITY_VECTOR)
         return DynamicsState(
             q, v, mass_matrix, bias, self._mass, com, momentum, centroidal_map, momentum_drift, frames
         )

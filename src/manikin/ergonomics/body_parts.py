@@ -13,7 +13,7 @@ from manikin.body import BodyModel, limb_named
 from manikin.errors import BodyError
 from manikin.motion import Motion
 from manikin.motion.motion import com_velocity, effector_positions
-from manikin.numerics.spatial import GRAVITY, FloatArray
+from manikin.numerics.spatial import GRAVITY, FloatArray, skew
 
 Flags = NDArray[np.bool_]
 
@@ -169,8 +169,7 @@ def joint_rotation(body: BodyModel, q: FloatArray, segment: str) -> FloatArray:
     found = np.broadcast_to(np.eye(3), (len(q), 3, 3))
     for hinge in body.segment(segment).hinges:
         angle = q[:, 7 + body.joint_index(hinge.name)][:, None, None]
-        x, y, z = hinge.axis
-        turn = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        turn = skew(hinge.axis)
         found = found @ (np.eye(3) + np.sin(angle) * turn + (1.0 - np.cos(angle)) * (turn @ turn))
     return found
 

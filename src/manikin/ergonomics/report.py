@@ -29,7 +29,7 @@ from manikin.ergonomics.strength import (
 )
 from manikin.errors import BodyError
 from manikin.motion import Motion
-from manikin.motion.dynamics import centroidal_motion
+from manikin.motion.dynamics import CarriedForces, centroidal_motion
 from manikin.numerics.spatial import FloatArray, finite_number, wrench_about
 from manikin.runtime.display import Displayed
 
@@ -140,7 +140,7 @@ def rebuilt_stance(body: BodyModel, motion: Motion, row: int, friction: float = 
 def _of_schedule(
     found: LowestMargin, body: BodyModel, motion: Motion, schedule: ContactSchedule, row: int
 ) -> LowestMargin:
-    com, wrench = _dynamic_wrench(body, motion, row)
+    com, wrench = _dynamic_wrench(body, motion, row, schedule)
     wrenches = [wrench]
     measured = contact_wrench(_one_frame(motion, row), schedule)[0]
     if np.isfinite(measured).all() and measured.any():
@@ -173,11 +173,15 @@ def _margin_margin(W: WrenchPolytope, wrench: FloatArray, com: FloatArray) -> fl
     return float(stability_margins(W, wrench_about(wrench, W.reference), com).wrench_about_com)
 
 
-def _dynamic_wrench(body: BodyModel, motion: Motion, row: int) -> tuple[FloatArray, FloatArray]:
+def _dynamic_wrench(
+    body: BodyModel, motion: Motion, row: int, schedule: ContactSchedule | None = None
+) -> tuple[FloatArray, FloatArray]:
     """CoM (3,) and (6,) wrench about the world's origin that the motion needs of its contacts [N, N.m]."""
     rows = slice(row, row + 1)
-    found = centroidal_motion(body, motion.q[rows], motion.v[rows], motion.a[rows])
-    return found.com[0], found.wrench[0]
+    states = motion.q[rows], motion.v[rows], motion.a[rows]
+    found = centroidal_motion(body, *states)
+    load = None if schedule is None else CarriedForces.of(body, schedule, motion.time[rows], *states)
+    return found.com[0], found.wrench[0] + (0.0 if load is None else load.wrench[0])
 
 
 NO_TORQUES = "the motion has no joint torques"

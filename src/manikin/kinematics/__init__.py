@@ -8,30 +8,13 @@ from manikin.kinematics.posture_problem import (
     PostureProblem,
     Preferences,
     com_target,
+    place_over_contacts,
     touching_pairs,
 )
-from manikin.kinematics.posture_search import (
-    PostureResult,
-    SolverSettings,
-    generate_posture,
-    place_over_contacts,
-)
+from manikin.kinematics.posture_search import PostureResult, SolverSettings, generate_posture
 
 __all__ = [
-    "Aligner",
-    "Alignment",
-    "EffectorPlacements",
-    "LimbKinematics",
-    "Placement",
-    "PointTargets",
-    "PostureProblem",
-    "PostureResult",
-    "Preferences",
-    "ReachVolume",
-    "SolverSettings",
-    "com_target",
-    "generate_posture",
-    "place_over_contacts",
-    "reach_volume",
-    "touching_pairs",
-]
+    "Aligner", "Alignment", "EffectorPlacements", "LimbKinematics", "Placement", "PointTargets",
+    "PostureProblem", "PostureResult", "Preferences", "ReachVolume", "SolverSettings", "com_target",
+    "generate_posture", "place_over_contacts", "reach_volume", "touching_pairs",
+]  # fmt: skip

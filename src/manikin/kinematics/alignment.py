@@ -1,7 +1,4 @@
-"""Bringing effectors exactly onto surfaces: inverse kinematics of a limb ([Tonneau2015]_ 5.3.2).
-
-Also here. One step of the inverse kinematics of a limb as a compiled expression.
-"""
+"""Bringing effectors exactly onto surfaces: inverse kinematics of a limb ([Tonneau2015]_ 5.3.2)."""
 
 from dataclasses import dataclass
 from typing import Any, cast
@@ -10,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from manikin.kinematics.limb_kinematics import LimbKinematics
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, skew
 
 LEVER = 0.3
 """What one radian of tilt weighs beside one metre [m]."""
@@ -21,7 +18,7 @@ _ZERO = 1e-12  # what is smaller comes from rounding
 
 
 class AlignmentStep:
-    """Measures how far an effector is from a point and a normal, and makes one damped step towards them.
+    """Distance of an effector to a point and a normal and one damped step towards them, compiled.
 
     The expression of one limb has a thousand operations and takes microseconds, less than a single
     array operation on many limbs costs. Inputs and outputs are buffers that belong to the step.
@@ -35,12 +32,7 @@ class AlignmentStep:
     """
 
     def __init__(self, chain: LimbKinematics, *, level: bool) -> None:
-        """Compile the step of one limb.
-
-        Args:
-            chain: The limb.
-            level: Whether the step turns the effector to the normal as well, or only moves it.
-        """
+        """Compile the step of one limb, which turns the effector to the normal too if it is to be level."""
         self.q, self.moved = np.zeros(len(chain)), np.zeros(len(chain))
         self.point, self.normal = np.zeros(3), np.zeros(3)
         self.rotation = np.zeros(9)
@@ -54,11 +46,7 @@ class AlignmentStep:
         self._read = self._missing.data
 
     def __call__(self) -> tuple[float, float]:
-        """Evaluate at ``q``.
-
-        Returns:
-            Distance to the point [m], and angle to the normal [rad].
-        """
+        """Distance to the point [m], and angle to the normal [rad] at ``q``."""
         self._evaluate()
         return self._read[0], self._read[1]
 
@@ -81,7 +69,7 @@ def _step(chain: LimbKinematics, *, level: bool) -> ca.Function:
 
 
 def _forward(chain: LimbKinematics, q: Any) -> tuple[Any, Any, list[Any], list[Any]]:
-    """Effector's place and axes, the hinges' axes and places, in the limb's frame."""
+    """Effector's position and axes, the hinges' axes and positions, in the limb's frame."""
     turn, place = ca.SX.eye(3), ca.SX.zeros(3, 1)
     axes, hinges = [], []
     for number, (axis, offset) in enumerate(zip(chain.axes, chain.offsets, strict=True)):
@@ -94,8 +82,7 @@ def _forward(chain: LimbKinematics, q: Any) -> tuple[Any, Any, list[Any], list[A
 
 def _about(axis: FloatArray, angle: Any) -> Any:
     """Rotation about a unit axis."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross = skew(axis)
     turned = ca.sin(angle) * _constant(cross) + (1.0 - ca.cos(angle)) * _constant(cross @ cross)
     return ca.SX(_constant(np.eye(3))) + turned
 
@@ -198,10 +185,10 @@ class Aligner:
             normal: (3,) unit vector in the limb's frame.
             max_tilt: Angle between z axis and normal that the caller will accept [rad].
         """
-        found = _descend(self._level, angles, point, normal, LEVER)
-        if max_tilt <= TILT_TOLERANCE or found.error <= POSITION_TOLERANCE:
-            return found
-        return _descend(self._shift, found.angles, point, normal, 0.0)
+        level = _descend(self._level, angles, point, normal, LEVER)
+        if max_tilt <= TILT_TOLERANCE or level.error <= POSITION_TOLERANCE:
+            return level
+        return _descend(self._shift, level.angles, point, normal, 0.0)
 
 
 def _descend(

@@ -1,8 +1,8 @@
-"""How low a body folds under a ceiling, and how high its centre of mass may be there.
+"""Postures folded under a ceiling, and the height of the centre of mass there.
 
-Under a ceiling a body can squat with an upright trunk or stoop on straight legs; recorded
-people do neither, they go half way ([Qiu2012]_ 3.2.3: CoM at about 0.85, 0.80 and 0.65 m under
-beams of 1.45, 1.30 and 1.10 m, within 3 cm of the mean of our two extremes).
+Under a ceiling a body can squat with an upright trunk or stoop on straight legs; recorded people go half way
+([Qiu2012]_ 3.2.3: CoM at about 0.85, 0.80 and 0.65 m under beams of 1.45, 1.30 and 1.10 m, within 3 cm of the
+mean of our two extremes).
 """
 
 from collections.abc import Iterator
@@ -63,17 +63,11 @@ class Fold:
 
 @lru_cache(maxsize=64)
 def fold_under(body: BodyModel, height: float) -> Fold | None:
-    """Fold a standing body under a ceiling that covers all of it.
+    """Fold a standing body under a ceiling at a height above its supports [m]; None without such a posture.
 
     The ceiling is lowered onto the standing body step by step, each posture beginning from the
-    one before, so that the result does not jump between unlike postures.
-
-    Args:
-        body: A body with feet; results are kept by its identity.
-        height: Of the ceiling above the supports [m].
-
-    Returns:
-        The fold, or None when no posture on both feet was found.
+    one before, so that the result does not jump between unlike postures. Results are kept by the body's
+    identity.
 
     Raises:
         BodyError: If the body has no stature or no soles.

@@ -1,4 +1,4 @@
-"""A human's legs in closed form: where the feet are, and the angles that put them somewhere; many at once."""
+"""Forward and inverse kinematics of a human's legs in closed form, many postures at once."""
 
 import numpy as np
 
@@ -34,14 +34,7 @@ class LegKinematics:
     """
 
     def __init__(self, body: BodyModel) -> None:
-        """Take the lengths from a body.
-
-        Args:
-            body: A human.
-
-        Raises:
-            BodyError: If its legs have other hinges or differ.
-        """
+        """Take the lengths from a human; BodyError if its legs have other hinges or differ."""
         sides = [[body.segment(f"{side}_{name}") for name in ("thigh", "leg", "foot")]
                  for side in ("left", "right")]  # fmt: skip
         left = [hinge for part in sides[0] for hinge in part.hinges]
@@ -73,20 +66,11 @@ class LegKinematics:
     def feet(
         self, pelvis: FloatArray, place: FloatArray, angles: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Orientations and origins (ankles) of the feet.
-
-        Args:
-            pelvis: (n, 3, 3) from the pelvis' axes to the world's.
-            place: (n, 3) pelvis' origin [m].
-            angles: (n, h) of all hinges [rad].
-
-        Returns:
-            (2, n, 3, 3) from the feet's axes to the world's, and (2, n, 3) [m].
-        """
+        """Rotations (2, n, 3, 3) and origins (2, n, 3) [m] of the feet in the world, see :meth:`angles`."""
         a = angles[:, self.slots].transpose(2, 1, 0)
         thigh = _reflected(pelvis) @ _hip(a[0], a[1], a[2])
-        shank = thigh @ _about_y(a[3]) @ _about_z(-a[4])
-        foot = _reflect_right(shank @ _about_y(-a[5]) @ _about_x(-a[6]))
+        shank = thigh @ _turn(a[3], "y") @ _turn(-a[4], "z")
+        foot = _reflect_right(shank @ _turn(-a[5], "y") @ _turn(-a[6], "x"))
         thigh, shank = _reflect_right(thigh), _reflect_right(shank)
         ankle = self.hips(pelvis, place) - self.thigh * thigh[..., 2] - self.shank * shank[..., 2]
         return foot, ankle
@@ -94,17 +78,14 @@ class LegKinematics:
     def angles(
         self, pelvis: FloatArray, place: FloatArray, foot: FloatArray, ankle: FloatArray, angles: FloatArray
     ) -> FloatArray:
-        """Angles, within limits or not, that put the feet there; out of reach, as near as a leg gets.
+        """(n, h) angles, within limits or not, that place the feet, or come as near as possible [rad].
 
         Args:
             pelvis: (n, 3, 3) from the pelvis' axes to the world's.
             place: (n, 3) pelvis' origin [m].
             foot: (2, n, 3, 3) from the feet's axes to the world's.
             ankle: (2, n, 3) the feet's origins [m].
-            angles: (n, h) of all hinges, of which the rotations of the knees are kept [rad].
-
-        Returns:
-            (n, h) with those of the legs replaced [rad].
+            angles: (n, h) of all hinges; the rotations of the knees are kept [rad].
         """
         line = ankle - self.hips(pelvis, place)
         line[1] *= REFLECTION
@@ -117,18 +98,20 @@ class LegKinematics:
         # Angle at the hip between the thigh and the line to the ankle, which lies behind it.
         behind = np.arctan2(b * np.sin(bend), a + b * np.cos(bend))
         plane = _plane(-line / size[..., None], pelvis[..., 1], foot[..., 0], rotation, bend - behind)
-        thigh = plane @ _about_y(-behind)
-        shank = thigh @ _about_y(bend) @ _about_z(-rotation)
+        thigh = plane @ _turn(-behind, "y")
+        shank = thigh @ _turn(bend, "y") @ _turn(-rotation, "z")
         hip, ankle_turn = np.swapaxes(pelvis, -1, -2) @ thigh, np.swapaxes(shank, -1, -2) @ foot
-        found = np.empty((*bend.shape, 7))
-        found[..., 0] = np.arctan2(-hip[..., 0, 2], hip[..., 2, 2])
-        found[..., 1] = np.arcsin(np.clip(-hip[..., 1, 2], -1.0, 1.0))
-        found[..., 2] = np.arctan2(-hip[..., 1, 0], hip[..., 1, 1])
-        found[..., 3], found[..., 4] = bend, rotation
-        found[..., 5] = np.arctan2(ankle_turn[..., 2, 0], ankle_turn[..., 0, 0])
-        found[..., 6] = np.arctan2(ankle_turn[..., 1, 2], ankle_turn[..., 1, 1])
+        legs = np.stack([
+            np.arctan2(-hip[..., 0, 2], hip[..., 2, 2]),
+            np.arcsin(np.clip(-hip[..., 1, 2], -1.0, 1.0)),
+            np.arctan2(-hip[..., 1, 0], hip[..., 1, 1]),
+            bend,
+            rotation,
+            np.arctan2(ankle_turn[..., 2, 0], ankle_turn[..., 0, 0]),
+            np.arctan2(ankle_turn[..., 1, 2], ankle_turn[..., 1, 1]),
+        ], axis=-1)  # fmt: skip
         result = angles.copy()
-        result[:, self.slots] = found.transpose(1, 0, 2)
+        result[:, self.slots] = legs.transpose(1, 0, 2)
         return result
 
 
@@ -158,9 +141,9 @@ def _plane(
     amount = np.maximum(np.hypot(along, across), 1e-9)
     phase = np.arctan2(across, along)
     offset = np.arccos(np.clip(-c3 * f3 / amount, -1.0, 1.0))
-    one, other = phase + offset, phase - offset
-    ahead = np.cos(one) * f1 + np.sin(one) * f2 >= np.cos(other) * f1 + np.sin(other) * f2
-    turn = np.where(ahead, one, other)
+    left, right = phase + offset, phase - offset
+    ahead = np.cos(left) * f1 + np.sin(left) * f2 >= np.cos(right) * f1 + np.sin(right) * f2
+    turn = np.where(ahead, left, right)
     cos, sin = np.cos(turn)[..., None], np.sin(turn)[..., None]
     plane = np.empty((*up.shape, 3))
     plane[..., 0], plane[..., 1], plane[..., 2] = cos * front + sin * side, cos * side - sin * front, up
@@ -174,9 +157,9 @@ def _reflected(turns: FloatArray) -> FloatArray:
 
 def _reflect_right(turns: FloatArray) -> FloatArray:
     """(2, n, 3, 3) with the second half reflected, to and from the reflected body."""
-    found = turns.copy()
-    found[1] *= _REFLECT
-    return found
+    reflected = turns.copy()
+    reflected[1] *= _REFLECT
+    return reflected
 
 
 def _hip(flexion: FloatArray, abduction: FloatArray, rotation: FloatArray) -> FloatArray:
@@ -190,23 +173,13 @@ def _hip(flexion: FloatArray, abduction: FloatArray, rotation: FloatArray) -> Fl
     ])  # fmt: skip
 
 
-def _about_x(angle: FloatArray) -> FloatArray:
-    return _turn(angle, 1, 2)
-
-
-def _about_y(angle: FloatArray) -> FloatArray:
-    return _turn(angle, 2, 0)
-
-
-def _about_z(angle: FloatArray) -> FloatArray:
-    return _turn(angle, 0, 1)
-
-
-def _turn(angle: FloatArray, first: int, second: int) -> FloatArray:
-    """(..., 3, 3) rotations that carry the first axis towards the second."""
+def _turn(angle: FloatArray, axis: str) -> FloatArray:
+    """(..., 3, 3) rotations about x, y or z."""
+    about = "xyz".index(axis)
+    first, second = (about + 1) % 3, (about + 2) % 3
     turn = np.zeros((*angle.shape, 3, 3))
     cosine, sine = np.cos(angle), np.sin(angle)
     turn[..., first, first] = turn[..., second, second] = cosine
     turn[..., second, first], turn[..., first, second] = sine, -sine
-    turn[..., 3 - first - second, 3 - first - second] = 1.0
+    turn[..., about, about] = 1.0
     return turn

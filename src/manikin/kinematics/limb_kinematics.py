@@ -1,7 +1,4 @@
-"""Forward kinematics of one limb at many joint angles at once.
-
-Also here. Where the effector of a limb can get to: the convex hull of many sampled places.
-"""
+"""Forward kinematics of one limb at many joint angles at once, and the reach volume sampled with it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +14,7 @@ from manikin.body.model import BodyModel
 from manikin.body.natural_range import NaturalRange
 from manikin.body.segments import Limb
 from manikin.errors import BodyError
-from manikin.numerics.spatial import FloatArray, frozen_array, skew
+from manikin.numerics.spatial import FloatArray, cross, frozen_array, skew
 
 MIN_COUNT = 100
 """Fewest samples from which a hull is made; 10,000 are a fair picture ([Tonneau2015]_ 4.3.4)."""
@@ -30,7 +27,7 @@ _CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3, indexing="ij"), axis=-1).res
 
 @dataclass(frozen=True, eq=False)
 class ReachVolume:
-    """Convex hull of the places of an effector, in the frame of the segment the limb is fixed to.
+    """Convex hull of the positions of an effector, in the frame of the segment the limb is fixed to.
 
     Attributes:
         limb: The limb.
@@ -49,10 +46,7 @@ class ReachVolume:
     b: FloatArray
 
     def residual(self, points: ArrayLike) -> FloatArray:
-        """(...) distance of (..., 3) points to the nearest face, negative outside [m].
-
-        The residual radius ``min(b - A s)`` of [Tonneau2015]_ algorithm 1.
-        """
+        """(...) residual radius ``min(b - A s)`` of (..., 3) points ([Tonneau2015]_ algorithm 1) [m]."""
         return np.min(self.b - np.asarray(points, dtype=np.float64) @ self.A.T, axis=-1)
 
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
@@ -64,16 +58,12 @@ class ReachVolume:
         """Centre (3,) and radius [m] of the largest sphere inside, the Chebyshev sphere (4.1.2)."""
         table = np.column_stack([self.A, np.ones(len(self.b))])
         bounds = [(None, None)] * 3 + [(0.0, None)]
-        found = linprog([0.0, 0.0, 0.0, -1.0], A_ub=table, b_ub=self.b, bounds=bounds)
-        return frozen_array(found.x[:3], "centre"), float(found.x[3])
+        ball = linprog([0.0, 0.0, 0.0, -1.0], A_ub=table, b_ub=self.b, bounds=bounds).x
+        return frozen_array(ball[:3], "centre"), float(ball[3])
 
 
 def hull_of(limb: Limb, segment: str, points: FloatArray) -> ReachVolume:
-    """Convex hull of points (n, 3) in the frame of the carrying segment [m].
-
-    Raises:
-        BodyError: If the points lie in a plane, as those of a limb with one hinge do.
-    """
+    """Convex hull of points (n, 3) of the carrying segment [m]; BodyError if they lie in a plane."""
     if np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-9) < 3:
         raise BodyError(
             f"limb {limb.name!r} reaches points of a plane only; valid: an effector that moves in space"
@@ -86,28 +76,17 @@ def hull_of(limb: Limb, segment: str, points: FloatArray) -> ReachVolume:
     inward = np.einsum("fi,fi->f", turned, hull.equations[:, :3]) < 0.0
     faces[inward] = faces[inward][:, ::-1]
     faces.setflags(write=False)
-    return ReachVolume(
-        limb,
-        segment,
-        frozen_array(vertices, "vertices", (None, 3)),
-        faces,
-        frozen_array(hull.equations[:, :3], "A", (None, 3)),
-        frozen_array(-hull.equations[:, 3], "b", (None,)),
-    )
+    A, b = frozen_array(hull.equations[:, :3], "A"), frozen_array(-hull.equations[:, 3], "b")
+    return ReachVolume(limb, segment, frozen_array(vertices, "vertices"), faces, A, b)
 
 
-def rigid_reach(limb: Limb, segment: str, place: FloatArray, rotation: FloatArray) -> ReachVolume:
+def rigid_reach(limb: Limb, segment: str, position: FloatArray, rotation: FloatArray) -> ReachVolume:
     """Reach of a limb without joints: a cube of :data:`GIVE` on each side of its effector.
 
     The effector moves with the trunk alone; a surface that meets the cube is near enough to be touched.
-
-    Args:
-        limb: The limb.
-        segment: Name of the segment that carries it.
-        place: (3,) of the effector in that segment [m].
-        rotation: (3, 3) from the effector's axes to the segment's.
+    Its position (3,) [m] and its rotation (3, 3) are those in the segment that carries it.
     """
-    return hull_of(limb, segment, place + GIVE * _CORNERS @ rotation.T)
+    return hull_of(limb, segment, position + GIVE * _CORNERS @ rotation.T)
 
 
 def reach_volume(
@@ -132,8 +111,8 @@ def reach_volume(
     if not len(chain):
         return rigid_reach(limb, segment, limb_origin(body, limb) + chain.tip, chain.tip_rotation)
     source = NaturalRange(body, limb) if natural else chain
-    places = chain.place(source.random_angles(rng, count)).positions
-    return hull_of(limb, segment, places + limb_origin(body, limb))
+    positions = chain.place(source.random_angles(rng, count)).positions
+    return hull_of(limb, segment, positions + limb_origin(body, limb))
 
 
 _IDENTITY = np.eye(3)
@@ -162,7 +141,7 @@ class LimbKinematics:
 
     Attributes:
         limb: The limb.
-        slots: (k,) places of its hinges in the configuration vector.
+        slots: (k,) indices of its hinges in the configuration vector.
         lower: (k,) smallest angles [rad].
         upper: (k,) largest angles [rad].
         torque_lower: (k,) most negative torques [N.m].
@@ -178,10 +157,10 @@ class LimbKinematics:
         self.slots = limb_slots(body, limb)
         hinges = limb_hinges(body, limb)
         self._hinges = [(name, len(body.segment(name).hinges)) for name in limb.segments]
-        self.lower = frozen_array([hinge.lower for hinge in hinges], "lower")
-        self.upper = frozen_array([hinge.upper for hinge in hinges], "upper")
-        self.torque_lower = frozen_array([hinge.torque_lower for hinge in hinges], "torque_lower")
-        self.torque_upper = frozen_array([hinge.torque_upper for hinge in hinges], "torque_upper")
+        self.lower, self.upper, self.torque_lower, self.torque_upper = (
+            frozen_array([getattr(hinge, name) for hinge in hinges], name)
+            for name in ("lower", "upper", "torque_lower", "torque_upper")
+        )
         self.axes = frozen_array(np.reshape([hinge.axis for hinge in hinges], (-1, 3)), "axes")
         offsets, tip = _offsets(body, limb)
         self.offsets, self.tip = frozen_array(offsets, "offsets"), frozen_array(tip, "tip")
@@ -198,25 +177,20 @@ class LimbKinematics:
         return rng.uniform(self.lower, self.upper, (count, len(self)))
 
     def place(self, angles: ArrayLike) -> EffectorPlacements:
-        """Place the effector at many joint angles.
-
-        Args:
-            angles: (n, k) [rad].
+        """Place the effector at many joint angles (n, k) [rad].
 
         Raises:
-            BodyError: If the angles are not (n, k).
+            BodyError: If the angles are of another shape.
         """
         q = np.asarray(angles, dtype=np.float64)
         if q.ndim != 2 or q.shape[1] != len(self):
             raise BodyError(f"limb {self.limb.name!r} angles have shape {q.shape}; valid: (n, {len(self)})")
-        count = len(q)
-        shape = (count, 3, len(self))
-        found = EffectorPlacements(
-            np.empty((count, 3)), np.empty((count, 3, 3)), np.empty(shape), np.empty(shape)
-        )
-        for rows in _blocks(count):
-            self._place_block(q[rows], found, rows)
-        return found
+        n, k = q.shape
+        out = EffectorPlacements(*(np.empty(shape) for shape in ((n, 3), (n, 3, 3), (n, 3, k), (n, 3, k))))
+        for start in range(0, n, _BLOCK):
+            rows = slice(start, start + _BLOCK)
+            self._place_block(q[rows], out, rows)
+        return out
 
     def segment_placements(self, angles: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
         """Name, axes (n, 3, 3) and origin (n, 3) of moving segments in the frame of the limb."""
@@ -252,30 +226,18 @@ class LimbKinematics:
         out.positions[rows] = point
         out.rotations[rows] = turn @ self.tip_rotation
         out.axes[rows] = axes.transpose(0, 2, 1)
-        out.jacobians[rows] = _cross(axes, point[:, None] - places).transpose(0, 2, 1)
+        out.jacobians[rows] = cross(axes, point[:, None] - places).transpose(0, 2, 1)
 
 
 def _offsets(body: BodyModel, limb: Limb) -> tuple[FloatArray, FloatArray]:
     """Translations before each hinge (k, 3), and from the last hinge to the effector (3,) [m]."""
-    found: list[FloatArray] = []
+    offsets: list[FloatArray] = []
     offset = np.zeros(3)
     for number, name in enumerate(limb.segments):
         segment = body.segment(name)
         # The limb's frame is at the origin of its first segment.
         offset = offset + (segment.origin if number else 0.0)
         for _ in segment.hinges:
-            found.append(offset)
+            offsets.append(offset)
             offset = np.zeros(3)
-    return np.reshape(found, (-1, 3)), offset + body.effector(limb.effector).translation
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products of (..., 3) by (..., 3), without the overhead of ``np.cross``."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        out[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
-    return out
-
-
-def _blocks(count: int) -> Iterator[slice]:
-    return (slice(start, start + _BLOCK) for start in range(0, count, _BLOCK))
+    return np.reshape(offsets, (-1, 3)), offset + body.effector(limb.effector).translation

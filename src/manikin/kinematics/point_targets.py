@@ -1,8 +1,4 @@
-"""Where points of a body's segments were recorded, instant by instant.
-
-Also here. What a posture costs that should have points at their targets, at many instants at once. Normal
-equations of points on segments that should be at their targets, at many instants at once. Where segments of a
-body are in many postures at once, and how its joints move them.
+"""Recorded positions of points of a body, and the cost of postures with its normal equations, many at once.
 
 A point at ``x`` from the root moves with ``v + w x x`` when the joints' velocities add up to ``v`` and ``w``
 there. The matrix of the weighted squares is therefore the inertia matrix of a body whose only masses are the
@@ -28,7 +24,7 @@ from manikin.numerics.spatial import FloatArray, frozen_array, skew
 
 @dataclass(frozen=True, eq=False)
 class Placements:
-    """Of s segments at n instants, in the axes of the world.
+    """Placements of s segments at n instants, in the axes of the world.
 
     Attributes:
         roots: (3, n) origins of the root [m].
@@ -61,9 +57,9 @@ class SegmentPlacements:
         n, count, model, data = len(q), len(self._turns), self._model, self._data
         turns, shifts = np.empty((n, count, 3, 3)), np.empty((n, count, 3))
         columns = np.empty((n, model.nv, 6))
-        here = np.array(q)
-        here[:, :3] = 0.0
-        for frame, posture in enumerate(here):
+        centred = np.array(q)
+        centred[:, :3] = 0.0
+        for frame, posture in enumerate(centred):
             caused: Any = pin.computeJointJacobians(model, data, posture)
             pin.updateFramePlacements(model, data)
             turns[frame], shifts[frame], columns[frame] = self._turns, self._shifts, caused.T
@@ -96,18 +92,18 @@ class PointTargets:
     weights: FloatArray
 
     def __post_init__(self) -> None:
-        k, places = len(self.names), np.array(self.positions, dtype=np.float64)
+        k, seen = len(self.names), np.array(self.positions, dtype=np.float64)
         if k == 0 or len(self.segments) != k:
             raise InputError(f"{k} targets on {len(self.segments)} segments; valid: a segment for each")
-        if places.ndim != 3 or places.shape[1:] != (k, 3) or np.any(np.isinf(places)):
-            raise InputError(f"target positions have shape {places.shape}; valid: (n, {k}, 3), not infinite")
-        places[np.any(np.isnan(places), axis=2)] = np.nan
-        never = np.flatnonzero(np.all(np.isnan(places[..., 0]), axis=0))
+        if seen.ndim != 3 or seen.shape[1:] != (k, 3) or np.any(np.isinf(seen)):
+            raise InputError(f"target positions have shape {seen.shape}; valid: (n, {k}, 3), not infinite")
+        seen[np.any(np.isnan(seen), axis=2)] = np.nan
+        never = np.flatnonzero(np.all(np.isnan(seen[..., 0]), axis=0))
         if never.size:
             raise InputError(f"target {self.names[never[0]]!r} is never seen; valid: in at least one frame")
-        places.setflags(write=False)
+        seen.setflags(write=False)
         object.__setattr__(self, "points", frozen_array(self.points, "target points", (k, 3)))
-        object.__setattr__(self, "positions", places)
+        object.__setattr__(self, "positions", seen)
         object.__setattr__(self, "weights", frozen_array(self.weights, "target weights", (k,)))
         if np.any(self.weights <= 0.0):
             raise InputError("a target weighs nothing or less; valid: above 0")
@@ -127,12 +123,7 @@ class PointTargets:
 
 
 def origin_targets(centres: Mapping[str, FloatArray], segments: Sequence[str]) -> PointTargets:
-    """Targets of the origins of segments, each of weight 1.
-
-    Args:
-        centres: (n, 3) recorded joint centres [m] by the segment that begins there.
-        segments: Which of them.
-    """
+    """Targets of weight 1 of the origins of segments, at recorded joint centres (n, 3) [m] by segment."""
     names = tuple(segments)
     positions = np.stack([centres[name] for name in names], axis=1)
     return PointTargets(names, names, np.zeros((len(names), 3)), positions, np.ones(len(names)))
@@ -149,7 +140,7 @@ HOLD = REST**2 + STEADY**2
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Of n postures.
+    """Cost of n postures and what it follows from.
 
     Attributes:
         q: (n, nq) the postures.
@@ -193,11 +184,11 @@ class PostureCost:
         self._body = body
         self._points = PointEquations(body, targets)
         self._rest = body.standing_posture()[7:]
-        told = self._points.told
-        self._untold = np.setdiff1d(np.arange(len(self._rest)), told)
-        self.slots = np.concatenate([np.arange(6), 6 + told])
-        self._angles = 7 + told
-        self._lower, self._upper = body.lower[told], body.upper[told]
+        moving = self._points.moving
+        self._still = np.setdiff1d(np.arange(len(self._rest)), moving)
+        self.slots = np.concatenate([np.arange(6), 6 + moving])
+        self._angles = 7 + moving
+        self._lower, self._upper = body.lower[moving], body.upper[moving]
 
     def drawn_to(self, before: FloatArray) -> FloatArray:
         """(n, h) angles of least cost without points, after (n, nq) postures [rad]."""
@@ -205,15 +196,15 @@ class PostureCost:
 
     def settled(self, q: FloatArray, held: FloatArray) -> FloatArray:
         """(n, nq) postures of which the hinges that move no point are as drawn to."""
-        found = np.array(q)
-        found[:, 7 + self._untold] = held[:, self._untold]
-        return found
+        settled = np.array(q)
+        settled[:, 7 + self._still] = held[:, self._still]
+        return settled
 
     def later(self, before: FloatArray, instants: int) -> FloatArray:
         """(nq,) a posture whose hinges are drawn to rest for some instants, without points."""
-        found = np.array(before)
-        found[7:] = self._rest + (STEADY**2 / HOLD) ** instants * (before[7:] - self._rest)
-        return found
+        later = np.array(before)
+        later[7:] = self._rest + (STEADY**2 / HOLD) ** instants * (before[7:] - self._rest)
+        return later
 
     def distances(self, q: FloatArray, wanted: FloatArray) -> FloatArray:
         """(n, k) distances of the points from their targets (n, k, 3) [m], NaN where one is not seen."""
@@ -221,13 +212,7 @@ class PostureCost:
         return np.linalg.norm(q[:, None, :3] + points - wanted, axis=2)
 
     def at(self, q: FloatArray, held: FloatArray, wanted: FloatArray) -> Evaluation:
-        """The cost of (n, nq) postures.
-
-        Args:
-            q: The postures.
-            held: (n, h), see :meth:`drawn_to`.
-            wanted: (n, k, 3) targets [m]; NaN where one is not seen.
-        """
+        """The cost of (n, nq) postures drawn to angles ``held``, with targets (n, k, 3) [m]."""
         placed, points = self._points.placed(q)
         error = points + (placed.roots - wanted.transpose(1, 2, 0))
         weights = self._points.weights[:, None] * ~np.isnan(error[:, 0])
@@ -258,16 +243,16 @@ class PostureCost:
         velocities = np.zeros((len(q), self._body.nv))
         velocities[:, self.slots] = steps / np.maximum(largest, 1.0)[:, None]
         model = self._body.pinocchio
-        found = np.array([pin.integrate(model, *pair) for pair in zip(q, velocities, strict=True)])
-        found[:, 7:] = np.clip(found[:, 7:], self._body.lower, self._body.upper)
-        return found
+        moved = np.array([pin.integrate(model, *pair) for pair in zip(q, velocities, strict=True)])
+        moved[:, 7:] = np.clip(moved[:, 7:], self._body.lower, self._body.upper)
+        return moved
 
 
 class PointEquations:
     """Which velocities move which points, and the equations that follow.
 
     Attributes:
-        told: Numbers of the hinges that move a point.
+        moving: Numbers of the hinges that move a point.
         weights: (k,) of the points.
     """
 
@@ -283,9 +268,9 @@ class PointEquations:
             below[names.index(body.segments[number].parent or "")] |= below[number]
         carried = below[:, [names.index(name) for name in targets.segments]]
         owners = np.repeat(np.arange(len(names)), [len(segment.hinges) for segment in body.segments])
-        self.told = np.flatnonzero(carried[owners].any(axis=1))
-        moved = np.concatenate([np.zeros(6, dtype=np.int64), owners[self.told]])
-        self._velocities = np.concatenate([np.arange(6), 6 + self.told])
+        self.moving = np.flatnonzero(carried[owners].any(axis=1))
+        moved = np.concatenate([np.zeros(6, dtype=np.int64), owners[self.moving]])
+        self._velocities = np.concatenate([np.arange(6), 6 + self.moving])
         loaded, self._load = np.unique(moved, return_inverse=True)
         self._carried = carried[loaded].astype(np.float64)
         self._coupled = np.tril(below[moved[None], moved[:, None]])
@@ -300,23 +285,14 @@ class PointEquations:
     def assembled(
         self, columns: FloatArray, x: FloatArray, error: FloatArray, weights: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Half the gradient and the Gauss-Newton matrix of the weighted sum of squares.
+        """Half the gradient (n, d) and the lower Gauss-Newton matrix (n, d, d) of the weighted squares.
 
         Velocities are those of the root, linear and angular in its own axes, and of the hinges that are
-        :attr:`told`.
-
-        Args:
-            columns: (nv, 6, n), see :class:`manikin.kinematics.point_targets.Placements`.
-            x: (k, 3, n) points from the root [m].
-            error: (k, 3, n) of the points from their targets [m].
-            weights: (k, n).
-
-        Returns:
-            (n, d) and (n, d, d), of which only the lower triangle is filled.
+        :attr:`moving`. Arguments are those of :class:`Evaluation`.
         """
         w, columns = weights[:, None], columns[self._velocities]
         wx, force = w * x, w * error
-        squares, turning = ((one[:, :, None] * x[:, None]).reshape(len(x), 9, -1) for one in (wx, force))
+        squares, turning = ((item[:, :, None] * x[:, None]).reshape(len(x), 9, -1) for item in (wx, force))
         moments = np.concatenate([w, wx, squares, force, turning], axis=1)
         sums = (self._carried @ moments.reshape(len(x), -1)).reshape(-1, *moments.shape[1:])
         loads = (self._table @ sums).reshape(len(sums), 7, 6, -1)[self._load]

@@ -1,13 +1,11 @@
-"""What a posture must satisfy and what it should look like.
+"""Requirements and preferences of a posture."""
 
-Also here. Hips and shoulders within the volumes that were learnt for them, as a requirement of a posture.
-"""
-
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from manikin.body.configuration import Configuration
@@ -34,7 +32,7 @@ from manikin.scene.spheres import SphereProximity
 
 @dataclass(frozen=True, eq=False)
 class LearntRangeTerm:
-    """What each ball joint lacks of its learnt volume: ``r = min(d(q) - margin, 0)`` [rad].
+    """Violation of each ball joint's learnt volume: ``r = min(d(q) - margin, 0)`` [rad].
 
     ``d`` is the signed distance of its three angles to the surface of the volume ([Tonneau2015]_ 4.3.3).
 
@@ -72,7 +70,7 @@ class LearntRangeTerm:
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where an effector that touches nothing must be.
+    """Required or wished pose of an effector that touches nothing.
 
     Attributes:
         position: (3,) [m], or None to leave it free.
@@ -216,17 +214,16 @@ class PostureProblem:
         wishes: list[tuple[FloatArray, Term]] = [
             (hinge_weights(self.body, weights), ReferenceTerm(self.reference[7:]))
         ]
-        for contact in self.contacts:
-            if contact.kind is ContactKind.GRASP and contact.oriented:
-                weight = np.full(3, weights.grasp)
-                wishes.append((weight, RotationTerm(contact.effector, contact.rotation_contact_to_world)))
-        for name, placement in self.placements.items():
-            if placement.position is not None and placement.position_weight is not None:
-                weight = np.full(3, placement.position_weight)
-                wishes.append((weight, PositionTerm(name, placement.position)))
-            if placement.rotation is not None and placement.rotation_weight is not None:
-                weight = np.full(3, placement.rotation_weight)
-                wishes.append((weight, RotationTerm(name, placement.rotation)))
+        wishes += [
+            (np.full(3, weights.grasp), RotationTerm(contact.effector, contact.rotation_contact_to_world))
+            for contact in self.contacts
+            if contact.kind is ContactKind.GRASP and contact.oriented
+        ]
+        for name, item in self.placements.items():
+            if item.position is not None and item.position_weight is not None:
+                wishes.append((np.full(3, item.position_weight), PositionTerm(name, item.position)))
+            if item.rotation is not None and item.rotation_weight is not None:
+                wishes.append((np.full(3, item.rotation_weight), RotationTerm(name, item.rotation)))
         if self.com is not None and self.com_weight is not None and np.any(np.isfinite(self.com)):
             wishes.append((np.full(np.isfinite(self.com).sum(), self.com_weight), ComTerm(self.com)))
         if self.upright:
@@ -252,21 +249,14 @@ class PostureProblem:
 
 def hinge_weights(body: BodyModel, preferences: Preferences) -> FloatArray:
     """(nv - 6,) weight of each hinge: that of the first key its name contains."""
-    return np.array(
-        [
-            next((w for key, w in preferences.hinges.items() if key in name), preferences.hinge)
-            for name in body.joint_names
-        ]
-    )
+    return np.array([
+        next((w for key, w in preferences.hinges.items() if key in name), preferences.hinge)
+        for name in body.joint_names
+    ])  # fmt: skip
 
 
 def touching_pairs(body: BodyModel, effector_obstacles: Iterable[tuple[str, str]]) -> Ignored:
-    """Pairs (segment, obstacle) that a contact brings together: the effector's segment and its children.
-
-    Args:
-        body: The body.
-        effector_obstacles: Pairs of an effector and the obstacle it touches.
-    """
+    """Pairs (segment, obstacle) of contacts (effector, obstacle): the effector's segment and its children."""
     pairs = set()
     for effector, obstacle in effector_obstacles:
         segment = body.effector(effector).segment
@@ -280,3 +270,45 @@ def com_target(
 ) -> FloatArray:
     """(3,) centre-of-mass target with the axes that are not given left free."""
     return np.array([np.nan if value is None else float(np.asarray(value)) for value in (x, y, z)])
+
+
+def place_over_contacts(problem: PostureProblem, q: FloatArray) -> FloatArray:
+    """(nq,) posture ``q`` moved as a rigid whole to where its effectors must be.
+
+    The root is turned about the vertical to the mean heading of the required rotations and moved so that
+    the mean of the effectors' positions matches.
+    """
+    positions = [t for t in problem.requirements() if isinstance(t, PositionTerm)]
+    rotations = [t for t in problem.requirements() if isinstance(t, RotationTerm)]
+    feet = [t for t in positions if t.kind == "contact" and "foot" in t.effector] or positions
+    configuration = Configuration(problem.body, q)
+    turned = np.array(configuration.q)
+    if rotations:
+        turns = [t.rotation @ configuration.effector_placement(t.effector)[0].T for t in rotations]
+        headings = [np.arctan2(r[1, 0] - r[0, 1], r[0, 0] + r[1, 1]) for r in turns]
+        yaw = float(np.arctan2(np.sum(np.sin(headings)), np.sum(np.cos(headings))))
+        turn = pin.SE3(pin.utils.rotate("z", yaw), np.zeros(3))
+        turned[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(turned[:7]))
+        configuration.update(turned)
+    if feet:
+        offsets = [t.position - configuration.effector_placement(t.effector)[1] for t in feet]
+        turned[:3] += np.mean(offsets, axis=0)
+    elif problem.com is not None:
+        turned[:3] += np.nan_to_num(problem.com - configuration.com)
+    return turned
+
+
+def without_one(problem: PostureProblem) -> Iterator[tuple[str, PostureProblem]]:
+    """The problem with one requirement left out at a time, and the name of that."""
+    if problem.com is not None:
+        yield "the centre-of-mass requirement", replace(problem, com=None)
+    if problem.proximity is not None:
+        yield "the clearances", replace(problem, proximity=None)
+    if problem.learnt_margin is not None:
+        yield "the learnt ranges of motion", replace(problem, learnt_margin=None)
+    for contact in problem.contacts:
+        rest = tuple(other for other in problem.contacts if other is not contact)
+        yield f"contact '{contact.effector}'", replace(problem, contacts=rest)
+    for name in problem.placements:
+        rest_of = {key: value for key, value in problem.placements.items() if key != name}
+        yield f"placement '{name}'", replace(problem, placements=rest_of)

@@ -1,16 +1,15 @@
 """The posture generator: a whole-body configuration that meets requirements ([Qiu2012]_ 6.2.2).
 
-Sequential quadratic programming on the tangent space of the body.  With requirements
-``r(q) = 0``, distances ``d(q) >= 0`` and wishes ``s(q)`` each iteration solves, for the
-tangent step ``v``,
+Sequential quadratic programming on the tangent space of the body. With requirements ``r(q) = 0``,
+distances ``d(q) >= 0`` and wishes ``s(q)`` each iteration solves, for the tangent step ``v``,
 
     min  1/2 |s + S v|^2_W + 1/2 rho |r + R v|^2 + 1/2 rho |slack|^2
     s.t. d + D v + slack >= 0,  hinge ranges,  |v|_inf <= trust region,
 
-which always has a solution, also where the requirements have none.  Steps are accepted when
-the sum of the squares falls, after a second-order correction where the requirements curve.
-Last, what the wishes have pulled from the requirements is removed by the smallest changes
-that do so, so that the requirements end up exact and not merely heavily weighted.
+which always has a solution, also where the requirements have none. Steps are accepted when the sum of the
+squares falls, after a second-order correction where the requirements curve. At last the residuals that the
+wishes have left in the requirements are removed by the smallest changes, so that the requirements end up
+exact and not merely heavily weighted.
 """
 
 from collections.abc import Iterator
@@ -25,14 +24,10 @@ from numpy.typing import ArrayLike
 
 from manikin.body.configuration import Configuration
 from manikin.errors import BodyError
-from manikin.kinematics.posture_problem import PostureProblem
+from manikin.kinematics.posture_problem import PostureProblem, place_over_contacts, without_one
 from manikin.kinematics.posture_terms import (
     ClearanceTerm,
-    LimitTerm,
     Linearised,
-    PositionTerm,
-    RotationTerm,
-    Term,
 )
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.scene.distance import Pair
@@ -55,7 +50,7 @@ MAX_TRUST = 0.8
 """Largest trust region [m, rad]."""
 
 COMPARED = 2
-"""Cold starts that must succeed; the better posture is taken, for there are poor local minima."""
+"""Cold starts that must succeed; the better posture is taken, as there are poor local minima."""
 
 PATIENCE = 6
 """Iterations in a row that gain less than half a percent after which a start is given up."""
@@ -63,7 +58,7 @@ PATIENCE = 6
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """How hard to try.
+    """Tolerances and effort of a search.
 
     Attributes:
         tolerance: Largest residual of a requirement [m, rad].
@@ -131,7 +126,7 @@ def generate_posture(
         problem: Requirements and preferences.
         start: (nq,) where to begin, such as a neighbouring posture; the reference placed over
             the contacts when omitted.
-        settings: How hard to try.
+        settings: Tolerances and effort.
 
     Returns:
         A posture that meets all requirements (without ``start`` the better of the first two
@@ -143,21 +138,21 @@ def generate_posture(
     settings = settings or SolverSettings()
     solver = PostureSolver(problem, settings)
     freely: PostureSolver | None = None
-    found: list[_Iterate] = []
+    tried: list[_Iterate] = []
     for q, warm in _starts(problem, start, settings):
         # A cold start goes to its contacts through the obstacles first: from outside, thin
         # obstacles would trap it on their wrong side. A low one may trap it there.
         if not warm and problem.proximity is not None:
             freely = freely or PostureSolver(replace(problem, proximity=None), settings)
-            found.append(solver.solve(freely.solve(q).q))
-            if not solver.meets(found[-1]):
-                found.append(solver.solve(q))
+            tried.append(solver.solve(freely.solve(q).q))
+            if not solver.meets(tried[-1]):
+                tried.append(solver.solve(q))
         else:
-            found.append(solver.solve(q))
-        met = sum(solver.meets(item) for item in found)
+            tried.append(solver.solve(q))
+        met = sum(solver.meets(item) for item in tried)
         if met == COMPARED or (met and warm):
             break
-    best = min(found, key=solver.rank)
+    best = min(tried, key=solver.rank)
     return solver.result(best, solver.iterations + (freely.iterations if freely else 0))
 
 
@@ -211,10 +206,8 @@ class PostureSolver:
     """Solves one problem from several starts."""
 
     def __init__(self, problem: PostureProblem, settings: SolverSettings) -> None:
-        self.problem = problem
-        self.settings = settings
-        self.requirements: tuple[Term, ...] = problem.requirements()
-        self._limits: LimitTerm = problem.limits()
+        self.problem, self.settings = problem, settings
+        self.requirements, self._limits = problem.requirements(), problem.limits()
         self._clearances: ClearanceTerm | None = problem.clearances(settings.activation)
         wishes = problem.wishes()
         self._wishes = tuple(term for _, term in wishes)
@@ -288,7 +281,7 @@ class PostureSolver:
 
     def linearise(self, q: FloatArray) -> _Iterate:
         """Evaluate every term, with hinges put back that rounding took out of their ranges."""
-        q = self._inside_limits(q)
+        q = np.concatenate([q[:7], np.clip(q[7:], self._limits.lower, self._limits.upper)])
         configuration = self._configuration.update(q)
         nv = self.problem.body.nv
         requirements = [term.evaluate(configuration) for term in self.requirements]
@@ -298,8 +291,8 @@ class PostureSolver:
         if self._clearances is None:
             clearance, pairs = Linearised(np.zeros(0), np.zeros((0, nv))), ()
         else:
-            found = self._clearances.evaluate(configuration)
-            clearance, pairs = Linearised(found.residual, found.jacobian), found.pairs
+            residual, jacobian, pairs = self._clearances.evaluate(configuration)
+            clearance = Linearised(residual, jacobian)
         return _Iterate(q, _stack(requirements, nv), parts, _stack(wishes, nv), clearance, pairs)
 
     def result(self, iterate: _Iterate, iterations: int) -> PostureResult:
@@ -309,20 +302,12 @@ class PostureSolver:
         worst = int(np.argmin(residual)) if len(residual) else -1
         misses = () if succeeded else self._misses(iterate)
         limits = self._limits.at_limit(self._configuration.update(iterate.q))
+        clearance, pair = (residual[worst], iterate.pairs[worst]) if worst >= 0 else (np.inf, None)
+        failure = None if succeeded else self._explanation(misses, limits)
+        q = frozen_array(iterate.q, "posture q")
         return PostureResult(
-            succeeded,
-            frozen_array(iterate.q, "posture q"),
-            iterate.error,
-            float(residual[worst]) if worst >= 0 else float("inf"),
-            iterate.pairs[worst] if worst >= 0 else None,
-            limits,
-            iterations,
-            misses,
-            None if succeeded else self._explanation(misses, limits),
+            succeeded, q, iterate.error, float(clearance), pair, limits, iterations, misses, failure
         )
-
-    def _inside_limits(self, q: FloatArray) -> FloatArray:
-        return np.concatenate([q[:7], np.clip(q[7:], self._limits.lower, self._limits.upper)])
 
     def _merit(self, iterate: _Iterate) -> float:
         intrusion = np.minimum(iterate.clearance.residual - self.settings.buffer, 0.0)
@@ -368,62 +353,31 @@ class PostureSolver:
 
     def _misses(self, iterate: _Iterate) -> tuple[str, ...]:
         """What is not met, worst first."""
-        found: list[tuple[float, str]] = []
+        misses: list[tuple[float, str]] = []
         for term, part in zip(self.requirements, iterate.parts, strict=True):
             residual = iterate.requirement.residual[part]
             size = float(np.abs(residual).max(initial=0.0))
             if size > self.settings.tolerance:
-                found.append((size, term.describe(residual)))
+                misses.append((size, term.describe(residual)))
         if self._clearances is not None and iterate.intrusion > self.settings.clearance_tolerance:
             text = self._clearances.describe(iterate.clearance.residual, iterate.pairs)
-            found.append((iterate.intrusion, text))
-        return tuple(text for _, text in sorted(found, key=lambda item: -item[0]))
+            misses.append((iterate.intrusion, text))
+        return tuple(text for _, text in sorted(misses, key=lambda item: -item[0]))
 
     def _explanation(self, misses: tuple[str, ...], limits: tuple[str, ...]) -> str:
         text = "; ".join(misses[:2])
         if limits:
             text += f"; at the end of their range: {', '.join(limits[:6])}"
-        blame = self._blame() if self.settings.explain else None
-        return text + (f"; a posture exists without {blame}" if blame else "")
-
-    def _blame(self) -> str | None:
-        """A single requirement without which a posture exists, or None."""
-        quick = replace(self.settings, explain=False)
-        for name, lighter in _without_one(self.problem):
-            if generate_posture(lighter, settings=quick).succeeded:
-                return name
-        return None
+        if self.settings.explain:
+            quick = replace(self.settings, explain=False)
+            for name, lighter in without_one(self.problem):
+                if generate_posture(lighter, settings=quick).succeeded:
+                    return f"{text}; a posture exists without {name}"
+        return text
 
 
 _SOFT = 8
 """DAQP's mark of a constraint that may be broken at a price."""
-
-
-def place_over_contacts(problem: PostureProblem, q: FloatArray) -> FloatArray:
-    """(nq,) posture ``q`` moved as a rigid whole onto the places its effectors must have.
-
-    The root is turned about the vertical to the mean heading of the required rotations and
-    moved so that the mean of the effectors' positions matches.
-    """
-    positions = [t for t in problem.requirements() if isinstance(t, PositionTerm)]
-    rotations = [t for t in problem.requirements() if isinstance(t, RotationTerm)]
-    feet = [t for t in positions if t.kind == "contact" and "foot" in t.effector] or positions
-    configuration = Configuration(problem.body, q)
-    turned = np.array(configuration.q)
-    if rotations:
-        headings = [
-            _heading(t.rotation @ configuration.effector_placement(t.effector)[0].T) for t in rotations
-        ]
-        yaw = float(np.arctan2(np.sum(np.sin(headings)), np.sum(np.cos(headings))))
-        turn = pin.SE3(pin.utils.rotate("z", yaw), np.zeros(3))
-        turned[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(turned[:7]))
-        configuration.update(turned)
-    if feet:
-        offsets = [t.position - configuration.effector_placement(t.effector)[1] for t in feet]
-        turned[:3] += np.mean(offsets, axis=0)
-    elif problem.com is not None:
-        turned[:3] += np.nan_to_num(problem.com - configuration.com)
-    return turned
 
 
 def _starts(
@@ -456,22 +410,6 @@ def _templates(problem: PostureProblem, settings: SolverSettings) -> Iterator[Fl
         yield q
 
 
-def _without_one(problem: PostureProblem) -> Iterator[tuple[str, PostureProblem]]:
-    """The problem with one requirement left out at a time."""
-    if problem.com is not None:
-        yield "the centre-of-mass requirement", replace(problem, com=None)
-    if problem.proximity is not None:
-        yield "the clearances", replace(problem, proximity=None)
-    if problem.learnt_margin is not None:
-        yield "the learnt ranges of motion", replace(problem, learnt_margin=None)
-    for contact in problem.contacts:
-        rest = tuple(other for other in problem.contacts if other is not contact)
-        yield f"contact '{contact.effector}'", replace(problem, contacts=rest)
-    for name in problem.placements:
-        rest_of = {key: value for key, value in problem.placements.items() if key != name}
-        yield f"placement '{name}'", replace(problem, placements=rest_of)
-
-
 def _bent(iterate: _Iterate, candidate: _Iterate, step: FloatArray) -> _Iterate:
     """The iterate, shifted so that the linear model of residuals and distances is exact at the candidate."""
     jacobian = iterate.requirement.jacobian
@@ -491,10 +429,5 @@ def _bent(iterate: _Iterate, candidate: _Iterate, step: FloatArray) -> _Iterate:
 def _stack(parts: list[Linearised], nv: int) -> Linearised:
     if not parts:
         return Linearised(np.zeros(0), np.zeros((0, nv)))
-    return Linearised(
-        np.concatenate([part.residual for part in parts]), np.vstack([part.jacobian for part in parts])
-    )
-
-
-def _heading(rotation: FloatArray) -> float:
-    return float(np.arctan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1]))
+    residuals, jacobians = zip(*parts, strict=True)
+    return Linearised(np.concatenate(residuals), np.vstack(jacobians))

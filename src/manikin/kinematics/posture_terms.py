@@ -39,22 +39,14 @@ class Term(Protocol):
 
     def evaluate(self, configuration: Configuration) -> Linearised:
         """Residual and Jacobian at a configuration."""
-        ...
 
     def describe(self, residual: FloatArray) -> str:
         """Say in words what a residual of this term means."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
 class PositionTerm:
-    """An effector's origin at a place: ``r = p - p*`` [m].
-
-    Attributes:
-        effector: Name of the effector.
-        position: (3,) place in the world [m].
-        kind: What the message calls it, such as ``"contact"``.
-    """
+    """An effector's origin at a position (3,) in the world: ``r = p - p*`` [m]; messages name the kind."""
 
     effector: str
     position: FloatArray
@@ -72,13 +64,7 @@ class PositionTerm:
 
 @dataclass(frozen=True, eq=False)
 class RotationTerm:
-    """An effector's axes parallel to given ones: ``r = log(R R*^T)`` in the world [rad].
-
-    Attributes:
-        effector: Name of the effector.
-        rotation: (3, 3) wanted effector-to-world rotation.
-        kind: What the message calls it.
-    """
+    """An effector's axes as in a rotation (3, 3) to the world: ``r = log(R R*^T)`` in the world [rad]."""
 
     effector: str
     rotation: FloatArray
@@ -101,11 +87,7 @@ class RotationTerm:
 
 @dataclass(frozen=True, eq=False)
 class ComTerm:
-    """The centre of mass at a place, along the axes that are given: ``r = c - c*`` [m].
-
-    Attributes:
-        position: (3,) place [m]; NaN leaves an axis free.
-    """
+    """The centre of mass at a position (3,), NaN for free axes: ``r = c - c*`` [m]."""
 
     position: FloatArray
 
@@ -154,11 +136,7 @@ class UprightTerm:
 
 @dataclass(frozen=True, eq=False)
 class ReferenceTerm:
-    """The hinges near a reference posture: ``r = q_hinges - q*_hinges`` [rad].
-
-    Attributes:
-        angles: (nv - 6,) reference angles [rad].
-    """
+    """The hinges near reference angles (nv - 6,): ``r = q_hinges - q*_hinges`` [rad]."""
 
     angles: FloatArray
 
@@ -204,14 +182,10 @@ class LimitTerm:
     def _margins(self) -> FloatArray:
         return np.minimum(self.margin, 0.25 * (self.body.upper - self.body.lower))
 
-    def bounds(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
-        """(nv - 6,) smallest and largest change of each hinge that stays inside."""
-        angles = configuration.q[7:]
-        return self.lower - angles, self.upper - angles
-
     def evaluate(self, configuration: Configuration) -> Linearised:
         """Slack of each hinge to its nearer end, and its Jacobian."""
-        below, above = self.bounds(configuration)
+        angles = configuration.q[7:]
+        below, above = self.lower - angles, self.upper - angles
         nearer_lower = -below < above
         count = len(below)
         jacobian = np.hstack([np.zeros((count, 6)), np.diag(np.where(nearer_lower, 1.0, -1.0))])
@@ -265,11 +239,10 @@ class ClearanceTerm:
     def evaluate(self, configuration: Configuration) -> Clearances:
         """Distances beyond the safety distance of the pairs that are close."""
         reach = max(self.safety, self.self_safety) + self.activation
-        found = self.proximity.evaluate(configuration.q, reach, self.ignore)
-        safety = np.array([self.self_safety if "/" in other else self.safety for _, other in found.pairs])
-        return Clearances(
-            found.distance - safety, found.gradient.reshape(-1, configuration.body.nv), found.pairs
-        )
+        close = self.proximity.evaluate(configuration.q, reach, self.ignore)
+        safety = np.array([self.self_safety if "/" in other else self.safety for _, other in close.pairs])
+        gradient = close.gradient.reshape(-1, configuration.body.nv)
+        return Clearances(close.distance - safety, gradient, close.pairs)
 
     def describe(self, residual: FloatArray, pairs: tuple[Pair, ...]) -> str:
         """Say which pair is closest to or beyond its safety distance."""

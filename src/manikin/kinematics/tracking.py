@@ -1,8 +1,4 @@
-"""Postures of a body that follow targets from one instant to the next.
-
-Also here. Postures within the joints' limits whose points lie closest to their targets. The best step of a
-convex quadratic within bounds, nearly.
-"""
+"""Postures within the joints' limits whose points lie closest to targets, from one instant to the next."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,41 +30,41 @@ def search(
     The n searches do not depend on each other; together they take less time.
 
     Args:
-        cost: Of postures.
+        cost: Cost of postures.
         starts: (n, nq) postures within the limits.
-        wanted: (n, k, 3) places of the targets [m]; NaN where one is not seen.
+        wanted: (n, k, 3) positions of the targets [m]; NaN where one is not seen.
         before: (n, nq) postures to stay near.
-        least_gain: Share of the cost by which a step has to lower it, not to be the last one.
+        least_gain: A step that lowers the cost by a smaller share is the last one.
 
     Returns:
         (n, nq) postures and their costs (n,) [m^2].
     """
     held = cost.drawn_to(before)
-    here = cost.at(cost.settled(starts, held), held, wanted)
-    q, costs = here.q, here.cost
+    now = cost.at(cost.settled(starts, held), held, wanted)
+    q, costs = now.q, now.cost
     damping, frames = np.full(len(q), FIRST_DAMPING), np.flatnonzero(costs > LEAST_COST)
     gradient, matrix = np.empty((len(q), len(cost.slots))), np.empty((len(q), *2 * [len(cost.slots)]))
-    fresh, here = frames, here.only(costs > LEAST_COST)
+    fresh, now = frames, now.only(costs > LEAST_COST)
     for _ in range(MOST_STEPS):
         if not frames.size:
             break
         if fresh.size:
-            gradient[fresh], matrix[fresh] = cost.equations(here)
+            gradient[fresh], matrix[fresh] = cost.equations(now)
         lower, upper = cost.room(q[frames])
         steps, promised = np.empty_like(lower), np.empty(len(frames))
         for number, frame in enumerate(frames):
             right = -gradient[frame]
             steps[number] = bounded_step(matrix[frame], right, damping[frame], lower[number], upper[number])
             promised[number] = right @ steps[number]
-        here = cost.at(cost.moved(q[frames], steps), held[frames], wanted[frames])
-        gained = costs[frames] - here.cost
+        now = cost.at(cost.moved(q[frames], steps), held[frames], wanted[frames])
+        gained = costs[frames] - now.cost
         better, enough = gained > 0.0, least_gain * costs[frames]
         last = (promised <= enough) | (better & (gained <= enough))
-        here, fresh = here.only(better), frames[better]
-        q[fresh], costs[fresh] = here.q, here.cost
+        now, fresh = now.only(better), frames[better]
+        q[fresh], costs[fresh] = now.q, now.cost
         damping[frames] = _next_damping(damping[frames], gained, promised)
         going = ~last & (damping[frames] < MOST_DAMPING) & (costs[frames] > LEAST_COST)
-        here, fresh, frames = here.only(going[better]), frames[better & going], frames[going]
+        now, fresh, frames = now.only(going[better]), frames[better & going], frames[going]
     return q, costs
 
 
@@ -85,21 +81,14 @@ MOST_ROUNDS = 5
 def bounded_step(
     matrix: FloatArray, right: FloatArray, damping: float, lower: FloatArray, upper: FloatArray
 ) -> FloatArray:
-    """Solution of ``(matrix + damping) @ step = right`` within bounds.
+    """Solution (d,) of ``(matrix + damping) @ step = right`` within bounds.
 
     Unknowns that would leave their bounds are put on them, the others solved for again, until none leaves. An
     unknown that is on its bound and pushed outward stays there (Bertsekas, "Projected Newton methods for
     optimization problems with simple constraints", 1982).
 
-    Args:
-        matrix: (d, d), not indefinite; its lower triangle is read.
-        right: (d,).
-        damping: Added to the diagonal, above 0.
-        lower: (d,) at most 0.
-        upper: (d,) at least 0.
-
-    Returns:
-        (d,) step.
+    The lower triangle of the semidefinite matrix (d, d) is read; the damping is above 0, the lower bounds
+    (d,) are at most 0, the upper ones at least 0.
     """
     matrix = matrix.copy()
     matrix.reshape(-1)[:: len(right) + 1] += damping
@@ -153,7 +142,7 @@ def follow(
 
     Args:
         body: The body that carries the targets' points.
-        targets: Of n instants.
+        targets: Targets at n instants.
         starts: (n, nq) postures within the limits; the first is where the search begins, the others
             are tried where the search from the frame before leaves a point farther than :data:`POOR`.
         rate: Frames per second [Hz]; None for frames that are far from each other.
@@ -224,8 +213,8 @@ class _Following:
         guess = self._guess(first, stop)
         q, costs = search(self._cost, guess[1:], self._wanted[first:stop], guess[:-1])
         self._keep(first, q)
-        found = self._better_start(first, costs)
-        return stop if found is None else found + 1
+        better = self._better_start(first, costs)
+        return stop if better is None else better + 1
 
     def _guess(self, first: int, stop: int) -> FloatArray:
         """Postures from the frame before the first, on a curve through some that are searched roughly."""
@@ -233,10 +222,10 @@ class _Following:
         for frame in [*range(first - 1 + self._apart, stop - 1, self._apart), stop - 1]:
             before = self._cost.later(q[-1], frame - knots[-1] - 1)
             wanted = self._wanted[frame : frame + 1]
-            found = search(self._cost, q[-1][None], wanted, before[None], ROUGH)[0][0]
-            found[3:7] *= np.copysign(1.0, found[3:7] @ q[-1][3:7])
+            rough = search(self._cost, q[-1][None], wanted, before[None], ROUGH)[0][0]
+            rough[3:7] *= np.copysign(1.0, rough[3:7] @ q[-1][3:7])
             knots.append(frame)
-            q.append(found)
+            q.append(rough)
         curve = CubicSpline(knots, q)(np.arange(first - 1, stop))
         curve[:, 3:7] /= np.linalg.norm(curve[:, 3:7], axis=1, keepdims=True)
         curve[:, 7:] = np.clip(curve[:, 7:], self._body.lower, self._body.upper)

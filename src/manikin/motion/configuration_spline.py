@@ -93,15 +93,11 @@ def states_from_raw(raw: FloatArray, raw_rate: FloatArray, raw_second: FloatArra
 
 
 def tangent_map(raw: FloatArray) -> FloatArray:
-    """Derivative of Pinocchio's tangent vector with respect to the raw coordinates.
+    """(n, 7, 7) derivative of Pinocchio's tangent vector by the raw coordinates (n, nq) of the pelvis.
 
-    Args:
-        raw: (n, nq) raw spline values.
-
-    Returns:
-        (n, 7, 7) whose first six rows map raw pelvis coordinates (position, quaternion) to
-        the pelvis part of the tangent; the last row is the radial direction of the
-        quaternion, which does not move the body.  Joint angles map to themselves.
+    The first six rows map raw pelvis coordinates (position, quaternion) to the pelvis part of the tangent;
+    the last row is the radial direction of the quaternion, which does not move the body. Joint angles map
+    to themselves.
     """
     size = np.linalg.norm(raw[:, 3:7], axis=1)
     u = raw[:, 3:7] / size[:, None]

@@ -8,14 +8,27 @@ bit for bit what was written.
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
-from manikin.body import BodyModel, Effector, Hinge, Limb, Segment, Shape
-from manikin.contact import Contact, ContactKind, ContactSchedule, Phase, SolePart, Stance, StanceSequence
+from manikin.body import BodyModel, Effector, Hinge, Limb, Segment
+from manikin.body import Shape as BodyShape
+from manikin.contact import (
+    CarriedLoad,
+    Contact,
+    ContactKind,
+    ContactSchedule,
+    Phase,
+    SolePart,
+    Stance,
+    StanceSequence,
+)
 from manikin.numerics.spatial import frozen_array
 from manikin.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Plane, Scene, Sphere
+from manikin.scene.obstacle import Shape
 
 Json = dict[str, Any]
 
@@ -33,20 +46,26 @@ def describe_body(body: BodyModel) -> Json:
         "sole_length_m": body.sole_length,
         "sole_width_m": body.sole_width,
         "segments": [_describe_segment(segment) for segment in body.segments],
-        "effectors": [
-            {"name": e.name, "segment": e.segment, "translation": e.translation.tolist(),
-             "rotation": e.rotation.tolist()}
-            for e in body.effectors.values()
-        ],
+        "effectors": [_plain(effector) for effector in body.effectors.values()],
         "standing_angles": dict(body.standing_angles),
         "soft_pairs": sorted(sorted(pair) for pair in body.soft_pairs),
         "limbs": [
-            {"name": limb.name, "effector": limb.effector, "segments": list(limb.segments),
-             "kind": str(limb.kind), "mirror": limb.mirror}
-            | ({} if limb.patch is None else {"patch_m": list(limb.patch)})
+            _plain(limb, "patch") | ({} if limb.patch is None else {"patch_m": list(limb.patch)})
             for limb in body.limbs
         ],
     }  # fmt: skip
+
+
+def _plain(value: Any, *without: str) -> Any:
+    """A dataclass as a mapping of its fields but for some; arrays as lists, enumerations as text."""
+    if is_dataclass(value):
+        names = (item.name for item in fields(value) if item.name not in without)
+        return {name: _plain(getattr(value, name)) for name in names}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return str(value) if isinstance(value, StrEnum) else value
 
 
 def body_from(description: Mapping[str, Any]) -> BodyModel:
@@ -73,8 +92,14 @@ def body_from(description: Mapping[str, Any]) -> BodyModel:
         loads=description.get("loads_kg", {}),
         sole_length=description["sole_length_m"],
         sole_width=description["sole_width_m"],
-        limbs=tuple(_limb_from(limb) for limb in description.get("limbs", ())),
-    )
+        limbs=tuple(
+            Limb(
+                limb["name"], limb["effector"], tuple(limb["segments"]), ContactKind(limb["kind"]),
+                limb["mirror"], tuple(limb["patch_m"]) if "patch_m" in limb else None,
+            )
+            for limb in description.get("limbs", ())
+        ),
+    )  # fmt: skip
 
 
 def body_key(body: BodyModel) -> str:
@@ -82,35 +107,9 @@ def body_key(body: BodyModel) -> str:
     return hashlib.sha256(json.dumps(describe_body(body), sort_keys=True).encode()).hexdigest()
 
 
-def _limb_from(data: Mapping[str, Any]) -> Limb:
-    kind = ContactKind(data["kind"])
-    patch = data.get("patch_m")
-    return Limb(
-        data["name"], data["effector"], tuple(data["segments"]), kind, data["mirror"],
-        None if patch is None else (patch[0], patch[1]),
-    )  # fmt: skip
-
-
 def _describe_segment(segment: Segment) -> Json:
-    return {
-        "name": segment.name,
-        "parent": segment.parent,
-        "origin": segment.origin.tolist(),
-        "mass": segment.mass,
-        "com": segment.com.tolist(),
-        "inertia": segment.inertia.tolist(),
-        "hinges": [
-            {"name": h.name, "axis": h.axis.tolist(), "lower": h.lower, "upper": h.upper,
-             "velocity_limit": h.velocity_limit, "torque_lower": h.torque_lower,
-             "torque_upper": h.torque_upper}
-            for h in segment.hinges
-        ],
-        "shapes": [
-            {"name": s.name, "kind": str(s.kind), "size": s.size.tolist(),
-             "translation": s.translation.tolist(), "rotation": s.rotation.tolist()}
-            for s in segment.shapes
-        ],
-    }  # fmt: skip
+    parts = {"hinges": _plain(segment.hinges), "shapes": _plain(segment.shapes)}
+    return _plain(segment, *parts) | parts
 
 
 def _segment_from(data: Mapping[str, Any]) -> Segment:
@@ -122,22 +121,18 @@ def _segment_from(data: Mapping[str, Any]) -> Segment:
         mass=data["mass"],
         com=np.array(data["com"]),
         inertia=np.array(data["inertia"]),
-        shapes=tuple(Shape(**shape) for shape in data["shapes"]),
+        shapes=tuple(BodyShape(**shape) for shape in data["shapes"]),
     )
 
 
 def describe_scene(scene: Scene) -> Json:
     """Obstacles and floor of a scene [m]; meshes with all their triangles."""
-    floor = ("floor",) if scene.floor_height is not None else ()
-    return {
-        "floor_height": scene.floor_height,
-        "obstacles": [
-            {"name": o.name, **_describe_shape(o), "rotation": o.rotation.tolist(),
-             "translation": o.translation.tolist()}
-            for o in scene
-            if o.name not in floor
-        ],
-    }  # fmt: skip
+    obstacles = [
+        {"name": o.name, **_describe_shape(o.shape)} | _plain(o, "name", "shape")
+        for o in scene
+        if scene.floor_height is None or o.name != "floor"
+    ]
+    return {"floor_height": scene.floor_height, "obstacles": obstacles}
 
 
 def scene_from(description: Mapping[str, Any]) -> Scene:
@@ -154,33 +149,24 @@ def scene_from(description: Mapping[str, Any]) -> Scene:
     return Scene(obstacles, description["floor_height"])
 
 
-def _describe_shape(obstacle: Obstacle) -> Json:
-    shape = obstacle.shape
-    if isinstance(shape, Box):
-        return {"kind": "box", "size": shape.size.tolist()}
-    if isinstance(shape, Sphere):
-        return {"kind": "sphere", "radius": shape.radius}
-    if isinstance(shape, (Cylinder, Capsule)):
-        kind = "cylinder" if isinstance(shape, Cylinder) else "capsule"
-        return {"kind": kind, "radius": shape.radius, "length": shape.length}
-    if isinstance(shape, (Plane, HalfSpace)):
-        kind = "plane" if isinstance(shape, Plane) else "half_space"
-        return {"kind": kind, "normal": shape.normal.tolist(), "offset": shape.offset}
-    return {"kind": "mesh", "source": shape.source, "vertices": shape.vertices.tolist(),
-            "faces": shape.faces.tolist()}  # fmt: skip
+_KINDS: Mapping[str, type[Shape]] = {
+    "box": Box, "sphere": Sphere, "cylinder": Cylinder, "capsule": Capsule, "plane": Plane,
+    "half_space": HalfSpace, "mesh": Mesh,
+}  # fmt: skip
 
 
-def _shape_from(data: Mapping[str, Any]) -> Box | Sphere | Cylinder | Capsule | Plane | HalfSpace | Mesh:
-    kind = data["kind"]
-    if kind == "mesh":
-        return Mesh(data["vertices"], data["faces"], data["source"])
-    if kind == "box":
-        return Box(data["size"])
-    if kind == "sphere":
-        return Sphere(data["radius"])
-    if kind in ("cylinder", "capsule"):
-        return (Cylinder if kind == "cylinder" else Capsule)(data["radius"], data["length"])
-    return {"plane": Plane, "half_space": HalfSpace}[kind](data["normal"], data["offset"])
+def _describe_shape(shape: Shape) -> Json:
+    kind = next(name for name, shape_type in _KINDS.items() if isinstance(shape, shape_type))
+    if isinstance(shape, Mesh):
+        return {"kind": kind, "source": shape.source} | _plain(shape, "source", "dropped_faces")
+    return {"kind": kind} | _plain(shape)
+
+
+def _shape_from(data: Mapping[str, Any]) -> Shape:
+    shape_type = _KINDS[data["kind"]]
+    return shape_type(
+        **{item.name: data[item.name] for item in fields(shape_type) if item.name != "dropped_faces"}
+    )
 
 
 def describe_schedule(schedule: ContactSchedule) -> Json:
@@ -194,6 +180,7 @@ def describe_schedule(schedule: ContactSchedule) -> Json:
                 "normal_force_cap": phase.stance.normal_force_cap,
                 "friction_model": phase.stance.friction_model,
                 "contacts": [_describe_contact(contact) for contact in phase.stance],
+                **({} if phase.load is None else {"load": _describe_load(phase.load)}),
             }
             for phase in schedule.sequence
         ],
@@ -216,43 +203,38 @@ def schedule_from(description: Mapping[str, Any]) -> ContactSchedule:
             ),
             phase["min_duration"],
             phase["max_duration"],
+            _load_from(phase["load"]) if "load" in phase else None,
         )
         for phase in description["phases"]
     ]
     return ContactSchedule(StanceSequence(phases), description["instants"])
 
 
+def _describe_load(load: CarriedLoad) -> Json:
+    return {"masses_kg": dict(load.masses), "offset": load.offset.tolist()}
+
+
+def _load_from(description: Mapping[str, Any]) -> CarriedLoad:
+    return CarriedLoad(
+        description["masses_kg"], frozen_array(description["offset"], "offset of the load [m]", (3,))
+    )
+
+
 def _describe_contact(contact: Contact) -> Json:
-    return {
-        "effector": contact.effector,
-        "kind": str(contact.kind),
-        "position": contact.position.tolist(),
-        "rotation": contact.rotation_contact_to_world.tolist(),
-        "points": contact.points.tolist(),
-        "friction": contact.friction,
-        "normal_force_cap": contact.normal_force_cap,
-        "torsion_limit": contact.torsion_limit,
-        "max_force": contact.max_force,
-        "max_moment": contact.max_moment,
-        "part": str(contact.part),
-        "oriented": contact.oriented,
-        "settle": contact.settle,
-    }
+    """In the order of the fields, the rotation under a shorter name."""
+    values = _plain(contact)
+    return {key.removesuffix("_contact_to_world"): value for key, value in values.items()}
 
 
 def _contact_from(data: Mapping[str, Any]) -> Contact:
-    return Contact(
-        effector=data["effector"],
-        kind=ContactKind(data["kind"]),
-        position=frozen_array(data["position"], "contact position", (3,)),
-        rotation_contact_to_world=frozen_array(data["rotation"], "contact rotation", (3, 3)),
-        points=frozen_array(data["points"], "contact points", (None, 3)),
-        friction=data["friction"],
-        normal_force_cap=data["normal_force_cap"],
-        torsion_limit=data["torsion_limit"],
-        max_force=data["max_force"],
-        max_moment=data["max_moment"],
-        part=SolePart(data.get("part", SolePart.FULL)),
-        oriented=data.get("oriented", False),
-        settle=data.get("settle", 0.0),
-    )
+    values = dict(data)
+    arrays = {
+        name: frozen_array(values.pop(key), f"contact {key}", shape)
+        for name, key, shape in (
+            ("position", "position", (3,)),
+            ("rotation_contact_to_world", "rotation", (3, 3)),
+            ("points", "points", (None, 3)),
+        )
+    }
+    kinds = {"kind": ContactKind(values.pop("kind")), "part": SolePart(values.pop("part", SolePart.FULL))}
+    return Contact(**values, **arrays, **kinds)

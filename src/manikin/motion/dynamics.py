@@ -1,13 +1,12 @@
-"""What a motion needs from outside: the wrench that all contacts together must supply.
+"""Dynamics of sampled motions: the wrench that all contacts together must supply, and momentum rates.
 
-Two ways lead there. The rate of the centroidal momentum gives the wrench with the centre of mass and the
-angular momentum (:func:`centroidal_motion`); the recursive Newton-Euler equations give it with the torques of
-a body without contacts (:class:`FreeDynamics`). Both agree to rounding.
-
-Also here. Rate of the centroidal momentum of sampled motions, with exact derivatives by raw coordinates.
-Kinematics of a whole-body spline at its samples, with what one pass over them gives at once.
+The rate of the centroidal momentum gives the wrench with the centre of mass and the angular momentum
+(:func:`centroidal_motion`); the recursive Newton-Euler equations give it with the torques of a body without
+contacts (:class:`FreeDynamics`). Both agree to rounding. :class:`MotionSampler` evaluates a whole-body
+spline with exact derivatives by its raw coordinates.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +14,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from manikin.body import BodyModel
+from manikin.body.load import with_masses
+from manikin.contact import CarriedLoad, ContactSchedule
 from manikin.motion.configuration_spline import (
     StateSamples,
     TurnDerivatives,
@@ -23,7 +24,7 @@ from manikin.motion.configuration_spline import (
     turn_derivatives,
 )
 from manikin.numerics.banded import SampledBasis
-from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, rotation_from_quaternion, skew
+from manikin.numerics.spatial import GRAVITY_VECTOR, FloatArray, cross, rotation_from_quaternion, skew
 from manikin.scene.distance import moves_by_joint
 from manikin.scene.distance_bounds import PlacedShapes, PlacementReader
 
@@ -67,13 +68,7 @@ class MomentumRateSamples:
     def by_raw(
         self, states: StateSamples, raw: tuple[FloatArray, FloatArray, FloatArray], tangent: FloatArray
     ) -> MomentumRate:
-        """Differentiate by the raw coordinates (n, nq), their rates and second derivatives.
-
-        Args:
-            states: The states that were recorded.
-            raw: Raw spline values, rates and second derivatives.
-            tangent: (n, 7, 7) :func:`tangent_map` of the raw values.
-        """
+        """Differentiate by raw values, rates and second derivatives (n, nq), with :func:`tangent_map`."""
         turn = turn_derivatives(*(part[:, 3:7] for part in raw))
         blocks = [np.zeros((*self._by_q.shape[:2], raw[0].shape[1])) for _ in range(3)]
         for block, joints in zip(blocks, (self._by_q, self._by_v, self._by_a), strict=True):
@@ -83,13 +78,9 @@ class MomentumRateSamples:
         return MomentumRate(self._value, (blocks[0], blocks[1], blocks[2]))
 
     def _add_pelvis_turn(
-        self,
-        blocks: list[FloatArray],
-        states: StateSamples,
-        raw_second: FloatArray,
-        tangent: FloatArray,
+        self, blocks: list[FloatArray], states: StateSamples, raw_second: FloatArray, tangent: FloatArray,
         turn: TurnDerivatives,
-    ) -> None:
+    ) -> None:  # fmt: skip
         # With the world velocity of the pelvis held, its velocity in the pelvis frame turns.
         by_omega = self._by_v[:, :, 3:6] + self._by_a[:, :, :3] @ skew(states.v[:, :3])
         by_alpha = self._by_a[:, :, 3:6]
@@ -118,7 +109,7 @@ class MotionSamples:
         tangent: (n, 7, 7) :func:`~manikin.motion.configuration_spline.tangent_map`.
         com: (n, 3) centre of mass [m].
         com_jacobian: (n, 3, nv).
-        momentum: Rate of the centroidal momentum.
+        momentum: Rate of the centroidal momentum, with what is carried.
         frames: (n, k, 4, 4) frame-to-world transforms of the frames asked for.
         shapes: The collision shapes, with the joints' Jacobians.
     """
@@ -134,15 +125,18 @@ class MotionSamples:
 
 
 class MotionSampler:
-    """Evaluates splines of one basis.
+    """Evaluates splines of one basis, with the frames of some effectors of a body.
 
-    Args:
-        body: The body.
-        frames: Names of the effectors whose frames are needed.
-        basis: The spline's basis at the samples.
+    ``loads`` says what is carried at each sample, or None.
     """
 
-    def __init__(self, body: BodyModel, frames: tuple[str, ...], basis: SampledBasis) -> None:
+    def __init__(
+        self,
+        body: BodyModel,
+        frames: tuple[str, ...],
+        basis: SampledBasis,
+        loads: Sequence[CarriedLoad | None] | None = None,
+    ) -> None:
         self._model: pin.Model = body.pinocchio
         self._data = self._model.createData()
         self._geometry, self._geometry_data = body.geometry, pin.GeometryData(body.geometry)
@@ -152,12 +146,16 @@ class MotionSampler:
         self._frame_reader = PlacementReader(self._data.oMf, indices)
         moves = moves_by_joint(self._model)
         self._moving = [np.flatnonzero(moves[self._model.frames[index].parentJoint]) for index in indices]
+        carried: dict[int, tuple[CarriedLoad, list[int]]] = {}
+        for sample, load in enumerate(loads or ()):
+            if load is not None:
+                carried.setdefault(id(load), (load, []))[1].append(sample)
+        self._loaded = [(with_masses(body, load.masses).pinocchio, rows) for load, rows in carried.values()]
 
     def sample(self, points: FloatArray) -> MotionSamples:
         """Evaluate the spline with control points (k, nq)."""
-        raw = (
-            self._basis.evaluate(points), self._basis.evaluate(points, 1), self._basis.evaluate(points, 2)
-        )  # fmt: skip
+        basis = self._basis
+        raw = basis.evaluate(points), basis.evaluate(points, 1), basis.evaluate(points, 2)
         states, tangent = states_from_raw(*raw), tangent_map(raw[0])
         n, model, data = len(states.q), self._model, self._data
         momentum = MomentumRateSamples(model, n)
@@ -171,10 +169,33 @@ class MotionSampler:
             com[s], jacobians[s] = data.com[0], data.J
             self._frame_reader.read(frames[s])
             self._shape_reader.read(shapes[s])
+        rate = momentum.by_raw(states, raw, tangent)
+        for loaded, rows in self._loaded:
+            self._replace(rate, loaded, rows, states, raw, tangent)
         return MotionSamples(
-            raw, states, tangent, com, momentum.linear_by_acceleration / self._mass,
-            momentum.by_raw(states, raw, tangent), frames, PlacedShapes(shapes, jacobians),
+            raw, states, tangent, com, momentum.linear_by_acceleration / self._mass, rate, frames,
+            PlacedShapes(shapes, jacobians),
         )  # fmt: skip
+
+    @staticmethod
+    def _replace(
+        rate: MomentumRate,
+        loaded: pin.Model,
+        rows: list[int],
+        states: StateSamples,
+        raw: tuple[FloatArray, FloatArray, FloatArray],
+        tangent: FloatArray,
+    ) -> None:
+        """Put the momentum's rate of body and load, about their common centre, where the load is carried."""
+        part, data = StateSamples(*(item[rows] for item in states)), loaded.createData()
+        momentum = MomentumRateSamples(loaded, len(rows))
+        for k in range(len(rows)):
+            momentum.record(k, data, part)
+        first, second, third = (item[rows] for item in raw)
+        of_both = momentum.by_raw(part, (first, second, third), tangent[rows])
+        rate.value[rows] = of_both.value
+        for own, other in zip(rate.jacobians, of_both.jacobians, strict=True):
+            own[rows] = other
 
     def frame_jacobian(self, motion: MotionSamples, number: int) -> FloatArray:
         """(n, 6, nv) linear, then angular velocity of frame ``number`` in world axes, per ``v``."""
@@ -208,7 +229,7 @@ def centroidal_motion(body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArr
     """Wrench that the scene must apply to a body in motion, by the rate of its centroidal momentum.
 
     Args:
-        body: Who moves.
+        body: The body.
         q: (n, nq) configurations.
         v: (n, nv) velocities.
         a: (n, nv) accelerations.
@@ -239,14 +260,7 @@ class FreeDynamics:
 
     @classmethod
     def of(cls, body: BodyModel, q: FloatArray, v: FloatArray, a: FloatArray) -> "FreeDynamics":
-        """By the recursive Newton-Euler equations.
-
-        Args:
-            body: Who moves.
-            q: (n, nq) configurations.
-            v: (n, nv) velocities.
-            a: (n, nv) accelerations.
-        """
+        """By the recursive Newton-Euler equations; arguments as of :func:`centroidal_motion`."""
         model, data = body.pinocchio, body.pinocchio.createData()
         needed, jacobians = np.empty((len(q), model.nv)), np.empty((len(q), 6, model.nv))
         for k in range(len(q)):
@@ -260,3 +274,60 @@ class FreeDynamics:
     def part(self, rows: NDArray[np.int64]) -> "FreeDynamics":
         """Some of the samples."""
         return FreeDynamics(self.needed[rows], self.wrench[rows], self.jacobians[rows])
+
+    def carrying(self, load: "CarriedForces") -> "FreeDynamics":
+        """With what effectors carry besides."""
+        return FreeDynamics(self.needed + load.needed, self.wrench + load.wrench, self.jacobians)
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedForces:
+    """What the loads of a schedule's phases need besides the body's own motion, at n samples.
+
+    Attributes:
+        needed: (n, nv) generalised forces [N, N.m]; the first six in the pelvis' frame.
+        wrench: (n, 6) their weight and inertia, force [N] and moment about the world origin [N.m].
+    """
+
+    needed: FloatArray
+    wrench: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        body: BodyModel,
+        schedule: ContactSchedule,
+        time: FloatArray,
+        q: FloatArray,
+        v: FloatArray,
+        a: FloatArray,
+    ) -> "CarriedForces | None":
+        """Of the point masses that a motion carries in some phases; None where it carries nothing.
+
+        Args:
+            body: Who moves, without the loads.
+            schedule: The contacts in time, with the loads of the phases.
+            time: (n,) [s].
+            q: (n, nq) configurations.
+            v: (n, nv) velocities.
+            a: (n, nv) accelerations.
+        """
+        if all(phase.load is None for phase in schedule.sequence):
+            return None
+        model, data = body.pinocchio, body.pinocchio.createData()
+        needed, wrench = np.zeros((len(time), body.nv)), np.zeros((len(time), 6))
+        for k, number in enumerate(schedule.phase_at(time)):
+            load = schedule.sequence[int(number)].load
+            if load is None:
+                continue
+            pin.forwardKinematics(model, data, q[k], v[k], a[k])
+            pin.computeJointJacobians(model, data, q[k])
+            for effector, mass in load.masses.items():
+                frame = body.effector_frame(effector)
+                position = pin.updateFramePlacement(model, data, frame).translation
+                rate = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
+                force = mass * (rate - GRAVITY_VECTOR)
+                jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
+                needed[k] += jacobian.T @ force
+                wrench[k] += np.concatenate([force, cross(position, force)])
+        return cls(needed, wrench)

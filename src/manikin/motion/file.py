@@ -70,9 +70,9 @@ class MotionFile(Displayed):
     Attributes:
         planned: Motion as planned.
         executed: Motion as simulated.
-        body: Who moved.
-        scene: Where.
-        schedule: With which contacts, when.
+        body: The moving body.
+        scene: Its surroundings.
+        schedule: Its contacts in time.
         recorded: Motion of a recorded person, reconstructed.
         shifted: The recorded motion after the least shift onto its contacts.
     """
@@ -96,16 +96,12 @@ class MotionFile(Displayed):
     @property
     def motions(self) -> dict[str, Motion]:
         """The motions there are, by name, in the order of :data:`GROUPS`."""
-        found = {name: getattr(self, name) for name in GROUPS}
-        return {name: motion for name, motion in found.items() if motion is not None}
+        groups = {name: getattr(self, name) for name in GROUPS}
+        return {name: motion for name, motion in groups.items() if motion is not None}
 
 
 def write_motions(path: str | Path, content: MotionFile) -> None:
-    """Write a motion file; an interruption leaves the old file or none.
-
-    Args:
-        path: Where to; its folder must exist.
-        content: At least one motion.
+    """Write a motion file with at least one motion; an interruption leaves the old file or none.
 
     Raises:
         MotionFileError: If there is no motion, or the file cannot be written.
@@ -160,12 +156,7 @@ def _fill(file: h5py.File, content: MotionFile) -> None:
 
 
 def margin_form(motion: Motion, schedule: ContactSchedule | None) -> str:
-    """Form and friction model of a motion's margin, in words.
-
-    Args:
-        motion: Gives the unit.
-        schedule: Gives the friction model, with its stances; None leaves it unsaid.
-    """
+    """Form of a motion's margin in words, with the friction model where the schedule is known."""
     form = (
         "residual ball of the wrench polytope, moments about the centre of mass, alpha = 1 m"
         if motion.margin_unit == "N.m"
@@ -200,13 +191,10 @@ def _content(file: h5py.File, source: str) -> MotionFile:
     if version != FORMAT_VERSION:
         raise MotionFileError(f"{source}: has format version {version}; valid: {FORMAT_VERSION}")
     content = MotionFile(
-        planned=_read_motion(file, "planned", source),
-        executed=_read_motion(file, "executed", source),
         body=_read_json(file, "body", body_from, source),
         scene=_read_json(file, "scene", scene_from, source),
         schedule=_read_json(file, "schedule", schedule_from, source),
-        recorded=_read_motion(file, "recorded", source),
-        shifted=_read_motion(file, "shifted", source),
+        **{name: _read_motion(file, name, source) for name in GROUPS},
     )
     if not content.motions:
         raise MotionFileError(f"{source}: holds no motion; valid: a group {' or '.join(GROUPS)}")

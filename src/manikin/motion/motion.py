@@ -1,8 +1,4 @@
-"""A whole-body motion sampled in time, with its contacts, forces and margin.
-
-Also here. Quantities that follow from a motion: phases, velocities, placements, centre of pressure. Where the
-massless feet of a point mass are: on their contacts, and between them in flight.
-"""
+"""A whole-body motion sampled in time, with its contacts, forces and margin, and what follows from it."""
 
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
@@ -39,24 +35,23 @@ def foot_positions(schedule: ContactSchedule, times: FloatArray) -> dict[str, Fl
     positions = {}
     swings = schedule.sequence.swings()
     for name in schedule.sequence.effectors:
-        found = np.empty((len(times), 3))
+        path = np.empty((len(times), 3))
         for number, phase in enumerate(schedule.sequence):
             if name in phase.stance:
-                found[schedule.phase_at(times) == number] = phase.stance[name].position
+                path[schedule.phase_at(times) == number] = phase.stance[name].position
         for swing in (item for item in swings if item.effector == name):
-            inside = (schedule.phase_at(times) >= swing.first_phase) & (
-                schedule.phase_at(times) <= swing.last_phase
-            )
+            phases = schedule.phase_at(times)
+            inside = (phases >= swing.first_phase) & (phases <= swing.last_phase)
             first, last = swing.start or swing.end, swing.end or swing.start
             if first is None or last is None:
                 continue
             begin, end = schedule.swing_interval(swing)
             u = np.clip((times[inside] - begin) / (end - begin), 0.0, 1.0)[:, None]
-            path = first.position + u**3 * (u * (6.0 * u - 15.0) + 10.0) * (last.position - first.position)
+            line = first.position + u**3 * (u * (6.0 * u - 15.0) + 10.0) * (last.position - first.position)
             normal = (first.normal + last.normal) / 2.0
             still = swing.start is None or swing.end is None
-            found[inside] = path + (0.0 if still else LIFT) * np.sin(np.pi * u) ** 2 * normal
-        positions[name] = found
+            path[inside] = line + (0.0 if still else LIFT) * np.sin(np.pi * u) ** 2 * normal
+        positions[name] = path
     return positions
 
 
@@ -147,15 +142,8 @@ class Motion(Displayed):
 
     def arrays(self) -> dict[str, NDArray]:
         """The array fields by name, in their order of declaration."""
-        return {
-            f.name: getattr(self, f.name)
-            for f in fields(self)
-            if isinstance(getattr(self, f.name), np.ndarray)
-        }
-
-
-SMALLEST_LOAD = 20.0
-"""Vertical force [N] below which there is no centre of pressure."""
+        values = ((f.name, getattr(self, f.name)) for f in fields(self))
+        return {name: value for name, value in values if isinstance(value, np.ndarray)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,12 +199,12 @@ def effector_positions(
         return {name: foot_positions(schedule, motion.time)[name] for name in names}
     data = body.pinocchio.createData()
     frames = {name: body.effector_frame(name) for name in names}
-    found = {name: np.empty((len(motion.time), 3)) for name in names}
+    positions = {name: np.empty((len(motion.time), 3)) for name in names}
     for index, q in enumerate(motion.q):
         pin.forwardKinematics(body.pinocchio, data, q)
         for name, frame in frames.items():
-            found[name][index] = pin.updateFramePlacement(body.pinocchio, data, frame).translation
-    return found
+            positions[name][index] = pin.updateFramePlacement(body.pinocchio, data, frame).translation
+    return positions
 
 
 def segment_positions(body: BodyModel, q: FloatArray) -> dict[str, FloatArray]:
@@ -226,28 +214,6 @@ def segment_positions(body: BodyModel, q: FloatArray) -> dict[str, FloatArray]:
     """
     data = body.pinocchio.createData()
     pin.framesForwardKinematics(body.pinocchio, data, q)
-    found = {s.name: data.oMf[body.segment_frame(s.name)].translation.copy() for s in body.segments}
-    for name in body.effectors:
-        found[f"effector/{name}"] = data.oMf[body.effector_frame(name)].translation.copy()
-    return found
-
-
-def centre_of_pressure(body: BodyModel, motion: Motion) -> FloatArray:
-    """(n, 3) centre of pressure of all contacts [m]; NaN where nothing carries load.
-
-    The mean of the contacts' own centres of pressure, weighted with their vertical forces.
-    On level ground it is the zero moment point; with feet at several heights it stays
-    between them.
-    """
-    places = effector_positions(body, motion, motion.contact_names)
-    moment = np.zeros((len(motion.time), 3))
-    load = np.zeros(len(motion.time))
-    for number, name in enumerate(motion.contact_names):
-        force, torque = motion.contact_force[:, number, :3], motion.contact_force[:, number, 3:]
-        vertical = force[:, 2]
-        load += vertical
-        moment += vertical[:, None] * places[name]
-        moment[:, 0] -= torque[:, 1]
-        moment[:, 1] += torque[:, 0]
-    safe = np.where(load > SMALLEST_LOAD, load, np.nan)
-    return moment / safe[:, None]
+    frames = {segment.name: body.segment_frame(segment.name) for segment in body.segments}
+    frames |= {f"effector/{name}": body.effector_frame(name) for name in body.effectors}
+    return {name: data.oMf[frame].translation.copy() for name, frame in frames.items()}

@@ -68,7 +68,7 @@ class BlockBandedSystem:
         self.reset()
 
     def reset(self) -> None:
-        """Forget every term."""
+        """Remove all terms."""
         size, d = self._basis.size, self._dimension
         self._blocks = np.zeros((self._bandwidth * size, d * d))
         self._coupled: list[FloatArray] = []
@@ -89,13 +89,7 @@ class BlockBandedSystem:
         self._right -= self._rows[order] @ gradient
 
     def add_diagonal(self, weight: FloatArray, gradient: FloatArray, order: int = 0) -> None:
-        """Add per-sample terms whose Gauss-Newton matrices are diagonal.
-
-        Args:
-            weight: (n, d) diagonals of the matrices.
-            gradient: (n, d) gradients of half the squared residuals.
-            order: 0 for values, 1 for rates, 2 for accelerations.
-        """
+        """Add terms as :meth:`add` does whose Gauss-Newton matrices have the diagonals ``weight`` (n, d)."""
         self._memory = None
         self._blocks[:, :: self._dimension + 1] += self._products[order] @ weight
         self._right -= self._rows[order] @ gradient
@@ -116,11 +110,7 @@ class BlockBandedSystem:
         self._coupled.append(local.reshape(n, m, -1))
 
     def solve(self, damping: float | FloatArray) -> FloatArray:
-        """Return the step of every control point, (size, d), with Levenberg damping.
-
-        Args:
-            damping: One number, or one per control point.
-        """
+        """(size, d) step of every control point, with Levenberg damping: one number, or one per point."""
         size, d = self._basis.size, self._dimension
         if self._memory is None:  # a step is often solved for again with more damping
             self._memory = self._assembled()

@@ -40,11 +40,11 @@ _CHUNK = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """Facets of a polytope around the origin.
+    """Facets ``H x <= h`` of a polytope around the origin, with unit rows.
 
     Attributes:
-        H: (m, d) unit normals.
-        h: (m,) offsets.
+        H: (m, d).
+        h: (m,).
         multipliers: (m, k) part of each offset that each level pays for.
         flat: (e, d) orthonormal directions across the affine hull (``flat @ x = 0``).
     """
@@ -235,7 +235,7 @@ class NormalFan:
 
 
 def fan_of_generators(generators: FloatArray, levels: FloatArray, bounded_above: BoolArray) -> NormalFan:
-    """Fan of ``{sum_j l_j g_j : l >= 0, levels.T l <= 1 (or == 1)}``.
+    """Normal fan of ``{sum_j l_j g_j : l >= 0, levels.T l <= 1 (or == 1)}``.
 
     Args:
         generators: (n, d); their span must be the polytope's affine hull (it holds 0).
@@ -306,8 +306,7 @@ def _pyramid_normals(base: FloatArray, cap: FloatArray) -> FloatArray:
 def _white_coordinates(generators: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
     """Coordinates y (n, r) of unit covariance with ``generators = y @ basis.T + rest``.
 
-    Returns:
-        y, basis (d, r), its pseudo-inverse (r, d), and a bound on the length of the rest.
+    Also basis (d, r), its pseudo-inverse (r, d), and a bound on the length of the rest.
     """
     n, d = generators.shape
     if n == 0:

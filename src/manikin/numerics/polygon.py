@@ -13,10 +13,7 @@ _FAR = 1e4
 
 
 def convex_polygon(points: ArrayLike) -> FloatArray:
-    """Hull of points in the plane (monotone chain).
-
-    Args:
-        points: (n, 2).
+    """Hull of points (n, 2) in the plane (monotone chain).
 
     Returns:
         (k, 2) vertices counter-clockwise; k is 0, 1 or 2 for empty and flat hulls.
@@ -30,11 +27,7 @@ def convex_polygon(points: ArrayLike) -> FloatArray:
 
 
 def polygon_of_halfplanes(A: ArrayLike, b: ArrayLike) -> FloatArray:
-    """Polygon ``{x : A x <= b}`` by clipping a square of 20 km; it is taken to be bounded.
-
-    Args:
-        A: (m, 2).
-        b: (m,).
+    """Bounded polygon ``{x : A x <= b}`` of (m, 2) and (m,) rows, by clipping a square of 20 km.
 
     Returns:
         (k, 2) vertices counter-clockwise; none when no point satisfies all rows.
@@ -52,15 +45,11 @@ def polygon_of_halfplanes(A: ArrayLike, b: ArrayLike) -> FloatArray:
 
 
 def signed_distance(points: ArrayLike, polygon: ArrayLike) -> FloatArray:
-    """Distance to the boundary of a convex polygon, positive inside, negative outside.
+    """(...) distance to the boundary of a convex polygon, positive inside, negative outside [m].
 
     Args:
         points: (..., 2).
-        polygon: (k, 2) counter-clockwise; a point or a segment has no inside, no polygon
-            at all is infinitely far.
-
-    Returns:
-        (...) [m].
+        polygon: (k, 2) counter-clockwise; a point or a segment has no inside, an empty one is infinitely far.
     """
     p, corners = np.asarray(points, dtype=np.float64), np.asarray(polygon, dtype=np.float64)
     if len(corners) == 0:

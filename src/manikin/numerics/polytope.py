@@ -40,31 +40,6 @@ class Polytope:
         object.__setattr__(self, "H", rows)
         object.__setattr__(self, "h", offsets)
 
-    @staticmethod
-    def from_vertices(points: ArrayLike) -> "Polytope":
-        """Hull of points; it may be flat.
-
-        Args:
-            points: (n, d), at least one.
-
-        Raises:
-            PolytopeError: If there is no point or a coordinate is not finite.
-        """
-        return Polytope(*convex_hull(points))
-
-    @staticmethod
-    def from_generators(points: ArrayLike, segments: ArrayLike) -> "Polytope":
-        """Hull of points plus the sum of the segments ``[-s, s]`` (a zonotope for one point).
-
-        Args:
-            points: (n, d), at least one.
-            segments: (q, d) half segments.
-
-        Raises:
-            PolytopeError: If there is no point or a number is not finite.
-        """
-        return Polytope(*convex_hull(points, segments))
-
     @property
     def dimension(self) -> int:
         """Dimension d of the space."""
@@ -74,24 +49,16 @@ class Polytope:
         return len(self.h)
 
     def distances(self, points: ArrayLike) -> FloatArray:
-        """Signed distances ``h - H x`` to every facet's plane ([Qiu2012]_ Algorithm 3, corrected).
+        """(..., m) signed distances ``h - H x`` of (..., d) points to every facet's plane, positive inside.
 
-        Args:
-            points: (..., d).
-
-        Returns:
-            (..., m), positive inside.
+        [Qiu2012]_ Algorithm 3, corrected.
         """
         return self.h - np.asarray(points, dtype=np.float64) @ self.H.T
 
     def margin(self, points: ArrayLike) -> FloatArray:
-        """Smallest signed facet distance, ``min_i h_i - H_i x``; inside it is the residual radius.
+        """(...) smallest signed facet distance of (..., d) points, ``min_i h_i - H_i x``, negative outside.
 
-        Args:
-            points: (..., d).
-
-        Returns:
-            (...), negative outside.
+        Inside it is the residual radius, that of the largest ball about the point within the polytope.
         """
         x = np.asarray(points, dtype=np.float64)
         if x.shape[-1:] != (self.dimension,):
@@ -110,12 +77,8 @@ class Polytope:
         np.negative(margins, out=margins)
         return margins.reshape(x.shape[:-1])
 
-    def residual_radius(self, point: ArrayLike) -> FloatArray:
-        """Radius of the largest ball about ``point`` inside the polytope, 0 outside."""
-        return np.maximum(self.margin(point), 0.0)
-
     def contains(self, points: ArrayLike, tolerance: float = 0.0) -> NDArray[np.bool_]:
-        """Whether each point is inside, give or take ``tolerance``."""
+        """Whether each point is inside or at most ``tolerance`` beyond a facet."""
         return np.asarray(self.margin(points) >= -tolerance)
 
     def inscribed_ball(self) -> tuple[FloatArray, float]:
@@ -124,27 +87,17 @@ class Polytope:
         Raises:
             PolytopeError: If the polytope is empty or holds balls of any size.
         """
-        centre, radius = self._largest_ball(None)
+        centre, radius = self._largest_ball()
         if radius < -_tolerance(self.h):
             raise PolytopeError("polytope is empty; valid: a polytope with at least one point")
         return centre, max(radius, 0.0)
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether no point satisfies all rows."""
-        return self._largest_ball(1.0)[1] < -_tolerance(self.h)
 
     def intersection(self, other: "Polytope") -> "Polytope":
         """Points of both polytopes (rows of both, none removed)."""
         return Polytope(np.vstack([self.H, other.H]), np.concatenate([self.h, other.h]))
 
     def preimage(self, matrix: ArrayLike, offset: ArrayLike = 0.0) -> "Polytope":
-        """Points ``y`` whose image ``matrix @ y + offset`` is inside (a slice of the polytope).
-
-        Args:
-            matrix: (d, k).
-            offset: (d,) or 0.
-        """
+        """Points ``y`` (k,) with ``matrix (d, k) @ y + offset (d,)`` inside: a slice of the polytope."""
         m = np.asarray(matrix, dtype=np.float64)
         return Polytope(self.H @ m, self.h - self.H @ np.broadcast_to(offset, (self.dimension,)))
 
@@ -159,18 +112,14 @@ class Polytope:
             raise PolytopeError("polytope is flat; valid: one with a ball inside")
         return vertices_around(self.H, self.h, centre)
 
-    def _largest_ball(self, largest: float | None) -> tuple[FloatArray, float]:
+    def _largest_ball(self) -> tuple[FloatArray, float]:
         d = self.dimension
         cost = np.zeros(d + 1)
         cost[-1] = -1.0
         lifted = np.column_stack([self.H, np.linalg.norm(self.H, axis=1)])
         scale = max(1.0, float(np.abs(self.h).max(initial=0.0)))
         answer = linprog(
-            cost,
-            A_ub=lifted,
-            b_ub=self.h / scale,
-            bounds=[(None, None)] * d + [(None, None if largest is None else largest / scale)],
-            method="highs",
+            cost, A_ub=lifted, b_ub=self.h / scale, bounds=[(None, None)] * (d + 1), method="highs"
         )
         if answer.status == 3:
             raise PolytopeError("polytope holds balls of any size; valid: a bounded polytope")
@@ -183,8 +132,8 @@ def convex_hull(points: ArrayLike, segments: ArrayLike | None = None) -> tuple[F
     """Facets of the hull of points (plus segments ``[-s, s]``), each once, flat hulls included.
 
     Args:
-        points: (n, d).
-        segments: (q, d), none when omitted.
+        points: (n, d), at least one.
+        segments: (q, d) half segments; with a single point the hull is a zonotope.
 
     Returns:
         H (m, d) with unit rows and h (m,).
@@ -212,12 +161,12 @@ def vertices_around(H: FloatArray, h: FloatArray, interior: FloatArray) -> Float
     """
     try:
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = HalfspaceIntersection(np.column_stack([H, -h]), interior).intersections
+            vertices = HalfspaceIntersection(np.column_stack([H, -h]), interior).intersections
     except QhullError:
-        found = np.full((1, H.shape[1]), np.inf)
-    if not np.all(np.abs(found) < 1e12 * (1.0 + np.abs(h).max())):
+        vertices = np.full((1, H.shape[1]), np.inf)
+    if not np.all(np.abs(vertices) < 1e12 * (1.0 + np.abs(h).max())):
         raise PolytopeError("polytope has no vertices; valid: a bounded one of dimension 2 or more")
-    return found
+    return vertices
 
 
 def facet_rows(fan: NormalFan, extent: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,8 +1,4 @@
-"""The low-pass filter of recorded signals: Butterworth of second order, forward and backward.
-
-Also here. Periodic signals as truncated Fourier series over a phase of period 1. Runs of frames in which
-something holds. Mean, deviation and range of a measure over several motions.
-"""
+"""Sampled signals: low-pass filter, Fourier series of periodic ones, runs of frames, spread of measures."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,11 +12,11 @@ from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray
 
 HARMONICS = 8
-"""Of a walking cycle; they leave out 0.4 degrees RMS of the recorded cycles in the median, 1.0 at most."""
+"""Harmonics of a walking cycle; the rest of recorded cycles is 0.4 deg RMS in the median, 1.0 at most."""
 
 
 def fourier_basis(phase: ArrayLike, harmonics: int = HARMONICS) -> FloatArray:
-    """Values of ``1, cos 2 pi k p, ..., sin 2 pi k p, ...`` ([Truong2010]_ 6.1 with the period T).
+    """(..., 2 harmonics + 1) ``1, cos 2 pi k p, ..., sin 2 pi k p, ...`` ([Truong2010]_ 6.1, period T).
 
     The thesis prints ``k pi t / T``, which has the period 2 T; a cycle of duration T is ``2 k pi t / T``
     with ``p = t / T``.
@@ -28,35 +24,19 @@ def fourier_basis(phase: ArrayLike, harmonics: int = HARMONICS) -> FloatArray:
     Args:
         phase: (...) phases p, 1 a whole cycle.
         harmonics: Largest k.
-
-    Returns:
-        (..., 2 harmonics + 1).
     """
     angle = 2.0 * np.pi * np.asarray(phase, dtype=np.float64)[..., None] * np.arange(1, harmonics + 1)
     return np.concatenate([np.ones((*angle.shape[:-1], 1)), np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def fourier_coefficients(samples: FloatArray, harmonics: int = HARMONICS) -> FloatArray:
-    """Coefficients of signals sampled at n even phases from 0, the last before 1.
-
-    Args:
-        samples: (n, s) of s signals, n > 2 harmonics.
-        harmonics: Largest k kept.
-
-    Returns:
-        (2 harmonics + 1, s): mean, cosines, sines.
-    """
+    """(2 harmonics + 1, s) mean, cosines, sines of signals (n, s) at n > 2 harmonics even phases from 0."""
     spectrum = np.fft.rfft(samples, axis=0)[: harmonics + 1] / len(samples)
     return np.concatenate([spectrum[:1].real, 2.0 * spectrum[1:].real, -2.0 * spectrum[1:].imag])
 
 
 def shifted(coefficients: FloatArray, phase: float) -> FloatArray:
-    """Coefficients of the same signals when what was at ``phase`` is at 0.
-
-    Args:
-        coefficients: (..., 2 harmonics + 1, s).
-        phase: New zero.
-    """
+    """(..., 2 harmonics + 1, s) coefficients of the same signals with their phase 0 at ``phase``."""
     harmonics = (coefficients.shape[-2] - 1) // 2
     angle = 2.0 * np.pi * phase * np.arange(1, harmonics + 1)[:, None]
     mean, cosine, sine = np.split(coefficients, [1, harmonics + 1], axis=-2)
@@ -68,22 +48,13 @@ def shifted(coefficients: FloatArray, phase: float) -> FloatArray:
 
 
 def mask_runs(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First frame and the one after the last of each run, in order.
-
-    Args:
-        holds: (n,) whether it holds in each frame.
-    """
+    """First frame and the one after the last of each run of True in a mask (n,), in order."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
     return [(int(first), int(stop)) for first, stop in edges.reshape(-1, 2)]
 
 
 def switch(closes: NDArray[np.bool_], opens: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n,) state of a switch that is open before the first frame; where both hold, it closes.
-
-    Args:
-        closes: (n,) whether it closes in each frame.
-        opens: (n,) whether it opens.
-    """
+    """(n,) whether a switch, at first open, is closed; where it both closes and opens, it closes."""
     state, states = False, np.zeros(len(closes), dtype=bool)
     for frame in range(len(states)):
         state = bool(closes[frame]) or (state and not opens[frame])
@@ -94,13 +65,12 @@ def switch(closes: NDArray[np.bool_], opens: NDArray[np.bool_]) -> NDArray[np.bo
 def lasting(
     holds: NDArray[np.bool_], shortest: float, shortest_cut: float | None = None
 ) -> list[tuple[int, int]]:
-    """Runs of at least ``shortest`` frames, interruptions of less ignored.
+    """Runs of at least ``shortest`` frames in a mask (n,), shorter interruptions ignored.
 
     Args:
-        holds: (n,) whether it holds in each frame.
-        shortest: Frames; what is missing before the first frame and behind the last is no interruption.
-        shortest_cut: Frames of a run that begins with the first frame or ends with the last, of which a
-            part is missing; as many as of any other if None.
+        holds: The mask; what is missing before its first frame and behind its last is no interruption.
+        shortest: Frames.
+        shortest_cut: Least frames of a run that the begin or the end of the mask cuts; ``shortest`` if None.
     """
     held, last = holds.copy(), len(holds)
     for first, stop in mask_runs(~holds):
@@ -116,15 +86,7 @@ def lasting(
 
 @dataclass(frozen=True)
 class Spread:
-    """How a measure is spread.
-
-    Attributes:
-        count: Of the values.
-        mean: Of the values.
-        deviation: Standard deviation of a sample, with count - 1; NaN for one value.
-        smallest: Of the values.
-        largest: Of the values.
-    """
+    """Number, mean, range and ``deviation`` of values, as a sample: with count - 1, NaN for one value."""
 
     count: int
     mean: float
@@ -159,7 +121,7 @@ class Spread:
 
 
 SHARES = 2.0
-"""The rate to give for a cutoff that is a share of half the rate."""
+"""Rate of :func:`low_passed` with which the cutoff is a share of half the actual rate."""
 
 
 def low_passed(
@@ -171,11 +133,8 @@ def low_passed(
         values: (n, ...), at least two, at an even rate.
         cutoff: Where each of the two passes halves the power [Hz]; above 0 and below half the rate.
         rate: Per second [Hz], or :data:`SHARES`.
-        padding: Values by which each end is continued at most, by its mirror image about the last one; None
-            for those of two periods of the cutoff.
-
-    Returns:
-        Of the same shape.
+        padding: Most values by which each end is continued, mirrored about the last one; None for those of
+            two periods of the cutoff.
     """
     wanted = int(np.ceil(2.0 * rate / cutoff)) if padding is None else padding
     sections = _sections(float(cutoff), float(rate))

@@ -1,9 +1,7 @@
-"""Small helpers on vectors, rotations and checked, read-only arrays.
+"""Vectors, wrenches, rotations and frames, single or many at once, and checked, read-only arrays.
 
-Rotations are 3x3 matrices or xyzw quaternions; ``rotation_a_to_b`` maps
-coordinates in frame *a* to coordinates in frame *b*.
-
-Also here. Rotations of many frames at once; also of a single one, without the overhead of general classes.
+Rotations are 3x3 matrices or xyzw quaternions; ``rotation_a_to_b`` maps coordinates in frame *a* to
+coordinates in frame *b*.
 """
 
 import math
@@ -35,8 +33,8 @@ def frozen_array(
     """Copy ``value`` into a finite, read-only float array of the wanted shape.
 
     Args:
-        value: Anything numpy can turn into an array of floats.
-        name: How the message calls it, with its place (``"contact 'left_foot' position"``).
+        value: Numbers.
+        name: Name in the message, with its owner (``"contact 'left_foot' position"``).
         shape: Expected shape; ``None`` entries are free. ``None`` accepts any shape.
         error: Exception class to raise.
 
@@ -47,7 +45,10 @@ def frozen_array(
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise error(f"{name} is {value!r}; valid: numbers of shape {_shape_text(shape)}") from None
-    if shape is not None and not _shape_matches(array.shape, shape):
+    if shape is not None and not (
+        array.ndim == len(shape)
+        and all(wanted in (None, size) for size, wanted in zip(array.shape, shape, strict=True))
+    ):
         raise error(f"{name} has shape {array.shape}; valid: shape {_shape_text(shape)}")
     if not np.all(np.isfinite(array)):
         raise error(f"{name} is {array.tolist()}; valid: finite numbers")
@@ -89,12 +90,6 @@ def finite_number(
     return number
 
 
-def _shape_matches(actual: tuple[int, ...], wanted: Sequence[int | None]) -> bool:
-    return len(actual) == len(wanted) and all(
-        w is None or a == w for a, w in zip(actual, wanted, strict=True)
-    )
-
-
 def _shape_text(shape: Sequence[int | None] | None) -> str:
     if shape is None:
         return "(any)"
@@ -116,14 +111,7 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def skew(vector: ArrayLike) -> FloatArray:
-    """Matrix of the cross product, ``skew(a) @ b == cross(a, b)`` ([Qiu2012]_ 2.10).
-
-    Args:
-        vector: (3,) or (..., 3).
-
-    Returns:
-        (..., 3, 3).
-    """
+    """(..., 3, 3) matrices of cross products by (..., 3): ``skew(a) @ b = cross(a, b)`` ([Qiu2012]_ 2.10)."""
     v = np.asarray(vector, dtype=np.float64)
     if v.ndim == 1:
         x, y, z = v.tolist()
@@ -151,6 +139,14 @@ def wrench_map(point: FloatArray) -> FloatArray:
     return moved
 
 
+def rows_about(rows: FloatArray, shift: FloatArray) -> FloatArray:
+    """(m, 6) rows on wrenches rewritten for wrenches about a point moved by ``shift`` (3,) [m].
+
+    ``H1 f + H2 (tau + shift ^ f)`` with the moment ``tau`` about the new point.
+    """
+    return np.hstack([rows[:, :3] + cross(rows[:, 3:], np.broadcast_to(shift, (len(rows), 3))), rows[:, 3:]])
+
+
 def rotation_from_yaw(yaw: float) -> FloatArray:
     """Rotation by ``yaw`` [rad] about the vertical."""
     c, s = np.cos(yaw), np.sin(yaw)
@@ -173,11 +169,7 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> FloatArray:
 
 
 def rotation_from_normal(normal: ArrayLike, yaw: float = 0.0) -> FloatArray:
-    """Rotation whose z axis is ``normal``: the smallest tilt of the world, after a yaw about z.
-
-    Args:
-        normal: (3,) direction, not zero.
-        yaw: Turn about the normal before tilting [rad].
+    """Rotation with z along ``normal`` (3,): the smallest tilt of the world, after a ``yaw`` [rad] about z.
 
     Raises:
         InputError: If the normal is zero or not finite.
@@ -194,6 +186,22 @@ def rotation_from_normal(normal: ArrayLike, yaw: float = 0.0) -> FloatArray:
         k = skew(axis)
         tilt = np.eye(3) + k + k @ k / (1.0 + n[2])
     return tilt @ rotation_from_yaw(yaw)
+
+
+def axes_of_normal(normal: FloatArray) -> FloatArray:
+    """(3, 3) rotation with z along a unit ``normal`` (3,), x across the world axis farthest from it."""
+    across = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
+    across /= np.linalg.norm(across)
+    return np.column_stack([across, np.cross(normal, across), normal])
+
+
+def turned_root(q: ArrayLike, yaw: float) -> FloatArray:
+    """(..., nq) configurations with the root turned about the vertical through itself by ``yaw`` [rad]."""
+    turned = np.array(q, dtype=np.float64)
+    s, c = np.sin(0.5 * yaw), np.cos(0.5 * yaw)
+    x, y, z, w = np.moveaxis(turned[..., 3:7].copy(), -1, 0)
+    turned[..., 3:7] = np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
+    return turned
 
 
 def check_rotation(rotation: ArrayLike, name: str, error: type[InputError] = InputError) -> FloatArray:
@@ -231,7 +239,7 @@ class PlanarTransform:
 
     @property
     def is_identity(self) -> bool:
-        """Whether nothing moves."""
+        """Whether both frames are equal."""
         return self.x == 0.0 and self.y == 0.0 and self.yaw_deg == 0.0
 
     @property
@@ -247,7 +255,7 @@ class PlanarTransform:
         return PlanarTransform(x, y, -self.yaw_deg + 0.0)
 
     def after(self, other: "PlanarTransform") -> "PlanarTransform":
-        """The transform that does ``other`` first, then this one."""
+        """Composition: ``other`` first, then this transform."""
         x, y = self.points([other.x, other.y]).tolist()
         return PlanarTransform(x, y, self.turned(other.yaw_deg))
 
@@ -297,16 +305,10 @@ def rotation_vector(rotations: FloatArray) -> FloatArray:
 
 
 def rotation_vector_jacobian(vectors: FloatArray) -> FloatArray:
-    """Derivative of rotation vectors by a turn of the rotated frame about its own axes.
+    """(n, 3, 3) derivative of rotation vectors (n, 3) [rad] by a turn of the rotated frame in its own axes.
 
     ``I + [w] / 2 + (1 - (a / 2) cot(a / 2)) / a^2 [w]^2`` with ``a = |w|``, the inverse of the right
     Jacobian of SO(3).
-
-    Args:
-        vectors: (n, 3) rotation vectors ``w`` [rad].
-
-    Returns:
-        (n, 3, 3).
     """
     angle = np.linalg.norm(vectors, axis=-1)
     safe = np.where(angle < 0.02, 1.0, angle)
@@ -319,11 +321,11 @@ def rotation_vector_jacobian(vectors: FloatArray) -> FloatArray:
 
 def matrix(rows: list[list[FloatArray]]) -> FloatArray:
     """(..., 3, 3) of nine (...) entries."""
-    found = np.empty((*rows[0][0].shape, 3, 3))
+    result = np.empty((*rows[0][0].shape, 3, 3))
     for i, row in enumerate(rows):
         for j, entry in enumerate(row):
-            found[..., i, j] = entry
-    return found
+            result[..., i, j] = entry
+    return result
 
 
 def rotations(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> FloatArray:
@@ -338,15 +340,15 @@ def rotations(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> FloatArra
 
 
 def quaternions(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> FloatArray:
-    """(..., 4) the same as xyzw quaternions, continuous in the angles."""
+    """(..., 4) xyzw quaternions of :func:`rotations`, continuous in the angles."""
     cy, sy, cp, sp = np.cos(0.5 * yaw), np.sin(0.5 * yaw), np.cos(0.5 * pitch), np.sin(0.5 * pitch)
     cr, sr = np.cos(0.5 * roll), np.sin(0.5 * roll)
-    found = np.empty((*cy.shape, 4))
-    found[..., 0] = cy * cp * sr - sy * sp * cr
-    found[..., 1] = cy * sp * cr + sy * cp * sr
-    found[..., 2] = sy * cp * cr - cy * sp * sr
-    found[..., 3] = cy * cp * cr + sy * sp * sr
-    return found
+    return np.stack([
+        cy * cp * sr - sy * sp * cr,
+        cy * sp * cr + sy * cp * sr,
+        sy * cp * cr - cy * sp * sr,
+        cy * cp * cr + sy * sp * sr,
+    ], axis=-1)  # fmt: skip
 
 
 def dot(first: FloatArray, second: FloatArray) -> FloatArray:

@@ -5,10 +5,8 @@ degree ``k`` (the thesis says "order"). Knot spans are half-open, ``[t_j, t_j+1)
 last one is closed, so that the basis functions add up to one everywhere on the domain.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,14 +51,9 @@ class BSpline:
         return np.unique(self.knots)
 
     def __call__(self, t: ArrayLike, derivative: int = 0) -> FloatArray:
-        """Evaluate the curve or one of its derivatives ([Qiu2012]_ 2.28, 2.34).
+        """(..., d) values of the curve or of a derivative at (...) parameters ([Qiu2012]_ 2.28, 2.34).
 
-        Args:
-            t: (...) parameter values inside the domain.
-            derivative: Order; beyond the degree the derivative is zero.
-
-        Returns:
-            (..., d).
+        Beyond the degree the derivative is zero.
 
         Raises:
             SplineError: If a value lies outside the domain.
@@ -109,7 +102,7 @@ class BSpline:
         Args:
             degree: Degree k.
             knots: (m + 1,) clamped knots.
-            t: (s,) parameter values.
+            t: (s,) parameter values inside the domain.
             values: (s, d) wanted positions.
             first: (i, d) control points a_0 ... a_i-1 to keep, see :func:`start_control_points`.
             last: (j, d) control points a_n-j+1 ... a_n to keep, see :func:`end_control_points`.
@@ -152,30 +145,24 @@ def check_clamped(degree: int, knots: ArrayLike, control_points: int) -> FloatAr
         raise SplineError(
             f"spline has {len(times)} knots; valid: {needed} (control points {control_points} + degree + 1)"
         )
-    if np.any(np.diff(times) < 0):
-        raise SplineError(f"spline knots are {times.tolist()}; valid: nondecreasing")
-    clamped = times[degree] == times[0] and times[-1 - degree] == times[-1]
     inner = times[degree + 1 : len(times) - degree - 1]
-    if not clamped or times[0] == times[-1] or np.any((inner == times[0]) | (inner == times[-1])):
-        raise SplineError(
-            f"spline knots are {times.tolist()}; valid: first and last knot repeated {degree + 1} times"
-        )
-    if degree > 0 and np.any(inner[degree:] == inner[:-degree]):
-        raise SplineError(
-            f"spline knots are {times.tolist()}; valid: inner knots repeated at most {degree} times"
-        )
+    clamped = times[degree] == times[0] and times[-1 - degree] == times[-1]
+    wanted = None
+    if np.any(np.diff(times) < 0):
+        wanted = "nondecreasing"
+    elif not clamped or times[0] == times[-1] or np.any((inner == times[0]) | (inner == times[-1])):
+        wanted = f"first and last knot repeated {degree + 1} times"
+    elif degree > 0 and np.any(inner[degree:] == inner[:-degree]):
+        wanted = f"inner knots repeated at most {degree} times"
+    if wanted:
+        raise SplineError(f"spline knots are {times.tolist()}; valid: {wanted}")
     return times
 
 
 def clamped_knots(degree: int, breakpoints: ArrayLike) -> FloatArray:
-    """Knots that pass once through each inner breakpoint ([Qiu2012]_ 2.31 and 5.4.3).
+    """(b + 2 k,) knots that pass once through each inner breakpoint ([Qiu2012]_ 2.31 and 5.4.3).
 
-    Args:
-        degree: Degree k.
-        breakpoints: (b,) increasing; b - 1 spans, hence b + k - 1 control points.
-
-    Returns:
-        (b + 2 k,).
+    The b increasing breakpoints make b - 1 spans, hence b + k - 1 control points.
 
     Raises:
         SplineError: If the breakpoints do not increase.
@@ -186,46 +173,14 @@ def clamped_knots(degree: int, breakpoints: ArrayLike) -> FloatArray:
     return np.concatenate([np.full(degree, times[0]), times, np.full(degree, times[-1])])
 
 
-def span_basis(degree: int, knots: Sequence[Any], span: int, t: Any) -> list[Any]:
-    """The k + 1 basis functions that live on one knot span, by the Cox-de Boor recursion.
-
-    Algorithm 2 of [Qiu2012]_ with its inner loop corrected to end at ``j - 1``. Only sums,
-    products and quotients are used, so numbers, arrays and CasADi symbols are equally good
-    for ``knots`` and ``t``: this is how the knots can be unknowns of an optimisation. Not a
-    single denominator vanishes on a span of positive length.
-
-    Args:
-        degree: Degree k.
-        knots: (m + 1,) clamped knots.
-        span: Index j of the span ``[t_j, t_j+1)`` that holds ``t``, k <= j <= n.
-        t: Parameter value(s).
-
-    Returns:
-        ``[N_j-k,k(t), ..., N_j,k(t)]``; all other basis functions are zero there.
-    """
-    values: list[Any] = [1.0 + 0.0 * t]
-    for d in range(1, degree + 1):
-        raised: list[Any] = [0.0 * t] * (d + 1)
-        for r in range(d):
-            left, right = knots[span - d + 1 + r], knots[span + 1 + r]
-            share = values[r] / (right - left)
-            raised[r] = raised[r] + (right - t) * share
-            raised[r + 1] = raised[r + 1] + (t - left) * share
-        values = raised
-    return values
-
-
 def basis_matrix(degree: int, knots: ArrayLike, t: ArrayLike, derivative: int = 0) -> FloatArray:
-    """Discretisation matrix of the spline or of a derivative ([Qiu2012]_ 2.52, 2.55).
+    """(s, n + 1) matrix A with ``p^(d)(t_j) = A[j] @ control_points`` ([Qiu2012]_ 2.52, 2.55).
 
     Args:
         degree: Degree k.
         knots: (m + 1,) clamped knots.
         t: (s,) parameter values inside the domain.
-        derivative: Order; the matrix still multiplies the control points of the spline itself.
-
-    Returns:
-        (s, n + 1) matrix A with ``p^(d)(t_j) = A[j] @ control_points``.
+        derivative: Order d; the control points are those of the spline itself.
 
     Raises:
         SplineError: If the knots are not clamped or a value lies outside the domain.
@@ -240,15 +195,12 @@ def basis_matrix(degree: int, knots: ArrayLike, t: ArrayLike, derivative: int = 
 
 
 def derivative_matrix(degree: int, knots: ArrayLike, order: int) -> FloatArray:
-    """Matrix from the control points to those of a derivative, ``T_d0`` ([Qiu2012]_ 2.32, 2.44).
+    """(n + 1 - d, n + 1) ``T_d0`` from control points to those of a derivative ([Qiu2012]_ 2.32, 2.44).
 
     Args:
         degree: Degree k.
         knots: (m + 1,) clamped knots.
         order: d, 0 <= d <= k.
-
-    Returns:
-        (n + 1 - d, n + 1).
 
     Raises:
         SplineError: If the knots are not clamped or the order is out of range.
@@ -273,7 +225,7 @@ def start_control_points(
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,
 ) -> FloatArray:
-    """First control points that give the wanted start ([Qiu2012]_ 2.45-2.47).
+    """(1 to 3, d) first control points that give the wanted start ([Qiu2012]_ 2.45-2.47).
 
     Args:
         degree: Degree k >= 2 when an acceleration is wanted.
@@ -281,9 +233,6 @@ def start_control_points(
         position: (d,) p(t_0).
         velocity: (d,) first derivative there; None leaves it free.
         acceleration: (d,) second derivative there; needs a velocity too.
-
-    Returns:
-        (1 to 3, d).
 
     Raises:
         SplineError: If an acceleration is given without a velocity.
@@ -325,14 +274,9 @@ def end_control_points(
 
 
 def bernstein_matrix(degree: int, s: ArrayLike) -> FloatArray:
-    """Bernstein polynomials, the B-spline basis of a single span ([Qiu2012]_ 2.30 on [0, 1]).
+    """(n, k + 1) Bernstein polynomials ``C(k, j) s^j (1 - s)^(k - j)`` at (n,) parameters in [0, 1].
 
-    Args:
-        degree: Degree k.
-        s: (n,) in [0, 1].
-
-    Returns:
-        (n, k + 1) values ``C(k, j) s^j (1 - s)^(k - j)``.
+    They are the B-spline basis of a single span ([Qiu2012]_ 2.30).
     """
     return basis_matrix(degree, clamped_knots(degree, (0.0, 1.0)), s)
 

@@ -18,7 +18,7 @@ import pinocchio as pin
 from manikin.analysis import Analysis
 from manikin.body import BodyModel
 from manikin.body.segments import end_of
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, turned_root
 from manikin.runtime.palette import COLOURS, colours_of, readable, side_colour
 
 TENTHS = 10.0
@@ -280,7 +280,7 @@ class _Postures:
 
     def __init__(self, analysis: Analysis) -> None:
         frames = np.unique((np.arange(0.5, POSTURES) / POSTURES * len(analysis.time)).astype(np.int64))
-        turned = _turned(analysis.motion.q[frames], -_heading(analysis))
+        turned = turned_root(analysis.motion.q[frames], -_heading(analysis))
         turned[:, :2] = 0.0
         self._instants = analysis.time[frames]
         self._colours = list(map(side_colour, _drawn(analysis.body)))
@@ -343,11 +343,3 @@ def _heading(analysis: Analysis) -> float:
         return float(np.arctan2(way[1], way[0]))
     x, y, z, w = q[len(q) // 2, 3:7]
     return float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
-
-
-def _turned(q: FloatArray, angle: float) -> FloatArray:
-    """(n, nq) postures turned about the vertical."""
-    turned = np.array(q)
-    about = pin.Quaternion(np.array([0.0, 0.0, np.sin(0.5 * angle), np.cos(0.5 * angle)]))
-    turned[:, 3:7] = [(about * pin.Quaternion(one)).coeffs() for one in q[:, 3:7]]
-    return turned

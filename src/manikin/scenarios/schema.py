@@ -144,6 +144,7 @@ class ScenarioFile(Section):
         self._check_recovery()
         self._check_walking()
         self._check_body()
+        self._check_load()
         self._check_wholebody()
         if self.supports is None:
             self._check_planned()
@@ -252,6 +253,23 @@ class ScenarioFile(Section):
                     f"task.{end}.height_m",
                     f"is {state.height_m:g}; valid in a walk: that of the floor, {self.floor_height_m:g}",
                 )
+
+    def _check_load(self) -> None:
+        """Refuse a load of some phases where there are none, or that a planner would not feel."""
+        load = self.body.load
+        if load is None or load.lasts:
+            return
+        key = "body.load.from_phase" if load.from_phase is not None else "body.load.until_phase"
+        if self.supports is None:
+            raise refuse(
+                key, "is given without supports; valid: a load of the whole motion, or phases of supports"
+            )
+        if self.body.model != "human":
+            raise refuse(
+                key, f"does not apply to {WORDS[self.body.model]}; valid: a load of the whole motion"
+            )
+        if self.wholebody.method == "refine" or self.planning.method == "keyframes":
+            raise refuse(key, "is given for a refined or recorded motion; valid: a load of the whole motion")
 
     def _check_wholebody(self) -> None:
         """Refuse what cannot be refined."""

@@ -10,10 +10,12 @@ from itertools import combinations
 
 import numpy as np
 
-from manikin.body import BodyModel
+from manikin.body import BodyModel, Configuration
 from manikin.body.anthropometry import TOE_HINGE_FROM_HEEL
 from manikin.body.human import SEAT_LENGTH, SEAT_WIDTH
+from manikin.body.load import hand_masses
 from manikin.contact import (
+    CarriedLoad,
     Contact,
     Phase,
     Stance,
@@ -25,11 +27,12 @@ from manikin.contact import (
     soles_overlap,
 )
 from manikin.errors import InputError
-from manikin.numerics.spatial import rotation_from_normal, rotation_from_rpy
+from manikin.numerics.spatial import frozen_array, rotation_from_normal, rotation_from_rpy
 from manikin.planning.contacts import ContactRules
+from manikin.planning.whole_body.posture_style import READY
 from manikin.scenarios.sections import ContactSection, SoleSection
 from manikin.scenarios.validation import Path as KeyPath
-from manikin.scenarios.values import ScenarioValues
+from manikin.scenarios.values import ScenarioValues, build_body
 from manikin.scene import Scene
 
 
@@ -167,12 +170,41 @@ def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSe
                     Stance([_contact(values, *item, planning) for item in contacts.items()], model=model),
                     section.min_duration_s,
                     section.max_duration_s,
+                    load,
                 )
-                for section, contacts in zip(supports.phases, supports.resolved_phases(), strict=True)
+                for section, contacts, load in zip(
+                    supports.phases, supports.resolved_phases(), carried_loads(values), strict=True
+                )
             ]
         )
     except InputError as error:
         raise values.refused(("supports", "phases"), error) from None
+
+
+def carried_loads(values: ScenarioValues) -> list[CarriedLoad | None]:
+    """What each phase of the supports carries that is no part of the body.
+
+    Raises:
+        ScenarioError: If the load is carried in phases that the supports do not have.
+    """
+    load, phases = values.file.body.load, values.explicit_supports().phases
+    if load is None or load.lasts:
+        return [None] * len(phases)
+    first = 0 if load.from_phase is None else load.from_phase
+    last = len(phases) - 1 if load.until_phase is None else load.until_phase
+    for key, number, least in (("from_phase", first, 0), ("until_phase", last, first)):
+        if not least <= number < len(phases):
+            raise values.error(
+                ("body", "load", key),
+                f"is {number}; valid: {least} to {len(phases) - 1}, phases of the supports",
+            )
+    body = build_body(values)
+    masses = hand_masses(body, load.mass_kg, load.hand)
+    ready = Configuration(body, READY.posture(body))
+    hands = np.mean([ready.effector_placement(name)[1] for name in masses], axis=0)
+    ahead = rotation_from_rpy(0.0, 0.0, math.radians(values.start_heading_deg))
+    carried = CarriedLoad(masses, frozen_array(ahead @ (hands - ready.com), "offset of the load [m]", (3,)))
+    return [carried if first <= number <= last else None for number in range(len(phases))]
 
 
 def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> None:

@@ -86,9 +86,9 @@ class ScenarioValues:
 
     @property
     def moved_mass(self) -> float:
-        """Body mass with the load in the hands [kg]."""
+        """Body mass with what the hands carry during the whole motion [kg]."""
         load = self.file.body.load
-        return self.mass if load is None else self.mass + load.mass_kg
+        return self.mass if load is None or not load.lasts else self.mass + load.mass_kg
 
     @property
     def is_point_mass(self) -> bool:
@@ -352,6 +352,7 @@ def build_body(values: ScenarioValues) -> BodyModel:
     if values.file.body.model in ("insect", "urdf"):
         return _creature(values)
     load = values.file.body.load
+    load = load if load is not None and load.lasts else None
     if values.file.body.model == "kudoh":
         return kudoh() if load is None else carrying(kudoh(), load.mass_kg, load.hand)
     if values.is_point_mass:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
 from manikin.errors import InputError, ScenarioError
-from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_rpy
+from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_rpy, turned_root
 from manikin.planning.contacts import Endpoints, Habit
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.scenarios.sections import ObstacleSection
@@ -106,7 +106,7 @@ def start_posture(
         if found.stage is None:
             raise ScenarioError(f"{values.source}: {found.failure}; valid: another place or posture")
         return np.array(found.stage.q)
-    q = turned(body.standing_posture(), yaw)
+    q = turned_root(body.standing_posture(), yaw)
     q[2] += values.start_level
     q[:2] = place if place is not None else q[:2] + values.start_com[:2] - Configuration(body, q).com[:2]
     return q
@@ -114,21 +114,9 @@ def start_posture(
 
 def carried_to(q: FloatArray, at: ArrayLike, yaw: float, level: float) -> FloatArray:
     """(nq,) a posture made for the ground at the origin, at a place x and y and a level [m], turned [rad]."""
-    found = turned(q, yaw)
+    found = turned_root(q, yaw)
     found[:2] = at
     found[2] += level
-    return found
-
-
-def turned(q: FloatArray, yaw: float) -> FloatArray:
-    """(nq,) the configuration with its root turned about the vertical through itself [rad]."""
-    found = np.array(q)
-    half = np.array([np.sin(0.5 * yaw), np.cos(0.5 * yaw)])
-    x, y, z, w = q[3:7]
-    found[3:7] = (
-        half[1] * x - half[0] * y, half[1] * y + half[0] * x,
-        half[1] * z + half[0] * w, half[1] * w - half[0] * z,
-    )  # fmt: skip
     return found
 
 

@@ -10,25 +10,10 @@ from manikin.scene.spheres import SphereProximity
 from manikin.scene.surface import Surface
 
 __all__ = [
-    "Box",
-    "Capsule",
-    "Clearance",
-    "Cylinder",
-    "HalfSpace",
-    "Mesh",
-    "Obstacle",
-    "Plane",
-    "Proximity",
-    "ProximityResult",
-    "Scene",
-    "Sphere",
-    "SphereCover",
-    "SphereProximity",
-    "Surface",
-    "cover",
-    "load_mesh",
+    "Box", "Capsule", "Clearance", "Cylinder", "HalfSpace", "Mesh", "Obstacle", "Plane", "Proximity",
+    "ProximityResult", "Scene", "Sphere", "SphereCover", "SphereProximity", "Surface", "cover", "load_mesh",
     "segment_of",
-]
+]  # fmt: skip
 
 
 make_callable(__name__)

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 import manikin.runtime.coal_workarounds  # noqa: F401  (before the first distance)
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, axes_of_normal
 from manikin.scene.mesh import IntArray, Mesh, MeshPiece
 from manikin.scene.obstacle import (
     Box,
@@ -181,16 +181,13 @@ def convex_geometry(vertices: FloatArray) -> coal.CollisionGeometry:
 def _endless_part(obstacle: Obstacle, shape: Plane | HalfSpace) -> CollisionPart:
     """Part whose frame has z along the normal, so that its bounds are tight."""
     normal = shape.normal
-    across = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
-    across /= np.linalg.norm(across)
-    turn = np.column_stack([across, np.cross(normal, across), normal])
     endless = np.full(2, np.inf)
     up = np.array([0.0, 0.0, 1.0])
     solid = isinstance(shape, HalfSpace)
     return CollisionPart(
         obstacle=obstacle.name,
         geometry=coal.Halfspace(up, 0.0) if solid else coal.Plane(up, 0.0),
-        rotation=obstacle.rotation @ turn,
+        rotation=obstacle.rotation @ axes_of_normal(normal),
         translation=obstacle.translation + obstacle.rotation @ (normal * shape.offset),
         low=np.append(-endless, -np.inf if solid else 0.0),
         high=np.append(endless, 0.0),
@@ -204,15 +201,8 @@ def _mesh_part(obstacle: Obstacle, piece: MeshPiece) -> CollisionPart:
     else:
         geometry = triangle_geometry(piece.vertices, piece.faces)
         surface = ClosedSurface(piece.vertices, piece.faces, geometry) if piece.closed else None
-    return CollisionPart(
-        obstacle.name,
-        geometry,
-        obstacle.rotation,
-        obstacle.translation,
-        piece.vertices.min(axis=0),
-        piece.vertices.max(axis=0),
-        surface,
-    )
+    low, high = piece.vertices.min(axis=0), piece.vertices.max(axis=0)
+    return CollisionPart(obstacle.name, geometry, obstacle.rotation, obstacle.translation, low, high, surface)
 
 
 def _merged_open_pieces(mesh: Mesh) -> list[MeshPiece]:

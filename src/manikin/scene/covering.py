@@ -22,7 +22,7 @@ class SphereCover:
     Attributes:
         centres: (k, 3) [m].
         radii: (k,) [m].
-        overshoot: How far, at most, a sphere reaches beyond the shape [m] (an upper bound).
+        overshoot: Upper bound of how far a sphere reaches beyond the shape [m].
     """
 
     centres: FloatArray
@@ -34,28 +34,21 @@ class SphereCover:
 
 
 def cover(shape: Shape, *, count: int | None = None, radius: float | None = None) -> SphereCover:
-    """Cover a shape with spheres.
+    """Cover a shape, or the surface of a mesh that is not closed, with spheres.
 
     Args:
         shape: Any shape with an end; planes and half-spaces need no spheres.
         count: Largest number of spheres; 8 when neither is given.
         radius: Largest sphere radius [m]; as many spheres as it takes are used.
 
-    Returns:
-        Spheres whose union contains the shape; of a mesh that is not closed, its surface.
-
     Raises:
-        SceneError: If the shape is endless, both or neither limit is usable, or the radius
-            is too small for the shape.
+        SceneError: If the shape is endless, a limit is not usable, or the radius too small for the shape.
     """
-    if isinstance(shape, (Plane, HalfSpace)):
-        raise SceneError(f"a {type(shape).__name__} cannot be covered by spheres; valid: a shape with an end")
     if count is not None and radius is not None:
         raise SceneError(f"cover was given count {count} and radius {radius:g} m; valid: one of them")
     if radius is not None:
         return _cover_to_radius(shape, finite_number(radius, "cover radius [m]", above=0.0, error=SceneError))
-    if count is None:
-        count = _DEFAULT_COUNT
+    count = _DEFAULT_COUNT if count is None else count
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
         raise SceneError(f"cover count is {count!r}; valid: a whole number >= 1")
     return _cover_with(shape, int(count))
@@ -82,17 +75,15 @@ def _cover_to_radius(shape: Shape, radius: float) -> SphereCover:
 
 
 def _cover_with(shape: Shape, count: int) -> SphereCover:
+    if isinstance(shape, (Plane, HalfSpace)):
+        raise SceneError(f"a {type(shape).__name__} cannot be covered by spheres; valid: a shape with an end")
     if isinstance(shape, Sphere):
         return _made(np.zeros((1, 3)), np.array([shape.radius]), 0.0)
     if isinstance(shape, Capsule):
         return _capsule_cover(shape, count)
     if isinstance(shape, Box):
         return _box_cover(shape, count)
-    if isinstance(shape, Cylinder):
-        return _cylinder_cover(shape, count)
-    if isinstance(shape, Mesh):
-        return _mesh_cover(shape, count)
-    raise SceneError(f"a {type(shape).__name__} cannot be covered by spheres; valid: a shape with an end")
+    return _cylinder_cover(shape, count) if isinstance(shape, Cylinder) else _mesh_cover(shape, count)
 
 
 def _made(centres: FloatArray, radii: FloatArray, overshoot: float) -> SphereCover:
@@ -113,9 +104,7 @@ def _capsule_cover(capsule: Capsule, count: int) -> SphereCover:
 def _box_cover(box: Box, count: int) -> SphereCover:
     """Equal cells, one circumscribed sphere each, divided where it shrinks the spheres most."""
     cells = _divisions(box.size, count)
-    centres = np.array(
-        [_cell_centres(size, n) for size, n in zip(box.size, cells, strict=True)], dtype=object
-    )
+    centres = [_cell_centres(size, n) for size, n in zip(box.size, cells, strict=True)]
     grid = np.array(list(product(*centres)), dtype=np.float64)
     side = box.size / cells
     radius = float(np.linalg.norm(side) / 2)
@@ -142,14 +131,9 @@ def _cylinder_cover(cylinder: Cylinder, count: int) -> SphereCover:
     """The better of slabs along the axis and the cells of the box around it that touch it."""
     slab = cylinder.length / count
     radius = float(np.hypot(cylinder.radius, slab / 2))
-    heights = _cell_centres(cylinder.length, count)
-    stack = _made(
-        np.column_stack([np.zeros((count, 2)), heights]),
-        np.full(count, radius),
-        radius - min(cylinder.radius, slab / 2),
-    )
+    centres = np.column_stack([np.zeros((count, 2)), _cell_centres(cylinder.length, count)])
+    best = _made(centres, np.full(count, radius), radius - min(cylinder.radius, slab / 2))
     around = Box((2 * cylinder.radius, 2 * cylinder.radius, cylinder.length))
-    best = stack
     for number in range(count, 2 * count + 1):  # culled corner cells make room for finer cells
         cells = _box_cover(around, number)
         divisions = _divisions(around.size, number)

@@ -38,12 +38,10 @@ class BodyGeometry(Protocol):
     @property
     def pinocchio(self) -> pin.Model:
         """Kinematic model."""
-        ...
 
     @property
     def geometry(self) -> pin.GeometryModel:
         """Collision shapes."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +71,7 @@ class ProximityResult:
 
 @dataclass(frozen=True, eq=False)
 class ProximitySamples:
-    """Close pairs of many configurations, ordered by sample.
-
-    Attributes:
-        sample: (k,) index of the configuration.
-        distance: (k,) signed distances [m].
-        gradient: (k, nv) derivatives of the distances by the tangent of the configuration.
-        pairs: k names, (body shape, obstacle or other body shape).
-    """
+    """Close pairs of many configurations, ordered by sample (k,), otherwise as :class:`ProximityResult`."""
 
     sample: NDArray[np.int64]
     distance: FloatArray
@@ -106,13 +97,11 @@ class Clearance:
 class Proximity:
     """Distances of every body shape to every obstacle and to other body shapes.
 
-    Distances are exact for primitives and convex mesh pieces, with the penetration depth
-    as negative distance. Closed mesh pieces that are not convex give exact clearances and
-    a depth sampled on the body shape; open ones have no inside, and where a shape crosses
-    them the depth is that of the worst triangle.
+    Distances are exact for primitives and convex mesh pieces, negative by the penetration depth. Closed mesh
+    pieces that are not convex give exact clearances and a depth sampled on the body shape; open
+    ones have no inside, and where a shape crosses them the depth is that of the worst triangle.
 
-    One instance works on buffers of its own: use one per thread. Results do not depend on
-    earlier queries.
+    One instance works on buffers of its own: use one per thread. Results do not depend on earlier queries.
 
     Attributes:
         pairs: (body shape, obstacle or other body shape) of every pair checked.
@@ -139,7 +128,8 @@ class Proximity:
         first, second = _pair_table(self._count, len(parts), self_pairs(body) if self_collision else [])
         self._bounds = PairBounds(self._shapes, parts, first, second)
         self._meters = _meters(self._shapes, parts, first, second)
-        self.pairs: tuple[Pair, ...] = _pair_names(self._shapes, parts, first, second)
+        names = [item.name for item in self._shapes.geometryObjects] + [part.obstacle for part in parts]
+        self.pairs: tuple[Pair, ...] = tuple((names[a], names[b]) for a, b in zip(first, second, strict=True))
         moves = moves_by_shape(self._model, self._shapes, len(parts))
         self._sensitivity = moves[second] - moves[first]
         self._fixed = {
@@ -190,17 +180,9 @@ class Proximity:
         return ProximityResult(distance, gradient, names, on_body, on_other, normal)
 
     def evaluate_over(
-        self,
-        q_samples: FloatArray,
-        activation: float = 0.1,
-        ignore: Ignored | Sequence[Ignored] = NOTHING,
+        self, q_samples: FloatArray, activation: float = 0.1, ignore: Ignored | Sequence[Ignored] = NOTHING
     ) -> ProximitySamples:
-        """Measure every close pair of many configurations; like :meth:`evaluate`, with one broad phase.
-
-        Args:
-            q_samples: (n, nq).
-            activation: [m]; farther pairs are left out.
-            ignore: One set for all samples, or n sets.
+        """Measure every close pair of (n, nq) configurations, see :meth:`evaluate_placed`.
 
         Raises:
             SceneError: If the number of ignore sets is not n, or a sample is not a finite
@@ -209,12 +191,9 @@ class Proximity:
         return self.evaluate_placed(self.place(q_samples), activation, ignore)
 
     def evaluate_placed(
-        self,
-        placed: PlacedShapes,
-        activation: float = 0.1,
-        ignore: Ignored | Sequence[Ignored] = NOTHING,
+        self, placed: PlacedShapes, activation: float = 0.1, ignore: Ignored | Sequence[Ignored] = NOTHING,
         known: KnownDistances | None = None,
-    ) -> ProximitySamples:
+    ) -> ProximitySamples:  # fmt: skip
         """Measure every close pair of many configurations whose kinematics are known.
 
         A pair that was found far is measured again only when its shapes have moved so much
@@ -224,10 +203,7 @@ class Proximity:
             placed: Shapes and Jacobians of n configurations.
             activation: [m]; farther pairs are left out.
             ignore: One set for all samples, or n sets.
-            known: What an earlier evaluation of a similar motion has found; this one is kept there.
-
-        Raises:
-            SceneError: If the number of ignore sets is not n.
+            known: Distances of an earlier evaluation of a similar motion; those of this one are kept there.
         """
         rotations, translations = _split(placed.placements)
         corners = self._bounds.corners(rotations, translations)
@@ -282,21 +258,11 @@ class Proximity:
     def minimum_over(
         self, q_samples: FloatArray, ignore: Ignored | Sequence[Ignored] = NOTHING, tolerance: float = 1e-6
     ) -> Clearance:
-        """Smallest signed distance over many configurations.
+        """Smallest signed distance over (n, nq) configurations, exact to ``tolerance`` [m].
 
-        Best first: every (sample, pair) has a lower bound, from covering spheres at first;
-        measuring one of them raises the bounds of its pair at all other samples, because a
-        distance changes no faster than the shape moves. Only what could still be the
-        minimum is measured, so the result is exact to ``tolerance``.
-
-        Args:
-            q_samples: (n, nq).
-            ignore: One set for all samples, or n sets.
-            tolerance: [m].
-
-        Raises:
-            SceneError: If the number of ignore sets is not n, or a sample is not a finite
-                vector of the body's size.
+        Best first: every (sample, pair) has a lower bound, from covering spheres at first; measuring one of
+        them raises the bounds of its pair at all other samples, because a distance changes no faster than the
+        shape moves. Only what could still be the minimum is measured. Raises as :meth:`evaluate_over`.
         """
         samples = [checked_configuration(self._model, q) for q in q_samples]
         considered = self._considered_over(ignore, len(samples))
@@ -373,17 +339,17 @@ class Proximity:
 
         The vectors are buffers that the next measurement of the same pair overwrites.
         """
-        places = dict(self._fixed)
-        found = []
+        transforms = dict(self._fixed)
+        measured = []
         for index in indices:
             shape, other = self._first[index], self._second[index]
             for key in (shape, other):
-                if key not in places:
+                if key not in transforms:
                     # The shape's own transform: making new ones takes longer than many a distance.
-                    places[key] = self._moving[key]
-                    places[key].setTransform(rotations[key], translations[key])
-            found.append(self._meters[index](places[shape], places[other], within))
-        return found
+                    transforms[key] = self._moving[key]
+                    transforms[key].setTransform(rotations[key], translations[key])
+            measured.append(self._meters[index](transforms[shape], transforms[other], within))
+        return measured
 
 
 def _split(placements: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -397,10 +363,9 @@ def segment_of(shape_name: str) -> str:
 
 
 def checked_configuration(model: pin.Model, q: FloatArray) -> FloatArray:
-    """Return ``q`` after checking it; a NaN would otherwise pass for "nothing is near".
+    """Return ``q``, or raise a SceneError if it is not a finite vector of the model's size.
 
-    Raises:
-        SceneError: If it is not a finite vector of the model's size.
+    A NaN would otherwise pass for "nothing is near".
     """
     q = np.asarray(q, dtype=np.float64)
     if q.shape != (model.nq,):
@@ -412,12 +377,12 @@ def checked_configuration(model: pin.Model, q: FloatArray) -> FloatArray:
 
 def considered(pairs: Sequence[Pair], ignore: Ignored) -> NDArray[np.bool_]:
     """(pairs,) False where a pair, by shape or segment and in either order, is in ``ignore``."""
-    return np.array([not _is_ignored(pair, ignore) for pair in pairs], dtype=bool)
 
+    def is_ignored(pair: Pair) -> bool:
+        first, second = ((name, segment_of(name)) for name in pair)
+        return any((a, b) in ignore or (b, a) in ignore for a in first for b in second)
 
-def _is_ignored(pair: Pair, ignore: Ignored) -> bool:
-    first, second = ((name, segment_of(name)) for name in pair)
-    return any((a, b) in ignore or (b, a) in ignore for a in first for b in second)
+    return np.array([not is_ignored(pair) for pair in pairs], dtype=bool)
 
 
 def _pair_table(shapes: int, parts: int, inner: list[tuple[int, int]]) -> tuple[IntArray, IntArray]:
@@ -425,13 +390,6 @@ def _pair_table(shapes: int, parts: int, inner: list[tuple[int, int]]) -> tuple[
     both = [(shape, shapes + part) for part in range(parts) for shape in range(shapes)] + inner
     table = np.array(both, dtype=np.int64).reshape(-1, 2)
     return table[:, 0], table[:, 1]
-
-
-def _pair_names(
-    shapes: pin.GeometryModel, parts: Sequence[CollisionPart], first: IntArray, second: IntArray
-) -> tuple[Pair, ...]:
-    names = [item.name for item in shapes.geometryObjects] + [part.obstacle for part in parts]
-    return tuple((names[a], names[b]) for a, b in zip(first, second, strict=True))
 
 
 def _meters(
@@ -461,23 +419,21 @@ def self_pairs(body: BodyGeometry) -> list[tuple[int, int]]:
 
 
 def _shape_index(key: str | int, indices: dict[str, int]) -> int:
-    if isinstance(key, str):
-        if key not in indices:
-            raise SceneError(f"collision pair names shape {key!r}; valid: {', '.join(indices)}")
-        return indices[key]
-    if not 0 <= key < len(indices):
-        raise SceneError(f"collision pair names shape {key}; valid: 0 to {len(indices) - 1}")
-    return int(key)
+    number = indices.get(key, -1) if isinstance(key, str) else int(key)
+    if not 0 <= number < len(indices):
+        valid = ", ".join(indices) if isinstance(key, str) else f"0 to {len(indices) - 1}"
+        raise SceneError(f"collision pair names shape {key!r}; valid: {valid}")
+    return number
 
 
 def moves_by_shape(model: pin.Model, shapes: pin.GeometryModel, parts: int) -> FloatArray:
-    """(shapes + parts, nv): 1 where a velocity coordinate moves the shape; parts never move."""
+    """(shapes + parts, nv) 1 where a velocity coordinate moves the shape; parts never move."""
     joints = [item.parentJoint for item in shapes.geometryObjects] + [0] * parts
     return moves_by_joint(model)[joints]
 
 
 def moves_by_joint(model: pin.Model) -> FloatArray:
-    """(joints, nv): 1 where a velocity coordinate moves the joint; the world, joint 0, never moves."""
+    """(joints, nv) 1 where a velocity coordinate moves the joint; the world, joint 0, never moves."""
     table = np.zeros((model.njoints, model.nv))
     for joint in range(1, model.njoints):
         start, width = model.idx_vs[joint], model.nvs[joint]

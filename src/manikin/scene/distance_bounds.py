@@ -1,7 +1,4 @@
-"""Cheap lower bounds of distances, from spheres that cover the body's shapes.
-
-Also here. Exact distances between the capsules and balls of a body, for many pairs at once. The shapes of a
-body along a motion, and what is known of their distances from before.
+"""Cheap bounds of distances along a motion, from covering spheres and from the axes of capsules and balls.
 
 They only tell which pairs are worth measuring: normals and nearest points are Coal's.
 """
@@ -165,21 +162,11 @@ class PairBounds:
         return table.reshape(len(placed), -1).take(self._cells, axis=1)
 
     def corners(self, rotations: FloatArray, translations: FloatArray) -> FloatArray:
-        """(n, shapes, 8, 3) corners of the boxes around the shapes in the world [m].
-
-        Args:
-            rotations: (n, shapes, 3, 3) shape-to-world rotations.
-            translations: (n, shapes, 3) [m].
-        """
+        """(n, shapes, 8, 3) corners of the boxes around the shapes in the world [m], see :meth:`lower`."""
         return self._corners @ np.swapaxes(rotations, -1, -2) + translations[:, :, None]
 
     def moved(self, before: FloatArray, after: FloatArray) -> FloatArray:
-        """(n, pairs) by how much a pair's distance may change when its shapes move [m].
-
-        Args:
-            before: (n, shapes, 8, 3) their :meth:`corners`.
-            after: The same after the movement.
-        """
+        """(n, pairs) largest change of a pair's distance when its shapes' :meth:`corners` move [m]."""
         path = np.zeros((len(before), self._count + len(self._part_low)))
         steps = after - before
         path[:, : self._count] = np.sqrt(np.einsum("nsci,nsci->nsc", steps, steps).max(axis=2))
@@ -188,7 +175,7 @@ class PairBounds:
     def tighten(
         self, lower: FloatArray, wanted: NDArray[np.bool_], rotations: FloatArray, translations: FloatArray
     ) -> None:
-        """Raise the lower bounds of pairs of capsules and balls of the body to their distances.
+        """Raise the bounds of pairs of capsules and balls of the body to their distances.
 
         Args:
             lower: (n, pairs) lower bounds, changed in place [m].
@@ -257,15 +244,18 @@ def shape_of(geometry: coal.CollisionGeometry) -> tuple[Shape, FloatArray]:
         return Cylinder(geometry.radius, 2 * geometry.halfLength), centre
     if isinstance(geometry, coal.Box):
         return Box(2 * geometry.halfSide), centre
-    geometry.computeLocalAABB()
-    low, high = geometry.aabb_local.min_, geometry.aabb_local.max_
+    low, high = _local_box(geometry)
     return Box(np.maximum(high - low, 1e-6)), (low + high) / 2
+
+
+def _local_box(geometry: coal.CollisionGeometry) -> tuple[FloatArray, FloatArray]:
+    geometry.computeLocalAABB()
+    return geometry.aabb_local.min_, geometry.aabb_local.max_
 
 
 def box_corners(geometry: coal.CollisionGeometry) -> FloatArray:
     """(8, 3) corners of the box around a Coal geometry in its own frame."""
-    geometry.computeLocalAABB()
-    low, high = geometry.aabb_local.min_, geometry.aabb_local.max_
+    low, high = _local_box(geometry)
     signs = np.array(list(product((0.0, 1.0), repeat=3)))
     return low + signs * (high - low)
 
@@ -273,9 +263,9 @@ def box_corners(geometry: coal.CollisionGeometry) -> FloatArray:
 def _few_spheres(geometry: coal.CollisionGeometry) -> tuple[FloatArray, FloatArray]:
     """Exactly ``SPHERES_PER_SHAPE`` covering spheres, repeated where fewer do."""
     shape, centre = shape_of(geometry)
-    found = cover(shape, count=SPHERES_PER_SHAPE)
-    repeated = np.arange(SPHERES_PER_SHAPE) % len(found)
-    return found.centres[repeated] + centre, found.radii[repeated]
+    spheres = cover(shape, count=SPHERES_PER_SHAPE)
+    repeated = np.arange(SPHERES_PER_SHAPE) % len(spheres)
+    return spheres.centres[repeated] + centre, spheres.radii[repeated]
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,13 +283,10 @@ class PlacedShapes:
 
 
 class PlacementReader:
-    """Copies transforms out of Pinocchio's buffers.
+    """Copies some or all transforms out of a buffer of a ``pin.Data`` or ``pin.GeometryData``.
 
-    The transforms lie one after the other, so that one view of each part reads all of them at once.
-
-    Args:
-        buffer: Transforms of a ``pin.Data`` or ``pin.GeometryData``, kept alive by their owner.
-        chosen: Indices of the transforms to read; all when omitted.
+    The transforms lie one after the other, so that one view of each part reads all of them at once. Their
+    owner keeps them alive.
     """
 
     def __init__(self, buffer: "pin.StdVec_SE3", chosen: Sequence[int] | None = None) -> None:
@@ -329,9 +316,8 @@ def _stacked(views: list[FloatArray], shape: tuple[int, ...]) -> FloatArray:
 class KnownDistances:
     """Lower bounds of distances along a motion that is measured again after a change.
 
-    A distance that was measured, or bounded, differs from its value after the change by no more than
-    its two shapes have moved.  Only what may be near then has to be measured again; the result is the
-    same as without this knowledge.
+    A distance that was measured, or bounded, differs from its value after the change by no more than its two
+    shapes have moved. Only pairs that may be near then are measured again; the result is the same.
     """
 
     def __init__(self) -> None:

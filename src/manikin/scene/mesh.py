@@ -17,6 +17,7 @@ IntArray = NDArray[np.int64]
 Convexity = Literal["no", "hull", "parts"]
 
 FORMATS = ("stl", "obj", "ply", "dae")
+_FORMATS_TEXT = ", ".join(f".{name}" for name in FORMATS)
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Units a mesh file may be said to be in, in metres."""
 
@@ -39,14 +40,14 @@ _DEGENERATE_HEIGHT = 1e-9  # [m]; a triangle flatter than this has no usable nor
 class Mesh:
     """A triangle mesh in its own frame.
 
-    Vertices at the same place are merged and degenerate triangles dropped on
-    construction, so that connected pieces and closed surfaces can be recognised.
+    Coincident vertices are merged and degenerate triangles dropped on construction, so that connected pieces
+    and closed surfaces can be recognised.
 
     Attributes:
         vertices: (n, 3) [m].
         faces: (m, 3) vertex indices, counter-clockwise seen from outside.
-        source: Where it came from, for messages (a path or a name).
-        dropped_faces: How many degenerate triangles were dropped.
+        source: Path or name, for messages.
+        dropped_faces: Number of degenerate triangles dropped.
     """
 
     vertices: FloatArray
@@ -74,8 +75,7 @@ class Mesh:
             max_faces: More triangles than this (after hulls) are refused.
 
         Raises:
-            SceneError: If the mesh is empty, not finite, badly indexed, of a suspicious
-                size or too large.
+            SceneError: If the mesh is empty, not finite, badly indexed, of a suspicious size or too large.
         """
         points = frozen_array(vertices, f"mesh {source!r} vertices", (None, 3), SceneError)
         triangles = _checked_faces(faces, len(points), source)
@@ -98,13 +98,10 @@ class Mesh:
 
     @cached_property
     def pieces(self) -> "tuple[MeshPiece, ...]":
-        """Connected pieces, each with its own frame-free vertices."""
-        whole = as_trimesh(self.vertices, self.faces)
-        groups = trimesh.graph.connected_components(
-            whole.face_adjacency, nodes=np.arange(len(self.faces)), min_len=1
+        """Connected pieces, each with its own vertices."""
+        return tuple(
+            _piece(self.vertices, self.faces[group]) for group in _connected(self.vertices, self.faces)
         )
-        ordered = sorted((np.sort(group) for group in groups), key=lambda group: int(group[0]))
-        return tuple(_piece(self.vertices, self.faces[group]) for group in ordered)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +148,9 @@ def load_mesh(
     file = Path(path)
     extension = file.suffix.lower().lstrip(".")
     if extension not in FORMATS:
-        raise SceneError(f"mesh file '{file}' has the extension '{file.suffix}'; valid: {_formats_text()}")
+        raise SceneError(f"mesh file '{file}' has the extension '{file.suffix}'; valid: {_FORMATS_TEXT}")
     if not file.is_file():
-        raise SceneError(f"mesh file '{file}' does not exist; valid: an existing {_formats_text()} file")
+        raise SceneError(f"mesh file '{file}' does not exist; valid: an existing {_FORMATS_TEXT} file")
     if unit is not None and unit not in UNITS:
         raise SceneError(f"mesh file '{file}' unit is {unit!r}; valid: {', '.join(UNITS)}")
     if up is not None and up not in _UP_TO_Z:
@@ -171,10 +168,6 @@ def as_trimesh(vertices: FloatArray, faces: IntArray) -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices=vertices, faces=faces, process=False, validate=False)
 
 
-def _formats_text() -> str:
-    return ", ".join(f".{name}" for name in FORMATS)
-
-
 def _read(file: Path, extension: str) -> trimesh.Trimesh:
     try:
         scene: Any = trimesh.load_scene(str(file), file_type=extension)
@@ -183,7 +176,7 @@ def _read(file: Path, extension: str) -> trimesh.Trimesh:
         reason = " ".join(str(error).split())[:120]
         raise SceneError(
             f"mesh file '{file}' cannot be read ({type(error).__name__}: {reason}); "
-            f"valid: a well-formed {_formats_text()} file"
+            f"valid: a well-formed {_FORMATS_TEXT} file"
         ) from None
     if mesh is None or not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise SceneError(f"mesh file '{file}' holds no triangles; valid: at least one")
@@ -221,12 +214,8 @@ def _checked_faces(faces: ArrayLike, vertex_count: int, source: str) -> IntArray
 def _cleaned(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, int]:
     """Merge vertices closer than a millionth of the size; drop degenerate and repeated triangles."""
     grid = max(float(np.ptp(points, axis=0).max()) * 1e-6, 1e-12)
-    _, first, inverse = np.unique(
-        np.round((points - points.min(axis=0)) / grid).astype(np.int64),
-        axis=0,
-        return_index=True,
-        return_inverse=True,
-    )
+    cells = np.round((points - points.min(axis=0)) / grid).astype(np.int64)
+    _, first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     merged = points[first]
     faces = inverse.reshape(-1)[triangles]
     corners = merged[faces]
@@ -249,17 +238,19 @@ def _check_extent(points: FloatArray, source: str) -> None:
         )
 
 
+def _connected(vertices: FloatArray, faces: IntArray) -> list[IntArray]:
+    """Indices of the faces of each connected piece, in the order of their first ones."""
+    adjacency = as_trimesh(vertices, faces).face_adjacency
+    groups = trimesh.graph.connected_components(adjacency, nodes=np.arange(len(faces)), min_len=1)
+    return sorted((np.sort(group) for group in groups), key=lambda group: int(group[0]))
+
+
 def _hulls(points: FloatArray, triangles: IntArray, convex: str, source: str) -> tuple[FloatArray, IntArray]:
     if convex not in ("hull", "parts"):
         raise SceneError(f"mesh {source!r} convex is {convex!r}; valid: no, hull, parts")
-    whole = as_trimesh(points, triangles)
-    groups = [np.arange(len(triangles))]
-    if convex == "parts":
-        groups = trimesh.graph.connected_components(
-            whole.face_adjacency, nodes=np.arange(len(triangles)), min_len=1
-        )
+    groups = _connected(points, triangles) if convex == "parts" else [np.arange(len(triangles))]
     vertices, faces, start = [], [], 0
-    for group in sorted(groups, key=lambda item: int(np.min(item))):
+    for group in groups:
         hull = _hull(points[np.unique(triangles[group])], source)
         vertices.append(np.asarray(hull.vertices))
         faces.append(np.asarray(hull.faces, dtype=np.int64) + start)
@@ -296,10 +287,5 @@ def _is_convex(vertices: FloatArray, faces: IntArray) -> bool:
     offsets = np.einsum("ij,ij->i", normals, corners[:, 0])
     tolerance = 1e-5 * float(np.ptp(vertices, axis=0).max())
     chunk = max(1, 2_000_000 // len(vertices))
-    return all(
-        bool(
-            (normals[start : start + chunk] @ vertices.T - offsets[start : start + chunk, None]).max()
-            <= tolerance
-        )
-        for start in range(0, len(faces), chunk)
-    )
+    rows = [slice(start, start + chunk) for start in range(0, len(faces), chunk)]
+    return all(bool((normals[r] @ vertices.T - offsets[r, None]).max() <= tolerance) for r in rows)

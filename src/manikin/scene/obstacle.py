@@ -1,13 +1,10 @@
-"""A named, placed shape.
+"""Obstacles: named shapes with a placement.
 
-Also here. Shapes of obstacles, each in its own frame: plain sizes, checked once.
-
-Solids have an inside; a plane has none. Long shapes lie along their local z axis.
+Shapes are plain, checked sizes in their own frames; long ones lie along their local z axis.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -16,7 +13,7 @@ from numpy.typing import ArrayLike
 from manikin.errors import SceneError
 from manikin.numerics.spatial import FloatArray, check_rotation, finite_number, frozen_array
 from manikin.runtime.display import Displayed
-from manikin.scene.mesh import Convexity, Mesh, as_trimesh, load_mesh
+from manikin.scene.mesh import Mesh, as_trimesh
 
 LARGEST_SIZE = 1000.0
 """Sizes beyond this [m] are taken for a mistaken unit."""
@@ -24,11 +21,7 @@ LARGEST_SIZE = 1000.0
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """A rectangular box centred on its frame.
-
-    Attributes:
-        size: (3,) full side lengths [m], > 0.
-    """
+    """A rectangular box centred on its frame, of full side lengths ``size`` (3,) [m] > 0."""
 
     size: FloatArray
 
@@ -41,11 +34,7 @@ class Box:
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
-    """A ball centred on its frame.
-
-    Attributes:
-        radius: [m], > 0.
-    """
+    """A ball centred on its frame, of ``radius`` [m] > 0."""
 
     radius: float
 
@@ -55,12 +44,7 @@ class Sphere:
 
 @dataclass(frozen=True, eq=False)
 class Cylinder:
-    """A solid cylinder along z, centred on its frame.
-
-    Attributes:
-        radius: [m], > 0.
-        length: Along z [m], > 0.
-    """
+    """A solid cylinder along z, centred on its frame, of ``radius`` and ``length`` [m] > 0."""
 
     radius: float
     length: float
@@ -72,12 +56,7 @@ class Cylinder:
 
 @dataclass(frozen=True, eq=False)
 class Capsule:
-    """A cylinder along z closed by two half balls, centred on its frame.
-
-    Attributes:
-        radius: [m], > 0.
-        length: Of the cylindrical part [m], > 0; the whole is ``length + 2 radius`` long.
-    """
+    """A cylinder of ``radius`` and ``length`` [m] > 0 along z, with half balls on both ends, centred."""
 
     radius: float
     length: float
@@ -89,36 +68,26 @@ class Capsule:
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """The two-sided surface ``normal . x = offset``, without thickness or inside.
-
-    Attributes:
-        normal: (3,) unit vector (normalised on construction).
-        offset: Along the unit normal [m].
-    """
+    """The two-sided surface ``normal . x = offset`` [m] of a unit normal (3,), without inside."""
 
     normal: FloatArray
     offset: float
 
     def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
         object.__setattr__(self, "normal", _unit(normal, "plane normal"))
-        object.__setattr__(self, "offset", _offset(offset, "plane offset"))
+        object.__setattr__(self, "offset", finite_number(offset, "plane offset [m]", error=SceneError))
 
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace:
-    """Everything with ``normal . x <= offset``: a floor, a wall, the ground.
-
-    Attributes:
-        normal: (3,) unit vector out of the solid (normalised on construction).
-        offset: Along the unit normal [m].
-    """
+    """Everything with ``normal . x <= offset`` [m] of a unit normal (3,): a floor, a wall, the ground."""
 
     normal: FloatArray
     offset: float
 
     def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None:
         object.__setattr__(self, "normal", _unit(normal, "half-space normal"))
-        object.__setattr__(self, "offset", _offset(offset, "half-space offset"))
+        object.__setattr__(self, "offset", finite_number(offset, "half-space offset [m]", error=SceneError))
 
 
 Shape = Box | Sphere | Cylinder | Capsule | Plane | HalfSpace | Mesh
@@ -147,10 +116,6 @@ def _length(value: object, name: str) -> float:
     return finite_number(value, f"{name} [m]", above=0.0, at_most=LARGEST_SIZE, error=SceneError)
 
 
-def _offset(value: object, name: str) -> float:
-    return finite_number(value, f"{name} [m]", error=SceneError)
-
-
 def _unit(vector: ArrayLike, name: str) -> FloatArray:
     direction = frozen_array(vector, name, (3,), SceneError)
     length = float(np.linalg.norm(direction))
@@ -167,7 +132,7 @@ DRAWN_HALF_SIZE = 10.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Obstacle(Displayed):
-    """A shape of the scene at a fixed place.
+    """A shape of the scene at a fixed placement.
 
     Attributes:
         name: Unique in its scene.
@@ -203,27 +168,6 @@ class Obstacle(Displayed):
         object.__setattr__(
             self, "translation", frozen_array(translation, f"{where} translation [m]", (3,), SceneError)
         )
-
-    @classmethod
-    def from_file(
-        cls,
-        name: str,
-        path: str | Path,
-        *,
-        unit: str | None = None,
-        up: str | None = None,
-        scale: float = 1.0,
-        convex: Convexity = "no",
-        rotation: ArrayLike | None = None,
-        translation: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> "Obstacle":
-        """Make an obstacle from a mesh file; arguments as for :func:`manikin.scene.load_mesh`.
-
-        Raises:
-            SceneError: If the file or the placement is not usable.
-        """
-        mesh = load_mesh(path, unit=unit, up=up, scale=scale, convex=convex)
-        return cls(name, mesh, rotation, translation)
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:

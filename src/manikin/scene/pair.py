@@ -1,7 +1,4 @@
-"""Signed distance of one pair of Coal geometries.
-
-Also here. Depth of a body shape inside a closed mesh that is not convex.
-"""
+"""Signed distance of one pair of Coal geometries, also of a shape inside a closed mesh that is not convex."""
 
 import math
 from typing import Protocol
@@ -28,7 +25,6 @@ class Meter(Protocol):
         self, place: coal.Transform3s, other: coal.Transform3s, within: float = math.inf
     ) -> Measured:
         """Distance, normal and nearest points; see :class:`PairMeter`."""
-        ...
 
 
 _FINE = 1e-8
@@ -56,14 +52,9 @@ class PairMeter:
     ) -> Measured:
         """Measure at the two geometry-to-world placements.
 
-        Args:
-            place: Of the first geometry.
-            other: Of the second.
-            within: Only of a smaller distance are normal and points wanted [m]; reading them takes
-                longer than many a distance.
-
         Returns:
-            Distance, negative in penetration; normal; nearest points, the vectors NaN where not wanted.
+            Distance, negative in penetration; normal; nearest points. From a distance of ``within`` [m] on
+            the vectors are NaN, as reading them takes longer than many a distance.
         """
         result = self._result
         result.clear()
@@ -99,12 +90,8 @@ class BallCylinderMeter:
         centre = place.getTranslation()
         nearest, outward, height = self._nearest(rotation.T @ (centre - origin))
         normal = -(rotation @ outward)
-        return (
-            height - self._ball_radius,
-            normal,
-            centre + self._ball_radius * normal,
-            rotation @ nearest + origin,
-        )
+        on_ball, on_cylinder = centre + self._ball_radius * normal, rotation @ nearest + origin
+        return height - self._ball_radius, normal, on_ball, on_cylinder
 
     def _nearest(self, point: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Surface point nearest to a point, unit vector from it outward, and signed distance."""

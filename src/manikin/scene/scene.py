@@ -1,6 +1,6 @@
 """A scene: named obstacles and a floor."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,7 +8,7 @@ import coal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from manikin.contact import Contact, ContactKind, Stance
+from manikin.contact import Contact, ContactKind
 from manikin.errors import ContactError, SceneError
 from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
 from manikin.runtime.display import Displayed
@@ -94,20 +94,11 @@ class Scene(Displayed):
     def supporting_surface(
         self, contact: Contact, tolerance: float = 0.005, max_angle: float | None = None
     ) -> Surface:
-        """Find the surface on which every point of a contact rests.
+        """Closest surface on which every point of a contact rests.
 
-        Each point must be within ``tolerance`` of the surface, above or below it, and at
-        most ``tolerance`` beyond its edge; normals may differ by ``max_angle`` (2 degrees
-        when omitted). A grasp needs only a surface near its point, whatever its normal;
-        round obstacles have none, see :meth:`nearest`.
-
-        Args:
-            contact: The contact.
-            tolerance: [m].
-            max_angle: [rad].
-
-        Returns:
-            The closest such surface.
+        Each point must be within ``tolerance`` [m] of the surface, above or below it, and at most that far
+        beyond its edge; normals may differ by ``max_angle`` [rad], 2 degrees when omitted. A grasp needs only
+        a surface near its point, whatever its normal; round obstacles have none, see :meth:`nearest`.
 
         Raises:
             ContactError: If there is none; the message says how far the nearest one is.
@@ -136,58 +127,23 @@ class Scene(Displayed):
         return name, distance
 
     def touched_obstacle(self, contact: Contact, tolerance: float = 0.005) -> str:
-        """Name of the obstacle that a contact touches.
+        """Name of the obstacle that a contact touches; ContactError if there is none.
 
-        Args:
-            contact: A sole or point, which lies on a surface, or a grasp, which has the fingers
-                around something within :data:`GRASP_REACH` of its position.
-            tolerance: As for :meth:`supporting_surface`.
-
-        Raises:
-            ContactError: If there is none.
+        A sole or point lies on a surface, see :meth:`supporting_surface`; a grasp has the fingers around
+        something within :data:`GRASP_REACH` of its position.
         """
         if contact.kind is not ContactKind.GRASP:
             return self.supporting_surface(contact, tolerance).obstacle
         name, distance = self.nearest(contact.position) if self.obstacles else ("", np.inf)
         if distance > GRASP_REACH:
             place = np.round(contact.position, 4).tolist()
-            nearest = (
-                f"the nearest, {name!r}, is {distance * 1000:.1f} mm away" if name else "the scene is empty"
-            )
+            away = f"the nearest, {name!r}, is {distance * 1000:.1f} mm away"
+            nearest = away if name else "the scene is empty"
             raise ContactError(
                 f"grasp '{contact.effector}' at {place} m holds on to nothing: {nearest}; "
                 f"valid: within {GRASP_REACH * 1000:g} mm of an obstacle"
             )
         return name
-
-    def resting_pairs(
-        self,
-        stance: Stance,
-        segments: Mapping[str, Sequence[str]] | None = None,
-        tolerance: float = 0.005,
-    ) -> frozenset[tuple[str, str]]:
-        """Pairs (segment, obstacle) that touch on purpose, for ``ignore`` of a proximity.
-
-        Args:
-            stance: The contacts.
-            segments: Segments that may touch with each effector, such as
-                ``{"left_foot": ("left_foot", "left_toes")}``; the effector's own name for
-                those not listed.
-            tolerance: As for :meth:`supporting_surface`.
-
-        Returns:
-            For a sole or point the obstacle of its supporting surface, for a grasp the
-            nearest obstacle.
-
-        Raises:
-            ContactError: If a contact touches nothing.
-        """
-        found = set()
-        for contact in stance:
-            obstacle = self.touched_obstacle(contact, tolerance)
-            names = (segments or {}).get(contact.effector, (contact.effector,))
-            found.update((segment, obstacle) for segment in names)
-        return frozenset(found)
 
     @cached_property
     def _point_meters(self) -> dict[str, list[tuple[Meter, coal.Transform3s]]]:

@@ -34,13 +34,10 @@ OBSTACLE_SPHERES = 20
 class SphereProximity:
     """Distances of the closest two spheres of each pair.
 
-    A drop-in for :class:`manikin.scene.Proximity` whose gradient is continuous as long as
-    the same two spheres are the closest. Each body shape and each obstacle is covered by
-    spheres; planes and half-spaces are kept as they are. A distance is never larger than
-    the true clearance, and negative wherever the shapes touch; how negative says nothing
-    about their true depth.
-
-    One instance works on buffers of its own: use one per thread.
+    Its interface is that of :class:`manikin.scene.Proximity`; its gradient is continuous as long as the same
+    two spheres are the closest. Each body shape and each obstacle is covered by spheres; planes and
+    half-spaces are kept as they are. A distance is never larger than the true clearance, and negative where
+    the shapes touch; how negative says nothing about their true depth. Use one instance per thread.
 
     Attributes:
         pairs: (body shape, obstacle or other body shape) of every pair checked.
@@ -104,15 +101,10 @@ class SphereProximity:
         return int(self._model.nv)
 
     def evaluate(self, q: FloatArray, activation: float = 0.1, ignore: Ignored = NOTHING) -> ProximityResult:
-        """Measure the closest two spheres of every pair closer than ``activation``.
+        """Measure the closest two spheres of every pair, as :meth:`manikin.scene.Proximity.evaluate`.
 
         The gradient is ``(J_i - J_j)^T D / |D|`` with ``D = p_i - p_j`` between the centres
         ([Qiu2012]_ F.4), and ``J_i^T D / |D|`` for an obstacle (F.5).
-
-        Args:
-            q: (nq,) configuration.
-            activation: [m].
-            ignore: As for :meth:`manikin.scene.Proximity.evaluate`.
         """
         jacobian = pin.computeJointJacobians(self._model, self._data, checked_configuration(self._model, q))
         pin.updateGeometryPlacements(self._model, self._data, self._shapes, self._geometry_data)
@@ -174,53 +166,55 @@ class SphereProximity:
         return normal, centre + radius * normal, on_other
 
 
-class _Spheres:
+class _Groups:
+    """Consecutive blocks of given sizes."""
+
+    def __init__(self, sizes: Sequence[int]) -> None:
+        self._ends: IntArray = np.cumsum(np.array(sizes, dtype=np.int64))
+        self.starts: IntArray = self._ends - np.array(sizes, dtype=np.int64)
+        self.size = int(sum(sizes))
+
+    def block(self, number: int) -> slice:
+        return slice(int(self.starts[number]), int(self._ends[number]))
+
+
+class _Spheres(_Groups):
     """The body's spheres, grouped by shape."""
 
     def __init__(self, covers: Sequence[SphereCover]) -> None:
-        sizes = np.array([len(item) for item in covers], dtype=np.int64)
+        sizes = [len(item) for item in covers]
+        super().__init__(sizes)
         self._local = np.vstack([item.centres for item in covers])
         self._owner = np.repeat(np.arange(len(covers)), sizes)
-        self._ends: IntArray = np.cumsum(sizes)
         self.radii = np.concatenate([item.radii for item in covers])
-        self.starts: IntArray = self._ends - sizes
 
     def placed(self, matrices: FloatArray) -> FloatArray:
         """(k, 3) centres in the world, of (shapes, 4, 4) transforms."""
         owner = matrices[self._owner]
         return np.einsum("kij,kj->ki", owner[:, :3, :3], self._local) + owner[:, :3, 3]
 
-    def block(self, shape: int) -> slice:
-        return slice(int(self.starts[shape]), int(self._ends[shape]))
 
-
-class _Targets:
+class _Targets(_Groups):
     """What stands still: one column per plane or half-space, then one per obstacle sphere."""
 
     def __init__(
         self, flats: Sequence[Obstacle], solids: Sequence[Obstacle], covers: Sequence[SphereCover]
     ) -> None:
+        super().__init__([1] * len(flats) + [len(item) for item in covers])
         self._flat_count = len(flats)
         self._two_sided = np.array([isinstance(item.shape, Plane) for item in flats], dtype=bool)
         planes = [item.world_plane for item in flats]
         self._normals = np.array([normal for normal, _ in planes]).reshape(-1, 3)
         self._offsets = np.array([offset for _, offset in planes])
-        placed = [item.to_world(found.centres) for item, found in zip(solids, covers, strict=True)]
+        placed = [item.to_world(cover.centres) for item, cover in zip(solids, covers, strict=True)]
         self._centres = np.vstack([np.zeros((0, 3)), *placed])
-        self._radii = np.concatenate([np.zeros(0), *(found.radii for found in covers)])
-        sizes = np.array([1] * len(flats) + [len(found) for found in covers], dtype=np.int64)
-        self._ends: IntArray = np.cumsum(sizes)
-        self.starts: IntArray = self._ends - sizes
-        self.size = int(sizes.sum())
+        self._radii = np.concatenate([np.zeros(0), *(cover.radii for cover in covers)])
 
     def gaps(self, centres: FloatArray, radii: FloatArray) -> FloatArray:
         """(k, size) gaps of body spheres."""
         height = centres @ self._normals.T - self._offsets
         height = np.where(self._two_sided, np.abs(height), height) - radii[:, None]
         return np.hstack([height, _sphere_gaps(centres, radii, self._centres, self._radii)])
-
-    def block(self, obstacle: int) -> slice:
-        return slice(int(self.starts[obstacle]), int(self._ends[obstacle]))
 
     def toward(self, target: int, centre: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Direction from a centre to the target, and the target's nearest point."""
@@ -253,8 +247,8 @@ def _direction(vector: FloatArray) -> FloatArray:
 
 def _shape_cover(geometry: coal.CollisionGeometry, count: int) -> SphereCover:
     shape, centre = shape_of(geometry)
-    found = cover(shape, count=count)
-    return SphereCover(found.centres + centre, found.radii, found.overshoot)
+    spheres = cover(shape, count=count)
+    return SphereCover(spheres.centres + centre, spheres.radii, spheres.overshoot)
 
 
 def _count(count: int | Mapping[str, int] | None, name: str, default: int) -> int:

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
-from manikin.numerics.spatial import FloatArray, frozen_array
+from manikin.numerics.spatial import FloatArray, axes_of_normal, frozen_array
 from manikin.scene.mesh import Mesh, as_trimesh
 from manikin.scene.obstacle import Box, Cylinder, HalfSpace, Obstacle, Plane
 
@@ -34,9 +34,7 @@ class Surface:
     @cached_property
     def rotation(self) -> FloatArray:
         """(3, 3) surface-to-world rotation with z along the normal."""
-        across = np.cross(np.eye(3)[int(np.argmin(np.abs(self.normal)))], self.normal)
-        across /= np.linalg.norm(across)
-        rotation = np.column_stack([across, np.cross(self.normal, across), self.normal])
+        rotation = axes_of_normal(self.normal)
         rotation.setflags(write=False)
         return rotation
 

@@ -132,7 +132,7 @@ class _Run:
         padded: Sequence[str] = (),
         wishes: Sequence[ForceWish] = (),
     ) -> None:
-        self.body, self.plan = body, motion
+        self.body, self.plan, self.schedule = body, motion, schedule
         settings = settings or ControlSettings()
         physics = physics or default_physics(body, schedule)
         self.period = settings.period
@@ -194,6 +194,8 @@ class _Run:
 
     def _switch(self, time: float) -> None:
         """Tell the world which touches are planned at a time of the plan, and hold on to grasps."""
+        load = self.schedule.sequence[int(self.schedule.phase_at(time))].load
+        self.world.carry({} if load is None else load.masses)
         now = tuple(number for number, hold in enumerate(self.holds) if _expected(hold.interval, time))
         if now != self._planned_now:
             planned = [(self.holds[i].segments, self.holds[i].obstacle) for i in now]

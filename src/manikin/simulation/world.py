@@ -9,10 +9,11 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from manikin.body.load import with_masses
 from manikin.errors import InputError
 from manikin.numerics.spatial import FloatArray, cross, finite_number, frozen_array
 from manikin.simulation.carrying import CarriedPoints
-from manikin.simulation.compile import SimulationModel, obstacle_of, root_rotation
+from manikin.simulation.compile import SimulationModel, compile_model, obstacle_of, root_rotation
 
 
 @dataclass(frozen=True)
@@ -157,6 +158,13 @@ class _Pressed:
         return cls(np.zeros((0, 2), dtype=int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
 
 
+_INERTIAL = (
+    "body_mass", "body_ipos", "body_iquat", "body_inertia", "body_subtreemass", "body_invweight0", "dof_M0",
+    "dof_invweight0", "actuator_acc0",
+)  # fmt: skip
+"""Arrays of the engine's model that depend on the masses."""
+
+
 class World:
     """Steps the physics engine and tells what it feels.
 
@@ -183,6 +191,7 @@ class World:
         self._masks: dict[tuple[tuple[str, ...], bool], NDArray[np.bool_]] = {}
         self._tables: dict[tuple[tuple[str, ...], str], NDArray[np.bool_]] = {}
         self._pushes: list[Push] = []
+        self._load: dict[str, float] = {}
         self._grips: dict[str, Grip] = {}
         self._grip_forces: dict[str, FloatArray] = {}
         self._touches: dict[tuple[str, str], Touch] = {}
@@ -232,6 +241,20 @@ class World:
         self._carried.clear()
 
     # --- what acts -------------------------------------------------------------------------
+
+    def carry(self, masses: Mapping[str, float]) -> None:
+        """Give effectors point masses to carry in place of those before, at rest in their frames.
+
+        Args:
+            masses: [kg] by the name of the effector; none sets everything down.
+        """
+        if masses == self._load:
+            return
+        model = self.model
+        loaded = compile_model(with_masses(model.body, masses), model.scene, model.options).mujoco
+        for name in _INERTIAL:
+            getattr(self._model, name)[:] = getattr(loaded, name)
+        self._load = dict(masses)
 
     def apply_push(
         self,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from manikin.body import human, limb_named
-from manikin.body.natural_range import learnt_distance
+from manikin.body.natural_range import learnt_joints
 from manikin.errors import ScenarioError
 from manikin.kinematics import reach_volume
 from manikin.pipeline.stages.contact_stage import find_supports
@@ -12,6 +12,12 @@ from manikin.scenarios import load_scenario
 
 SLACK = 2e-4
 """Tolerance of the postures' requirements [rad]."""
+
+
+def learnt_distance(body, q):
+    """(n,) distance of the worst hip or shoulder to the surface of its volume, negative outside [rad]."""
+    angles = np.asarray(q)[:, 7:]
+    return np.min([j.range.volume.distance(angles[:, j.hinges]) for j in learnt_joints(body)], axis=0)
 
 
 def found_with(ranges, name):

@@ -71,7 +71,10 @@ def schedule_in_world(schedule: ContactSchedule, transform_task_to_world: Planar
             if id(contact) not in moved:
                 moved[id(contact)] = contact_in_world(contact, transform_task_to_world)
         stance = Stance([moved[id(contact)] for contact in phase.stance], model=phase.stance.model)
-        phases.append(replace(phase, stance=stance))
+        load = phase.load
+        if load is not None:
+            load = replace(load, offset=transform_task_to_world.directions(load.offset))
+        phases.append(replace(phase, stance=stance, load=load))
     return ContactSchedule(StanceSequence(phases), schedule.instants)
 
 

@@ -130,18 +130,24 @@ def phase_margins(
 ) -> list[FloatArray]:
     """Margin at the instants of :func:`phase_times`; at key instants in both polytopes [N.m] or [N]."""
     return [
-        np.concatenate([block.min(axis=1) for block in facet_margins(problem, trajectory, polytope, times)])
-        for polytope, times in zip(polytopes, phase_times(trajectory), strict=True)
+        np.concatenate(
+            [block.min(axis=1) for block in facet_margins(problem, trajectory, polytope, times, phase)]
+        )
+        for phase, (polytope, times) in enumerate(zip(polytopes, phase_times(trajectory), strict=True))
     ]
 
 
 def facet_margins(
-    problem: CentroidalProblem, trajectory: CentroidalTrajectory, polytope: WrenchPolytope, times: FloatArray
+    problem: CentroidalProblem,
+    trajectory: CentroidalTrajectory,
+    polytope: WrenchPolytope,
+    times: FloatArray,
+    phase: int,
 ) -> Iterator[FloatArray]:
-    """(up to 1024, facets) distances to every facet at the given times, in blocks [N.m] or [N]."""
+    """(up to 1024, facets) distances to every facet at the given times of a phase, in blocks [N.m] or [N]."""
     for start in range(0, len(times), _BLOCK):
         part = times[start : start + _BLOCK]
-        distances = polytope.distances(trajectory.pseudo_wrench(part, problem.reference))
+        distances = polytope.distances(trajectory.pseudo_wrench(part, problem.reference, phase))
         yield distances / row_slopes(polytope, problem, trajectory.position(part))
 
 
@@ -167,8 +173,8 @@ def measure(
         *_duration_residuals(problem, trajectory),
     )
     zmp = least_zmp_distance(
-        (part.stance, trajectory.pseudo_wrench(instants))
-        for part, instants in zip(problem.sequence, times, strict=True)
+        (part.stance, trajectory.pseudo_wrench(instants, phase=number))
+        for number, (part, instants) in enumerate(zip(problem.sequence, times, strict=True))
     )
     return Residuals(items, lowest[phase], phase, time, zmp)
 

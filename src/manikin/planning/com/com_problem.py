@@ -124,14 +124,25 @@ class CentroidalTrajectory(Displayed):
         """(..., 3) third derivative at each time [m/s^3] ([Qiu2012]_ 5.6)."""
         return self._derivative(time, 3)
 
-    def pseudo_wrench(self, time: ArrayLike, reference: ArrayLike | None = None) -> FloatArray:
+    def pseudo_wrench(
+        self, time: ArrayLike, reference: ArrayLike | None = None, phase: int | None = None
+    ) -> FloatArray:
         """(..., 6) ``[m (a - g); (p - o) x m (a - g) + Ldot]`` about ``reference`` o [N, N.m].
 
         [Qiu2012]_ 4.6 for a point mass, 4.51 with the rate of its angular momentum; o is the world's origin
-        when omitted.
+        when omitted. A load of the phases moves with the CoM, at its offset from it; at a key instant that of
+        ``phase`` counts, or of the later one.
         """
         rate = None if self.turning is None else self.angular_momentum_rate(time)
-        return pseudo_wrench(self.mass, self.position(time), self.acceleration(time), rate, reference)
+        position, acceleration = self.position(time), self.acceleration(time)
+        wrench = pseudo_wrench(self.mass, position, acceleration, rate, reference)
+        times = np.asarray(time, dtype=np.float64)
+        phases = self.schedule.phase_at(times) if phase is None else np.full(times.shape, phase)
+        for number, item in enumerate(self.schedule.sequence):
+            if item.load is not None and np.any(rows := phases == number):
+                place = position[rows] + item.load.offset
+                wrench[rows] += pseudo_wrench(item.load.mass, place, acceleration[rows], None, reference)
+        return wrench
 
     def angular_momentum_rate(self, time: ArrayLike) -> FloatArray:
         """(..., 3) rate of the angular momentum about the CoM at each time [N.m]; zero for a point mass."""

@@ -15,7 +15,7 @@ from manikin.balance.margin import force_levers, wrench_levers
 from manikin.contact import ContactKind, Stance, StanceSequence
 from manikin.errors import InputError
 from manikin.numerics.polytope import Polytope
-from manikin.numerics.spatial import GRAVITY, FloatArray, skew
+from manikin.numerics.spatial import GRAVITY, FloatArray, rows_about, skew
 from manikin.planning.com.com_problem import CentroidalProblem
 
 FIRM_FRICTION = 0.7
@@ -242,9 +242,7 @@ def _bounds(problem: CentroidalProblem, polytopes: Sequence[Polytope]) -> FloatA
     """Upper bounds of the margin at the key instants; of forces only the sign counts."""
     if problem.margin_space != "wrench_about_origin":
         return margin_bounds(polytopes)
-    forces = [p.H[:, :3] - np.cross(p.H[:, 3:], problem.reference) for p in polytopes]
-    about_origin = [np.hstack([f, p.H[:, 3:]]) for f, p in zip(forces, polytopes, strict=True)]
-    return intersection_radii([Polytope(H, p.h) for H, p in zip(about_origin, polytopes, strict=True)])
+    return intersection_radii([Polytope(rows_about(P.H, -problem.reference), P.h) for P in polytopes])
 
 
 def _largest_distance(polytope: Polytope, lengths: FloatArray) -> float:

@@ -38,8 +38,11 @@ def facet_distances(
 ) -> list[FloatArray]:
     """Least distance of the pseudo-wrench from every facet of each phase [N.m] or [N]."""
     return [
-        np.min([block.min(axis=0) for block in facet_margins(problem, trajectory, polytope, times)], axis=0)
-        for polytope, times in zip(polytopes, phase_times(trajectory), strict=True)
+        np.min(
+            [block.min(axis=0) for block in facet_margins(problem, trajectory, polytope, times, phase)],
+            axis=0,
+        )
+        for phase, (polytope, times) in enumerate(zip(polytopes, phase_times(trajectory), strict=True))
     ]
 
 
@@ -150,6 +153,7 @@ def build_programme(problem: CentroidalProblem, facets: FacetIndices) -> ComProg
             geometric=tuple(constraint.function for constraint in problem.geometric),
             limited_distance=problem.support_distance is not None,
             key_planes=tuple(plane.key for plane in problem.key_planes),
+            loaded=tuple(number for number, phase in enumerate(problem.sequence) if phase.load is not None),
         )
     )
 
@@ -212,6 +216,9 @@ def _parameters(
         values[f"H{index}"] = polytope.H[rows] / length[:, None]
         values[f"h{index}"] = polytope.h[rows] / length
         values[f"contacts{index}"] = [contact.position - reference for contact in phase.stance]
+    for index, phase in enumerate(problem.sequence):
+        if phase.load is not None:
+            values[f"load{index}"] = (phase.load.mass, *phase.load.offset)
     for index, plane in enumerate(problem.key_planes):
         values[f"normal{index}"] = plane.normal
         values[f"offset{index}"] = plane.offset - plane.normal @ reference

@@ -42,6 +42,7 @@ class ComStructure:
         rows: Number of facets imposed in each phase.
         contacts: Number of contacts of each phase.
         key_planes: Key instant of each plane.
+        loaded: Phases with a load.
     """
 
     degree: int
@@ -52,6 +53,7 @@ class ComStructure:
     geometric: tuple[Callable[[Any, Any, Any], Any], ...]
     limited_distance: bool
     key_planes: tuple[int, ...] = ()
+    loaded: tuple[int, ...] = ()
 
     @property
     def phases(self) -> int:
@@ -207,6 +209,10 @@ def _add_balance(builder: _Builder, phase: int, mass: ca.SX, position: ca.SX, ac
     h = builder.parameter(f"h{phase}", facets)
     force = mass * (acceleration - ca.repmat(ca.DM([[0.0, 0.0, -GRAVITY]]), count, 1))
     wrench = ca.horzcat(force, _cross(position, force))
+    if phase in structure.loaded:  # a further mass that moves with the CoM, at an offset from it
+        load = builder.parameter(f"load{phase}", 4)
+        push = load[0] / mass * force
+        wrench += ca.horzcat(push, _cross(position + ca.repmat(load[1:].T, count, 1), push))
     slack = ca.repmat(h.T, count, 1) - wrench @ H.T
     scale = MARGIN_SCALE[structure.margin_space]
     wanted = builder.margin * ca.SX.ones(count, facets)

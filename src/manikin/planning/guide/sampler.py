@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from manikin.errors import InputError
-from manikin.numerics.spatial import FloatArray, finite_number, frozen_array
+from manikin.numerics.spatial import FloatArray, axes_of_normal, finite_number, frozen_array
 from manikin.planning.guide.checker import ReachabilityChecker
 from manikin.planning.guide.condition import SceneTriangles, endless
 from manikin.scene.obstacle import HalfSpace, Obstacle
@@ -215,9 +215,7 @@ class PoseSampler:
 def _cut_plane(item: Obstacle, region: SamplingRegion) -> tuple[FloatArray, FloatArray, np.ndarray]:
     """Two triangles of a plane that cover the region's shadow on it, normals, and whether solid."""
     normal, offset = item.world_plane
-    across = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
-    across /= np.linalg.norm(across)
-    axes = np.stack([across, np.cross(normal, across)])
+    axes = np.ascontiguousarray(axes_of_normal(normal)[:, :2].T)
     corners = np.array(np.meshgrid(*np.stack([region.lower, region.upper]).T)).reshape(3, -1).T
     flat = corners @ axes.T
     (left, low), (right, high) = flat.min(axis=0), flat.max(axis=0)

@@ -118,7 +118,7 @@ class MotionObjective:
         self, body: BodyModel, proximity: Proximity | None, targets: FitTargets, basis: SampledBasis
     ) -> None:
         self._body, self._proximity, self.targets, self.basis = body, proximity, targets, basis
-        self._sampler = MotionSampler(body, tuple(targets.effectors), basis)
+        self._sampler = MotionSampler(body, tuple(targets.effectors), basis, targets.loads)
         self._known = KnownDistances()
         meeting = targets.meeting
         self._ignored = targets.ignored if meeting is None else meeting.without(targets.ignored)
@@ -267,6 +267,9 @@ class MotionObjective:
         scale[:, 3:] = scales.moment_share * np.maximum(targets.margin, 10.0)[:, None]
         residual = momentum.value.copy()
         residual[:, :3] -= self._body.mass * targets.com_acceleration
+        for sample, load in enumerate(targets.loads or ()):
+            if load is not None:
+                residual[sample, :3] -= load.mass * targets.com_acceleration[sample]
         if targets.turning is not None:
             residual[:, 3:] -= targets.turning
         first, second, third = (jacobian / scale[:, :, None] for jacobian in momentum.jacobians)

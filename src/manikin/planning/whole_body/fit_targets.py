@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from manikin.body import BodyModel
 from manikin.body.limbs import hanging_segment
-from manikin.contact import Contact, ContactKind, ContactSchedule, SolePart
+from manikin.contact import CarriedLoad, Contact, ContactKind, ContactSchedule, SolePart
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.whole_body.fit_strength import HeldForces
 from manikin.planning.whole_body.sliding_touchdown import SITTING_DOWN, Ignored, SlidingTouchdown
@@ -67,6 +67,7 @@ class FitTargets:
             mass, zero.
         reference_second: (n, nq) second derivatives of the reference, from which accelerations count; None
             where any acceleration costs.
+        loads: What is carried at each sample besides the body, or None for nothing.
         forces: Contact forces at which joint torques beyond the strength cost; None where no torque costs.
     """
 
@@ -82,6 +83,7 @@ class FitTargets:
     meeting: SlidingTouchdown | None = None
     turning: FloatArray | None = None
     reference_second: FloatArray | None = None
+    loads: tuple[CarriedLoad | None, ...] | None = None
     forces: HeldForces | None = None
 
 

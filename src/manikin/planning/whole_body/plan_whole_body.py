@@ -260,6 +260,7 @@ class _Goal:
             reference_scale=scale,
             ignored=ignored_pairs(planner.body, planner.scene, schedule, time),
             meeting=sliding_touchdown_at(planner.body, planner.scene, schedule, time),
+            loads=tuple(schedule.sequence[int(phase)].load for phase in schedule.phase_at(time)),
             forces=held,
         )
 
@@ -399,5 +400,7 @@ class _Planner:
         """(n,) margins of the planned centre of mass [N.m]."""
         schedule, com = self.trajectory.schedule, self.trajectory.position(time)
         wrench = pseudo_wrench(self.body.mass, com, self.trajectory.acceleration(time))
+        if any(phase.load is not None for phase in schedule.sequence):
+            wrench = self.trajectory.pseudo_wrench(time)
         stances = [phase.stance for phase in schedule.sequence]
         return motion_margin(stances, schedule.phase_at(time), wrench, com, polytopes=self.polytopes).margin

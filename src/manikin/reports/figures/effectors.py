@@ -17,7 +17,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Swing
 from manikin.errors import FigureError
-from manikin.numerics.spatial import FloatArray
+from manikin.numerics.spatial import FloatArray, rotation_from_yaw, turned_root
 from manikin.pipeline.run_directory import RunRecord
 from manikin.recordings import Reconstruction, RecordedSupports
 from manikin.recordings.supports.support_levels import effector_places
@@ -251,10 +251,9 @@ def _seen_from_the_side(found: Reconstruction, places: FloatArray) -> FloatArray
     facing = np.array([pin.Quaternion(q[3:7]).toRotationMatrix()[:2, 0] for q in found.q]).mean(axis=0)
     if way @ (moved if np.linalg.norm(moved) > 1.0 else facing) < 0.0:
         way = -way
-    turn = pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.0, -float(np.arctan2(way[1], way[0]))))
-    q = np.array(found.q)
-    q[:, :3] = q[:, :3] @ turn.toRotationMatrix().T
-    q[:, 3:7] = [(turn * pin.Quaternion(one[3:7])).coeffs() for one in q]
+    yaw = -float(np.arctan2(way[1], way[0]))
+    q = turned_root(found.q, yaw)
+    q[:, :3] = q[:, :3] @ rotation_from_yaw(yaw).T
     return q
 
 

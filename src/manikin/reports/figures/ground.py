@@ -84,7 +84,7 @@ def _draw_plan(axes: Axes, schedule: ContactSchedule, name: str, path: ZmpPath) 
         draw_contact(axes, contact, ABOVE, colours[contact.effector])
     for plane in path.planes:
         if plane is not None and len(plane.polygon) > 1:
-            axes.fill(*plane.corners_in_world[:, :2].T, fill=False, edgecolor=EDGE, linewidth=0.8,
+            axes.fill(*plane.in_world(plane.polygon)[:, :2].T, fill=False, edgecolor=EDGE, linewidth=0.8,
                       linestyle=(0, (5, 3)), zorder=1)  # fmt: skip
     counts = [len(phase.stance) for phase in schedule.sequence]
     for part in sections(path.phase):

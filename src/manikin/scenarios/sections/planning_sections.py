@@ -173,12 +173,24 @@ class LimbSection(Section):
 
 
 class LoadSection(Section):
-    """What the hands carry during the whole motion."""
+    """What the hands carry, during the whole motion or some of the phases of its supports."""
 
     mass_kg: Positive = Field(description="mass of the load [kg], a point at the middle of the palms")
     hand: Literal["left", "right", "both"] = Field(
         default="both", description="which hand carries it; both carry half each"
     )
+    from_phase: Annotated[int, Field(strict=True, ge=0)] | None = Field(
+        default=None,
+        description="phase of the supports that begins as it is taken up (default: the first)",
+    )
+    until_phase: Annotated[int, Field(strict=True, ge=0)] | None = Field(
+        default=None, description="phase of the supports that ends as it is set down (default: the last)"
+    )
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it is carried all the time, as a part of the hands."""
+        return self.from_phase is None and self.until_phase is None
 
 
 class BodySection(Section):
