@@ -359,6 +359,4 @@ def _executed(result: Replan, even: Reconstruction) -> Replan:
     clock = schedule.instants, result.recording.key_times
     adapted = adapt_postures(body, scene, trajectory, result.com.polytopes, (even.time, even.q), clock)
     execution = execute(body, scene, adapted.motion, schedule, settings=SETTINGS, hold=0.0)
-    return Replan(
-        result.method, body, scene, result.recording, result.recorded, result.com, adapted, execution
-    )  # fmt: skip
+    return replace(result, adapted=adapted, execution=execution)
