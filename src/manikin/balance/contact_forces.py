@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from manikin.balance.friction import pyramid_edges, pyramid_sides
+from manikin.balance.friction import edges_in_world, pyramid_sides
 from manikin.contact import Contact, ContactKind, ContactSchedule, FrictionModel, Stance
 from manikin.numerics.spatial import FloatArray, cross
 
@@ -79,7 +79,7 @@ class ContactGenerators:
                 point = np.tile(contact.position, (len(wrench), 1))
             else:
                 rotation = contact.rotation_contact_to_world
-                edges = pyramid_edges(contact, stance.friction_model) @ rotation.T
+                edges = edges_in_world(contact, stance.friction_model)
                 force = np.tile(edges, (len(local), 1))
                 point = np.repeat(contact.position + local @ rotation.T, len(edges), axis=0)
                 couple, normal = np.zeros(force.shape), np.ones(len(force))
