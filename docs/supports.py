@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from acknowledgements import THANKS
 from PIL import Image
+from support_strip import support_strip_figure
 
 from manikin.errors import ManikinError
 from manikin.recordings import (
@@ -27,7 +28,6 @@ from manikin.recordings import (
     supports_of,
     timing_errors,
 )
-from manikin.reports.figures import support_strip_figure
 from manikin.reports.figures.write_figures import save_figure
 
 PAGE = Path(__file__).with_suffix(".md")

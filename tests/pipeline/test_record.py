@@ -148,7 +148,7 @@ def test_compare_prints_one_object_or_tables_and_draws(tmp_path, finished_run, c
 def test_compare_needs_a_place_it_can_write_to(tmp_path, finished_run, capfd):
     first = write_run(tmp_path / "first", finished_run)
     assert main(["compare", str(first), str(first), "--out", str(first / "summary.json")]) == 2
-    assert "cannot be written" in capfd.readouterr().err
+    assert "is a file; valid: a directory" in capfd.readouterr().err
 
 
 def test_read_run_names_the_error_class(tmp_path):

@@ -1,13 +1,7 @@
 """The table of many runs, and the verdict of each."""
 
 from manikin.pipeline.batch import counts
-from manikin.reports.summary_table import (
-    HEADER,
-    counts_line,
-    result_rows,
-    text_table,
-    verdict_line,
-)
+from manikin.reports.summary_table import HEADER, counts_line, result_rows, text_table, verdict_line
 
 GOOD = {
     "scenario": "platform", "variant": None, "expected": "success", "as_expected": True,

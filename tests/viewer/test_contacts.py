@@ -137,4 +137,4 @@ def test_the_command_serves_a_scenario(monkeypatch, capfd):
     assert {limb.name for limb in served[0].body.limbs} >= {"left_arm", "right_leg"}
     assert main(["view", "nowhere", "--contacts"]) == BAD_INPUT
     assert main(["view", "nowhere", "--samples", "200"]) == BAD_INPUT
-    assert "--samples goes with --contacts" in capfd.readouterr().err
+    assert "--samples does not go with this run: it is for --contacts" in capfd.readouterr().err

@@ -1,7 +1,4 @@
-"""Bodies, scenes and stances from a few words.
-
-Also here. Balance of one stance, to print and to draw.
-"""
+"""Bodies, scenes, stances and their balance from a few words."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -32,7 +29,7 @@ __all__ = ["Balance", "balance", "creature", "grasp", "human", "point", "scene",
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Balance(Displayed):
-    """How far a stance is from losing its balance, and what gives way first.
+    """Balance of a stance: its margins, and what gives way first.
 
     Attributes:
         stance: The contacts.
@@ -55,7 +52,7 @@ class Balance(Displayed):
         return self.report.limiting.description
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
+        """Labels and texts of the value."""
         return {
             "balanced": str(self.report.balanced), "margin": f"{self.margin:.1f} N.m",
             "force": f"{self.report.force_margin:.0f} N", "limiting": self.limiting,

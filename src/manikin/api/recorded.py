@@ -30,7 +30,7 @@ class RecordedMotion(Displayed):
     source: Path
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
+        """Labels and texts of the value."""
         kind = "markers" if isinstance(self.recording, MarkerRecording) else "skeleton"
         frames, rate = len(self.recording), self.recording.rate
         return {"file": self.source.name, "kind": kind, "frames": str(frames), "rate": f"{rate:g} Hz"}
@@ -55,7 +55,7 @@ class MeasuredRecording(Displayed):
     analysis: Analysis
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
+        """Labels and texts of the value."""
         return self.analysis.facts()
 
     def to_frame(self) -> "DataFrame":
@@ -87,7 +87,7 @@ class Drawing:
     svg: str
 
     def __repr__(self) -> str:
-        """Its size."""
+        """Size of the text."""
         return f"Drawing({len(self.svg)} characters of SVG)"
 
     def _repr_svg_(self) -> str:

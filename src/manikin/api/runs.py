@@ -1,6 +1,6 @@
 """Runs: planned, executed, walked, pushed and compared, to print, draw and watch."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -26,7 +26,7 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run(Displayed):
-    """What a run found: its verdict, motions and figures.
+    """Result of a run: its verdict, motions and figures.
 
     Attributes:
         summary: As printed by ``manikin run --json``.
@@ -40,7 +40,7 @@ class Run(Displayed):
     _kept: TemporaryDirectory[str] | None = field(default=None)
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
+        """Labels and texts of the value."""
         failure, motion = self.summary["failure"], self.motion
         duration = {} if motion is None else {"duration": f"{motion.duration:.2f} s"}
         reason = {} if failure is None else {"failure": f"{failure['stage']}: {failure['reason']}"}
@@ -78,7 +78,7 @@ class Run(Displayed):
 
     @property
     def requirements(self) -> "Requirements":
-        """What the run had to keep, measured and allowed."""
+        """Requirements of the run, measured and allowed."""
         return Requirements(tuple(self.summary["requirements"]))
 
     @property
@@ -99,9 +99,7 @@ class Run(Displayed):
         """
         from manikin.reports.figures import FIGURES
 
-        if figure not in FIGURES:
-            raise InputError(f"figure is {figure!r}; valid: {', '.join(FIGURES)}")
-        return FIGURES[figure](self.record)
+        return _drawn(FIGURES, figure, self.record)
 
     def view(self, port: int = 8080) -> None:
         """Play the motion in the browser until Ctrl-C, on this computer only."""
@@ -125,7 +123,7 @@ class Requirements(Displayed):
     rows: tuple[Mapping[str, Any], ...]
 
     def facts(self) -> dict[str, str]:
-        """How many there are, and which are broken."""
+        """Number of requirements, and the broken ones."""
         broken = [str(row["name"]) for row in self.rows if not row["held"]]
         return {"requirements": str(len(self.rows)), "broken": ", ".join(broken) or "none"}
 
@@ -150,7 +148,7 @@ class Comparison(Displayed):
     result: "RunComparison"
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
+        """Labels and texts of the value."""
         first, second = self.result.names
         matched = sum(pair.matched for pair in self.result.pairs)
         return {"first": first, "second": second, "matched phases": str(matched)}
@@ -167,9 +165,7 @@ class Comparison(Displayed):
         """
         from manikin.reports.figures import COMPARISONS
 
-        if figure not in COMPARISONS:
-            raise InputError(f"figure is {figure!r}; valid: {', '.join(COMPARISONS)}")
-        return COMPARISONS[figure](self.result)
+        return _drawn(COMPARISONS, figure, self.result)
 
 
 def plan(scenario: str | Path | Scenario, **options: Any) -> Run:
@@ -207,23 +203,14 @@ def simulate(
 
 
 def walk(
-    to: Place,
-    *,
-    start: Place = (0.0, 0.0, 0.0),
-    body: BodyModel | None = None,
-    max_speed: float | None = None,
-    seed: int | None = None,
-    out: str | Path | None = None,
-) -> Run:
+    to: Place, *, start: Place = (0.0, 0.0, 0.0), body: BodyModel | None = None,
+    max_speed: float | None = None, seed: int | None = None, out: str | Path | None = None,
+) -> Run:  # fmt: skip
     """Walk to a place as people do: path by optimal control, whole body from recorded walks.
 
     Args:
-        to: Goal.
-        start: Where the walk begins.
         body: Who walks; the default human when omitted.
         max_speed: Limit of the speed over the floor [m/s].
-        seed: Of every random choice.
-        out: Run directory that is kept.
 
     Raises:
         InputError: If a value is not usable.
@@ -234,15 +221,9 @@ def walk(
 
 
 def push(
-    force: float,
-    direction: float = 0.0,
-    *,
-    duration: float = 0.1,
-    body: BodyModel | None = None,
-    seed: int | None = None,
-    out: str | Path | None = None,
-    **recovery: Any,
-) -> Run:
+    force: float, direction: float = 0.0, *, duration: float = 0.1, body: BodyModel | None = None,
+    seed: int | None = None, out: str | Path | None = None, **recovery: Any,
+) -> Run:  # fmt: skip
     """Push a standing body and see whether it stays on its feet.
 
     Args:
@@ -250,8 +231,6 @@ def push(
         direction: Of the force, counter-clockwise from the body's forward axis [deg].
         duration: Of the push [s].
         body: A human; the body of Kudoh when omitted.
-        seed: Of every random choice.
-        out: Run directory that is kept.
         recovery: Keys of a scenario's ``recovery``, such as ``feet="free"`` and ``steps=1``.
 
     Raises:
@@ -269,7 +248,6 @@ def compare(first: Run | str | Path, second: Run | str | Path) -> Comparison:
 
     Args:
         first: A run, or its directory.
-        second: Another one.
 
     Raises:
         InputError: If a directory is not that of a run.
@@ -278,6 +256,12 @@ def compare(first: Run | str | Path, second: Run | str | Path) -> Comparison:
 
     records = [run.record if isinstance(run, Run) else read_run(run) for run in (first, second)]
     return Comparison(compare_runs(*records))
+
+
+def _drawn(figures: Mapping[str, Callable[[Any], "Figure"]], name: str, data: Any) -> "Figure":
+    if name not in figures:
+        raise InputError(f"figure is {name!r}; valid: {', '.join(figures)}")
+    return figures[name](data)
 
 
 def _job_options(options: dict[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What the commands of the command line share, and the larger ones of them.
+"""Commands of the command line, one module each.
 
 Nothing here loads numpy before a command runs: :func:`manikin.cli.app.main` limits its threads first.
 """

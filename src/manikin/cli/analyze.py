@@ -1,12 +1,7 @@
-"""``manikin analyze``: what a recorded person did, measured with the yardsticks of the plans.
+"""``manikin analyze``: measures of recorded people, the same as those of planned motions."""
 
-Also here. Processes that are ready by the time this one knows what they shall do.
-"""
-
-import multiprocessing
 import time as clock
 from collections.abc import Sequence
-from multiprocessing import forkserver
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,8 +11,14 @@ from manikin.cli.console import (
     BAD_INPUT,
     DONE,
     FAILED,
+    FiguresOption,
+    JobsOption,
     JsonOption,
+    LoadHandOption,
+    SexOption,
+    bars,
     complain,
+    directory_of,
     print_json,
     print_table,
     refuse,
@@ -28,17 +29,6 @@ from manikin.runtime.progress import Interruption
 
 if TYPE_CHECKING:
     from manikin.analysis.adaptation import Method
-
-
-def preload(module: str) -> None:
-    """Let a server of processes import a module while this process goes on.
-
-    Importing takes seconds, and the processes that the server starts have it done already. Nothing happens on
-    systems without such servers.
-    """
-    if "forkserver" in multiprocessing.get_all_start_methods():
-        forkserver.set_forkserver_preload([module])
-        forkserver.ensure_running()
 
 
 def analyze(
@@ -59,29 +49,25 @@ def analyze(
         float | None,
         typer.Option(metavar="KG", help="Mass of the person. Default: the file's, or the plates'."),
     ] = None,
-    sex: Annotated[str, typer.Option(metavar="male|female", help="Table of segment masses.")] = "male",
+    sex: SexOption = "male",
     friction: Annotated[float, typer.Option(metavar="MU", help="Of soles on the ground.")] = 0.8,
     load: Annotated[
         float, typer.Option("--load-kg", metavar="KG", help="Carried in the hands, as a mass.")
     ] = 0.0,
-    load_hand: Annotated[
-        str, typer.Option(metavar="left|right|both", help="Hand that carries --load-kg.")
-    ] = "both",
+    load_hand: LoadHandOption = "both",
     as_recorded: Annotated[
         bool,
         typer.Option("--as-recorded", help="Look for no shifted motion to stand beside the recorded one."),
     ] = False,
     plan: Annotated[
         str | None,
-        typer.Option(metavar="keyframes|timing-free", help="Plan the recording anew on its own stances."),
+        typer.Option(metavar="keyframes|timing-free", help="Re-plan the recording on its own stances."),
     ] = None,
     execute: Annotated[
         bool, typer.Option("--execute", help="With --plan: the whole body, executed in the physics engine.")
     ] = False,
-    jobs: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Files at a time; default: one per core.")
-    ] = None,
-    figures: Annotated[bool, typer.Option(help="Draw the figure of the report.")] = True,
+    jobs: JobsOption = None,
+    figures: FiguresOption = True,
     json: JsonOption = False,
 ) -> int:
     """Measure recorded people: supports, timing, balance, forces, effort; one report for each file."""
@@ -89,27 +75,20 @@ def analyze(
     if not single:
         refuse(plan is not None or execute, "--plan", "there are several files")
         refuse(frames is not None, "--frames", "there are several files")
-        if jobs != 1:
-            preload("manikin.reports.analysis_directory")
     from manikin.analysis import AnalysisOptions, recordings_in
 
     options = AnalysisOptions(
-        frames=frames,
-        mass=mass,
-        sex=sex,
-        friction=friction,
-        load=load,
-        load_hand=load_hand,
-        as_recorded=as_recorded,
-    )
+        frames=frames, mass=mass, sex=sex or "male", friction=friction, load=load,
+        load_hand=load_hand or "both", as_recorded=as_recorded,
+    )  # fmt: skip
     paths = recordings_in(sources)
-    if single:
-        refuse(jobs is not None, "--jobs", "there is one file")
-        directory = out if out is not None else None if json else Path("runs/analysis") / paths[0].stem
-        refuse(execute and plan is None, "--execute", "it needs --plan")
-        return _one(paths[0], directory, options, (plan, execute), draw=figures, json=json)
-    directory = out if out is not None else None if json else Path("runs/analysis")
-    return _several(paths, directory, options, context.obj, jobs, draw=figures, json=json)
+    if not single:
+        directory = directory_of(out, "analysis", json=json)
+        return _several(paths, directory, options, context.obj, jobs, draw=figures, json=json)
+    refuse(jobs is not None, "--jobs", "there is one file")
+    refuse(execute and plan is None, "--execute", "it needs --plan")
+    directory = directory_of(out, f"analysis/{paths[0].stem}", json=json)
+    return _one(paths[0], directory, options, (plan, execute), draw=figures, json=json)
 
 
 def _one(
@@ -123,26 +102,28 @@ def _one(
         chosen = None if method is None else _method(method)
         if directory is not None:
             AnalysisDirectory(directory)
-        found, planned = analyze_file(path, options), None
+        result, planned = analyze_file(path, options), None
         if chosen is not None:
-            from manikin.analysis.adaptation import adapt_recording as replan
+            from manikin.analysis.adaptation import adapt_recording
 
-            planned = replan(
-                found.found, found.supports, method=chosen, execute=execute, friction=options.friction
+            planned = adapt_recording(
+                result.found, result.supports, method=chosen, execute=execute, friction=options.friction
             )
         if directory is not None:
-            write_analysis(found, directory, draw=draw, plan=planned)
-    summary = summary_of(found, planned)
+            write_analysis(result, directory, draw=draw, plan=planned)
+    summary = summary_of(result, planned)
     failure = None if planned is None else summary["plan"]["failure"]
     if json:
         print_json(summary)
-        return FAILED if failure else DONE
-    print_table(_shown(summary))
-    for remark in summary["remarks"]:
-        typer.echo(f"note: {remark}", err=True)
-    if failure:
-        typer.echo(f"no plan: {failure}", err=True)
-    typer.echo(f"report in {directory}/report.html; see the motion with: manikin view {directory}", err=True)
+    else:
+        print_table(_shown(summary))
+        for remark in summary["remarks"]:
+            typer.echo(f"note: {remark}", err=True)
+        if failure:
+            typer.echo(f"no plan: {failure}", err=True)
+        typer.echo(
+            f"report in {directory}/report.html; see the motion with: manikin view {directory}", err=True
+        )
     return FAILED if failure else DONE
 
 
@@ -156,7 +137,7 @@ def _method(name: str) -> "Method":
 
 
 def _shown(summary: dict[str, Any]) -> dict[str, Any]:
-    """What people are told about a recording; everything is in the JSON."""
+    """Printed values of a recording; everything is in the JSON."""
     margin, residual, effort = summary["margin"], summary["reconstruction_residual_m"], summary["ergonomics"]
     shown = {
         "duration": f"{summary['duration_s']:.2f} s, {summary['frames']} frames",
@@ -176,31 +157,31 @@ def _shown(summary: dict[str, Any]) -> dict[str, Any]:
     if share is not None and (shifted := margin["shifted"]) is not None:
         shown["shifted"] = _shifted(shifted)
     for name in ("rula", "reba"):
-        if effort[name] is not None:
-            one = effort[name]
-            shown[name.upper()] = f"{one['max']} at {one['max_at_s']:.2f} s, {one['mean']:.1f} on average"
-    if effort["strength"] is not None:
-        one = effort["strength"]
-        shown["largest torque"] = (
-            f"{100.0 * one['max_share']:.0f} % of strength, {one['max_joint']} at {one['max_at_s']:.2f} s"
-        )
-    if summary["plan"] is not None and summary["plan"]["duration_s"] is not None:
-        one = summary["plan"]
+        if (score := effort[name]) is not None:
+            shown[name.upper()] = (
+                f"{score['max']} at {score['max_at_s']:.2f} s, {score['mean']:.1f} on average"
+            )
+    if (strength := effort["strength"]) is not None:
+        share, joint = 100.0 * strength["max_share"], strength["max_joint"]
+        shown["largest torque"] = f"{share:.0f} % of strength, {joint} at {strength['max_at_s']:.2f} s"
+    if (plan := summary["plan"]) is not None and plan["duration_s"] is not None:
         shown["plan"] = (
-            f"{one['duration_s']:.2f} s, CoM {1e3 * one['com_rms_m']:.1f} mm from the recorded one (RMS), "
-            f"margin at least {one['min_margin']:.2f} {one['margin_unit']}"
+            f"{plan['duration_s']:.2f} s, CoM {1e3 * plan['com_rms_m']:.1f} mm from the recorded one (RMS), "
+            f"margin at least {plan['min_margin']:.2f} {plan['margin_unit']}"
         )
     plates = summary["force_plates"]
-    if plates is not None and plates["timing_median_s"] is not None:
+    if plates is None:
+        return shown
+    if plates["timing_median_s"] is not None:
         shown["plates: instants"] = f"{1e3 * plates['timing_median_s']:.0f} ms (median of {plates['events']})"
-    if plates is not None and plates["cop_rms_m"] is not None:
+    if plates["cop_rms_m"] is not None:
         shown["plates: forces"] = (
             f"vertical {100.0 * plates['vertical_rms_body_weight']:.1f} % of body weight, "
             f"CoP {1e3 * plates['cop_rms_m']:.0f} mm (RMS)"
         )
-    if plates is not None and plates["torques"]:
+    if plates["torques"]:
         apart = ", ".join(
-            f"{joint.replace('_', ' ')} {one['rms_Nm']:.0f}" for joint, one in plates["torques"].items()
+            f"{joint.replace('_', ' ')} {item['rms_Nm']:.0f}" for joint, item in plates["torques"].items()
         )
         shown["plates: torques"] = f"{apart} N.m (RMS)"
     return shown
@@ -226,42 +207,33 @@ def _several(
         AnalysisDirectory,
         analyze_files,
         directories_for,
+        overview_of,
         write_overview,
     )
-    from manikin.runtime.progress import StageProgress
 
     if directory is not None:
         AnalysisDirectory(directory)
     folders = [None] * len(paths) if directory is None else directories_for(paths, directory)
     work = [AnalysisJob(path, folder, draw) for path, folder in zip(paths, folders, strict=True)]
     began, entries = clock.perf_counter(), {}
-    with stdout_kept_clean(), StageProgress() as bars:
+    with bars(interruption) as progress:
         for entry in analyze_files(work, options, workers=jobs or usable_cores()):
-            interruption.check()
             entries[entry.job.path] = entry
             if entry.summary is None:
                 complain(entry.refusal, BAD_INPUT)
-            bars("analyze", len(entries) / len(work), entry.job.path.name)
-    wall = clock.perf_counter() - began
+            progress("analyze", len(entries) / len(work), entry.job.path.name)
     ordered = [entries[path] for path in paths]
-    recorded = sum(entry.summary["duration_s"] for entry in ordered if entry.summary is not None)
-    refused = [entry for entry in ordered if entry.summary is None]
-    overview: dict[str, Any] = {
-        "files": [entry.summary for entry in ordered if entry.summary is not None],
-        "refused": [{"file": str(entry.job.path), "reason": entry.refusal} for entry in refused],
-        "duration_s": recorded, "wall_s": wall, "realtime_factor": recorded / wall,
-    }  # fmt: skip
+    overview = overview_of(ordered, clock.perf_counter() - began)
+    measured, refused = len(overview["files"]), len(overview["refused"])
     if directory is not None:
         write_overview(ordered, overview, directory)
     if json:
         print_json(overview)
     else:
-        typer.echo(
-            f"{len(ordered) - len(refused)} recordings of {recorded:.0f} s measured in {wall:.1f} s, "
-            f"{len(refused)} refused"
-        )
+        recorded, wall = overview["duration_s"], overview["wall_s"]
+        typer.echo(f"{measured} recordings of {recorded:.0f} s measured in {wall:.1f} s, {refused} refused")
         if directory is not None:
             typer.echo(f"overview in {directory}/index.html", err=True)
-    if len(refused) == len(ordered):
-        raise InputError(f"none of the {len(ordered)} files could be measured; valid: recordings, see above")
+    if not measured:
+        raise InputError(f"none of the {refused} files could be measured; valid: recordings, see above")
     return BAD_INPUT if refused else DONE

@@ -1,13 +1,9 @@
-"""Standard output and standard error of the commands, and their exit status.
-
-Also here. One job through the pipeline, with bars and a report for people. The result of a run on the screen:
-the verdict first, then each requirement with its measured value.
-"""
+"""Options, output and exit status of the commands, and one job of the pipeline."""
 
 import ctypes
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,16 +12,40 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from manikin.errors import InputError
-from manikin.reports.summary_table import verdict_line
-from manikin.runtime.progress import Interruption
+from manikin.reports.summary_table import verdict_lines
+from manikin.runtime.progress import Interruption, StageProgress
 
 if TYPE_CHECKING:
     from manikin.scenarios import Scenario
 
+DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
+"""Exit status of the commands."""
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+OutOption = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Directory. Default: one in runs; none with --json.")
+]
+FiguresOption = Annotated[bool, typer.Option(help="Draw the figures into the directory.")]
+JobsOption = Annotated[
+    int | None, typer.Option(metavar="N", min=1, help="Processes side by side; default: one per core.")
+]
+SexOption = Annotated[str | None, typer.Option(metavar="male|female", help="Sex of the person.")]
+LoadHandOption = Annotated[
+    str | None, typer.Option(metavar="left|right|both", help="Hand that carries --load-kg. Default: both.")
+]
+MotionArgument = Annotated[
+    Path, typer.Argument(metavar="DIR|FILE", help="Run directory or motion file (.h5).")
+]
+
+
+def directory_of(out: Path | None, name: str, *, json: bool) -> Path | None:
+    """Directory of the files: as asked for, else ``runs/NAME``; none beside JSON."""
+    return out if out is not None else None if json else Path("runs") / name
+
 
 @dataclass(frozen=True, eq=False)
 class JobOutcome:
-    """What a job left behind.
+    """Summary and files of a job.
 
     Attributes:
         summary: Of the run.
@@ -48,7 +68,8 @@ class JobOutcome:
         Args:
             shown: Values to print below the requirements.
         """
-        print_verdict(self.summary)
+        for line in verdict_lines(self.summary):
+            typer.echo(line)
         if shown:
             print_table(dict(shown))
         if self.viewable is not None:
@@ -61,97 +82,39 @@ def run_job(job: "Scenario", directory: Path | None, interruption: Interruption,
     """Run a scenario with bars on standard error.
 
     Args:
-        job: The scenario.
         directory: Run directory, or None to write nothing.
         interruption: Asked whether to go on whenever something was reported.
         draw: Whether figures are drawn into the directory.
     """
-    from manikin.runtime.progress import StageProgress
+    with bars(interruption) as progress:
+        from manikin.pipeline import runner
 
-    with stdout_kept_clean(), StageProgress() as bars:
-        from manikin.pipeline import runner as pipeline
-
-        def progress(stage: str, share: float) -> None:
-            interruption.check()
-            bars(stage, share)
-
-        result = pipeline.run(job, out=directory, seed=job.seed, progress=progress)
+        result = runner.run(job, out=directory, seed=job.seed, progress=progress)
         interruption.check()
         if directory is None:
             return JobOutcome(dict(result.summary), None, None)
         from manikin.reports.pages import write_run_page
-        from manikin.reports.write_outputs import write_outputs as write_products
+        from manikin.reports.write_outputs import write_outputs
 
         if draw:
-            write_products(directory, progress)
+            write_outputs(directory, progress)
         page = write_run_page(directory)
-        viewable = directory if result.motion is not None else None
-        return JobOutcome(dict(result.summary), page, viewable)
+        return JobOutcome(dict(result.summary), page, directory if result.motion is not None else None)
 
 
-HEADINGS = {
-    "walk": "planned walk", "centroidal": "planned centre of mass", "wholebody": "planned whole body",
-    "act": "planned act", "execution": "executed in the physics engine", "act execution": "executed act",
-    "push": "executed in the physics engine",
-}  # fmt: skip
-"""What the requirements of each stage are about."""
+@contextmanager
+def bars(interruption: Interruption) -> Iterator[Callable[..., None]]:
+    """Context with bars on standard error, which yields what reports (stage, share done, remark).
 
-YES_OR_NO = {"fell": ("no", "yes"), "at_rest": ("no", "yes")}
-"""Words of 0 and 1 for requirements that are no quantity."""
+    Standard output is kept clean. Each report asks whether the command is to be interrupted.
+    """
+    with stdout_kept_clean(), StageProgress() as progress:
 
+        def report(stage: str, share: float, remark: str = "") -> None:
+            interruption.check()
+            progress(stage, share, remark)
 
-def print_verdict(summary: Mapping[str, Any]) -> None:
-    """Print how a run ended, in one line, then every requirement; those that do not hold are marked."""
-    for line in verdict_lines(summary):
-        typer.echo(line)
-
-
-def verdict_lines(summary: Mapping[str, Any]) -> Iterator[str]:
-    """Lines of :func:`print_verdict`."""
-    yield verdict_line(summary)
-    yield about_line(summary)
-    rows: Sequence[Mapping[str, Any]] = summary["requirements"]
-    names = [requirement_name(row) for row in rows]
-    width = max(map(len, names), default=0)
-    heading = ""
-    for name, row in zip(names, rows, strict=True):
-        if HEADINGS[row["stage"]] != heading:
-            heading = HEADINGS[row["stage"]]
-            yield f"{heading}:"
-        measured, allowed = requirement_values(row)
-        mark = "ok    " if row["held"] else "FAILED"
-        time = "" if row["time_s"] is None else f"at {row['time_s']:.2f} s"
-        yield f"  {mark}  {name:{width}}  {measured:>14}  {allowed:<14}  {time}".rstrip()
-
-
-def about_line(summary: Mapping[str, Any]) -> str:
-    """Whose motion it is, how long it lasts and how long it took to compute."""
-    stature, mass = summary["stature_m"], summary["mass_kg"]
-    who = f"body of {mass:g} kg" if stature is None else f"person of {stature:g} m and {mass:g} kg"
-    known = [summary[stage] or {} for stage in ("wholebody", "centroidal", "walk")]
-    duration = next((block["duration_s"] for block in known if block.get("duration_s")), None)
-    lasts = "" if duration is None else f", motion of {duration:.2f} s"
-    return f"{who}{lasts}, computed in {summary['wall_s']:.1f} s, seed {summary['seed']}"
-
-
-def requirement_name(row: Mapping[str, Any]) -> str:
-    """Name of a requirement with what it was measured on."""
-    return f"{row['name']} ({row['where']})" if row["where"] else str(row["name"])
-
-
-def requirement_values(row: Mapping[str, Any]) -> tuple[str, str]:
-    """Measured and allowed value of a requirement, as texts."""
-    if row["key"] in YES_OR_NO:
-        words = YES_OR_NO[row["key"]]
-        return words[round(row["measured"])], words[round(row["limit"])]
-    unit = f" {row['unit']}" if row["unit"] else ""
-    measured = "-" if row["measured"] is None else f"{row['measured']:.3g}{unit}"
-    return measured, f"{row['sense']} {row['limit']:.3g}{unit}"
-
-
-DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
-
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+        yield report
 
 
 def refuse(given: bool, option: str, because: str) -> None:
@@ -200,6 +163,11 @@ def print_json(value: dict[str, Any]) -> None:
     from manikin.runtime.files import to_json
 
     typer.echo(to_json(value))
+
+
+def announce(url: str) -> None:
+    """Say where a viewer is served."""
+    typer.echo(f"viewer at {url} (Ctrl-C ends it)", err=True)
 
 
 def complain(message: str, status: int) -> int:

@@ -1,31 +1,36 @@
 """``manikin ergonomics``: RULA and REBA, torques against strength, effort and lowest margin of a motion."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from manikin.cli.console import DONE, JsonOption, flattened, print_json, print_table, stdout_kept_clean
+from manikin.cli.console import (
+    DONE,
+    JsonOption,
+    LoadHandOption,
+    MotionArgument,
+    flattened,
+    print_json,
+    print_table,
+    stdout_kept_clean,
+)
 from manikin.errors import InputError
 
-if TYPE_CHECKING:
-    from manikin.body import BodyModel
-    from manikin.motion import Motion
-    from manikin.motion.file import MotionFile
-
+_SCORE = ("max", "max_at_s", "max_side", "mean", "action_level", "action", "share_of_time")
 
 SHOWN = {
-    "rula": ("max", "max_at_s", "max_side", "mean", "action_level", "action", "share_of_time"),
-    "reba": ("max", "max_at_s", "max_side", "mean", "action_level", "action", "share_of_time"),
+    "rula": _SCORE,
+    "reba": _SCORE,
     "strength": ("max_share", "max_joint", "max_at_s"),
     "effort": ("squared_share_s", "rms_share", "positive_work_J", "negative_work_J"),
     "margin": ("min", "unit", "at_s", "limiting_contact"),
 }
-"""What people are told of each part; everything is in the JSON."""
+"""Printed values of each part; everything is in the JSON."""
 
 
 def ergonomics(
-    source: Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Run directory or motion file (.h5).")],
+    source: MotionArgument,
     planned: Annotated[bool, typer.Option("--planned", help="The planned motion.")] = False,
     executed: Annotated[
         bool, typer.Option("--executed", help="The executed motion; the default if there is one.")
@@ -41,9 +46,7 @@ def ergonomics(
         float | None,
         typer.Option(metavar="KG", help="Load in the hands, as a mass. Default: that of the motion."),
     ] = None,
-    load_hand: Annotated[
-        str, typer.Option(metavar="left|right|both", help="Hand that carries --load-kg.")
-    ] = "both",
+    load_hand: LoadHandOption = "both",
     load_pattern: Annotated[
         str, typer.Option(metavar="intermittent|static|shock", help="How the load acts.")
     ] = "intermittent",
@@ -80,9 +83,15 @@ def ergonomics(
     which = "planned" if planned else "executed" if executed else list(content.motions)[-1]
     if which not in content.motions:
         raise InputError(f"{source}: holds no {which} motion; valid: {', '.join(content.motions)}")
-    body, moved = _body(content, source), content.motions[which]
+    body, motion = content.body, content.motions[which]
+    if body is None:
+        raise InputError(f"{source}: holds no body; valid: a motion file with one, as manikin run writes it")
     if load_kg:
-        body, moved = _loaded(content, source, moved, load_kg, load_hand)
+        from manikin.balance.motion_forces import carried_motion
+
+        if content.schedule is None:
+            raise InputError(f"{source}: holds no contacts for --load-kg; valid: a motion of manikin run")
+        body, motion = carried_motion(body, motion, content.schedule, load_kg, load_hand or "both")
     phases = () if content.schedule is None else content.schedule.sequence
     carried = sum(body.loads.values())
     carried += max((phase.load.mass for phase in phases if phase.load is not None), default=0.0)
@@ -91,49 +100,22 @@ def ergonomics(
         neck_upright_deg=neck,
     )  # fmt: skip
     with stdout_kept_clean():
-        found = ergonomics_of(
-            body, moved, schedule=content.schedule, given=given,
-            fraction=fraction,
-        )  # fmt: skip
-    if csv is not None or figure is not None:
-        from manikin.reports.write_outputs import write_ergonomics_csv, write_ergonomics_figure
+        result = ergonomics_of(body, motion, schedule=content.schedule, given=given, fraction=fraction)
+    if csv is not None:
+        from manikin.runtime.files import write_result
 
-        if csv is not None:
-            write_ergonomics_csv(found, csv)
-        if figure is not None:
-            write_ergonomics_figure(found, figure, f"Ergonomics of {source.resolve().stem}, {which}")
-    report = {"motion": which} | found.as_dict()
+        write_result(csv, result.csv())
+    if figure is not None:
+        from manikin.reports.figures import ergonomics_figure
+        from manikin.reports.figures.write_figures import save_figure
+
+        save_figure(ergonomics_figure(result, f"Ergonomics of {source.resolve().stem}, {which}"), figure)
+    report = {"motion": which} | result.as_dict()
     if json:
         print_json(report)
     else:
         _print(report)
     return DONE
-
-
-def _body(content: "MotionFile", source: Path) -> Any:
-    """The body of a motion file.
-
-    Raises:
-        InputError: If the file does not hold it.
-    """
-    if content.body is None:
-        raise InputError(f"{source}: holds no body; valid: a motion file with one, as manikin run writes it")
-    return content.body
-
-
-def _loaded(
-    content: "MotionFile", source: Path, motion: "Motion", mass: float, hand: str
-) -> "tuple[BodyModel, Motion]":
-    """The motion made with a load.
-
-    Raises:
-        InputError: If the file does not hold its contacts, or the body cannot carry it.
-    """
-    from manikin.balance.motion_forces import carried_motion
-
-    if content.schedule is None:
-        raise InputError(f"{source}: holds no contacts for --load-kg; valid: a motion of manikin run")
-    return carried_motion(_body(content, source), motion, content.schedule, mass, hand)
 
 
 def _print(report: dict[str, Any]) -> None:

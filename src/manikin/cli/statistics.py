@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from manikin.cli.console import BAD_INPUT, DONE, JsonOption, complain, print_json, refuse, stdout_kept_clean
+from manikin.cli.console import BAD_INPUT, DONE, JsonOption, SexOption, bars, complain, print_json, refuse
 from manikin.errors import InputError
 from manikin.runtime.progress import Interruption
 
 if TYPE_CHECKING:
     from manikin.recordings.statistics.clip_statistics import From, GroupStatistics, StatisticsSettings
-    from manikin.recordings.statistics.clips import ClipFiles
     from manikin.recordings.statistics.phases import By
 
 
-STAGE = "recordings"
 SEXES = ("male", "female")
 
 Box = tuple[float, float, float, float, float]
@@ -62,7 +60,7 @@ def statistics(
     by: Annotated[
         str, typer.Option(metavar="number|kind|effectors", help="What phases have in common.")
     ] = "kind",
-    sex: Annotated[str, typer.Option(metavar="male|female", help="Sex, for the segments' masses.")] = "male",
+    sex: SexOption = "male",
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write statistics.json, phases.csv and figures there.")
     ] = None,
@@ -71,13 +69,8 @@ def statistics(
     """Phase durations, sequences, placements, centre of mass over sets of recordings."""
     if published:
         options = {
-            "FILE": files,
-            "--bar": bar,
-            "--box": box,
-            "--limit": limit,
-            "--phases": phases,
-            "--start": start,
-        }
+            "FILE": files, "--bar": bar, "--box": box, "--limit": limit, "--phases": phases, "--start": start,
+        }  # fmt: skip
         for option, value in options.items():
             refuse(value is not None, option, "the published motions are numbers already")
         return _published(out, by, json=json)
@@ -85,9 +78,9 @@ def statistics(
         raise InputError("no FILE is given; valid: recordings, folders or patterns, or --published")
     settings = _settings(bar, box, limit, effectors, phases, start, origin)
     _check_by(by)
-    if sex not in SEXES:
+    if sex not in (None, *SEXES):
         raise InputError(f"--sex is {sex!r}; valid: {', '.join(SEXES)}")
-    return _recorded(files, settings, cast("By", by), sex, out, context.obj, json=json)
+    return _recorded(files, settings, cast("By", by), sex or "male", out, context.obj, json=json)
 
 
 def _recorded(
@@ -96,21 +89,15 @@ def _recorded(
 ) -> int:  # fmt: skip
     from manikin.recordings.statistics.clip_statistics import clip_as_dict, statistics_of
     from manikin.recordings.statistics.clips import grouped_files, read_clips
-    from manikin.runtime.progress import StageProgress
 
     chosen = grouped_files(files)
-    with stdout_kept_clean(), StageProgress() as bars:
-
-        def report(share: float, remark: str) -> None:
-            interruption.check()
-            bars(STAGE, share, remark)
-
-        read = read_clips(chosen, sex=sex, report=report)
-        found = statistics_of(read.clips, settings)
+    with bars(interruption) as progress:
+        read = read_clips(chosen, sex=sex, report=lambda share, remark: progress("recordings", share, remark))
+        result = statistics_of(read.clips, settings)
         content: dict[str, Any] = {
             "limit_m": settings.limit,
             "overhead_m": None if settings.overhead is None else settings.overhead.height,
-            "groups": {group: one.as_dict() for group, one in found.items()},
+            "groups": {group: item.as_dict() for group, item in result.items()},
             "clips": [clip_as_dict(clip, settings) for clip in read.clips],
             "refused": [{"file": str(path), "reason": reason} for path, reason in read.refused.items()],
         }
@@ -118,16 +105,11 @@ def _recorded(
             from manikin.reports.directories import clip_figures, write_statistics
 
             sequences = [settings.phases_of(clip) for clip in read.clips]
-            write_statistics(out, content, sequences, clip_figures(read.clips, found, settings, by))
+            write_statistics(out, content, sequences, clip_figures(read.clips, result, settings, by))
     if json:
         print_json(content)
     else:
-        _print(found, by, settings.limit)
-    return _ending(read, out)
-
-
-def _ending(read: "ClipFiles", out: Path | None) -> int:
-    """Say what was refused, each in one line, and where the files are."""
+        _print(result, by, settings.limit)
     for reason in read.refused.values():
         complain(reason, BAD_INPUT)
     if out is not None and read.clips:
@@ -140,9 +122,9 @@ def _published(out: Path | None, by: str, *, json: bool) -> int:
     from manikin.recordings.statistics.phases import published_heights, published_phases
 
     _check_by(by)
-    found, heights = published_statistics(), published_heights()
+    result, heights = published_statistics(), published_heights()
     content = {
-        "groups": {group: one.as_dict() for group, one in found.items()},
+        "groups": {group: item.as_dict() for group, item in result.items()},
         "com_standing_m": heights.standing,
         "com_lowest_m": dict(heights.lowest),
         "overhead_m": dict(heights.beams),
@@ -155,7 +137,7 @@ def _published(out: Path | None, by: str, *, json: bool) -> int:
     if json:
         print_json(content)
     else:
-        _print(found, cast("By", "number"), None)
+        _print(result, cast("By", "number"), None)
     return DONE
 
 
@@ -170,7 +152,7 @@ def _settings(
     bar: float | None, box: Box | None, limit: float | None, effectors: str, phases: int | None,
     start: str | None, origin: str,
 ) -> "StatisticsSettings":  # fmt: skip
-    """What is measured.
+    """Settings of the statistics.
 
     Raises:
         InputError: If a word is unknown, a number does not fit, or both a bar and a box are given.
@@ -196,26 +178,26 @@ def _settings(
 
 
 def _print(groups: Mapping[str, "GroupStatistics"], by: "By", limit: float | None) -> None:
-    for group, one in groups.items():
-        typer.echo(f"{group}: {len(one.motions)} motions")
-        spreads = one.durations[by]
+    for group, item in groups.items():
+        typer.echo(f"{group}: {len(item.motions)} motions")
+        spreads = item.durations[by]
         width = max((len(name) for name in spreads), default=0)
         for name, s in spreads.items():
             typer.echo(
                 f"  {name:{width}}  n {s.count:3d}  mean {s.mean:.3f} s  SD {_known(s.deviation)}"
                 f"  CV {_known(s.variation)}  {s.smallest:.3f} to {s.largest:.3f}"
             )
-        _print_sequence(one)
-        for effector, s in one.distances.items():
-            within = f"; {100 * one.within[effector]:.1f} % within {limit:g} m" if one.within else ""
+        _print_sequence(item)
+        for effector, s in item.distances.items():
+            within = f"; {100 * item.within[effector]:.1f} % within {limit:g} m" if item.within else ""
             typer.echo(
                 f"  largest distance to {effector}: {s.mean:.3f} m, SD {_known(s.deviation)}, "
                 f"{s.smallest:.3f} to {s.largest:.3f}{within}"
             )
-        for motion, low in one.whole.items():
+        for motion, low in item.whole.items():
             tops = "".join(f", {part} {top:.2f}" for part, top in low.tops.items())
             typer.echo(f"  {motion}: lowest CoM {low.com_lowest:.2f} m at {low.com_lowest_at:.2f} s{tops}")
-        for motion, under in one.under:
+        for motion, under in item.under:
             room = "" if under.room is None else f", room {under.room:.2f}"
             typer.echo(
                 f"  {motion}: under it {under.start:.2f} to {under.end:.2f} s, CoM {under.com_lowest:.2f} m, "

@@ -1,29 +1,29 @@
 """``manikin words``: the partition of the goals of a walk into words."""
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from manikin.cli.console import DONE, JsonOption, print_json, refuse, stdout_kept_clean
+from manikin.cli.console import (
+    DONE,
+    JobsOption,
+    JsonOption,
+    OutOption,
+    bars,
+    directory_of,
+    print_json,
+    refuse,
+)
 from manikin.errors import InputError
-from manikin.runtime.progress import Interruption
-
-STAGE = "words"
 
 
 def words(
     context: typer.Context,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Directory. Default: runs/words; none with --json.")
-    ] = None,
+    out: OutOption = None,
     slices: Annotated[
         str, typer.Option(metavar="DEG,DEG|all", help="Final headings, each a multiple of 10 from 0 to 350.")
     ] = "all",
-    jobs: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Processes; default: one per core.")
-    ] = None,
+    jobs: JobsOption = None,
     figures: Annotated[
         bool | None, typer.Option("--figures/--no-figures", help="Draw the figures into the directory.")
     ] = None,
@@ -31,9 +31,17 @@ def words(
 ) -> int:
     """Partition the goals of a walk by the word of the best path; goes on where it was interrupted."""
     headings = _headings(slices)
-    directory = out if out is not None else None if json else Path("runs") / "words"
+    directory = directory_of(out, "words", json=json)
     refuse(figures is True and directory is None, "--figures", "there is no directory to draw into")
-    summary = _solve(headings, directory, context.obj, jobs=jobs, draw=figures is not False)
+    from manikin.pipeline.batch import usable_cores
+    from manikin.reports.directories import solve_partition
+    from manikin.walking.words import THESIS_GRID
+
+    with bars(context.obj) as progress:
+        summary = solve_partition(
+            headings, THESIS_GRID, directory, jobs=jobs or usable_cores(), draw=figures is not False,
+            progress=progress,
+        )  # fmt: skip
     if json:
         print_json(summary)
     else:
@@ -60,45 +68,6 @@ def _headings(text: str) -> list[int]:
                 f"--slices {text}: {part!r} is no slice; valid: all, or 0, 10, ... 350 with commas between"
             )
     return sorted({valid[part] for part in parts})
-
-
-def _solve(
-    headings: Sequence[int],
-    directory: Path | None,
-    interruption: Interruption,
-    *,
-    jobs: int | None,
-    draw: bool,
-) -> dict[str, Any]:
-    """Solve the slices that are not known yet, keep each as soon as it is, draw them."""
-    from manikin.pipeline.batch import usable_cores
-    from manikin.reports.directories import WordsDirectory, partition_as_dict
-    from manikin.runtime.progress import StageProgress
-    from manikin.walking.words import THESIS_GRID, WordSlice, solve_slices
-
-    kept = None if directory is None else WordsDirectory(directory, THESIS_GRID)
-    known: dict[int, WordSlice] = {} if kept is None else kept.slices
-    if kept is not None:
-        kept.begin(headings)
-    waiting = [heading for heading in headings if heading not in known]
-    with stdout_kept_clean(), StageProgress() as bars:
-        done = len(headings) - len(waiting)
-        bars(STAGE, done / len(headings), f"{done} of {len(headings)} slices")
-        for one in solve_slices(waiting, THESIS_GRID, jobs=jobs or usable_cores()):
-            known[round(one.heading_deg)] = one
-            if kept is not None:
-                kept.keep(one)
-            interruption.check()
-            done += 1
-            bars(STAGE, done / len(headings), f"{done} of {len(headings)} slices")
-        if kept is None:
-            return partition_as_dict(THESIS_GRID, headings, known)
-        summary = kept.finish(headings)
-        if draw:
-            from manikin.reports.write_outputs import write_words_figures
-
-            write_words_figures([known[heading] for heading in headings], kept.figures)
-    return summary
 
 
 def _print(summary: dict[str, Any]) -> None:

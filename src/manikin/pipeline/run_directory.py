@@ -1,4 +1,4 @@
-"""The run directory: what one job leaves behind.
+"""Run directory: the files of one run, and the run read back from them.
 
 ::
 
@@ -11,14 +11,11 @@
     DIR/motion.bvh         drawn from the files above, for animation programs
     DIR/figures/*.png      drawn from the files above
 
-Each file is written atomically, so an interrupted run leaves whole files of the stages
-that were done and nothing half-written.
-
-Also here. A run read back from its directory: plan, motions, and what follows from them.
+Each file is written atomically, so an interrupted run leaves whole files of the stages that were done.
 """
 
-import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -39,7 +36,7 @@ from manikin.planning.com import CentroidalTrajectory
 from manikin.planning.com.com_certificate import phase_margins, phase_times
 from manikin.planning.com.feasibility import polytopes_of
 from manikin.runtime.display import Displayed
-from manikin.runtime.files import FIGURES, ResultDirectory, write_result
+from manikin.runtime.files import FIGURES, ResultDirectory, read_json, write_result
 from manikin.scenarios import Scenario, load_scenario
 from manikin.scene import Scene
 
@@ -81,7 +78,7 @@ class ComTrack:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunRecord(Displayed):
-    """Everything that a run left behind; what it does not have is None or empty.
+    """Everything that is known of a run; what it does not have is None or empty.
 
     Attributes:
         label: What to call the run in figures.
@@ -106,17 +103,17 @@ class RunRecord(Displayed):
 
     @property
     def body(self) -> BodyModel | None:
-        """Who moved."""
+        """Body that moved."""
         return self.content.body
 
     @property
     def scene(self) -> Scene | None:
-        """Where."""
+        """Obstacles and floor."""
         return self.content.scene
 
     @property
     def schedule(self) -> ContactSchedule | None:
-        """With which contacts, when."""
+        """Contacts in time."""
         return self.content.schedule
 
     @property
@@ -172,7 +169,7 @@ class RunRecord(Displayed):
 
 
 def read_run(directory: str | Path) -> RunRecord:
-    """Read a run directory, however far the run got.
+    """Read a run directory, also of a run that stopped early.
 
     Args:
         directory: Written by ``manikin run``.
@@ -185,12 +182,12 @@ def read_run(directory: str | Path) -> RunRecord:
     summary = read_summary(folder)
     has_motion = (folder / MOTION).is_file()
     content = read_motions(folder / MOTION) if has_motion else MotionFile()
-    data = _read_trajectory(folder / STAGES / COM_TRAJECTORY)
-    if data is None:
+    planned = folder / STAGES / COM_TRAJECTORY
+    if not planned.is_file():
         mass = None if content.body is None else content.body.mass
         return RunRecord(_label(folder), content, summary, mass, walks=_read_walks(folder))
     scenario = load_scenario(folder / SCENARIO)
-    trajectory = _trajectory(data, scenario.build_sequence(planning=True), folder)
+    trajectory = _trajectory(read_json(planned), scenario.build_sequence(planning=True), folder)
     if not has_motion:
         real = _first_phases(scenario.build_sequence(), len(trajectory.schedule.sequence))
         schedule = ContactSchedule(real, trajectory.schedule.instants)
@@ -230,38 +227,30 @@ def _check_is_run(folder: Path) -> None:
         raise MotionFileError(f"{folder}: has no {SUMMARY}, its run did not finish; {valid} to its end")
 
 
-def _read_trajectory(path: Path) -> dict[str, Any] | None:
-    if not path.is_file():
-        return None
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise MotionFileError(f"{path}: cannot be read ({error}); valid: as written by manikin") from None
-    if not isinstance(data, dict):
-        raise MotionFileError(f"{path}: is not a JSON object; valid: as written by manikin")
-    return data
-
-
 def _read_walks(folder: Path) -> dict[str, FloatArray]:
-    """Ways over the floor, (n, 4) each; none where nobody walks."""
+    """Routes over the floor, (n, 4) each; none where nobody walks."""
     path = folder / STAGES / f"{WALK_PATHS}.json"
-    data = _read_trajectory(path)
-    try:
+    with _undamaged(path):
         return {
-            name: np.column_stack([one["time_s"], np.reshape(one["place"], (-1, 3))]).astype(np.float64)
-            for name, one in (data or {}).items()
+            name: np.column_stack([item["time_s"], np.reshape(item["place"], (-1, 3))]).astype(np.float64)
+            for name, item in (read_json(path) if path.is_file() else {}).items()
         }
-    except (KeyError, TypeError, ValueError) as error:
-        problem = " ".join(str(error).split())[:160]
-        raise MotionFileError(f"{path}: is damaged ({problem}); valid: as written by manikin") from None
 
 
 def _trajectory(data: dict[str, Any], sequence: StanceSequence, folder: Path) -> CentroidalTrajectory:
-    try:
+    with _undamaged(folder / STAGES / COM_TRAJECTORY):
         phases = len(data["key_instants_s"]) - 1
         return CentroidalTrajectory.from_dict(data, _first_phases(sequence, phases))
+
+
+@contextmanager
+def _undamaged(path: Path) -> Iterator[None]:
+    """Context in which values that do not fit become the message that ``path`` is damaged."""
+    try:
+        yield
+    except MotionFileError:
+        raise
     except (InputError, KeyError, TypeError, ValueError) as error:
-        path = folder / STAGES / COM_TRAJECTORY
         problem = " ".join(str(error).split())[:160]
         raise MotionFileError(f"{path}: is damaged ({problem}); valid: as written by manikin") from None
 
@@ -276,16 +265,16 @@ MOTION = "motion.h5"
 BVH = "motion.bvh"
 OTHERS = "motion-*.h5"
 WALK_PATHS = "walk_paths"
-"""What the walking stage keeps of the ways over the floor, by the name of who walks."""
+"""Stage result with the routes over the floor, by the name of the walker."""
 BODY = "the body"
-"""In it, the body that the scenario is about."""
+"""Name of the scenario's body in it."""
 SUMMARY = "summary.json"
 REPORT = "report.html"
 STAGES = "stages"
 
 
 def other_motion(name: str) -> str:
-    """File of the motion of somebody else who walks there."""
+    """File of the motion of another walker."""
     return OTHERS.replace("*", name)
 
 
@@ -315,7 +304,7 @@ class RunDirectory(ResultDirectory):
         return self.write(SCENARIO, yaml_text)
 
     def write_stage(self, name: str, result: Mapping[str, Any]) -> Path:
-        """Keep what a stage found, as soon as it is known.
+        """Keep the result of a stage, as soon as it is known.
 
         Args:
             name: Of the stage, such as ``"centroidal"``.
@@ -334,15 +323,4 @@ def read_summary(path: str | Path) -> dict[str, Any]:
     Raises:
         MotionFileError: If there is none, or it is damaged.
     """
-    file = Path(path) / SUMMARY
-    try:
-        summary = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise MotionFileError(
-            f"{file}: there is no such file; valid: the directory of a finished run"
-        ) from None
-    except (OSError, ValueError) as error:
-        raise MotionFileError(f"{file}: cannot be read ({error}); valid: as written by manikin") from None
-    if not isinstance(summary, dict):
-        raise MotionFileError(f"{file}: is not a JSON object; valid: as written by manikin")
-    return summary
+    return read_json(Path(path) / SUMMARY, "the directory of a finished run")

@@ -45,7 +45,6 @@ def run(
 
     Args:
         scenario: Name of a built-in scenario, a scenario file, or a scenario.
-        variant: Name of one of the scenario's variants.
         overrides: Values to set, ``"supports.friction=0.5"`` each.
         out: Run directory; nothing is written when omitted.
         seed: Seed of every random choice; the scenario's own when omitted.
@@ -92,7 +91,7 @@ def _follow_the_road(context: RunContext, report: Report, requirements: Executio
         if on_footprints is None:
             return RunResult.of(report)
         context = on_footprints
-    with_contacts = context if context.has_supports else plan_contacts(context, report)
+    with_contacts = context if context.scenario.file.supports is not None else plan_contacts(context, report)
     if with_contacts is None:
         return RunResult.of(report)
     if context.scenario.refines:

@@ -1,1 +1,1 @@
-"""What is made from finished runs: tables, figures, pages, comparisons, exports, directories."""
+"""Results of runs and recordings: tables, figures, pages, comparisons, exports, directories."""

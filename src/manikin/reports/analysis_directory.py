@@ -13,9 +13,6 @@ Each file is written atomically. A plan made on the stances of a recording is co
 ([Qiu2012]_ Table 7.7, Fig. 7.16 to 7.18).
 """
 
-import csv
-import gc
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -36,8 +33,8 @@ from manikin.planning.com.com_certificate import phase_margins, phase_times
 from manikin.reports.analysis_sheet import recording_sheet
 from manikin.reports.comparison.compare import RunComparison, compare_runs
 from manikin.reports.pages import analysis_page, render
-from manikin.runtime.files import ResultDirectory, make_directory, write_result
-from manikin.runtime.parallel import SERVED, prepare_worker, side_by_side
+from manikin.runtime.files import ResultDirectory, columns_csv, csv_text, make_directory, write_result
+from manikin.runtime.parallel import side_by_side
 
 
 def analyze_files(
@@ -61,25 +58,20 @@ def analyze_files(
         raise InputError(f"workers is {workers}; valid: at least 1")
     # Longest first, so that all processes end together.
     ordered = sorted(jobs, key=lambda job: -job.path.stat().st_size)
-    one = partial(analyze_one, options=options)
-    for _, entry in side_by_side(one, ordered, workers, "analysis", prepare=_prepare, method=SERVED):
+    item = partial(analyze_one, options=options)
+    for _, entry in side_by_side(item, ordered, workers, "analysis"):
         yield entry
-
-
-def _prepare() -> None:
-    prepare_worker()
-    gc.freeze()  # what the libraries brought along is not looked through again with every collection
 
 
 def analyze_one(job: AnalysisJob, options: AnalysisOptions) -> AnalysisEntry:
     """Measure one file and write its directory."""
     try:
-        found = analyze_file(job.path, options)
+        result = analyze_file(job.path, options)
     except (ManikinError, np.linalg.LinAlgError) as error:
         return AnalysisEntry(job, None, " ".join(str(error).split()))
     if job.directory is not None:
-        write_analysis(found, job.directory, draw=job.draw)
-    return AnalysisEntry(job, found.as_dict())
+        write_analysis(result, job.directory, draw=job.draw)
+    return AnalysisEntry(job, result.as_dict())
 
 
 def directories_for(paths: Sequence[Path], out: Path) -> list[Path]:
@@ -203,7 +195,6 @@ def write_analysis(
     """Write the files of one recording; the summary comes last.
 
     Args:
-        analysis: What was measured.
         directory: Created if it is not there.
         draw: Whether the report has its figures.
         plan: The recording re-planned.
@@ -221,28 +212,39 @@ def write_analysis(
     content = MotionFile(body=analysis.body) if plan is None else plan.content
     content = replace(content, recorded=analysis.motion, shifted=analysis.shifted_motion)
     write_motions(directory / MOTION, content)
-    write_result(directory / SERIES, _series_text(analysis))
+    write_result(directory / SERIES, columns_csv(analysis.series(), 6))
     write_result(directory / REPORT, analysis_page(analysis, summary, sheet, pictures))
     write_result(directory / SUMMARY, summary)
+
+
+def overview_of(entries: Sequence[AnalysisEntry], wall: float) -> dict[str, Any]:
+    """Content of ``analyses.json``: all summaries, and what was refused.
+
+    Args:
+        wall: Time that all of them took together [s].
+    """
+    measured = [entry.summary for entry in entries if entry.summary is not None]
+    duration = sum(summary["duration_s"] for summary in measured)
+    refused = [entry for entry in entries if entry.summary is None]
+    return {
+        "files": measured,
+        "refused": [{"file": str(entry.job.path), "reason": entry.refusal} for entry in refused],
+        "duration_s": duration, "wall_s": wall, "realtime_factor": duration / wall,
+    }  # fmt: skip
 
 
 def write_overview(entries: Sequence[AnalysisEntry], overview: dict[str, Any], directory: Path) -> None:
     """Write the table of several recordings as a page, as CSV and as JSON.
 
     Args:
-        entries: In order.
-        overview: What the command says of all of them.
+        overview: Of :func:`overview_of`.
         directory: Where the directories of the recordings are.
 
     Raises:
         MotionFileError: If they cannot be written.
     """
     rows = [_row(entry) for entry in entries]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write_result(directory / TABLE, text.getvalue())
+    write_result(directory / TABLE, csv_text(list(rows[0]), [list(row.values()) for row in rows]))
     write_result(directory / OVERVIEW, _overview_page(entries, rows, overview, directory))
     write_result(directory / ANALYSES, overview)
 
@@ -253,13 +255,13 @@ def _overview_page(
     """HTML of several recordings; columns without any value are left out."""
     files = [entry.job.path.resolve() for entry in entries]
     shared = Path(commonpath([file.parent for file in files]))
-    known = [one for one in COLUMNS if one[2] and any(row[one[0]] is not None for row in rows)]
+    known = [item for item in COLUMNS if item[2] and any(row[item[0]] is not None for row in rows)]
     shown = []
     for entry, file, row in zip(entries, files, rows, strict=True):
-        written = entry.job.directory is not None and entry.summary is not None
+        inside = None if entry.summary is None else entry.job.directory
         shown.append({
             "name": file.relative_to(shared).as_posix(),
-            "link": f"{entry.job.directory.relative_to(folder).as_posix()}/{REPORT}" if written else None,
+            "link": None if inside is None else f"{inside.relative_to(folder).as_posix()}/{REPORT}",
             **{key: None if row[key] is None else factor * row[key] for key, _, _, factor, _ in known},
         })  # fmt: skip
     columns = [{"key": key, "heading": heading, "decimals": digits} for key, _, heading, _, digits in known]
@@ -278,11 +280,3 @@ def _value(summary: Mapping[str, Any] | None, path: str) -> Any:
     for key in path.split("."):
         value = None if value is None else value.get(key)
     return len(value) if isinstance(value, list) else value
-
-
-def _series_text(found: Analysis) -> str:
-    columns = found.series()
-    text = io.StringIO()
-    text.write(",".join(columns) + "\n")
-    np.savetxt(text, np.column_stack(list(columns.values())), fmt="%.6g", delimiter=",")
-    return text.getvalue()

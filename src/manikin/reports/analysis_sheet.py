@@ -1,11 +1,7 @@
-"""A recorded person on one sheet: postures, supports, forces, balance, height, scores.
+"""A recorded person on one sheet: postures, supports, forces, margins, height and scores over time.
 
-All share one axis of time, band below band. The sheet is an SVG drawing and no figure of Matplotlib: there is
-one for every recording of a folder, and it is drawn in a hundredth of the time.
-
-Also here. Drawings for pages: lines, bars and words as SVG, which a browser draws sharply at any size.
-
-Making one takes a hundredth of what a figure of pixels takes.
+All share one axis of time, band below band. The sheet is an SVG drawing: there is one for every recording of
+a folder, and it is made in a hundredth of the time of a figure of Matplotlib.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,7 +18,7 @@ from manikin.numerics.spatial import FloatArray, turned_root
 from manikin.runtime.palette import COLOURS, colours_of, readable, side_colour
 
 TENTHS = 10.0
-"""Of a pixel: what coordinates are rounded to."""
+"""Coordinates are rounded to the inverse of this [1/px]."""
 
 INK = "#222222"
 
@@ -52,7 +48,7 @@ class SvgDrawing:
 
     def bar(self, x: float, y: float, width: float, height: float, colour: str) -> None:
         """A filled rectangle with its upper left corner at (x, y)."""
-        left, top, across, down = (_tenths(one) for one in (x, y, width, height))
+        left, top, across, down = (_tenths(item) for item in (x, y, width, height))
         self._parts.append(f'<rect x="{left}" y="{top}" width="{across}" height="{down}" fill="{colour}"/>')
 
     def text(
@@ -181,7 +177,7 @@ def recording_sheet(analysis: Analysis, words: str) -> str:
 
 
 class _Clock:
-    """Where instants are on the sheet."""
+    """Positions of instants on the sheet."""
 
     def __init__(self, first: float, last: float) -> None:
         self.first, self.last = first, last
@@ -224,8 +220,8 @@ def _bands(analysis: Analysis) -> list[_Band]:
     posture = analysis.ergonomics.posture
     if posture is not None:
         scores = {
-            one.method: (one.score.astype(np.float64), COLOURS[colour])
-            for one, colour in ((posture.rula, "planned"), (posture.reba, "executed"))
+            item.method: (item.score.astype(np.float64), COLOURS[colour])
+            for item, colour in ((posture.rula, "planned"), (posture.reba, "executed"))
         }
         bands.append(_Band("scores", scores, 0.0, 15.0))
     return bands
@@ -264,8 +260,8 @@ def _supports(sheet: SvgDrawing, clock: _Clock, analysis: Analysis, top: float) 
     colours = colours_of(names)
     for row, name in enumerate(names):
         level = top + ROW * row
-        for one in analysis.supports.of(name):
-            first, last = clock(np.array([one.start, one.end]))
+        for item in analysis.supports.of(name):
+            first, last = clock(np.array([item.start, item.end]))
             sheet.bar(first, level + 2.0, last - first, ROW - 4.0, colours[name])
         words = (readable(name), COLOURS["ink"])
         sheet.text(LEFT - 8.0, level + 0.5 * ROW + 4.0, words, anchor="end")
@@ -303,7 +299,7 @@ class _Postures:
         bones = places[:, None, None] + self._scale * self._bones * (1.0, -1.0)
         left, trunk, right = (side_colour(name) for name in ("left", "trunk", "right"))
         for colour in (left, trunk, right):  # seen from the right, whose limbs are the nearest
-            chosen = [number for number, one in enumerate(self._colours) if one == colour]
+            chosen = [number for number, item in enumerate(self._colours) if item == colour]
             sheet.strokes([line for lines in bones[:, chosen] for line in lines], colour, 5.0)
         for instant, (place, _) in zip(self._instants, places, strict=True):
             level = floor + self._scale * self._below + 18.0
@@ -313,8 +309,8 @@ class _Postures:
 def _drawn(body: BodyModel) -> list[str]:
     """Segments whose bones are drawn: from each parent to all, then of those that are nobody's parent."""
     parents = {segment.parent for segment in body.segments}
-    return [one.name for one in body.segments[1:]] + [
-        one.name for one in body.segments[1:] if one.name not in parents
+    return [item.name for item in body.segments[1:]] + [
+        item.name for item in body.segments[1:] if item.name not in parents
     ]
 
 
@@ -326,9 +322,9 @@ def _bones(body: BodyModel, q: FloatArray) -> FloatArray:
     """
     model, data = body.pinocchio, body.pinocchio.createData()
     pin.framesForwardKinematics(model, data, q)
-    frames = {one.name: data.oMf[body.segment_frame(one.name)] for one in body.segments}
+    frames = {item.name: data.oMf[body.segment_frame(item.name)] for item in body.segments}
     places = {name: frame.translation for name, frame in frames.items()}
-    lines = [[places[one.parent or ""], places[one.name]] for one in body.segments[1:]]
+    lines = [[places[item.parent or ""], places[item.name]] for item in body.segments[1:]]
     for name in _drawn(body)[len(lines) :]:
         end = end_of(body.segment(name))
         lines.append([places[name], frames[name].act(end)])
@@ -336,7 +332,7 @@ def _bones(body: BodyModel, q: FloatArray) -> FloatArray:
 
 
 def _heading(analysis: Analysis) -> float:
-    """Where the pelvis goes, or faces in the middle of the recording where it stays [rad]."""
+    """Heading of the way of the pelvis, or of the pelvis in the middle of the recording if it stays [rad]."""
     q = analysis.motion.q
     way = q[-1, :2] - q[0, :2]
     if float(np.linalg.norm(way)) > 0.5:

@@ -1,15 +1,7 @@
-"""The directory of a partition into words: slices are kept as soon as they are solved, and not solved again.
+"""Result directories of push maps, statistics of recordings and partitions into words.
 
-::
-
-    DIR/words.json           what is asked, what is known of it: counts and shares by word, residuals
-    DIR/slices/150.npz       paths of the slice of 150 deg: turns, shapes, lengths, costs
-    DIR/figures/*.png        drawn from the slices
-
-Each file is written atomically.
-
-Also here. The directory of push maps: every direction is kept as soon as it is known, and need not be
-searched again. The directory that ``manikin statistics --out`` writes.
+Directions of a map and slices of a partition are kept as soon as they are known, so that an interrupted
+search goes on where it was.
 
 ::
 
@@ -17,21 +9,19 @@ searched again. The directory that ``manikin statistics --out`` writes.
     DIR/map.csv                one row per map and direction
     DIR/figures/push_map.png   drawn from the maps
 
-Each file is written atomically.
-
-::
-
-    DIR/statistics.json             all that was measured
-    DIR/phases.csv                  one row per motion and phase
+    DIR/statistics.json        all that was measured
+    DIR/phases.csv             one row per motion and phase
     DIR/figures/phase_durations.png, placements.png, com_paths.png, com_heights.png, com_distances.png
+
+    DIR/words.json             what is asked, what is known of it: counts and shares by word, residuals
+    DIR/slices/150.npz         paths of the slice of 150 deg: turns, shapes, lengths, costs
+    DIR/figures/*.png          drawn from the slices
 
 Figures without content are left out.
 """
 
-import csv
-import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -39,7 +29,7 @@ from zipfile import BadZipFile
 import numpy as np
 from matplotlib.figure import Figure
 
-from manikin.errors import FigureError, InputError, MotionFileError
+from manikin.errors import FigureError, InputError
 from manikin.recordings.statistics.clip_statistics import GroupStatistics, StatisticsSettings
 from manikin.recordings.statistics.clips import RecordedClip
 from manikin.recordings.statistics.phases import (
@@ -54,23 +44,27 @@ from manikin.reports.figures import (
     com_distances_figure,
     com_heights_figure,
     com_paths_figure,
+    equal_paths_figure,
     phase_durations_figure,
     placements_figure,
     published_lowest,
+    push_map_figure,
+    words_figure,
 )
 from manikin.reports.figures.write_figures import save_figure
-from manikin.runtime.files import (
-    FIGURES,
-    ResultDirectory,
-    atomic_path,
-    make_directory,
-    to_json,
-    write_result,
-    writing,
-)
+from manikin.runtime.files import ResultDirectory, atomic_path, csv_text, to_json, writing
 from manikin.runtime.version import __version__
-from manikin.simulation import PushMap
-from manikin.walking.words import HEADINGS, THESIS_WORDS, WordGrid, WordSlice, count_words, shares
+from manikin.simulation import PushMap, PushTrials
+from manikin.walking.words import (
+    HEADINGS,
+    THESIS_WORDS,
+    WordGrid,
+    WordSlice,
+    count_words,
+    equal_paths,
+    shares,
+    solve_slices,
+)
 
 MAP = "map.json"
 TABLE = "map.csv"
@@ -83,25 +77,24 @@ def maps_as_dict(maps: Sequence[PushMap]) -> dict[str, Any]:
     """Content of ``map.json``: the first map, the others under ``compared``."""
     first, *others = maps
     return {
-        "manikin": __version__, "complete": not any(one.missing for one in maps), **first.as_dict(),
-        "compared": [one.as_dict() for one in others],
+        "manikin": __version__, "complete": not any(item.missing for item in maps), **first.as_dict(),
+        "compared": [item.as_dict() for item in others],
     }  # fmt: skip
 
 
 class MapDirectory(ResultDirectory):
-    """Reads and writes the files of some maps.
+    """Directory of push maps.
 
     Attributes:
         maps: As far as they are known.
     """
 
-    kind, marks = "map", (MAP,)
+    kind, marks, writer = "map", (MAP,), "manikin push --map"
 
     def __init__(self, path: str | Path, asked: Sequence[PushMap]) -> None:
-        """Create the directory, or go on with what an earlier run has found there.
+        """Create the directory, or continue the maps of an earlier run.
 
         Args:
-            path: The directory.
             asked: Empty maps of what is asked for.
 
         Raises:
@@ -111,73 +104,56 @@ class MapDirectory(ResultDirectory):
         super().__init__(path)
         self.maps = tuple(asked)
         if (self.path / MAP).exists():
-            self.maps = self._taken_over(_map_directory_read(self.path / MAP))
+            self.maps = self._continued(self.read(MAP))
 
     def keep(self, maps: Sequence[PushMap]) -> None:
-        """Write what is known by now.
-
-        Raises:
-            MotionFileError: If it cannot be written.
-        """
+        """Write what is known by now."""
         self.maps = tuple(maps)
         self.write(TABLE, _table(self.maps))
         self.write(MAP, maps_as_dict(self.maps))
 
-    def _taken_over(self, data: Mapping[str, Any]) -> tuple[PushMap, ...]:
-        """Maps of an earlier run.
+    def draw(self, trials: PushTrials) -> None:
+        """Draw the maps around the soles of the body in ``trials``.
 
         Raises:
-            InputError: If they are about something else.
+            FigureError: If no impulse was held.
         """
-        asked = _asked(maps_as_dict(self.maps))
-        kept = _asked(data)
+        save_figure(push_map_figure(self.maps, trials.soles()), self.figures / "push_map.png")
+
+    def _continued(self, data: Mapping[str, Any]) -> tuple[PushMap, ...]:
+        """Maps of an earlier run, which must be about the same."""
+        asked, kept = _asked(maps_as_dict(self.maps)), _asked(data)
         for key in dict.fromkeys((*asked, *kept)):
             if asked.get(key) != kept.get(key):
-                there, now = (json.dumps(one.get(key)) for one in (kept, asked))
+                known, now = (json.dumps(values.get(key)) for values in (kept, asked))
                 what = "other maps are compared there" if key == "compared" else (
-                    f"{key} is {there} there and {now} now")  # fmt: skip
+                    f"{key} is {known} there and {now} now")  # fmt: skip
                 raise InputError(f"{self.path / MAP}: {what}; valid: the same settings, or another directory")
         rest = {key: value for key, value in data.items() if key not in ("manikin", "complete", "compared")}
         try:
-            return tuple(PushMap.from_dict(one) for one in (rest, *data["compared"]))
+            return tuple(PushMap.from_dict(values) for values in (rest, *data["compared"]))
         except (KeyError, TypeError, ValueError):
-            raise _map_directory_damaged(self.path / MAP) from None
+            raise self.damaged(self.path / MAP) from None
 
 
 def _asked(data: Mapping[str, Any]) -> dict[str, Any]:
-    """What a file of maps is about, without what was found; as JSON holds it."""
-    one = {key: value for key, value in data.items() if key not in (*RESULTS, "complete", "compared")}
+    """Conditions of a file of maps, without its results; as JSON holds them."""
+    asked = {key: value for key, value in data.items() if key not in (*RESULTS, "complete", "compared")}
     others = data.get("compared")
     if isinstance(others, list):
-        one["compared"] = [_asked(other) for other in others if isinstance(other, Mapping)]
-    return json.loads(to_json(one))
-
-
-def _map_directory_read(path: Path) -> dict[str, Any]:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        raise _map_directory_damaged(path) from None
-    if not isinstance(data, dict):
-        raise _map_directory_damaged(path)
-    return data
-
-
-def _map_directory_damaged(path: Path) -> MotionFileError:
-    return MotionFileError(f"{path}: is damaged; valid: as written by manikin push --map")
+        asked["compared"] = [_asked(other) for other in others if isinstance(other, Mapping)]
+    return json.loads(to_json(asked))
 
 
 def _table(maps: Sequence[PushMap]) -> str:
     """One row per map and direction; what is not known is empty."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["map", "direction_deg", "impulse_Ns", "beyond_Ns", "bound_Ns"])
-    for number, one in enumerate(maps):
-        bounds = one.bound or (None,) * len(one.directions)
-        for direction, found, bound in zip(one.directions, one.found, bounds, strict=True):
-            row = (None, None, bound) if found is None else (found.held, found.beyond, bound)
-            writer.writerow([number, direction, *("" if value is None else value for value in row)])
-    return text.getvalue()
+    rows = []
+    for number, item in enumerate(maps):
+        bounds = item.bound or (None,) * len(item.directions)
+        for direction, result, bound in zip(item.directions, item.found, bounds, strict=True):
+            known = (None, None) if result is None else (result.held, result.beyond)
+            rows.append([number, direction, *known, bound])
+    return csv_text(("map", "direction_deg", "impulse_Ns", "beyond_Ns", "bound_Ns"), rows)
 
 
 STATISTICS = "statistics.json"
@@ -185,28 +161,25 @@ PHASES = "phases.csv"
 HEAD = ("group", "motion", "phase", "effectors", "start_s", "end_s", "duration_s", "whole")
 
 
+class StatisticsDirectory(ResultDirectory):
+    """Directory of statistics; other files in it are left alone."""
+
+    kind = "statistics"
+
+
 def write_statistics(
     directory: str | Path, content: Mapping[str, Any], sequences: Sequence[PhaseSequence],
     figures: Mapping[str, Figure],
 ) -> list[Path]:  # fmt: skip
-    """Write what was measured; other files in the directory are left alone.
-
-    Returns:
-        The files written.
+    """Write what was measured, and return the files.
 
     Raises:
         MotionFileError: If the directory cannot be written to.
     """
-    folder = Path(directory)
-    if folder.exists() and not folder.is_dir():
-        raise MotionFileError(f"{folder}: is a file; valid: a directory for the statistics")
-    make_directory(folder / FIGURES)
-    files = [
-        write_result(folder / STATISTICS, content),
-        write_result(folder / PHASES, phase_table(sequences)),
-    ]
+    folder = StatisticsDirectory(directory)
+    files = [folder.write(STATISTICS, content), folder.write(PHASES, phase_table(sequences))]
     for name, figure in figures.items():
-        files.append(folder / FIGURES / f"{name}.png")
+        files.append(folder.figures / f"{name}.png")
         save_figure(figure, files[-1])
     return files
 
@@ -223,12 +196,12 @@ def clip_figures(
     standing = [clip.standing_com for clip in clips if clip.standing_com is not None]
     drawn = {
         "phase_durations": lambda: phase_durations_figure([settings.phases_of(clip) for clip in clips], by),
-        "placements": lambda: placements_figure({group: one.placements for group, one in found.items()}),
+        "placements": lambda: placements_figure({group: item.placements for group, item in found.items()}),
         "com_paths": lambda: com_paths_figure(
             placed, [settings.origin_of(clip) for clip in placed], overhead=height
         ),
         "com_heights": lambda: com_heights_figure(
-            [LowestPoints.of(one, height) for one in found.values()],
+            [LowestPoints.of(item, height) for item in found.values()],
             sum(standing) / len(standing) if standing else None,
         ),
         "com_distances": lambda: com_distances_figure(
@@ -246,7 +219,7 @@ def clip_figures(
 
 def published_figures() -> dict[str, Figure]:
     """Figures of the published motions, by name; those of the means quoted in the thesis."""
-    quoted = [one for one in published_phases("left_foot") if not one.group.endswith("C3")]
+    quoted = [item for item in published_phases("left_foot") if not item.group.endswith("C3")]
     return {
         "phase_durations": phase_durations_figure(quoted),
         "com_heights": com_heights_figure(published_lowest(), published_heights().standing),
@@ -256,22 +229,22 @@ def published_figures() -> dict[str, Figure]:
 
 def phase_table(sequences: Sequence[PhaseSequence]) -> str:
     """One row per motion and phase, as CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(HEAD)
-    for one in sequences:
-        for label, phase, whole in zip(one.labels, one.phases, one.whole, strict=True):
+    rows = []
+    for item in sequences:
+        for label, phase, whole in zip(item.labels, item.phases, item.whole, strict=True):
             times = (f"{value:.4f}" for value in (phase.start, phase.end, phase.duration))
-            writer.writerow([one.group, one.name, label, " ".join(phase.effectors), *times, int(whole)])
-    return text.getvalue()
+            rows.append([item.group, item.name, label, " ".join(phase.effectors), *times, int(whole)])
+    return csv_text(HEAD, rows)
 
 
 WORDS = "words.json"
 SLICES = "slices"
+SHOWN_SLICES = (340, 150)
+"""Headings of the slices that are drawn if they are there, those of [Truong2010]_ Fig. 3.6 [deg]."""
 
 _ARRAYS = ("turns", "shapes", "lengths", "costs")
 _REACHED = 1e-6
-"""How far from its goal a path of a file may end [m]: what a changed byte exceeds."""
+"""Largest distance of a path's end from its goal [m]; a changed byte exceeds it."""
 
 
 def partition_as_dict(
@@ -280,13 +253,12 @@ def partition_as_dict(
     """Content of ``words.json``.
 
     Args:
-        grid: Of the places.
         headings: Of the slices that are asked for [deg].
         slices: Those that are known, by their heading [deg].
     """
     known = [slices[heading] for heading in headings if heading in slices]
     counts = count_words(known)
-    missed = [one.residuals() for one in known]
+    missed = [item.residuals() for item in known]
     names = {"position": "position_m", "heading": "heading_rad", "curvature": "curvature_per_m",
              "adjoint": "adjoint", "hamiltonian": "hamiltonian"}  # fmt: skip
     return {
@@ -295,28 +267,27 @@ def partition_as_dict(
         "solved": sum(counts.values()), "counts": counts, "shares": shares(counts),
         "others": [word for word in counts if word not in THESIS_WORDS],
         "max_residuals": {
-            key: max((float(getattr(one, name).max()) for one in missed), default=None)
+            key: max((float(getattr(item, name).max()) for item in missed), default=None)
             for name, key in names.items()
         },
-        "slices": {str(round(one.heading_deg)): count_words([one]) for one in known},
+        "slices": {str(round(item.heading_deg)): count_words([item]) for item in known},
     }  # fmt: skip
 
 
 class WordsDirectory(ResultDirectory):
-    """Reads and writes the slices of a partition.
+    """Directory of a partition into words.
 
     Attributes:
         grid: Of the places.
         slices: Those that are known, by their heading [deg].
     """
 
-    kind, marks = "partition", (WORDS,)
+    kind, marks, writer = "partition", (WORDS,), "manikin words"
 
     def __init__(self, path: str | Path, grid: WordGrid) -> None:
-        """Create the directory, or go on with what an earlier run has solved there.
+        """Create the directory, or continue the partition of an earlier run.
 
         Args:
-            path: The directory.
             grid: That is asked for.
 
         Raises:
@@ -326,77 +297,100 @@ class WordsDirectory(ResultDirectory):
         super().__init__(path)
         self.grid = grid
         if (self.path / WORDS).exists():
-            self._check_grid()
+            known = self.read(WORDS).get("grid")
+            if known is None:
+                raise self.damaged(self.path / WORDS)
+            if known != json.loads(to_json(grid.as_dict())):
+                raise InputError(
+                    f"{self.path / WORDS}: is of another grid, {json.dumps(known)}; "
+                    "valid: the same, or another directory"
+                )
         files = {heading: self._file(heading) for heading in HEADINGS}
         self.slices = {
-            heading: _read(file, grid, heading) for heading, file in files.items() if file.exists()
+            heading: self._slice(file, heading) for heading, file in files.items() if file.exists()
         }
 
     def begin(self, headings: Sequence[int]) -> None:
-        """Say which slices are asked for, before any is solved.
-
-        Raises:
-            MotionFileError: If it cannot be written.
-        """
+        """Say which slices are asked for, before any is solved."""
         self.write(WORDS, {"manikin": __version__, "complete": False, "grid": self.grid.as_dict(),
                            "headings_deg": list(headings)})  # fmt: skip
 
-    def keep(self, one: WordSlice) -> None:
-        """Write a slice.
-
-        Raises:
-            MotionFileError: If it cannot be written.
-        """
-        heading = round(one.heading_deg)
-        self.slices[heading] = one
+    def keep(self, solved: WordSlice) -> None:
+        """Write a slice."""
+        heading = round(solved.heading_deg)
+        self.slices[heading] = solved
         file = self._file(heading)
         with writing(file), atomic_path(file) as temporary, temporary.open("wb") as opened:
-            np.savez_compressed(opened, **{name: getattr(one, name) for name in _ARRAYS})
+            np.savez_compressed(opened, **{name: getattr(solved, name) for name in _ARRAYS})
 
     def finish(self, headings: Sequence[int]) -> dict[str, Any]:
-        """Write and return the summary of the slices that are asked for.
-
-        Raises:
-            MotionFileError: If it cannot be written.
-        """
+        """Write and return the summary of the slices that are asked for."""
         summary = partition_as_dict(self.grid, headings, self.slices)
         self.write(WORDS, summary)
         return summary
 
+    def draw(self, headings: Sequence[int]) -> None:
+        """Draw slices, and two paths of equal cost on a border of theirs if they have one.
+
+        Args:
+            headings: Of the slices that are asked for [deg]; drawn are those of :data:`SHOWN_SLICES`, else
+                the first two.
+        """
+        chosen = [heading for heading in SHOWN_SLICES if heading in headings] or list(headings[:2])
+        slices = [self.slices[heading] for heading in chosen]
+        save_figure(words_figure(slices), self.figures / "words.png")
+        borders = ((item, jumps[0]) for item in slices if (jumps := item.jumps()))
+        pairs = [equal_paths(*(item.path(*place) for place in border)) for item, border in borders]
+        if pairs:
+            save_figure(equal_paths_figure(pairs), self.figures / "equal_paths.png")
+
     def _file(self, heading: int) -> Path:
         return self.folder(SLICES) / f"{heading:03d}.npz"
 
-    def _check_grid(self) -> None:
-        file = self.path / WORDS
+    def _slice(self, file: Path, heading: int) -> WordSlice:
+        """Slice of a file, whose paths must reach their goals."""
         try:
-            there = json.loads(file.read_text(encoding="utf-8"))["grid"]
-        except (OSError, ValueError, KeyError, TypeError):
-            raise _damaged(file) from None
-        if there != json.loads(to_json(self.grid.as_dict())):
-            raise InputError(
-                f"{file}: is of another grid, {json.dumps(there)}; valid: the same, or another directory"
-            )
+            with np.load(file, allow_pickle=False) as data:
+                arrays = {name: np.asarray(data[name], dtype=np.float64) for name in _ARRAYS}
+            known = WordSlice(self.grid, float(heading), **arrays)
+            if known.missed() < _REACHED:
+                return known
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile, InputError):
+            pass
+        raise self.damaged(file, "; remove it to solve it again")
 
 
-def _read(file: Path, grid: WordGrid, heading: int) -> WordSlice:
-    """Slice of a file, whose paths must reach their goals.
+def solve_partition(
+    headings: Sequence[int], grid: WordGrid, path: Path | None, *, jobs: int, draw: bool,
+    progress: Callable[[str, float, str], None],
+) -> dict[str, Any]:  # fmt: skip
+    """Solve the slices of a partition that are not known yet, keep each as soon as it is, and draw them.
 
-    Raises:
-        MotionFileError: If it is damaged.
+    Args:
+        headings: Of the slices [deg].
+        path: Directory of the partition, or None to keep nothing.
+        jobs: Processes.
+        draw: Whether the figures are drawn.
+        progress: Told the stage, the share that is done and a remark after each slice.
+
+    Returns:
+        The summary.
     """
-    try:
-        with np.load(file, allow_pickle=False) as data:
-            arrays = {name: np.asarray(data[name], dtype=np.float64) for name in _ARRAYS}
-        found = WordSlice(grid, float(heading), **arrays)
-        missed = found.missed()
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile, InputError):
-        raise _damaged(file) from None
-    if not missed < _REACHED:
-        raise _damaged(file)
-    return found
-
-
-def _damaged(file: Path) -> MotionFileError:
-    return MotionFileError(
-        f"{file}: is damaged; valid: as written by manikin words; remove it to solve it again"
-    )
+    directory = None if path is None else WordsDirectory(path, grid)
+    known = {} if directory is None else directory.slices
+    if directory is not None:
+        directory.begin(headings)
+    waiting = [heading for heading in headings if heading not in known]
+    count, total = len(headings) - len(waiting), len(headings)
+    progress("words", count / total, f"{count} of {total} slices")
+    for done, solved in enumerate(solve_slices(waiting, grid, jobs=jobs), count + 1):
+        known[round(solved.heading_deg)] = solved
+        if directory is not None:
+            directory.keep(solved)
+        progress("words", done / total, f"{done} of {total} slices")
+    if directory is None:
+        return partition_as_dict(grid, headings, known)
+    summary = directory.finish(headings)
+    if draw:
+        directory.draw(headings)
+    return summary

@@ -98,7 +98,6 @@ def run_page(folder: Path, summary: Mapping[str, Any]) -> str:
 
     Args:
         folder: Run directory, whose figures are put in.
-        summary: Of the run.
     """
     files = {file.stem: file for file in sorted((folder / FIGURES).glob("*.png"))}
     names = [*(name for name in FIRST if name in files), *(name for name in files if name not in FIRST)]
@@ -113,7 +112,6 @@ def analysis_page(
     """HTML of a measured recording.
 
     Args:
-        analysis: What was measured.
         summary: Its numbers.
         sheet: SVG of :func:`manikin.reports.analysis_sheet.recording_sheet`; empty for none.
         pictures: PNG files of the plan by what they show.

@@ -1,6 +1,6 @@
-"""One table of many runs, and the verdict of each in words."""
+"""Results of runs in words: the verdict and requirements of one, one table of many."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 HEADER = (
@@ -66,7 +66,7 @@ def _row(run: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def result(run: Mapping[str, Any]) -> str:
-    """How a run ended, in words."""
+    """Outcome of a run in words."""
     if run["failure"] is None:
         return f"{run['verdict']}{'' if run['as_expected'] else ' although a failure was expected'}"
     word = "failed as expected" if run["as_expected"] else "FAILED"
@@ -74,11 +74,7 @@ def result(run: Mapping[str, Any]) -> str:
 
 
 def verdict_line(summary: Mapping[str, Any]) -> str:
-    """Verdict of a run with its scenario, and for a failure the reason first.
-
-    Args:
-        summary: Of a run.
-    """
+    """Verdict of a run with its scenario, and for a failure the reason first."""
     failure = summary["failure"]
     if failure is None:
         words = {
@@ -90,8 +86,57 @@ def verdict_line(summary: Mapping[str, Any]) -> str:
     return f"failed: {failure['reason']} ({summary['scenario']}, {failure['stage']}{after})"
 
 
+HEADINGS = {
+    "walk": "planned walk", "centroidal": "planned centre of mass", "wholebody": "planned whole body",
+    "act": "planned act", "execution": "executed in the physics engine", "act execution": "executed act",
+    "push": "executed in the physics engine",
+}  # fmt: skip
+"""Headings of the requirements of each stage."""
+
+YES_OR_NO = {"fell": ("no", "yes"), "at_rest": ("no", "yes")}
+"""Words of 0 and 1 for requirements that are no quantity."""
+
+
+def verdict_lines(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Verdict of a run in one line, then every requirement; broken ones are marked."""
+    yield verdict_line(summary)
+    yield about_line(summary)
+    rows: Sequence[Mapping[str, Any]] = summary["requirements"]
+    names = [f"{row['name']} ({row['where']})" if row["where"] else str(row["name"]) for row in rows]
+    width = max(map(len, names), default=0)
+    heading = ""
+    for name, row in zip(names, rows, strict=True):
+        if HEADINGS[row["stage"]] != heading:
+            heading = HEADINGS[row["stage"]]
+            yield f"{heading}:"
+        measured, allowed = requirement_values(row)
+        mark = "ok    " if row["held"] else "FAILED"
+        time = "" if row["time_s"] is None else f"at {row['time_s']:.2f} s"
+        yield f"  {mark}  {name:{width}}  {measured:>14}  {allowed:<14}  {time}".rstrip()
+
+
+def about_line(summary: Mapping[str, Any]) -> str:
+    """Body, duration of the motion, and computing time."""
+    stature, mass = summary["stature_m"], summary["mass_kg"]
+    who = f"body of {mass:g} kg" if stature is None else f"person of {stature:g} m and {mass:g} kg"
+    known = [summary[stage] or {} for stage in ("wholebody", "centroidal", "walk")]
+    duration = next((block["duration_s"] for block in known if block.get("duration_s")), None)
+    lasts = "" if duration is None else f", motion of {duration:.2f} s"
+    return f"{who}{lasts}, computed in {summary['wall_s']:.1f} s, seed {summary['seed']}"
+
+
+def requirement_values(row: Mapping[str, Any]) -> tuple[str, str]:
+    """Measured and allowed value of a requirement, as texts."""
+    if row["key"] in YES_OR_NO:
+        words = YES_OR_NO[row["key"]]
+        return words[round(row["measured"])], words[round(row["limit"])]
+    unit = f" {row['unit']}" if row["unit"] else ""
+    measured = "-" if row["measured"] is None else f"{row['measured']:.3g}{unit}"
+    return measured, f"{row['sense']} {row['limit']:.3g}{unit}"
+
+
 def counts_line(report: Mapping[str, Any]) -> str:
-    """How many of many runs were planned, proved and fell, and ended as their scenarios say."""
+    """Numbers of runs that were planned, proved, fell, and ended as their scenarios say."""
     words = (
         f"{len(report['runs'])} runs: {report['planned']} planned, {report['proved']} proved",
         f"{report['succeeded']} succeeded, {report['failed']} failed ({report['fell']} fell)",

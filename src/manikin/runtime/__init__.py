@@ -1,1 +1,1 @@
-"""What every room may use of the machine: atomic files, signals, progress, work in processes."""
+"""Use of the machine: atomic files, signals, progress, work in processes."""

@@ -1,7 +1,4 @@
-"""One line for a value at the prompt, and a table for it in a notebook.
-
-Also here. Packages that are also verbs of the library.
-"""
+"""One-line ``repr`` and notebook table of a value; packages that can be called as verbs."""
 
 import sys
 from collections.abc import Mapping, Sized
@@ -46,7 +43,7 @@ class Displayed:
     """
 
     def facts(self) -> dict[str, str]:
-        """What the value is, as labels and short texts in order."""
+        """Description of the value as labels and short texts in order."""
         if not is_dataclass(self):
             return {}
         return {field.name: _short(getattr(self, field.name)) for field in fields(self)}

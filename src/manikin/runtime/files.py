@@ -1,19 +1,17 @@
-"""Writing files so that nobody ever sees half of one.
+"""Result directories, and files that are written as a whole or not at all.
 
-Content goes to a hidden temporary file in the same folder, is flushed to the disk and
-then renamed over the target, which the operating system does in one step.  An
-interruption, even a kill, leaves the old file or none; after a kill a ``.NAME.*.tmp``
-file may remain.
-
-Also here. Directories of results: taken over or refused, and written so that an interruption leaves whole
-files.
+Content goes to a hidden temporary file in the same folder, is flushed to the disk and then renamed over the
+target, which the operating system does in one step. An interruption, even a kill, leaves the old file or
+none; after a kill a ``.NAME.*.tmp`` file may remain.
 """
 
+import csv
+import io
 import json
 import math
 import os
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -23,19 +21,25 @@ import numpy as np
 from manikin.errors import MotionFileError
 
 FIGURES = "figures"
+"""Folder of the figures in a result directory."""
 
 
 class ResultDirectory:
-    """Directory of one kind of result, told from others by a file that each of them has.
+    """Directory of one kind of result.
+
+    Whatever writes to it raises :class:`~manikin.errors.MotionFileError` if that is not possible.
 
     Attributes:
         path: The directory.
         kind: What the result is called in messages, such as ``"run"``.
-        marks: Files of which every such directory has one; the first is named in messages.
+        marks: Files of which every such directory has one, the first of them named in messages: a directory
+            without any is not taken over. If empty, any directory is, and its other files are left alone.
+        writer: Command that writes the files, for messages.
     """
 
     kind: ClassVar[str]
-    marks: ClassVar[tuple[str, ...]]
+    marks: ClassVar[tuple[str, ...]] = ()
+    writer: ClassVar[str] = "manikin"
 
     def __init__(self, path: str | Path) -> None:
         """Create the directory, or take over that of an earlier result of the same kind.
@@ -47,6 +51,8 @@ class ResultDirectory:
         if self.path.exists() and not self.path.is_dir():
             raise MotionFileError(f"{self.path}: is a file; valid: a directory for the {self.kind}")
         make_directory(self.path)
+        if not self.marks:
+            return
         content = sorted(item.name for item in self.path.iterdir() if not item.name.startswith("."))
         if content and not set(self.marks) & set(content):
             raise MotionFileError(
@@ -73,18 +79,23 @@ class ResultDirectory:
         Args:
             name: Of the file, relative to the directory.
             content: Text, or plain values and arrays that become JSON.
-
-        Raises:
-            MotionFileError: If it cannot be written.
         """
         return write_result(self.path / name, content)
 
-    def remove(self, *patterns: str) -> None:
-        """Remove files by their patterns.
+    def read(self, name: str) -> dict[str, Any]:
+        """JSON object in a file of the directory.
 
         Raises:
-            MotionFileError: If the directory cannot be written to.
+            MotionFileError: If it is damaged.
         """
+        return read_json(self.path / name, f"as written by {self.writer}")
+
+    def damaged(self, file: Path, advice: str = "") -> MotionFileError:
+        """Error of a file whose content does not fit."""
+        return MotionFileError(f"{file}: is damaged; valid: as written by {self.writer}{advice}")
+
+    def remove(self, *patterns: str) -> None:
+        """Remove files by their patterns."""
         with writing(self.path):
             for pattern in patterns:
                 for file in self.path.glob(pattern):
@@ -116,6 +127,26 @@ def write_result(path: str | Path, content: str | Mapping[str, Any]) -> Path:
     return Path(path)
 
 
+def read_json(path: Path, valid: str = "as written by manikin") -> dict[str, Any]:
+    """JSON object in a file.
+
+    Args:
+        valid: What the file should be, for messages.
+
+    Raises:
+        MotionFileError: If it cannot be read or is not a JSON object.
+    """
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise MotionFileError(f"{path}: there is no such file; valid: {valid}") from None
+    except (OSError, ValueError) as error:
+        raise MotionFileError(f"{path}: is damaged ({error}); valid: {valid}") from None
+    if not isinstance(value, dict):
+        raise MotionFileError(f"{path}: is damaged (not a JSON object); valid: {valid}")
+    return value
+
+
 def make_directory(path: Path) -> None:
     """Create a directory, and those above it, unless it is there.
 
@@ -124,6 +155,23 @@ def make_directory(path: Path) -> None:
     """
     with writing(path):
         path.mkdir(parents=True, exist_ok=True)
+
+
+def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    """Comma-separated text; None is an empty cell."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def columns_csv(columns: Mapping[str, np.ndarray], digits: int) -> str:
+    """Comma-separated text of arrays (n,), under their names, with so many significant digits."""
+    text = io.StringIO()
+    text.write(",".join(columns) + "\n")
+    np.savetxt(text, np.column_stack(list(columns.values())), fmt=f"%.{digits}g", delimiter=",")
+    return text.getvalue()
 
 
 def to_json(value: Any, indent: int | None = 2) -> str:

@@ -31,7 +31,7 @@ COLOURS = {
 """Okabe and Ito's palette, which colour-blind readers can tell apart."""
 
 CYCLE = ("#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#6A51A3", "#8C564B")
-"""For effectors without a colour of their own."""
+"""Colours of effectors without one of their own."""
 
 
 def readable(effector: str) -> str:

@@ -1,7 +1,4 @@
-"""Progress of a long job on standard error.
-
-Also here. Ctrl-C and termination that cannot get lost.
-"""
+"""Progress bars on standard error, and signals that cannot get lost."""
 
 import signal
 import threading

@@ -6,11 +6,11 @@ report page.
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 Sense = Literal["<=", ">=", ">"]
-"""How a measured value compares with its limit."""
+"""Comparison of a measured value with its limit."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,8 @@ class Requirement:
         Args:
             stage: Stage whose result was measured, such as ``"wholebody"``.
         """
-        return {
-            "stage": stage, "key": self.key, "name": self.name, "unit": self.unit,
-            "measured": self.measured, "sense": self.sense, "limit": self.limit,
-            "time_s": self.time_s, "where": self.where, "held": self.held,
-        }  # fmt: skip
+        values = {name: value for name, value in asdict(self).items() if name != "tolerance"}
+        return {"stage": stage, **values, "held": self.held}
 
 
 @dataclass(frozen=True)

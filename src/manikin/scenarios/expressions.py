@@ -1,17 +1,12 @@
-"""Arithmetic expressions of scenario files, read without ever running code.
+"""Arithmetic expressions of scenario files, and the heights that they bound.
 
-An expression such as ``"0.91 - 0.08*atan(10*(x-0.2))/pi"`` is parsed once; every node
-of its syntax tree must be on a short list (numbers, ``x y z pi e``, ``+ - * / **`` and
-the functions below), else it is refused.  What comes out is a callable that works on
-floats, numpy arrays and CasADi symbols alike.
+An expression such as ``"0.91 - 0.08*atan(10*(x-0.2))/pi"`` is parsed once and never run as code: every node
+of its syntax tree must be on a short list (numbers, ``x y z pi e``, ``+ - * / **`` and the functions below).
+It becomes a callable for floats, numpy arrays and CasADi symbols alike.
 
-Also here. Task heights carried over to bodies of another stature.
-
-A scenario gives the CoM's heights for a body of the reference stature.  For a body
-``s`` times as tall every height above the supports is ``s`` times as large:
-``z' = base + s (z - base)``, with the supports' level ``base`` blended smoothly from the
-start to the goal.  At ``s = 1`` nothing changes.  This is our own rule; the theses plan
-for one stature only.
+Heights are given for a body of the reference stature. For a body ``s`` times as tall every height above the
+supports is ``s`` times as large: ``z' = base + s (z - base)``, with the supports' level ``base`` blended
+smoothly from the start to the goal. This is our own rule; the theses plan for one stature only.
 """
 
 import ast
@@ -223,7 +218,7 @@ class HeightBand:
         return self._scaled(self.upper_expression, x, y, z)
 
     def violation(self, com: FloatArray) -> FloatArray:
-        """How far each CoM is outside the band; negative inside.
+        """Distance of each CoM outside the band; negative inside.
 
         Args:
             com: (..., 3) [m].

@@ -1,9 +1,4 @@
-"""Reading scenarios: the file, what it extends, the variant asked for and values set from outside.
-
-Also here. ``extends``: a scenario file that is built on another one. ``variants``: named changes of a
-scenario, kept in its own file. Finding scenario files: built-in ones by name, others by path, either with a
-variant.
-"""
+"""Reading of scenario files, with what they extend (``extends``) and their ``variants``."""
 
 import difflib
 from collections.abc import Mapping, Sequence
@@ -25,7 +20,6 @@ def read_extended(path: Path, above: tuple[Path, ...] = ()) -> Tree:
     """Read a scenario file, laid over the one it extends, if any.
 
     Args:
-        path: The file.
         above: Files that extend this one, the first at the front.
 
     Returns:
@@ -82,20 +76,16 @@ _NOT_IN_A_VARIANT = ("extends", VARIANTS)
 def variants_of(tree: Tree, source: str) -> dict[str, Tree]:
     """Changes of each variant, in the order of the file.
 
-    Args:
-        tree: Content of a scenario file.
-        source: Its name, for messages.
-
     Raises:
         ScenarioError: If a variant is not a mapping or holds a key that only a file has.
     """
-    found = tree.data.get(VARIANTS) if isinstance(tree.data, Mapping) else None
-    if found is None:
+    result = tree.data.get(VARIANTS) if isinstance(tree.data, Mapping) else None
+    if result is None:
         return {}
-    if not isinstance(found, Mapping):
+    if not isinstance(result, Mapping):
         here = place(source, (VARIANTS,), tree.lines)
-        raise ScenarioError(f"{here} is {found!r}; valid: a mapping of names and what they change")
-    for name, change in found.items():
+        raise ScenarioError(f"{here} is {result!r}; valid: a mapping of names and what they change")
+    for name, change in result.items():
         here = place(source, (VARIANTS, name), tree.lines)
         if not isinstance(name, str) or not name or set(name) & set("@/ "):
             raise ScenarioError(f"{here} is a name that cannot be asked for; valid: no @, / or space")
@@ -104,18 +94,13 @@ def variants_of(tree: Tree, source: str) -> dict[str, Tree]:
         for key in _NOT_IN_A_VARIANT:
             if key in change:
                 raise ScenarioError(f"{here}.{key} is not for a variant; valid: the other keys")
-    return {name: tree.under(VARIANTS, name) for name in found}
+    return {name: tree.under(VARIANTS, name) for name in result}
 
 
 def apply_variant(tree: Tree, variant: str, source: str) -> Tree:
     """Lay one variant over the scenario; the variants themselves stay.
 
     The name of the result is ``NAME@VARIANT``, unless the variant gives one.
-
-    Args:
-        tree: Content of a scenario file.
-        variant: Name of the variant.
-        source: Name of the file, for messages.
 
     Raises:
         ScenarioError: If there is no such variant, in one line with the valid names.
@@ -210,7 +195,6 @@ def load_scenario(
     Args:
         name_or_path: ``"platform"``, or the path of a YAML file; ``"walls@trial-4"`` asks for a
             variant as well.
-        variant: Name of one of the file's variants.
         overrides: Values to set, ``"supports.friction=0.5"`` each; see
             :func:`manikin.scenarios.scenario.override`.
 

@@ -1,4 +1,4 @@
-"""Where a scenario stands: the same file at another place, and the frame of its task.
+"""Frame of a scenario's task, and the same file at another place.
 
 Planning, control and simulation happen in the *task frame*: its origin is below the body at the start,
 its x axis points where the body faces there, its heights are those of the file.  Coordinates in it are
@@ -68,7 +68,7 @@ def moved_data(
 ) -> dict[str, Any]:
     """The values of a section and all in it, with coordinates in another frame.
 
-    Which values are coordinates, and of which kind, the sections' fields say (:class:`Moves`).
+    Which values are coordinates, and of which kind, the sections' fields say (:class:`FrameMoves`).
 
     Args:
         section: Checked.
@@ -78,21 +78,21 @@ def moved_data(
     """
     implied = section.implied()
     section = section.model_copy(update=implied)
-    found = data | section.model_dump(mode="json", include=set(implied))
+    result = data | section.model_dump(mode="json", include=set(implied))
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
-        if value is None or name not in found:
+        if value is None or name not in result:
             continue
         kind = next((item for item in field.metadata if isinstance(item, FrameMoves)), None)
         if kind is None:
-            found[name] = _moved_inside(value, found[name], transform, decimals)
+            result[name] = _moved_inside(value, result[name], transform, decimals)
         else:
-            found[name] = _MOVED[kind](value, transform, decimals, section)
-    return found
+            result[name] = _MOVED[kind](value, transform, decimals, section)
+    return result
 
 
 def _moved_inside(value: Any, data: Any, transform: PlanarTransform, decimals: int) -> Any:
-    """What holds sections, with the coordinates in them moved."""
+    """A value with the coordinates of the sections in it moved."""
     if isinstance(value, Section):
         return moved_data(value, data, transform, decimals)
     if isinstance(value, (list, tuple)):

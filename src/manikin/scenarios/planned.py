@@ -1,8 +1,4 @@
-"""A scenario with supports that were planned for it.
-
-Also here. Scenarios whose supports are the footprints of a walk. Scenarios of one walk and of one push, made
-from a few values instead of a file.
-"""
+"""Scenarios made from values: planned contacts, footprints of a walk, one walk, one push."""
 
 import math
 from collections.abc import Mapping
@@ -24,16 +20,16 @@ from manikin.scenarios.values import ScenarioValues
 from manikin.walking.footsteps.footprints import FEET, Footprint, Footprints
 
 STATURE = 1.75
-"""Of the body that the lengths here are for [m]."""
+"""Stature of the body that the lengths here are for [m]."""
 
 COM_HEIGHT = 0.96
 """Centre of mass of a person who stands before and after a walk, above the floor ([Qiu2012]_ 5.4.4) [m]."""
 
 COM_BAND = (0.92, 0.97)
-"""Its heights during the walk: knees neither locked nor deeply bent; our choice, as the next ones [m]."""
+"""Heights of the CoM in a walk, knees neither locked nor deeply bent; our choice, as the next ones [m]."""
 
 WALKED_MAX_SUPPORT_DISTANCE = 0.985
-"""Its largest distance from the middle of a sole that stands [m]."""
+"""Largest distance of the CoM from the middle of a sole that stands [m]."""
 
 LEAST = {1: 0.4, 2: 0.15}
 """Least durations of supports on one and two feet; a support that lasts longer in the walk lasts as long in
@@ -213,8 +209,6 @@ def walk_task(
     """A walk to a place.
 
     Args:
-        to: Goal.
-        start: Where the walk begins.
         body: Section ``body`` of the scenario; its default when omitted.
         max_speed: Limit of the speed over the floor [m/s].
         weights: Weights of the path's criterion, by name.
@@ -254,7 +248,6 @@ def push_task(
         force: [N].
         direction: Of the force, counter-clockwise from the body's forward axis [deg].
         duration: Of the push [s].
-        name: Of the scenario.
         body: Section ``body`` of the scenario; its default when omitted.
         recovery: Section ``recovery``.
         where: What messages call the values, by key.
@@ -284,10 +277,10 @@ MAX_SUPPORT_DISTANCE = 1.08
 """Largest distance from the centre of mass to a support ([Qiu2012]_ 7.2.2), of a body of 1.75 m [m]."""
 
 ABOVE = 0.01
-"""How far above that of its posture the centre of mass of a rising body may be [m]; our choice."""
+"""Height that the CoM of a rising body may be above that of its posture [m]; our choice."""
 
 LOWEST = 0.1
-"""How far below those of its postures the centre of mass may go on the way to an act [m]; our choice."""
+"""Depth that the CoM may be below those of its postures on the way to an act [m]; our choice."""
 
 PLANNING_SHARE = (0.8, 0.7)
 """Size of the soles that planning balances on, relative to the real ones ([Qiu2012]_ Fig. 7.6); ours."""
@@ -332,13 +325,11 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
         before = dict(stage.contacts)
         phases.append(phase)
     feet = next(c for stage in plan.stages for name, c in stage.contacts.items() if name.endswith("foot"))
+    long, wide = feet.length, feet.width
     supports = {
         "friction": friction,
-        "sole": {"length_m": feet.length, "width_m": feet.width},
-        "planning_sole": {
-            "length_m": PLANNING_SHARE[0] * feet.length,
-            "width_m": PLANNING_SHARE[1] * feet.width,
-        },
+        "sole": {"length_m": long, "width_m": wide},
+        "planning_sole": {"length_m": PLANNING_SHARE[0] * long, "width_m": PLANNING_SHARE[1] * wide},
         "phases": phases,
     }
     task = {
@@ -350,36 +341,24 @@ def with_supports(scenario: Scenario, plan: ContactPlan) -> Scenario:
     planning = scenario.planning.model_dump(mode="json", exclude_none=True)
     if scenario.planning == type(scenario.planning)() and not rises:
         planning = PLANNING
+    constraints = _constraints(scenario, plan)
     return scenario.replaced(
-        supports=supports,
-        contacts=None,
-        task=task,
-        com_constraints=_constraints(scenario, plan),
-        planning=planning,
+        supports=supports, contacts=None, task=task, com_constraints=constraints, planning=planning
     )
 
 
 def _entry(contact: Contact, friction: float) -> dict[str, Any]:
+    position = [float(x) for x in contact.position]
     if contact.kind is ContactKind.GRASP:
-        return _grasp_entry(contact)
-    entry: dict[str, Any] = {
-        "position": [float(x) for x in contact.position],
-        "yaw_deg": math.degrees(contact.yaw),
-    }
+        turn = np.rad2deg(pin.rpy.matrixToRpy(contact.rotation_contact_to_world))
+        rpy_deg = [float(x) for x in turn]
+        return {"position": position, "rpy_deg": rpy_deg, "max_force_N": contact.max_force}
+    entry: dict[str, Any] = {"position": position, "yaw_deg": math.degrees(contact.yaw)}
     if abs(contact.normal[2] - 1.0) > 1e-12:
         entry["normal"] = [float(x) for x in contact.normal]
     if contact.friction != friction:
         entry["friction"] = contact.friction
     return entry
-
-
-def _grasp_entry(contact: Contact) -> dict[str, Any]:
-    turn = np.rad2deg(pin.rpy.matrixToRpy(contact.rotation_contact_to_world))
-    return {
-        "position": [float(x) for x in contact.position],
-        "rpy_deg": [float(x) for x in turn],
-        "max_force_N": contact.max_force,
-    }
 
 
 def _constraints(values: ScenarioValues, plan: ContactPlan) -> list[dict[str, Any]]:

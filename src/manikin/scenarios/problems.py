@@ -1,8 +1,4 @@
-"""The problems of the centre-of-mass planners that a scenario states.
-
-Also here. Constraints on the CoM's height from the overhead obstacles of a scene. Recorded motions that a
-scenario names.
-"""
+"""Problems of the centre-of-mass planners that a scenario states, with its constraints and recordings."""
 
 import itertools
 from collections.abc import Sequence
@@ -12,7 +8,7 @@ import numpy as np
 
 from manikin.body import BodyModel, Configuration
 from manikin.contact import Contact, ContactKind, ContactSchedule, StanceSequence
-from manikin.errors import InputError, ScenarioError
+from manikin.errors import InputError
 from manikin.kinematics.fold import HEAD_CLEARANCE, fold_under, lowest_ceiling
 from manikin.motion.file import MotionFile, read_motions
 from manikin.motion.motion import phases_of
@@ -34,7 +30,7 @@ from manikin.scenarios.world import build_scene
 from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
 
 HOVERING = 0.3
-"""What leaves at least this above the supports is overhead, what leaves less is stepped over [m]."""
+"""Least height above the supports of an obstacle that is overhead [m]; a lower one is stepped over."""
 
 ONSET = 0.10
 """Distance within which the body comes down before an obstacle, for a stature of 1.75 m [m]."""
@@ -69,8 +65,8 @@ def overhead_constraints(
         chosen = [item for item in finite if _hovers(item, soles) and _over(item, way)]
     else:
         chosen = [item for item in finite if item.name in names]
-    found = (_constraint(body, obstacle, soles) for obstacle in chosen)
-    return tuple(constraint for constraint in found if constraint is not None)
+    result = (_constraint(body, obstacle, soles) for obstacle in chosen)
+    return tuple(constraint for constraint in result if constraint is not None)
 
 
 def _way(sequence: StanceSequence, ends: tuple[FloatArray, FloatArray]) -> list[FloatArray]:
@@ -166,7 +162,6 @@ def load_recording(
 
     Args:
         path: Run directory or motion file.
-        sequence: The scenario's stances.
         stature: Of the scenario's body [m].
         level: Height of the supports below the CoM.
         transform_recording_to_world: From the file's coordinates to the scenario's.
@@ -179,9 +174,9 @@ def load_recording(
     motion = next(reversed(content.motions.values()))
     table = phases_of(motion, content.schedule)
     wanted = [sorted(phase.stance.effectors) for phase in sequence]
-    found = [sorted(names) for names in table.supports]
-    if found != wanted:
-        raise InputError(f"{path}: {_difference(found, wanted)}; valid: a motion on the scenario's supports")
+    result = [sorted(names) for names in table.supports]
+    if result != wanted:
+        raise InputError(f"{path}: {_difference(result, wanted)}; valid: a motion on the scenario's supports")
     if content.schedule is not None:
         _check_places(path, content.schedule, sequence, transform_recording_to_world)
     com = _scaled(transform_recording_to_world.points(motion.com), content, stature, level)
@@ -233,7 +228,7 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
     options, seat = values.planning, values.seated_from
     rest = (0.0, 0.0, 0.0) if options.zero_end_accelerations else None
     given = {"degree": options.degree, "samples": options.samples}
-    try:
+    with values.refusing(("planning",)):
         return CentroidalProblem(
             values.moved_mass,
             _standing(values, planning=True),
@@ -251,10 +246,6 @@ def centroidal_problem(values: ScenarioValues) -> CentroidalProblem:
             weights=Weights(**options.weights.model_dump(exclude_none=True)),
             **{key: value for key, value in given.items() if value is not None},
         )
-    except ScenarioError:
-        raise
-    except InputError as error:
-        raise values.refused(("planning",), error) from None
 
 
 def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
@@ -267,17 +258,13 @@ def keyframe_problem(values: ScenarioValues) -> KeyframeProblem | None:
     if options.method != "keyframes" or options.recording is None:
         return None
     path, sequence = values.find_file(options.recording), stance_sequence(values, planning=True)
-    try:
+    with values.refusing(("planning", "recording")):
         frame = options.recording_frame
         recording = load_recording(
             path, sequence, values.file.body.stature_m, values.support_level(),
             IDENTITY if frame is None else frame.transform_to_world(),
         )  # fmt: skip
         return KeyframeProblem.of(centroidal_problem(values), recording, options.control_points)
-    except ScenarioError:
-        raise
-    except InputError as error:
-        raise values.refused(("planning", "recording"), error) from None
 
 
 def _standing(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
@@ -299,11 +286,11 @@ def _key_planes(values: ScenarioValues) -> tuple[KeyPlane, ...]:
 
 def _height_constraints(values: ScenarioValues) -> tuple[GeometricConstraint, ...]:
     band, entry = values.height_band, values.constraint("overhead")
-    found = () if band is None else height_band(band.lower, band.upper)
+    result = () if band is None else height_band(band.lower, band.upper)
     if entry is None or entry.overhead is None:
-        return found
+        return result
     names = None if entry.overhead == "automatic" else tuple(entry.overhead)
     overhead = overhead_constraints(
         build_body(values), build_scene(values), _standing(values), (values.start_com, values.goal_com), names
     )
-    return (*found, *overhead)
+    return (*result, *overhead)

@@ -1,7 +1,4 @@
-"""A scenario: the checked file, and the builders that turn it into the library's values.
-
-Also here. ``--set KEY=VALUE``: single values of a scenario, changed from outside.
-"""
+"""Scenario: a checked file, changed by ``--set KEY=VALUE``, and the builders of what it describes."""
 
 from __future__ import annotations
 
@@ -108,36 +105,24 @@ class Scenario(Displayed, ScenarioValues):
     """One job for the pipeline: the values of a scenario file and what is built from them."""
 
     def facts(self) -> dict[str, str]:
-        """What a reader wants to know first."""
-        return {
-            "name": self.name,
-            "body": self.file.body.model,
-            "mass": f"{self.mass:.1f} kg",
-            "seed": str(self.seed),
-        }
+        """Labels and texts of the value."""
+        model, mass = self.file.body.model, f"{self.mass:.1f} kg"
+        return {"name": self.name, "body": model, "mass": mass, "seed": str(self.seed)}
 
     def with_body(
-        self,
-        stature_m: float | None = None,
-        mass_kg: float | None = None,
-        sex: str | None = None,
-        age: float | None = None,
-        strength: float | None = None,
+        self, stature_m: float | None = None, mass_kg: float | None = None, sex: str | None = None,
+        age: float | None = None, strength: float | None = None,
         load: Mapping[str, float | str] | None = None,
-    ) -> Scenario:
+    ) -> Scenario:  # fmt: skip
         """Return the same scenario for another body; what is None stays.
 
         Raises:
             ScenarioError: If a value is out of its range.
         """
         given = {
-            "stature_m": stature_m,
-            "mass_kg": mass_kg,
-            "sex": sex,
-            "age": age,
-            "strength": strength,
+            "stature_m": stature_m, "mass_kg": mass_kg, "sex": sex, "age": age, "strength": strength,
             "load": load,
-        }
+        }  # fmt: skip
         return self._changed(body={k: v for k, v in given.items() if v is not None})
 
     def with_seed(self, seed: int) -> Scenario:
@@ -203,68 +188,40 @@ class Scenario(Displayed, ScenarioValues):
         return Scenario(validate(ScenarioFile, data, self.source), self.source, self.folder, {})
 
     def build_body(self) -> BodyModel:
-        """Build the body; its soles have the size that the supports give.
-
-        Raises:
-            ScenarioError: If the body's data are out of range.
-        """
+        """Build the body, see :func:`manikin.scenarios.values.build_body`."""
         from manikin.scenarios.values import build_body
 
         return build_body(self)
 
     def build_scene(self) -> Scene:
-        """Build the obstacles and the floor.
-
-        Raises:
-            ScenarioError: If a mesh cannot be read or a shape is degenerate.
-        """
+        """Build the obstacles and the floor, see :func:`manikin.scenarios.world.build_scene`."""
         from manikin.scenarios.world import build_scene
 
         return build_scene(self)
 
     def build_sequence(self, *, planning: bool = False) -> StanceSequence:
-        """Build the stances of the explicit supports.
-
-        Args:
-            planning: With the smaller soles that planning balances on, where given.
-
-        Raises:
-            ScenarioError: If there are no supports, or a contact slides between phases.
-        """
+        """Build the stances of the supports, see :func:`manikin.scenarios.sequence.stance_sequence`."""
         from manikin.scenarios.sequence import stance_sequence
 
         return stance_sequence(self, planning=planning)
 
     def build_centroidal_problem(self) -> CentroidalProblem:
-        """Build the problem of the centre-of-mass planner, see :mod:`manikin.scenarios.problems`.
-
-        Raises:
-            ScenarioError: If the supports or a centre of mass are missing, or a value is out of range.
-        """
+        """Build the problem of the centre-of-mass planner, see :mod:`manikin.scenarios.problems`."""
         from manikin.scenarios.problems import centroidal_problem
 
         return centroidal_problem(self)
 
     def build_keyframe_problem(self) -> KeyframeProblem | None:
-        """Build the problem of the keyframe-based planner; None when the file asks for another one.
+        """Build the problem of the keyframe-based planner, see :mod:`manikin.scenarios.problems`.
 
-        Raises:
-            ScenarioError: If the recording cannot be read or was made on other supports.
+        None when the file asks for another planner.
         """
         from manikin.scenarios.problems import keyframe_problem
 
         return keyframe_problem(self)
 
     def check_contacts(self, scene: Scene, tolerance: float = 0.005) -> None:
-        """Check that every contact of the supports lies on a surface of the scene.
-
-        Args:
-            scene: The built scene.
-            tolerance: Largest gap and overhang of a contact point [m].
-
-        Raises:
-            ScenarioError: For the first contact that is off every surface or overlaps another.
-        """
+        """Check that contacts lie on surfaces, see :func:`manikin.scenarios.sequence.check_contacts`."""
         from manikin.scenarios.sequence import check_contacts
 
         check_contacts(self, scene, tolerance)

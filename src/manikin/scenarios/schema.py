@@ -1,12 +1,14 @@
-"""What a scenario file may hold: its sections and the rules between them.
+"""Schema of a scenario file: its sections and the rules between them.
 
 Lengths are metres and angles degrees, as the keys say; the builders of
 :class:`~manikin.scenarios.scenario.Scenario` turn them into the library's own values.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from manikin.scenarios.sections.planning_sections import (
     WORDS,
@@ -26,7 +28,17 @@ from manikin.scenarios.sections.task_sections import (
     TaskSection,
     WalkingSection,
 )
-from manikin.scenarios.validation import Name, Number, Positive, Section, Text, refuse
+from manikin.scenarios.validation import (
+    Name,
+    Number,
+    Positive,
+    Section,
+    Text,
+    optional,
+    preset,
+    refuse,
+    required,
+)
 
 
 class ScenarioFile(Section):
@@ -40,62 +52,53 @@ class ScenarioFile(Section):
         default=None, exclude=True,
         description="first key of the file: a built-in scenario or a file that this one is laid over",
     )  # fmt: skip
-    name: Name = Field(description="short name, also that of the run directory")
-    description: str = Field(default="", description="one line for the list of scenarios")
-    body: BodySection = Field(default=BodySection(), description="whose motion it is")
-    reference_stature_m: Positive | None = Field(
-        default=None, description="stature that the task's heights and distances were measured for [m] "
+    name: Name = required("short name, also that of the run directory")
+    description: str = preset("", "one line for the list of scenarios")
+    body: BodySection = preset(BodySection(), "whose motion it is")
+    reference_stature_m: Positive | None = optional(
+        "stature that the task's heights and distances were measured for [m] "
         "(default: the body's own); they are scaled to the actual body"
-    )  # fmt: skip
-    reference_mass_kg: Positive | None = Field(
-        default=None,
-        description="mass that planning.min_margin was chosen for [kg] (default: the body's own); the "
-        "margin is scaled with mass and stature",
     )
-    floor_height_m: Number | None = Field(default=0.0, description="height of the floor [m], null for none")
+    reference_mass_kg: Positive | None = optional(
+        "mass that planning.min_margin was chosen for [kg] (default: the body's own); the "
+        "margin is scaled with mass and stature"
+    )
+    floor_height_m: Number | None = preset(0.0, "height of the floor [m], null for none")
     scene: list[ObstacleSection] = Field(default_factory=list, description="obstacles")
-    supports: SupportsSection | None = Field(
-        default=None, description="explicit sequence of supports; left out, contacts are planned"
+    supports: SupportsSection | None = optional(
+        "explicit sequence of supports; left out, contacts are planned"
     )
-    contacts: ContactsSection | None = Field(
-        default=None, description="how contacts are planned where no supports are given"
-    )
-    task: TaskSection = Field(description="start and goal")
+    contacts: ContactsSection | None = optional("how contacts are planned where no supports are given")
+    task: TaskSection = required("start and goal")
     com_constraints: list[ComConstraintSection] = Field(
         default_factory=list, description="constraints on the centre of mass"
     )
-    planning: PlanningSection = Field(default=PlanningSection(), description="options of the planner")
-    wholebody: WholebodySection = Field(
-        default=WholebodySection(), description="how the whole body's motion is found"
-    )
-    execution: Literal["required", "none"] = Field(
-        default="required",
-        description="required: a run succeeds only if the planned motion is also executed and keeps every "
+    planning: PlanningSection = preset(PlanningSection(), "options of the planner")
+    wholebody: WholebodySection = preset(WholebodySection(), "how the whole body's motion is found")
+    execution: Literal["required", "none"] = preset(
+        "required",
+        "required: a run succeeds only if the planned motion is also executed and keeps every "
         "requirement (proved); none: it is not executed, and succeeds if its plan keeps every requirement "
         "(planned), the default of a point mass and of a recorded walk, which cannot be executed",
     )
-    manner: Literal["ready", "walking", "close", "hanging", "climbing"] = Field(
-        default="ready",
-        description="how the body carries itself where the task leaves freedom: ready, arms raised and bent, "
+    manner: Literal["ready", "walking", "close", "hanging", "climbing"] = preset(
+        "ready",
+        "how the body carries itself where the task leaves freedom: ready, arms raised and bent, "
         "clear of the thighs; walking, upright with arms that swing against the legs; close, arms bent close "
         "to the body; hanging, arms that hang; climbing, arms raised and legs bent and spread",
     )
-    push: PushSection | None = Field(default=None, description="disturbance during the execution")
-    recovery: RecoverySection | None = Field(
-        default=None,
-        description="instead of a way to go: the body stands where it is, is pushed and keeps its balance; "
-        "task may be left out then",
+    push: PushSection | None = optional("disturbance during the execution")
+    recovery: RecoverySection | None = optional(
+        "instead of a way to go: the body stands where it is, is pushed and keeps its balance; "
+        "task may be left out then"
     )
-    walking: WalkingSection | None = Field(
-        default=None,
-        description="the body walks from start to goal over the floor as people do, around what stands there",
+    walking: WalkingSection | None = optional(
+        "the body walks from start to goal over the floor as people do, around what stands there"
     )
-    seed: Annotated[int, Field(strict=True, ge=0)] = Field(
-        default=0, description="seed of every random choice"
-    )
-    expect: Expectation = Field(
-        default=ExpectSection(outcome="success"),
-        description="how a run should end, success or failure, or a mapping with the stage and the reason of "
+    seed: Annotated[int, Field(strict=True, ge=0)] = preset(0, "seed of every random choice")
+    expect: Expectation = preset(
+        ExpectSection(outcome="success"),
+        "how a run should end, success or failure, or a mapping with the stage and the reason of "
         "an expected failure; 'manikin run all' counts an explained failure as right where one is expected",
     )
     variants: dict[str, dict[str, Any]] | None = Field(
@@ -113,7 +116,7 @@ class ScenarioFile(Section):
     @model_validator(mode="before")
     @classmethod
     def _only_planned(cls, data: Any) -> Any:
-        """What cannot be executed is planned only, where the file says nothing else."""
+        """Plan only what cannot be executed, where the file says nothing else."""
         if isinstance(data, dict) and "execution" not in data and _cannot_be_executed(data):
             return {**data, "execution": "none"}
         return data
@@ -124,20 +127,15 @@ class ScenarioFile(Section):
         for index, name in enumerate(names):
             if name in names[:index]:
                 raise refuse(f"scene[{index}].name", f"is {name!r} again; valid: a unique name")
+        one_of = f"the name of an obstacle of the scene ({', '.join(names) or 'it has none'})"
         for index, constraint in enumerate(self.com_constraints):
             wanted = constraint.overhead if isinstance(constraint.overhead, list) else []
             for number, name in enumerate(wanted):
                 if name not in names:
-                    raise refuse(
-                        f"com_constraints[{index}].overhead[{number}]",
-                        f"is {name!r}; valid: automatic, or the name of an obstacle of the scene "
-                        f"({', '.join(names) or 'it has none'})",
-                    )
+                    key = f"com_constraints[{index}].overhead[{number}]"
+                    raise refuse(key, f"is {name!r}; valid: automatic, or {one_of}")
         if self.task.act is not None and self.task.act.on not in names:
-            raise refuse(
-                "task.act.on", f"is {self.task.act.on!r}; valid: the name of an obstacle of the scene "
-                f"({', '.join(names) or 'it has none'})",
-            )  # fmt: skip
+            raise refuse("task.act.on", f"is {self.task.act.on!r}; valid: {one_of}")
         if self.task.act is not None and self.contacts is not None and self.contacts.limbs:
             raise refuse("contacts.limbs", "are given beside task.act; valid: one of them")
         self._check_execution()
@@ -167,6 +165,14 @@ class ScenarioFile(Section):
                     )
         return self
 
+    def _inapplicable(self, key: str) -> PydanticCustomError:
+        return refuse(key, f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
+
+    def _refuse_given(self, keys: Sequence[str], problem: str) -> None:
+        for key in keys:
+            if getattr(self, key) is not None:
+                raise refuse(key, problem)
+
     def _check_execution(self) -> None:
         """Refuse an execution of what cannot be executed, and none of what is nothing else."""
         if self.execution == "required":
@@ -189,10 +195,8 @@ class ScenarioFile(Section):
         if self.push is None:
             raise refuse("push", "is missing; valid: force_N, direction_deg, duration_s, at_s")
         if self.body.model not in ("human", "kudoh"):
-            raise refuse("recovery", f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
-        for key in ("supports", "contacts"):
-            if getattr(self, key) is not None:
-                raise refuse(key, "is given beside recovery; valid: one of them")
+            raise self._inapplicable("recovery")
+        self._refuse_given(("supports", "contacts"), "is given beside recovery; valid: one of them")
         for key in ("posture", "height_m"):
             value = getattr(self.task.start, key)
             if value not in (None, 0.0, "standing"):
@@ -221,12 +225,11 @@ class ScenarioFile(Section):
         if self.walking is None:
             return
         if self.body.model != "human":
-            raise refuse("walking", f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
+            raise self._inapplicable("walking")
         if self.floor_height_m is None:
             raise refuse("floor_height_m", "is null; valid in a walk: the height of a floor")
-        for key in ("contacts", "recovery", *(() if self.walking.is_planned(self.supports) else ("push",))):
-            if getattr(self, key) is not None:
-                raise refuse(key, "is given beside walking; valid: one of them")
+        others = ("contacts", "recovery", *(() if self.walking.is_planned(self.supports) else ("push",)))
+        self._refuse_given(others, "is given beside walking; valid: one of them")
         if (self.supports is None) != (self.walking.start is None):
             raise refuse("walking.start", "goes with supports, which it leads to; valid: both or neither")
         if self.walking.is_planned(self.supports):
@@ -312,10 +315,10 @@ class ScenarioFile(Section):
                         )
             return
         if self.task.act is not None:
-            raise refuse("task.act", f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
+            raise self._inapplicable("task.act")
         for key in ("reference_stature_m", "push"):
             if getattr(self, key) is not None and not (key == "push" and self.recovery is not None):
-                raise refuse(key, f"does not apply to {WORDS[self.body.model]}; valid: leave it out")
+                raise self._inapplicable(key)
         if self.body.model != "point_mass" and self.supports is not None:
             raise refuse("supports", f"do not apply to {WORDS[self.body.model]} yet; valid: leave them out")
 

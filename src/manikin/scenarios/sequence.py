@@ -1,8 +1,4 @@
-"""The stances that a scenario lists, and whether they fit its scene.
-
-Also here. The contact that a section of a scenario or stance file describes. What the contacts of a scenario
-can carry, and on which part of a sole it may stand.
-"""
+"""Stances that a scenario lists, and whether they fit its scene."""
 
 import math
 from dataclasses import replace
@@ -26,12 +22,10 @@ from manikin.contact import (
     sole,
     soles_overlap,
 )
-from manikin.errors import InputError
 from manikin.numerics.spatial import frozen_array, rotation_from_normal, rotation_from_rpy
 from manikin.planning.contacts import ContactRules
 from manikin.planning.whole_body.posture_style import READY
 from manikin.scenarios.sections import ContactSection, SoleSection
-from manikin.scenarios.validation import Path as KeyPath
 from manikin.scenarios.values import ScenarioValues, build_body
 from manikin.scene import Scene
 
@@ -48,8 +42,6 @@ def build_contact(
     """Build one contact from its section and the defaults around it.
 
     Args:
-        effector: Name of the effector.
-        entry: The contact's section.
         friction: Coulomb coefficient where the contact gives none.
         default_sole: Sole size where the contact gives none.
         planning: Let ``default_sole`` shrink a sole the contact gives itself.
@@ -103,7 +95,6 @@ def contact_rules(values: ScenarioValues, body: BodyModel) -> ContactRules:
     """Rules of the file's ``contacts`` for a body.
 
     Args:
-        values: The scenario's values.
         body: Its body; one without soles has no front of them.
     """
     options, patch = values.contacts, None
@@ -120,7 +111,7 @@ def friction_of(values: ScenarioValues) -> float:
 
 
 def _toe_hinge(body: BodyModel) -> float:
-    """Where the hinge of the toes crosses the sole's x axis; its tip without such a hinge [m]."""
+    """Place of the hinge of the toes on the sole's x axis; its tip without such a hinge [m]."""
     foot = body.effector("left_foot")
     toes = [segment for segment in body.segments if segment.parent == foot.segment and segment.hinges]
     own = foot.rotation.T @ (toes[0].origin - foot.translation) if toes else None
@@ -131,7 +122,6 @@ def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> Stance
     """Build the stances of the explicit supports; feet that roll have heel and toe phases.
 
     Args:
-        values: The scenario's values.
         planning: With the smaller soles, friction and force caps that planning balances on.
 
     Raises:
@@ -140,17 +130,14 @@ def stance_sequence(values: ScenarioValues, *, planning: bool = False) -> Stance
     sequence, supports = flat_sequence(values, planning=planning), values.explicit_supports()
     if supports.foot == "flat":
         return sequence
-    try:
+    with values.refusing(("supports", "foot")):
         return roll_feet(sequence, (TOE_HINGE_FROM_HEEL - 0.5) * supports.sole.length_m)
-    except InputError as error:
-        raise values.refused(("supports", "foot"), error) from None
 
 
 def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSequence:
     """Build the stances as the file lists them, with full soles.
 
     Args:
-        values: The scenario's values.
         planning: With the smaller soles, friction and force caps that planning balances on.
 
     Raises:
@@ -163,22 +150,12 @@ def flat_sequence(values: ScenarioValues, *, planning: bool = False) -> StanceSe
     model = values.contact_model
     if cap is not None:
         model = replace(model, normal_force_cap=cap)
-    try:
-        return StanceSequence(
-            [
-                Phase(
-                    Stance([_contact(values, *item, planning) for item in contacts.items()], model=model),
-                    section.min_duration_s,
-                    section.max_duration_s,
-                    load,
-                )
-                for section, contacts, load in zip(
-                    supports.phases, supports.resolved_phases(), carried_loads(values), strict=True
-                )
-            ]
-        )
-    except InputError as error:
-        raise values.refused(("supports", "phases"), error) from None
+    with values.refusing(("supports", "phases")):
+        phases, held = [], zip(supports.resolved_phases(), carried_loads(values), strict=True)
+        for section, (contacts, load) in zip(supports.phases, held, strict=True):
+            stance = Stance([_contact(values, *item, planning) for item in contacts.items()], model=model)
+            phases.append(Phase(stance, section.min_duration_s, section.max_duration_s, load))
+        return StanceSequence(phases)
 
 
 def carried_loads(values: ScenarioValues) -> list[CarriedLoad | None]:
@@ -211,8 +188,6 @@ def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> No
     """Check that every contact of the supports lies on a surface of the scene.
 
     Args:
-        values: The scenario's values.
-        scene: The built scene.
         tolerance: Largest gap and overhang of a contact point [m].
 
     Raises:
@@ -226,11 +201,8 @@ def check_contacts(values: ScenarioValues, scene: Scene, tolerance: float) -> No
                     f"overlaps {first.effector}; valid: soles that lie side by side",
                 )
         for contact in stance:
-            try:
+            with values.refusing(("supports", "phases", number, contact.effector)):
                 scene.touched_obstacle(contact, tolerance)
-            except InputError as error:
-                path: KeyPath = ("supports", "phases", number, contact.effector)
-                raise values.refused(path, error) from None
 
 
 def _contact(values: ScenarioValues, effector: str, entry: ContactSection, planning: bool) -> Contact:
@@ -240,17 +212,7 @@ def _contact(values: ScenarioValues, effector: str, entry: ContactSection, plann
         friction = supports.planning_friction or friction
         default_sole = supports.planning_sole or default_sole
     if effector == "buttocks":
-        default_sole = _seat_patch(values.file.body.stature_m)
-    return build_contact(
-        effector,
-        entry,
-        friction,
-        default_sole,
-        planning=planning,
-        force_cap=supports.contact_normal_force_cap_N,
-    )
-
-
-def _seat_patch(stature: float) -> SoleSection:
-    """Rectangle of the body's buttocks that presses on a seat."""
-    return SoleSection(length_m=SEAT_LENGTH * stature, width_m=SEAT_WIDTH * stature)
+        stature = values.file.body.stature_m  # the rectangle of the buttocks that presses on a seat
+        default_sole = SoleSection(length_m=SEAT_LENGTH * stature, width_m=SEAT_WIDTH * stature)
+    cap = supports.contact_normal_force_cap_N
+    return build_contact(effector, entry, friction, default_sole, planning=planning, force_cap=cap)

@@ -13,7 +13,18 @@ from manikin.errors import InputError, ScenarioError
 from manikin.scenarios.sections import ContactSection, SoleSection
 from manikin.scenarios.sections.planning_sections import FRICTION_MODEL_TEXT, FrictionModelName
 from manikin.scenarios.sequence import build_contact
-from manikin.scenarios.validation import Positive, Section, Text, Vector3, place, refuse, validate
+from manikin.scenarios.validation import (
+    Positive,
+    Section,
+    Text,
+    Vector3,
+    optional,
+    place,
+    preset,
+    refuse,
+    required,
+    validate,
+)
 from manikin.scenarios.yaml_reader import read_yaml
 
 if TYPE_CHECKING:
@@ -23,28 +34,26 @@ if TYPE_CHECKING:
 class NamedContactSection(ContactSection):
     """A contact and who makes it."""
 
-    effector: Text = Field(description="name, such as left_foot or right_hand")
+    effector: Text = required("name, such as left_foot or right_hand")
 
 
 class StanceFile(Section):
     """A whole stance file."""
 
-    mass_kg: Positive = Field(description="body mass [kg]")
-    com: Vector3 = Field(description="centre of mass [m]")
-    acceleration: Vector3 = Field(default=(0.0, 0.0, 0.0), description="of the centre of mass [m/s^2]")
-    angular_momentum_rate: Vector3 = Field(
-        default=(0.0, 0.0, 0.0), description="about the centre of mass [N.m]"
+    mass_kg: Positive = required("body mass [kg]")
+    com: Vector3 = required("centre of mass [m]")
+    acceleration: Vector3 = preset((0.0, 0.0, 0.0), "of the centre of mass [m/s^2]")
+    angular_momentum_rate: Vector3 = preset((0.0, 0.0, 0.0), "about the centre of mass [N.m]")
+    contacts: Annotated[list[NamedContactSection], Field(min_length=1)] = required("the contacts")
+    friction: Positive = preset(0.7, "Coulomb coefficient where a contact gives none")
+    sole: SoleSection = preset(
+        SoleSection(length_m=0.28, width_m=0.12), "sole size where a contact gives none"
     )
-    contacts: Annotated[list[NamedContactSection], Field(min_length=1)] = Field(description="the contacts")
-    friction: Positive = Field(default=0.7, description="Coulomb coefficient where a contact gives none")
-    sole: SoleSection = Field(
-        default=SoleSection(length_m=0.28, width_m=0.12), description="sole size where a contact gives none"
+    normal_force_cap_N: Positive | None = optional(
+        "largest sum of normal forces [N] (default: 3 body weights)"
     )
-    normal_force_cap_N: Positive | None = Field(
-        default=None, description="largest sum of normal forces [N] (default: 3 body weights)"
-    )
-    friction_model: FrictionModelName = Field(default="outer", description=FRICTION_MODEL_TEXT)
-    reference: Vector3 = Field(default=(0.0, 0.0, 0.0), description="point of the moments [m]")
+    friction_model: FrictionModelName = preset("outer", FRICTION_MODEL_TEXT)
+    reference: Vector3 = preset((0.0, 0.0, 0.0), "point of the moments [m]")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -91,13 +100,9 @@ class BalanceQuestion:
         file = self.file
         try:
             return evaluate_balance(
-                file.build_stance(),
-                file.mass_kg,
-                file.com,
-                file.acceleration,
-                file.angular_momentum_rate,
+                file.build_stance(), file.mass_kg, file.com, file.acceleration, file.angular_momentum_rate,
                 reference=file.reference,
-            )
+            )  # fmt: skip
         except InputError as error:
             raise ScenarioError(f"{self.source}: {error}") from None
 

@@ -23,7 +23,7 @@ Path = tuple[str | int, ...]
 
 
 class FrameMoves(Enum):
-    """How a value of a file changes with the frame of the world, as a mark in the annotation of its field."""
+    """Change of a value with the frame of the world, as a mark in the annotation of its field."""
 
     POINT = "point"
     """Position in the world, x and y, or x, y and z [m]."""
@@ -131,6 +131,21 @@ Weights3 = Annotated[
 ]
 
 
+def required(meaning: str) -> Any:
+    """Field of a section that has to be given."""
+    return Field(description=meaning)
+
+
+def preset(default: Any, meaning: str) -> Any:
+    """Field of a section with a default."""
+    return Field(default=default, description=meaning)
+
+
+def optional(meaning: str) -> Any:
+    """Field of a section that may be left out."""
+    return Field(default=None, description=meaning)
+
+
 def rule_error(rule: str) -> PydanticCustomError:
     """Make the error of a rule that pydantic does not know; ``rule`` says what is valid."""
     return PydanticCustomError("rule", "{rule}", {"rule": rule})
@@ -152,7 +167,6 @@ def validate(
     Args:
         model: The section at the root of the file.
         data: What the YAML reader returned.
-        source: Name of the file for messages.
         lines: Place (file and line) of each key, from the YAML reader.
 
     Raises:
@@ -203,7 +217,7 @@ def _describe(problem: ErrorDetails, data: Any, model: type[Section]) -> tuple[P
 
 
 def _meaning(model: type[Section], location: tuple[str | int, ...]) -> str:
-    """What a missing key should hold: the description of its field."""
+    """Description of the field of a missing key."""
     for part in location[:-1]:
         if part in model.model_fields:
             model = _section_of(model.model_fields[str(part)].annotation) or model
@@ -215,7 +229,7 @@ def _section_of(annotation: Any) -> Any:
     """The section inside an annotation such as ``list[X]`` or ``X | None``."""
     if isinstance(annotation, type) and issubclass(annotation, Section):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _section_of(part)) is not None), None)
+    return next((result for part in get_args(annotation) if (result := _section_of(part)) is not None), None)
 
 
 def _key_path(key: str) -> Path:

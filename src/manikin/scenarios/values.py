@@ -1,9 +1,10 @@
-"""What a scenario file says, scaled to its body, and where it says it."""
+"""Values of a scenario file, scaled to its body, with their places in the file."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -79,8 +80,6 @@ class ScenarioValues:
     def mass(self) -> float:
         """Body mass, without a load [kg]."""
         if self.file.body.model in ("urdf", "kudoh"):
-            pass
-
             return build_body(self).own_mass
         return self.file.body.mass_kg
 
@@ -94,11 +93,6 @@ class ScenarioValues:
     def is_point_mass(self) -> bool:
         """Whether the body is a point mass, which is planned but has nothing to execute."""
         return self.file.body.model == "point_mass"
-
-    @property
-    def has_stature(self) -> bool:
-        """Whether the body is a person, whose stature may be chosen."""
-        return self.file.body.model == "human"
 
     @property
     def contact_model(self) -> ContactModel:
@@ -116,18 +110,13 @@ class ScenarioValues:
         return self.file.wholebody.method == "refine"
 
     @property
-    def pace(self) -> float:
-        """Speed of a refined motion relative to what its contacts come with."""
-        return self.file.wholebody.pace
-
-    @property
     def execution_required(self) -> bool:
         """Whether the planned motion has to be executed for the run to succeed."""
         return self.file.execution == "required"
 
     @property
     def manner(self) -> str:
-        """How the body carries itself where the task leaves freedom."""
+        """Style of the postures where the task leaves freedom."""
         return self.file.manner
 
     @property
@@ -137,17 +126,17 @@ class ScenarioValues:
 
     @property
     def recovery(self) -> RecoverySection | None:
-        """How a standing body recovers from its push, or None."""
+        """Recovery of a standing body from its push, or None."""
         return self.file.recovery
 
     @property
     def walking(self) -> WalkingSection | None:
-        """How the body walks from start to goal, or None."""
+        """Walk from start to goal, or None."""
         return self.file.walking
 
     @property
     def act(self) -> ActSection | None:
-        """What the hands do to an object at the end, or None."""
+        """Act of the hands on an object at the end, or None."""
         return self.file.task.act
 
     @property
@@ -204,7 +193,7 @@ class ScenarioValues:
 
     @property
     def contacts(self) -> ContactsSection:
-        """How contacts are planned where no supports are given."""
+        """Options of planned contacts, where no supports are given."""
         return self.file.contacts or ContactsSection()
 
     @property
@@ -294,9 +283,19 @@ class ScenarioValues:
         """The constraint on the centre of mass that has the key, or None."""
         return next((c for c in self.file.com_constraints if getattr(c, key) is not None), None)
 
-    def refused(self, path: KeyPath, error: InputError) -> ScenarioError:
-        """The library's error as one of this file, with the place of the key."""
-        return ScenarioError(f"{place(self.source, path, self.lines)}: {error}")
+    @contextmanager
+    def refusing(self, path: KeyPath) -> Iterator[None]:
+        """Context in which an error of the library becomes one of this file, with the place of the key.
+
+        Raises:
+            ScenarioError: If the library refuses a value.
+        """
+        try:
+            yield
+        except ScenarioError:
+            raise
+        except InputError as error:
+            raise ScenarioError(f"{place(self.source, path, self.lines)}: {error}") from None
 
     def error(self, path: KeyPath, text: str) -> ScenarioError:
         """An error that begins with the place of the key and goes on with the text."""
@@ -367,14 +366,14 @@ def build_body(values: ScenarioValues) -> BodyModel:
         body = body if load is None else carrying(body, load.mass_kg, load.hand)
         return with_further_contacts(body, data.further_contacts) if data.further_contacts else body
     except InputError as error:
-        path: KeyPath = ("supports", "sole") if "sole" in str(error) else ("body",)
-        raise values.refused(path, error) from None
+        with values.refusing(("supports", "sole") if "sole" in str(error) else ("body",)):
+            raise
 
 
 def _creature(values: ScenarioValues) -> BodyModel:
     """An insect, or the creature of a robot description."""
     data = values.file.body
-    try:
+    with values.refusing(("body",)):
         if data.model == "insect":
             return insect(data.length_m, data.mass_kg)
         sole = data.sole
@@ -385,5 +384,3 @@ def _creature(values: ScenarioValues) -> BodyModel:
             sole_length=None if sole is None else sole.length_m,
             sole_width=None if sole is None else sole.width_m,
         )
-    except InputError as error:
-        raise values.refused(("body",), error) from None

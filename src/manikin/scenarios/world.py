@@ -1,8 +1,4 @@
-"""The body and the scene that a scenario describes.
-
-Also here. Obstacles of a scenario file. Where the body is at the start of a scenario, before anything is
-planned.
-"""
+"""Scene of a scenario, and the posture of its body at the start."""
 
 from pathlib import Path
 
@@ -10,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from manikin.body import BodyModel, Configuration
-from manikin.errors import InputError, ScenarioError
+from manikin.errors import ScenarioError
 from manikin.numerics.spatial import FloatArray, finite_number, rotation_from_rpy, turned_root
 from manikin.planning.contacts import Endpoints, Habit
 from manikin.planning.whole_body.posture_style import posture_style_of
@@ -74,9 +70,6 @@ def start_posture(
     near which planning would seek holds.
 
     Args:
-        values: The scenario's values.
-        body: Its body.
-        scene: Its scene.
         at: Where to stand, x and y [m]; the file's own place when omitted.
         heading_deg: Where to face, counter-clockwise from world x [deg]; the file's own, or that of
             its feet, when omitted.
@@ -100,12 +93,12 @@ def start_posture(
         return carried_to(posture_style_of(CLIMBING).posture(body), spot, yaw, level)
     if name != Habit.STANDING:
         spot = np.array(values.start_com[:2] if place is None else place)
-        found = Endpoints(
+        result = Endpoints(
             body, scene, friction_of(values), friction_model=values.contact_model.friction
         ).find(spot, yaw, Habit(name), start.height_m)
-        if found.stage is None:
-            raise ScenarioError(f"{values.source}: {found.failure}; valid: another place or posture")
-        return np.array(found.stage.q)
+        if result.stage is None:
+            raise ScenarioError(f"{values.source}: {result.failure}; valid: another place or posture")
+        return np.array(result.stage.q)
     q = turned_root(body.standing_posture(), yaw)
     q[2] += values.start_level
     q[:2] = place if place is not None else q[:2] + values.start_com[:2] - Configuration(body, q).com[:2]
@@ -114,10 +107,10 @@ def start_posture(
 
 def carried_to(q: FloatArray, at: ArrayLike, yaw: float, level: float) -> FloatArray:
     """(nq,) a posture made for the ground at the origin, at a place x and y and a level [m], turned [rad]."""
-    found = turned_root(q, yaw)
-    found[:2] = at
-    found[2] += level
-    return found
+    posture = turned_root(q, yaw)
+    posture[:2] = at
+    posture[2] += level
+    return posture
 
 
 def build_scene(values: ScenarioValues) -> Scene:
@@ -128,8 +121,6 @@ def build_scene(values: ScenarioValues) -> Scene:
     """
     obstacles = []
     for index, entry in enumerate(values.file.scene):
-        try:
+        with values.refusing(("scene", index)):
             obstacles.append(build_obstacle(entry, values.folder))
-        except InputError as error:
-            raise values.refused(("scene", index), error) from None
     return Scene(obstacles, floor_height=values.file.floor_height_m)

@@ -1,12 +1,10 @@
-"""YAML with line numbers, without YAML 1.1's traps.
+"""YAML with the line of every key, and how one file is laid over another.
 
-``1e-3`` is a number (PyYAML reads a text), ``010`` is ten, ``no`` and ``on`` are texts, and
-a key given twice is an error instead of silently replacing the first.
+YAML 1.1's traps are left out: ``1e-3`` is a number (PyYAML reads a text), ``010`` is ten, ``no`` and ``on``
+are texts, and a key given twice is an error instead of silently replacing the first.
 
-Also here. The content of a scenario file with the place of every key, and how one is laid over another.
-
-A mapping is merged key by key; a list or a single value replaces the one below; ``null``
-removes the key below it.  ``floor_height_m`` is the one key where ``null`` is a value.
+A mapping is merged key by key; a list or a single value replaces the one below; ``null`` removes the key
+below it. ``floor_height_m`` is the one key where ``null`` is a value.
 """
 
 import re
@@ -56,9 +54,6 @@ _Loader.add_implicit_resolver(
 
 def read_yaml(path: Path) -> tuple[Any, dict[KeyPath, str]]:
     """Read one YAML document.
-
-    Args:
-        path: The file.
 
     Returns:
         Its content in plain Python values, and the place of every key and list entry: the file

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from manikin.motion.file import MotionFile
     from manikin.planning.contacts.single_contact import LiveContacts
     from manikin.scene import Scene
+    from manikin.viewer.canvas import Page
     from manikin.walking import WalkController
 
 
@@ -35,10 +36,7 @@ def serve(
     """
     from manikin.viewer.session import ViewerSession
 
-    session = ViewerSession(content, port, others)
-    if announce is not None:
-        announce(session.url)
-    session.run()
+    _run(ViewerSession(content, port, others), announce)
 
 
 def serve_contacts(
@@ -48,18 +46,14 @@ def serve_contacts(
 
     Args:
         live: The body, its scene and where it begins.
-        port: Port to listen on; 0 picks a free one.
-        announce: Told the page's address when it can be opened.
+        port, announce: As of :func:`serve`.
 
     Raises:
         InputError: If the port is taken.
     """
     from manikin.viewer.contacts import ContactViewer
 
-    session = ContactViewer(live, port)
-    if announce is not None:
-        announce(session.url)
-    session.run()
+    _run(ContactViewer(live, port), announce)
 
 
 def serve_drive(
@@ -71,17 +65,18 @@ def serve_drive(
     """Let the user steer a walker with keys and sliders, in real time, until Ctrl-C.
 
     Args:
-        controller: The walker.
         scene: Drawn around the walker, who does not look at it.
-        port: Port to listen on; 0 picks a free one.
-        announce: Told the page's address when it can be opened.
+        port, announce: As of :func:`serve`.
 
     Raises:
         InputError: If the port is taken.
     """
     from manikin.viewer.drive import WalkViewer
 
-    session = WalkViewer(controller, scene, port)
+    _run(WalkViewer(controller, scene, port), announce)
+
+
+def _run(page: Page, announce: Callable[[str], None] | None) -> None:
     if announce is not None:
-        announce(session.url)
-    session.run()
+        announce(page.url)
+    page.run()

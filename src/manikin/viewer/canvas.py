@@ -1,7 +1,4 @@
-"""What every viewer shows: the server, the obstacles and the body's shapes.
-
-Also here. A page in the browser: its server, and the loop that serves it.
-"""
+"""A page in the browser: its server, and the obstacles and bodies that it shows."""
 
 import socket
 import threading
@@ -32,7 +29,6 @@ class Page(ABC):
         """Start the server.
 
         Args:
-            port: Port to listen on; 0 picks a free one.
             frame_rate: Largest number of pictures per second.
 
         Raises:
@@ -41,7 +37,10 @@ class Page(ABC):
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._frame_rate = frame_rate
-        self.server = start_server(port)
+        with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
+            self.server = viser.ViserServer(host=HOST, port=_checked_port(port), verbose=False)
+        self.server.scene.set_up_direction("+z")
+        self.server.gui.configure_theme(show_logo=False, show_share_button=False)
 
     @property
     def url(self) -> str:
@@ -50,7 +49,7 @@ class Page(ABC):
 
     @abstractmethod
     def advance(self, seconds: float) -> None:
-        """Show what has come of ``seconds`` of real time [s]."""
+        """Show the state after ``seconds`` more of real time [s]."""
 
     def run(self) -> None:
         """Serve until :meth:`close` is called or Ctrl-C is pressed."""
@@ -69,7 +68,8 @@ class Page(ABC):
         """Stop the server; a second call does nothing."""
         if not self._closed.is_set():
             self._closed.set()
-            stop_server(self.server)
+            with redirect_stdout(StringIO()):
+                self.server.stop()
 
 
 HOST = "127.0.0.1"
@@ -87,38 +87,14 @@ COLOURS = {
     "force": (230, 159, 0),
 }
 
-
 VIEW = np.array([-1.7, -1.9, 0.5])
-"""Where new visitors look from, seen from what they look at [m]."""
+"""Position of a new visitor's camera relative to what it looks at [m]."""
 
 WHOLE = 2.0
-"""Size of what is seen whole from there, a body aside [m]."""
-
+"""Size of what that camera sees as a whole, without a body [m]."""
 
 ABOVE = 0.35
-"""From the origin of the head to a name above it [m]."""
-
-
-def start_server(port: int) -> viser.ViserServer:
-    """Start a server on this computer.
-
-    Args:
-        port: Port to listen on; 0 picks a free one.
-
-    Raises:
-        InputError: If the port is taken.
-    """
-    with redirect_stdout(StringIO()):  # viser greets on standard output, whatever its verbosity
-        server = viser.ViserServer(host=HOST, port=_checked_port(port), verbose=False)
-    server.scene.set_up_direction("+z")
-    server.gui.configure_theme(show_logo=False, show_share_button=False)
-    return server
-
-
-def stop_server(server: viser.ViserServer) -> None:
-    """Stop a server without a word."""
-    with redirect_stdout(StringIO()):
-        server.stop()
+"""Height of a name above the origin of the head [m]."""
 
 
 def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: bool = False) -> None:
@@ -128,32 +104,29 @@ def add_scene(server: viser.ViserServer, scene: Scene | None, *, endless_floor: 
             continue
         mesh = obstacle.to_trimesh()
         server.scene.add_mesh_simple(
-            f"/scene/{obstacle.name}",
-            np.asarray(mesh.vertices),
-            np.asarray(mesh.faces),
-            color=COLOURS["obstacle"],
-            opacity=0.55,
-            flat_shading=True,
-            side="double",
-        )
+            f"/scene/{obstacle.name}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
+            color=COLOURS["obstacle"], opacity=0.55, flat_shading=True, side="double",
+        )  # fmt: skip
     if scene is not None and scene.floor_height is not None:
-        height = scene.floor_height - 1e-3
         server.scene.add_grid(
-            "/floor",
-            width=8.0,
-            height=8.0,
-            cell_size=0.5,
-            plane="xy",
-            position=(0, 0, height),
-            infinite_grid=endless_floor,
-        )
+            "/floor", width=8.0, height=8.0, cell_size=0.5, plane="xy",
+            position=(0, 0, scene.floor_height - 1e-3), infinite_grid=endless_floor,
+        )  # fmt: skip
+
+
+def add_arrow(server: viser.ViserServer, name: str, colour: tuple[int, int, int]) -> viser.ArrowsHandle:
+    """Make the arrow of a force or a normal, which is placed later."""
+    points = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]])
+    return server.scene.add_arrows(
+        name, points, np.array(colour, dtype=np.uint8), shaft_radius=0.012, head_radius=0.03,
+        head_length=0.06, visible=False,
+    )  # fmt: skip
 
 
 def look_at(server: viser.ViserServer, middle: FloatArray, size: float = 0.0) -> None:
     """Let new visitors look at a point from behind its right, from a person's height or above.
 
     Args:
-        server: Of the page.
         middle: (3,) the point [m].
         size: Of what is to be seen, a body aside: from farther away the larger it is [m].
     """
@@ -176,8 +149,6 @@ class BodyShapes:
         """Draw the body; what is inside it stays visible.
 
         Args:
-            server: Of the page.
-            body: Whose shapes.
             opacity: In [0, 1].
             root: Name of the body on the page.
         """

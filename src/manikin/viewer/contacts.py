@@ -8,7 +8,7 @@ import numpy as np
 from manikin.numerics.spatial import FloatArray
 from manikin.planning.contacts import HEURISTICS
 from manikin.planning.contacts.single_contact import LiveAnswer, LiveContacts, Role
-from manikin.viewer.canvas import BodyShapes, Page, add_scene, look_at, side_colour
+from manikin.viewer.canvas import BodyShapes, Page, add_arrow, add_scene, look_at, side_colour
 
 FRAME_RATE = 60.0
 """Largest number of updates per second; a change that comes while one is made waits for the next."""
@@ -35,7 +35,6 @@ class ContactViewer(Page):
 
         Args:
             live: The body, its scene and where it begins.
-            port: Port to listen on; 0 picks a free one.
 
         Raises:
             InputError: If the port is taken.
@@ -101,15 +100,7 @@ class ContactViewer(Page):
         self.gizmo.on_update(lambda _: self.move(self.gizmo.position, self.gizmo.wxyz))
         self._task = scene.add_arrows("/task", _arrow(np.zeros(3), np.ones(3)), np.zeros(3, dtype=np.uint8))
         self._normals = {
-            limb.name: scene.add_arrows(
-                f"/contacts/{limb.name}",
-                _arrow(np.zeros(3), np.ones(3)),
-                np.array(side_colour(limb.name), dtype=np.uint8),
-                shaft_radius=0.012,
-                head_radius=0.03,
-                head_length=0.06,
-                visible=False,
-            )
+            limb.name: add_arrow(self.server, f"/contacts/{limb.name}", side_colour(limb.name))
             for limb in self.live.body.limbs
         }
 
@@ -147,8 +138,8 @@ class ContactViewer(Page):
             head = answer.q[:3] + np.array([0.0, 0.0, 1.05])
             self._task.points = _arrow(head, TASK * self.live.direction)
             for name, arrow in self._normals.items():
-                found = answer.answers.get(name)
-                contact = None if found is None else found.contact
+                result = answer.answers.get(name)
+                contact = None if result is None else result.contact
                 if contact is not None:
                     arrow.points = _arrow(contact.position, NORMAL * contact.normal)
                 arrow.visible = contact is not None
@@ -156,10 +147,10 @@ class ContactViewer(Page):
 
 
 def _lines(answer: LiveAnswer) -> list[str]:
-    """What each limb found, in one line each."""
+    """Result of each limb, in one line each."""
     lines = []
-    for name, found in answer.answers.items():
-        words = f"{found.obstacle}, EFORT {answer.efforts[name]:.2f}" if found.found else found.message
+    for name, result in answer.answers.items():
+        words = f"{result.obstacle}, EFORT {answer.efforts[name]:.2f}" if result.found else result.message
         lines.append(f"- {name.replace('_', ' ')}: {words}")
     return lines
 

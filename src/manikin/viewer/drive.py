@@ -1,4 +1,4 @@
-"""The walking mode: somebody walks over the page as the keys say."""
+"""The walking mode: a walker that is steered with keys and sliders."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 FRAME_RATE = 60.0
 """Pictures per second."""
 LONGEST_STEP = 0.05
-"""Of the controller [s]; a page that was late makes up for it in several."""
+"""Longest step of the controller [s]; a late page catches up in several steps."""
 LONGEST_GAP = 0.5
-"""Real time that is made up for at most [s]; after a longer one the walk goes on from where it is."""
+"""Longest time that a late page catches up [s]."""
 TRAIL = 600
 """Places that are kept of the way [frames]."""
 
 
 @dataclass(frozen=True)
 class Key:
-    """What one key does to the directive.
+    """Effect of one key on the directive.
 
     Attributes:
         hotkey: The page's name of the key.
@@ -43,7 +43,7 @@ class Key:
 
     @property
     def shown(self) -> str:
-        """The key as people call it."""
+        """Common name of the key."""
         return self.hotkey.removeprefix("arrow") if self.hotkey != "space" else "space bar"
 
 
@@ -76,9 +76,7 @@ class WalkViewer(Page):
         """Start the server and show the walker standing.
 
         Args:
-            controller: The walker.
             scene: Drawn, but not looked at by the walker.
-            port: Port to listen on; 0 picks a free one.
 
         Raises:
             InputError: If the scene has no floor, or the port is taken.
@@ -157,7 +155,7 @@ class WalkViewer(Page):
         self.press(key)
 
     def _welcome(self, client: "ClientHandle") -> None:
-        """Let a new visitor see the walker, wherever it is by now."""
+        """Point the camera of a new visitor at the walker."""
         with client.atomic():
             client.camera.position, client.camera.look_at = self._middle + VIEW, self._middle
 
@@ -169,7 +167,7 @@ class WalkViewer(Page):
     def _slid(self, event: "GuiEvent[Any]") -> None:
         """Follow the sliders, unless it was this page that moved them."""
         if event.client is not None:
-            self.steer(np.array([one.value for one in self._sliders]))
+            self.steer(np.array([item.value for item in self._sliders]))
 
     def _show(self, frame: WalkFrame) -> None:
         moved = bool(np.any(frame.place != self._place))

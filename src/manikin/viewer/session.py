@@ -11,7 +11,8 @@ from manikin.motion import Motion
 from manikin.motion.file import MotionFile
 from manikin.motion.motion import effector_positions
 from manikin.numerics.spatial import FloatArray
-from manikin.viewer.canvas import COLOURS, BodyShapes, Page, add_scene, look_at, side_colour
+from manikin.runtime.palette import readable
+from manikin.viewer.canvas import COLOURS, BodyShapes, Page, add_arrow, add_scene, look_at, side_colour
 
 FRAME_RATE = 30.0
 """Pictures per second while playing."""
@@ -19,8 +20,10 @@ METRES_PER_NEWTON = 1e-3
 SMALLEST_FORCE = 5.0
 """Contact forces below this are not drawn [N]."""
 PLOT_POINTS = 400
+MOST_PLACES = 1000
+"""Places of the centre of mass that are drawn, about."""
 BESIDE = 1.2
-"""From the motion shown to the one beside it [m]."""
+"""Distance of the motion beside from the motion shown [m]."""
 NOTHING = "nothing"
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
 
@@ -43,7 +46,6 @@ class ViewerSession(Page):
 
         Args:
             content: At least one motion, and the body.
-            port: Port to listen on; 0 picks a free one.
             others: Motions of others who are there, by name, on the same clock.
 
         Raises:
@@ -85,7 +87,7 @@ class ViewerSession(Page):
         with self._lock:
             motion = self.motion
             self.time = float(np.clip(time, motion.time[0], motion.time[-1]))
-            index = int(np.clip(np.searchsorted(motion.time, self.time), 0, len(motion.time) - 1))
+            index = self._sample(motion)
             with self.server.atomic():
                 self._shapes.place(motion.q[index])
                 self._place_legs(motion, index)
@@ -153,7 +155,7 @@ class ViewerSession(Page):
         scene = self.server.scene
         add_scene(self.server, self.content.scene)
         for name, motion in self.content.motions.items():
-            path = _thinned(motion.com)
+            path = motion.com[:: max(1, len(motion.com) // MOST_PLACES)]
             segments = np.stack([path[:-1], path[1:]], axis=1)
             scene.add_line_segments(
                 f"/com/{name}", segments, np.array(COLOURS[name]), thickness=3.0, thickness_units="screen"
@@ -172,13 +174,7 @@ class ViewerSession(Page):
                 if len(corners) < 3:
                     continue
                 edges = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-                self.server.scene.add_line_segments(
-                    f"/contacts/{number}_{contact.effector}",
-                    edges,
-                    np.array(side_colour(contact.effector)),
-                    thickness=2.0,
-                    thickness_units="screen",
-                )
+                self._draw_lines(f"/contacts/{number}_{contact.effector}", edges, contact.effector, 2.0)
 
     # --- what moves ----------------------------------------------------------------------
 
@@ -194,18 +190,7 @@ class ViewerSession(Page):
         names = dict.fromkeys(
             name for motion in self.content.motions.values() for name in motion.contact_names
         )
-        self._arrows = {
-            name: scene.add_arrows(
-                f"/forces/{name}",
-                np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]]),
-                np.array(COLOURS["force"]),
-                shaft_radius=0.012,
-                head_radius=0.03,
-                head_length=0.06,
-                visible=False,
-            )
-            for name in names
-        }
+        self._arrows = {name: add_arrow(self.server, f"/forces/{name}", COLOURS["force"]) for name in names}
 
     def _build_others(self, others: Mapping[str, MotionFile]) -> None:
         self._others: list[tuple[BodyShapes, Motion]] = []
@@ -214,9 +199,13 @@ class ViewerSession(Page):
             shapes = BodyShapes(self.server, content.body, 0.35, f"/others/{name}")
             self._others.append((shapes, list(content.motions.values())[-1]))
 
+    def _sample(self, motion: Motion) -> int:
+        """Sample of a motion at the instant shown."""
+        return int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))
+
     def _place_others(self) -> None:
         for shapes, motion in self._others:
-            shapes.place(motion.q[int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))])
+            shapes.place(motion.q[self._sample(motion)])
 
     def _place_beside(self) -> None:
         together = self.beside != NOTHING
@@ -226,7 +215,7 @@ class ViewerSession(Page):
         if not together:
             return
         motion = self.content.motions[self.beside]
-        q = np.array(motion.q[int(np.searchsorted(motion.time, self.time).clip(0, len(motion.time) - 1))])
+        q = np.array(motion.q[self._sample(motion)])
         q[:2] += self._aside
         self._second.place(q)
         for label, name, shapes in zip(
@@ -252,13 +241,15 @@ class ViewerSession(Page):
         """Draw the massless legs of a point mass as lines, those in contact thicker."""
         for name, places in self._feet.items():
             on = bool(motion.support[index, motion.contact_names.index(name)])
-            self.server.scene.add_line_segments(
-                f"/legs/{name}",
-                np.array([[motion.com[index], places[index]]]),
-                np.array(side_colour(name)),
-                thickness=6.0 if on else 2.0,
-                thickness_units="screen",
-            )
+            leg = np.array([[motion.com[index], places[index]]])
+            self._draw_lines(f"/legs/{name}", leg, name, 6.0 if on else 2.0)
+
+    def _draw_lines(self, path: str, lines: FloatArray, effector: str, thickness: float) -> None:
+        """Draw lines (n, 2, 3) in the colour of an effector's side."""
+        colour = np.array(side_colour(effector))
+        self.server.scene.add_line_segments(
+            path, lines, colour, thickness=thickness, thickness_units="screen"
+        )
 
     def _forces_wanted(self) -> bool:
         return not hasattr(self, "_forces") or self._forces.value
@@ -305,18 +296,14 @@ class ViewerSession(Page):
         self._plot_range = (low - 0.05 * (high - low), high + 0.05 * (high - low))
         series: list[Any] = [uplot.Series(label="time [s]")]
         for name in self.content.motions:
-            series.append(uplot.Series(label=name, stroke=_css(COLOURS[name]), width=1.5))
+            series.append(uplot.Series(label=name, stroke=f"rgb{COLOURS[name]}", width=1.5))
         series.append(uplot.Series(label="now", stroke="#555555", width=1.0, points={"show": False}))
+        margins = uplot.Scale(auto=False, range=self._plot_range)
         self._plot = self.server.gui.add_uplot(
-            self._plot_data(self._plot_time[0]),
-            tuple(series),
-            scales={
-                "x": uplot.Scale(time=False, auto=True),
-                "y": uplot.Scale(auto=False, range=self._plot_range),
-            },
+            self._plot_data(self._plot_time[0]), tuple(series), aspect=1.35,
+            scales={"x": uplot.Scale(time=False, auto=True), "y": margins},
             axes=(uplot.Axis(label="time [s]"), uplot.Axis(label=f"margin [{self.motion.margin_unit}]")),
-            aspect=1.35,
-        )
+        )  # fmt: skip
 
     def _plot_data(self, time: float) -> tuple[FloatArray, ...]:
         """Time, margins, and a last row that stands up at the instant shown, as a cursor."""
@@ -328,22 +315,15 @@ class ViewerSession(Page):
     def _show_numbers(self, motion: Motion, index: int) -> None:
         self._slider.value = round(self.time, 3)
         self._plot.data = self._plot_data(self.time)
-        supports = [
-            n.replace("_", " ")
-            for n, on in zip(motion.contact_names, motion.support[index], strict=True)
-            if on
-        ]
+        held = zip(motion.contact_names, motion.support[index], strict=True)
+        supports = ", ".join(readable(name) for name, on in held if on)
         load = float(motion.contact_force[index, :, 2].sum())
-        self._text.content = "\n".join(
-            [
-                f"**{self.time:.3f} s**, {self.chosen}",
-                "",
-                f"- margin: **{motion.margin[index]:.1f} {motion.margin_unit}**",
-                f"- supports: {', '.join(supports) or 'none'}",
-                f"- vertical contact force: {load:.0f} N",
-                f"- CoM: {', '.join(f'{value:.3f}' for value in motion.com[index])} m",
-            ]
-        )
+        self._text.content = f"""**{self.time:.3f} s**, {self.chosen}
+
+- margin: **{motion.margin[index]:.1f} {motion.margin_unit}**
+- supports: {supports or "none"}
+- vertical contact force: {load:.0f} N
+- CoM: {", ".join(f"{value:.3f}" for value in motion.com[index])} m"""
 
 
 def _across(path: FloatArray) -> FloatArray:
@@ -351,12 +331,3 @@ def _across(path: FloatArray) -> FloatArray:
     way = path[-1, :2] - path[0, :2]
     length = float(np.linalg.norm(way))
     return np.array([-way[1], way[0]]) / length if length > 0.1 else np.array([0.0, 1.0])
-
-
-def _css(colour: tuple[int, int, int]) -> str:
-    return f"rgb{colour}"
-
-
-def _thinned(path: FloatArray, largest: int = 1000) -> FloatArray:
-    step = max(1, len(path) // largest)
-    return path[::step]

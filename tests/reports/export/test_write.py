@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from manikin.errors import InputError, MotionFileError
 from manikin.motion.file import MotionFile
-from manikin.reports.export import export_motion, pick_motion
-from manikin.reports.export.write import resample, to_csv
+from manikin.reports.export import export_motion, pick_motion, resample, to_csv
 
 
 def test_csv_holds_every_number_under_its_name(finished_run):

@@ -1,5 +1,8 @@
 """The strip of a recorded motion shows its supports."""
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,7 +10,12 @@ from manikin.body import human
 from manikin.errors import FigureError
 from manikin.kinematics import PointTargets
 from manikin.recordings import Reconstruction, RecordedSupports, Support
-from manikin.reports.figures import support_strip_figure
+
+spec = importlib.util.spec_from_file_location(
+    "support_strip", Path(__file__).resolve().parents[3] / "docs/support_strip.py"
+)
+docs = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(docs)
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +35,7 @@ def stood():
 
 def test_a_strip_has_a_bar_for_each_support(stood):
     found, supports = stood
-    _, heights, bars = support_strip_figure(found, supports, "stood").axes
+    _, heights, bars = docs.support_strip_figure(found, supports, "stood").axes
     names = [label.get_text() for label in bars.get_yticklabels()]
     assert names == ["left foot", "right foot", "left hand", "right hand", "left knee"]
     drawn = [[path.get_extents().intervalx for path in row.get_paths()] for row in bars.collections]
@@ -39,10 +47,10 @@ def test_a_strip_has_a_bar_for_each_support(stood):
 
 def test_a_strip_shows_a_part(stood):
     found, supports = stood
-    assert support_strip_figure(found, supports, "stood", (0.2, 0.6)).axes[2].get_xlim() == (0.2, 0.6)
+    assert docs.support_strip_figure(found, supports, "stood", (0.2, 0.6)).axes[2].get_xlim() == (0.2, 0.6)
 
 
 def test_a_strip_of_no_instant_is_refused(stood):
     found, supports = stood
     with pytest.raises(FigureError, match="valid: from 0 to 1 s"):
-        support_strip_figure(found, supports, "stood", (2.0, 3.0))
+        docs.support_strip_figure(found, supports, "stood", (2.0, 3.0))

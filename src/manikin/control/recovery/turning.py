@@ -39,7 +39,7 @@ LONGEST_TURN = 1.5
 
 @dataclass(frozen=True)
 class Turning:
-    """What a body can give towards one side.
+    """How far a body can turn towards one side.
 
     Attributes:
         moment: Beyond what the ZMP gives [N.m].
@@ -56,7 +56,7 @@ class Turning:
 
         Args:
             weight: Of the body [N].
-            frequency: Of the pendulum [1/s].
+            frequency: ``w`` [1/s].
         """
         if self.moment <= 0.0 or self.range <= 0.0:
             return 0.0
@@ -71,22 +71,10 @@ class Turning:
 
 
 def available_turning(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> Turning:
-    """Measure what a body can give against a fall.
-
-    Args:
-        controller: Of the balance, for the feet that carry and all limits.
-        q: (nq,) the posture.
-        towards: (2,) unit direction of the fall.
-    """
-    body = controller.body
-    state = controller.evaluate(q, np.zeros(body.nv))
+    """Measure how far a body can turn in a posture (nq,) against a fall in a unit direction (2,)."""
+    state = controller.evaluate(q, np.zeros(controller.body.nv))
     momentum, travel = _turned(controller, q, towards)
     return Turning(_moment(controller, state, towards), momentum, travel)
-
-
-def _axis(towards: FloatArray) -> FloatArray:
-    """(3,) axis about which a body falls that way."""
-    return np.array([-towards[1], towards[0], 0.0])
 
 
 def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArray) -> float:
@@ -100,7 +88,7 @@ def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArr
     equal = program.equalities
     upper, lower = np.isfinite(program.rows_upper), np.isfinite(program.rows_lower)
     upper[:equal] = lower[:equal] = False
-    found = linprog(
+    result = linprog(
         push_back,
         A_ub=np.concatenate((program.rows[upper], -program.rows[lower])),
         b_ub=np.concatenate((program.rows_upper[upper], -program.rows_lower[lower])),
@@ -108,17 +96,19 @@ def _moment(controller: BalanceRecovery, state: DynamicsState, towards: FloatArr
         b_eq=np.concatenate((program.rows_lower[:equal], -loop.com.offset[2:])),
         bounds=list(zip(program.lower, program.upper, strict=True)),
     )
-    if not found.success:
+    if not result.success:
         return 0.0
     height = controller.standing.height
     ahead = float(np.max((controller.area.corners - state.com[:2]) @ towards))
     by_zmp = GRAVITY / height * ahead
-    return max(0.0, state.mass * height * (-float(found.fun) - float(towards @ loop.com.offset[:2]) - by_zmp))
+    return max(
+        0.0, state.mass * height * (-float(result.fun) - float(towards @ loop.com.offset[:2]) - by_zmp)
+    )
 
 
 def _turned(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> tuple[float, float]:
     """Largest angular momentum on the way to the ends of the ranges, and its integral."""
-    body, axis = controller.body, _axis(towards)
+    body, axis = controller.body, np.array([-towards[1], towards[0], 0.0])
     speed = controller.settings.strength * body.velocity_limit
     speed[controller.locked] = 0.0
     momentum = travel = 0.0
@@ -129,14 +119,14 @@ def _turned(controller: BalanceRecovery, q: FloatArray, towards: FloatArray) -> 
         joints = loop.joints.matrix
         least = np.maximum(-speed, np.minimum(0.0, (body.lower - q[7:]) / TURN_STEP))
         most = np.minimum(speed, np.maximum(0.0, (body.upper - q[7:]) / TURN_STEP))
-        found = linprog(
+        result = linprog(
             -turns, A_ub=np.concatenate((joints, -joints)), b_ub=np.concatenate((most, -least)),
             A_eq=loop.com.matrix[:2], b_eq=np.zeros(2), bounds=(None, None),
         )  # fmt: skip
-        if not found.success or -found.fun < 1e-3:
+        if not result.success or -result.fun < 1e-3:
             break
-        momentum, travel = max(momentum, -found.fun), travel - found.fun * TURN_STEP
-        q = integrate(body, q, loop.acceleration.matrix @ found.x * TURN_STEP)
+        momentum, travel = max(momentum, -result.fun), travel - result.fun * TURN_STEP
+        q = integrate(body, q, loop.acceleration.matrix @ result.x * TURN_STEP)
     return momentum, travel
 
 
@@ -190,9 +180,8 @@ def edge_limits(controller: BalanceRecovery, q: ArrayLike, duration: float) -> t
         turning = available_turning(controller, posture, normal)
         excess = turning.excess(weight, frequency)
         room = float(offset - normal @ controller.com[:2])
-        limits.append(
-            EdgeLimit(normal, turning, excess, _impulse(controller, normal, room, excess, duration))
-        )
+        impulse = _impulse(controller, normal, room, excess, duration)
+        limits.append(EdgeLimit(normal, turning, excess, impulse))
     return tuple(limits)
 
 

@@ -1,8 +1,6 @@
-"""Contacts along one guide after the other, until there are some, with what that costs.
+"""Search for contacts along guides of the root ([Tonneau2015]_ chapter 6), and what it found.
 
-Also here. Start and goal of a scenario as contacts with a posture. The way of the root from start to goal, as
-the contact planner follows it ([Tonneau2015]_ chapter 6). What the search for contacts found, or why it found
-nothing.
+A guide is a way of the root from start to goal. One is followed after the other until there are contacts.
 """
 
 import time as clock
@@ -19,7 +17,7 @@ from manikin.scenarios import Scenario
 
 
 def stage_at(endpoints: Endpoints, scenario: Scenario, end: str) -> Stage | str:
-    """Contacts and posture at the start or the goal of a scenario, or why there are none.
+    """Contacts and posture at the start or the goal of a scenario, or the reason why there are none.
 
     Args:
         endpoints: Finds them.
@@ -28,8 +26,8 @@ def stage_at(endpoints: Endpoints, scenario: Scenario, end: str) -> Stage | str:
     """
     state = getattr(scenario.file.task, end)
     heading, habit = float(np.deg2rad(state.heading_deg or 0.0)), Habit(state.posture or "standing")
-    found = endpoints.find(np.array(state.at), heading, habit, state.height_m)
-    return found.stage or f"the {end}: {found.failure}"
+    result = endpoints.find(np.array(state.at), heading, habit, state.height_m)
+    return result.stage or f"the {end}: {result.failure}"
 
 
 GUIDE_POSES = 200
@@ -38,7 +36,7 @@ GUIDE_POSES = 200
 
 @dataclass(frozen=True, eq=False)
 class RootGuide:
-    """A way of the root, or why there is none.
+    """A guide of the root, or the reason why there is none.
 
     Attributes:
         line: The way, or None.
@@ -54,29 +52,28 @@ class RootGuide:
 
 
 def guide_root(world: GuideWorld, ends: FloatArray, rng: np.random.Generator) -> RootGuide:
-    """Find a comfortable way between two poses of the root.
+    """Find a guide between two poses of the root.
 
     Args:
         world: Scene, abstraction of the body, region and condition of the way.
         ends: (2, 7) poses at start and goal; where they do not fit, the nearest that do are taken.
-        rng: Source of all randomness.
     """
     began = clock.perf_counter()
     checker = world.checker()
     fits = [nearest_fit(pose, checker) for pose in ends]
     ends = np.array([pose if fit is None else fit for pose, fit in zip(ends, fits, strict=True)])
-    found = plan_guide(world, GuideTask(*ends), rng)
-    samples = found.statistics.samples
-    if found.path is None:
-        return RootGuide(None, samples, clock.perf_counter() - began, found.failure or "no guide")
-    poses = found.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES))
+    result = plan_guide(world, GuideTask(*ends), rng)
+    samples = result.statistics.samples
+    if result.path is None:
+        return RootGuide(None, samples, clock.perf_counter() - began, result.failure or "no guide")
+    poses = result.path.poses(np.linspace(0.0, 1.0, GUIDE_POSES))
     line = GuideLine.through(relax(poses, LocalPlanner(checker, tuple(ends)), rng))
     return RootGuide(line, samples, clock.perf_counter() - began)
 
 
 @dataclass(frozen=True, eq=False)
 class ContactSearch:
-    """Supports for a scenario, or why there are none.
+    """Supports for a scenario, or the reason why there are none.
 
     Attributes:
         scenario: The scenario with supports; None without a plan, and where a file cannot list such contacts.

@@ -1,10 +1,7 @@
-"""The contacts stage: supports for a scenario that gives start and goal alone.
+"""Contact stage: supports for a scenario that gives start and goal alone ([Tonneau2015]_ chapters 6 and 7).
 
-Also here. Contacts of feet from start and goal: guide, contacts, and the scenario with what was found.
-Contacts of any limbs from start and goal: guide, then algorithm 7 ([Tonneau2015]_ chapters 6 and 7).
-
-For a scenario without supports whose body goes on its feet ([Tonneau2015]_ chapters 6 and 7); the hands
-join in where it ends with an act.
+A body goes on its feet, and the hands join in where it ends with an act; or any limbs make contacts
+(algorithm 7).
 """
 
 from collections.abc import Iterator
@@ -13,7 +10,7 @@ from itertools import islice
 
 import numpy as np
 
-from manikin.body import BodyModel, Limb, limb_named, limbs_of
+from manikin.body import BodyModel, Limb, limb_named
 from manikin.body.limbs import is_further
 from manikin.contact import ContactKind
 from manikin.kinematics import reach_volume
@@ -63,60 +60,58 @@ AROUND = 1.2
 
 PITCH = (-0.2, 1.0)
 ROLL = (-0.1, 0.1)
-"""How the root may lean [rad]; our choice for a body on its feet."""
+"""Ranges of the lean of the root [rad]; our choice for a body on its feet."""
 
 TURN = float(np.deg2rad(75.0))
-"""How far the root may turn from the headings of start and goal, where these are that close [rad]."""
+"""Largest turn of the root from the headings of start and goal, where these are that close [rad]."""
 
 SEARCHES_AGAIN = 60
 """Postures that are looked for along every guide after the first, which the others are much like."""
 
 
-def find_foot_contacts(
-    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
-) -> ContactSearch:
-    """Plan the supports of a body that goes on its feet.
+class _Search:
+    """Search for contacts between start and goal of a scenario."""
 
-    Args:
-        scenario: Without supports.
-        body: A human.
-        scene: Its scene.
-        rng: Source of all randomness.
-    """
-    return _FootSearch(scenario, body, scene, rng).run()
-
-
-class _FootSearch:
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
         self._tally = SearchTally()
         self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
-        self._reference = posture_style_of(scenario.manner).posture(body)
         self._natural = scenario.contacts.ranges == "learnt"
-        self._endpoints = Endpoints(
-            body, scene, scenario.contacts.friction, self._reference,
-            natural=self._natural, friction_model=scenario.contact_model.friction,
+
+    def _endpoints(self, reference: FloatArray | None = None) -> Endpoints:
+        return Endpoints(
+            self._body, self._scene, self._scenario.contacts.friction, reference,
+            natural=self._natural, friction_model=self._scenario.contact_model.friction,
         )  # fmt: skip
+
+
+class _FootSearch(_Search):
+    """Search for the contacts of a human on its feet."""
+
+    def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
+        super().__init__(scenario, body, scene, rng)
+        self._reference = posture_style_of(scenario.manner).posture(body)
+        self._places = self._endpoints(self._reference)
         self._brace: Brace | None = None
 
     def run(self) -> ContactSearch:
-        start = stage_at(self._endpoints, self._scenario, "start")
+        start = stage_at(self._places, self._scenario, "start")
         if isinstance(start, str):
             return self._tally.failed(start, "start")
         goal = self._goal(start)
         if isinstance(goal, str):
             return self._tally.failed(goal, "goal")
-        standing = self._endpoints.risen(start) if "buttocks" in start.contacts else None
+        standing = self._places.risen(start) if "buttocks" in start.contacts else None
         if standing is not None and standing.stage is None:
             return self._tally.failed(standing.failure or "", "start")
         first = start if standing is None or standing.stage is None else standing.stage
-        found = self._tally.along_guides(
+        result = self._tally.along_guides(
             self._scenario.contacts.attempts,
             lambda: self._guide(first, goal),
             lambda line, number: self._follow(line, start, goal, number),
         )
-        if found.plan is None:
-            return found
-        return replace(found, scenario=with_supports(self._scenario, found.plan))
+        if result.plan is None:
+            return result
+        return replace(result, scenario=with_supports(self._scenario, result.plan))
 
     def _follow(self, line: GuideLine, start: Stage, goal: Stage, before: int) -> Extension:
         """Contacts along a guide after others, with the hands on the object where there is an act."""
@@ -132,22 +127,22 @@ class _FootSearch:
         return found if found.plan is None else replace(found, plan=self._acting(found.plan))
 
     def _goal(self, start: Stage) -> Stage | str:
-        """Where to go, or why there is no such place; for an act, on the level of the start."""
+        """Goal, or the reason why there is none; for an act, on the level of the start."""
         act = act_of(self._scenario)
         if act is None:
-            return stage_at(self._endpoints, self._scenario, "goal")
+            return stage_at(self._places, self._scenario, "goal")
         samples = sample_limbs(self._body, self._rng, natural=self._natural)
         friction, model = self._scenario.contacts.friction, self._scenario.contact_model.friction
-        found = find_braced_posture(
+        result = find_braced_posture(
             self._body, self._scene, samples, act, start.com[:2],
             level=min(contact.position[2] for contact in start.contacts.values()),
             settings=BraceSettings(friction=friction, friction_model=model), reference=self._reference,
         )  # fmt: skip
-        self._tally.summary["act_places"] = found.tried
-        if found.brace is None:
-            return found.failure or ""
-        self._brace = found.brace
-        return arrival(self._body, found.brace)
+        self._tally.summary["act_places"] = result.tried
+        if result.brace is None:
+            return result.failure or ""
+        self._brace = result.brace
+        return arrival(self._body, result.brace)
 
     def _acting(self, way: ContactPlan) -> ContactPlan:
         """The way, and the hands on the object where there is an act."""
@@ -161,7 +156,7 @@ class _FootSearch:
     def _abstraction(self) -> Abstraction:
         volumes = [
             reach_volume(self._body, limb, np.random.default_rng(0), natural=self._natural)
-            for limb in limbs_of(self._body)
+            for limb in self._body.limbs
             if limb.name in LEGS
         ]
         return abstraction_of(self._body, volumes)
@@ -198,39 +193,23 @@ STEEPEST = float(np.deg2rad(50.0))
 """Largest slope on which a limb that cannot hold on counts as within reach; our choice."""
 
 LEAN = 0.35
-"""How far the root may lean in any direction [rad]; our choice."""
+"""Largest lean of the root in any direction [rad]; our choice."""
 
 NEAR_GOAL = 0.2
 """Distance from its goal at which a climber's root has arrived: holds are where they are [m]; our choice."""
 
 
-def find_limb_contacts(
-    scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
-) -> ContactSearch:
-    """Plan contacts of the limbs that a scenario names, all limbs where it names none.
+class _LimbSearch(_Search):
+    """Search for contacts of the limbs that a scenario names, all limbs where it names none."""
 
-    Args:
-        scenario: Without supports.
-        body: Its body.
-        scene: Its scene.
-        rng: Source of all randomness.
-
-    Raises:
-        BodyError: If the body has no such limb.
-    """
-    return _LimbSearch(scenario, body, scene, rng).run()
-
-
-class _LimbSearch:
     def __init__(self, scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator) -> None:
-        self._tally = SearchTally()
-        self._scenario, self._body, self._scene, self._rng = scenario, body, scene, rng
+        super().__init__(scenario, body, scene, rng)
         self._limbs = _limbs(body, scenario.contact_limbs or ())
         self._kinds = {limb.name: _kind(body, limb) for limb in self._limbs}
         self._size = float(body.standing_posture()[2]) / STANDING_HEIGHT
         safe = max(self._size, SMALLEST)
-        self._reference = _as_climbing(body, scenario.manner)
-        self._natural = scenario.contacts.ranges == "learnt"
+        style = None if body.stature is None else posture_style_of(scenario.manner)
+        self._reference = np.array(body.standing_posture() if style is None else style.posture(body))
         settings = PostureFinderSettings(
             natural=self._natural, friction_model=scenario.contact_model.friction
         )
@@ -286,29 +265,23 @@ class _LimbSearch:
         )
 
     def _starts(self) -> Iterator[Endpoint]:
-        """Where the body is at the start, the best first, or why it cannot be there."""
+        """Postures at the start, the best first, or the reason why there is none."""
         state = self._scenario.file.task.start
         if self._body.stature is not None and state.posture != CLIMBING:
-            found = stage_at(self._endpoints(), self._scenario, "start")
-            yield Endpoint(None, found) if isinstance(found, str) else Endpoint(found)
+            result = stage_at(self._endpoints(), self._scenario, "start")
+            yield Endpoint(None, result) if isinstance(result, str) else Endpoint(result)
             return
         at, yaw = np.array(state.at), float(np.deg2rad(state.heading_deg or 0.0))
         q = self._standing(at, yaw, state.height_m)
-        for found in starts_on_limbs(self._poser, self._places, q, self._settings().shift_duration):
+        for result in starts_on_limbs(self._poser, self._places, q, self._settings().shift_duration):
             where = f"the start: no posture at {at.round(3).tolist()} m: "
-            yield found if found.stage is not None else Endpoint(None, f"{where}{found.failure}")
-
-    def _endpoints(self) -> Endpoints:
-        return Endpoints(
-            self._body, self._scene, self._scenario.contacts.friction,
-            natural=self._natural, friction_model=self._scenario.contact_model.friction,
-        )  # fmt: skip
+            yield result if result.stage is not None else Endpoint(None, f"{where}{result.failure}")
 
     def _goal(self) -> FloatArray | str:
         """(7,) pose of the root at the goal, or why there is none."""
         if self._body.stature is not None and not self._climbs:
-            found = stage_at(self._endpoints(), self._scenario, "goal")
-            return found if isinstance(found, str) else found.q[:7]
+            result = stage_at(self._endpoints(), self._scenario, "goal")
+            return result if isinstance(result, str) else result.q[:7]
         state = self._scenario.file.task.goal
         yaw = float(np.deg2rad(state.heading_deg or 0.0))
         return self._standing(np.array(state.at), yaw, state.height_m)[:7]
@@ -334,7 +307,7 @@ class _LimbSearch:
         )
 
     def _condition(self) -> Condition:
-        """What cannot hold on reaches something to stand on: all but two of more than four such limbs."""
+        """Limbs that cannot hold on reach something to stand on: all but two of more than four of them."""
         bearing = [
             limb.name for limb in self._limbs
             if self._kinds[limb.name] is not ContactKind.GRASP and not is_further(self._body, limb)
@@ -353,13 +326,6 @@ def _kind(body: BodyModel, limb: Limb) -> ContactKind:
     return ContactKind.GRASP if body.stature is not None and "hand" in limb.effector else limb.kind
 
 
-def _as_climbing(body: BodyModel, manner: str) -> FloatArray:
-    """(nq,) posture to be like: of a manner for a person, else standing."""
-    if body.stature is None:
-        return np.array(body.standing_posture())
-    return posture_style_of(manner).posture(body)
-
-
 def find_supports(
     scenario: Scenario, body: BodyModel, scene: Scene, rng: np.random.Generator
 ) -> ContactSearch:
@@ -367,15 +333,12 @@ def find_supports(
 
     Args:
         scenario: Without supports.
-        body: Its body.
-        scene: Its scene.
-        rng: Source of all randomness.
 
     Raises:
         BodyError: If the scenario names a limb that the body has not.
     """
-    find = find_foot_contacts if scenario.contact_limbs is None else find_limb_contacts
-    return find(scenario, body, scene, rng)
+    search = _FootSearch if scenario.contact_limbs is None else _LimbSearch
+    return search(scenario, body, scene, rng).run()
 
 
 def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
@@ -392,15 +355,15 @@ def plan_contacts(context: RunContext, report: Report) -> RunContext | None:
     if scenario.contact_limbs is not None and not scenario.refines:
         raise scenario.error(("wholebody", "method"), "is follow; valid: refine, for contacts of any limbs")
     report.progress("contacts", 0.0)
-    found = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
-    report.summary["contacts"] = dict(found.summary)
-    report.keep("contacts", found.to_dict(report.transform))
-    if found.plan is None:
-        report.fail("contacts", found.failure or "", where=found.where)
+    result = find_supports(scenario, context.body, context.scene, np.random.default_rng(scenario.seed))
+    report.summary["contacts"] = dict(result.summary)
+    report.keep("contacts", result.to_dict(report.transform))
+    if result.plan is None:
+        report.fail("contacts", result.failure or "", where=result.where)
         return None
-    planned = replace(context, plan=found.plan)
-    if not scenario.refines and found.scenario is not None:
-        planned = planned.with_supports(found.scenario)
-        report.keep_scenario(found.scenario)
+    planned = replace(context, plan=result.plan)
+    if not scenario.refines and result.scenario is not None:
+        planned = planned.with_supports(result.scenario)
+        report.keep_scenario(result.scenario)
     report.progress("contacts", 1.0)
     return planned

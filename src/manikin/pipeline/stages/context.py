@@ -1,19 +1,13 @@
-"""What every stage of a run reads: the scenario with its body, its scene and what was found before.
+"""Context, report and result of a run.
 
-Everything here is in the frame of the task (:mod:`manikin.scenarios.placement`): the stages work there, and
-results are moved to the world where they leave, in :class:`~manikin.pipeline.stages.context.Report` and
-:class:`~manikin.pipeline.stages.context.RunResult`.
-
-Also here. What a run reports: its summary and verdict, the files of its directory, its progress. The outcome
-of one run. Results of a run in the world: what was found in the frame of the task, moved to where that is.
-
-The stages work in the frame of the task; what leaves through here is in the world.
+The stages work in the frame of the task (:mod:`manikin.scenarios.placement`); results are moved to the world
+where they leave, in :class:`Report` and :class:`RunResult`.
 """
 
 import re
 import time as clock
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +19,10 @@ from manikin.motion.file import MotionFile, write_motions
 from manikin.motion.passage import Passage
 from manikin.numerics.spatial import IDENTITY, FloatArray, PlanarTransform, frozen_array
 from manikin.numerics.spline import BSpline
-from manikin.pipeline.run_directory import MOTION, RunDirectory, other_motion
+from manikin.pipeline.run_directory import MOTION, RunDirectory
 from manikin.planning.com import CentroidalProblem, CentroidalResult, CentroidalTrajectory, KeyframeProblem
 from manikin.planning.contacts import ContactPlan
-from manikin.planning.whole_body import (
-    RefineResult,
-    WholeBodyResult,
-    WholeBodySettings,
-    measure_passage,
-)
+from manikin.planning.whole_body import RefineResult, WholeBodyResult, WholeBodySettings, measure_passage
 from manikin.planning.whole_body.posture_style import posture_style_of
 from manikin.runtime.requirement import RequirementTable
 from manikin.scenarios import Scenario
@@ -180,7 +169,7 @@ class RunContext:
         return self._posed(scenario)
 
     def posed_problem(self) -> CentroidalProblem | KeyframeProblem:
-        """What the centre of mass is planned for.
+        """Problem of the centre of mass.
 
         Raises:
             ScenarioError: If there are no supports yet.
@@ -188,16 +177,6 @@ class RunContext:
         if self.problem is None:
             raise ScenarioError(f"scenario {self.scenario.name!r} has no supports; valid: with supports")
         return self.problem
-
-    @property
-    def has_supports(self) -> bool:
-        """Whether the scenario lists supports."""
-        return self.scenario.file.supports is not None
-
-    @property
-    def is_recorded(self) -> bool:
-        """Whether the centre of mass follows the key frames of a recording."""
-        return isinstance(self.problem, KeyframeProblem)
 
     @property
     def padded(self) -> tuple[str, ...]:
@@ -217,17 +196,17 @@ class RunContext:
         return replace(self, scenario=scenario, problem=problem)
 
     def passage(self, schedule: ContactSchedule, motion: Motion) -> Passage:
-        """How low the body comes, and how near its head to the scene."""
+        """Lowest height of the body, and least distance of its head from the scene."""
         return measure_passage(self.body, self.scene, schedule, motion, self.padded)
 
 
 Progress = Callable[[str, float], None]
-"""Told the stage and the share of it that is done, in [0, 1]."""
+"""Callback with the stage and the share of it that is done, in [0, 1]."""
 
 
 @dataclass(frozen=True)
 class StageFailure:
-    """Why a run ended without success.
+    """Reason why a run ended without success.
 
     Attributes:
         stage: ``"contacts"``, ``"centroidal"``, ``"wholebody"``, ``"execution"`` or ``"push"``.
@@ -243,7 +222,7 @@ class StageFailure:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the ``failure`` block of the summary."""
-        return {"stage": self.stage, "reason": self.reason, "time_s": self.time_s, "where": self.where}
+        return asdict(self)
 
 
 class Report:
@@ -265,7 +244,6 @@ class Report:
         Args:
             context: What is run.
             out: Run directory; nothing is written when None.
-            progress: Told how far the run is, or None.
             began: Reading of ``time.perf_counter`` when the run began [s].
 
         Raises:
@@ -279,7 +257,8 @@ class Report:
         self._tables: dict[str, RequirementTable] = {}
         self._directory = None if out is None else RunDirectory(out)
         scenario = context.given
-        self._keep_scenario(scenario)
+        if self._directory is not None:
+            self._directory.write_scenario(scenario.to_yaml())
         stature = None if scenario.is_point_mass else context.body.stature
         self.summary: dict[str, Any] = {
             "scenario": scenario.name, "stature_m": stature, "mass_kg": scenario.mass, "seed": scenario.seed,
@@ -292,7 +271,7 @@ class Report:
 
     @property
     def transform(self) -> PlanarTransform:
-        """From the frame of the task to the world, where everything is that is kept."""
+        """Transform from the frame of the task to the world; results are kept in the world."""
         return self._context.transform_task_to_world
 
     @property
@@ -304,7 +283,6 @@ class Report:
         """Say why the run is no success.
 
         Args:
-            stage: Stage that failed.
             reason: In one line; positions in it, in the frame of the task, are moved to the world.
             time: When in the motion [s].
             where: Phase, contact, limb or pair.
@@ -332,17 +310,25 @@ class Report:
 
     def keep_scenario(self, scenario: Scenario) -> None:
         """Keep a scenario of the task frame with the supports that were found, in the world."""
-        self._keep_scenario(scenario.from_task_frame(self.transform))
+        if self._directory is not None:
+            self._directory.write_scenario(scenario.from_task_frame(self.transform).to_yaml())
 
     def keep_motions(
-        self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None
-    ) -> None:
-        """Keep the motions that there are so far, moved to the world."""
-        self._keep_motions(MOTION, schedule, planned, executed)
-
-    def keep_other(self, name: str, schedule: ContactSchedule, planned: Motion) -> None:
-        """Keep the motion of somebody else, who has the same body, moved to the world."""
-        self._keep_motions(other_motion(name), schedule, planned)
+        self, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None,
+        file: str = MOTION,
+    ) -> None:  # fmt: skip
+        """Keep the motions that there are so far, moved to the world, in a file of the run directory."""
+        if self._directory is None:
+            return
+        transform = self.transform
+        content = MotionFile(
+            None if planned is None else motion_in_world(planned, transform),
+            None if executed is None else motion_in_world(executed, transform),
+            self._context.body,
+            self._context.scene_in_world,
+            schedule_in_world(schedule, transform),
+        )
+        write_motions(self._directory.path / file, content)
 
     def close(self) -> dict[str, Any]:
         """Complete the summary, write it and return it."""
@@ -371,33 +357,14 @@ class Report:
             stage = "execution" if required else "wholebody"
             self.fail(stage, "the motion was not executed" if required else "there is no plan")
 
-    def _keep_scenario(self, scenario: Scenario) -> None:
-        if self._directory is not None:
-            self._directory.write_scenario(scenario.to_yaml())
-
-    def _keep_motions(
-        self, name: str, schedule: ContactSchedule, planned: Motion | None, executed: Motion | None = None
-    ) -> None:
-        if self._directory is None:
-            return
-        transform = self.transform
-        content = MotionFile(
-            None if planned is None else motion_in_world(planned, transform),
-            None if executed is None else motion_in_world(executed, transform),
-            self._context.body,
-            self._context.scene_in_world,
-            schedule_in_world(schedule, transform),
-        )
-        write_motions(self._directory.path / name, content)
-
 
 def place(phase: int | None, where: str) -> str:
-    """Where something failed, in words: a phase with its contacts, or what there is of both."""
+    """Place of a failure in words: a phase with its contacts, or what is known of both."""
     return where if phase is None else f"phase {phase}" + (f" on {where}" if where else "")
 
 
 def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
+    """Take a progress report and do nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -441,12 +408,7 @@ class RunResult:
         """Close the report of a run and gather what its stages returned.
 
         Args:
-            report: Of the run.
-            centroidal: Of the centre of mass.
-            wholebody: Of the whole body.
-            execution: Of the physics engine.
             planned: The planned motion, where no whole body was planned.
-            recovery: Of a recovery from a push.
         """
         executed = execution.motion if execution is not None else None
         if recovery is not None:

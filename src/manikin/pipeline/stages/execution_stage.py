@@ -1,7 +1,6 @@
-"""The execution stage: the planned motion under control in the physics engine, and its report.
+"""Execution stage: the planned motion, with its act, under control in the physics engine.
 
-Also here. What an executed motion must keep. The act at the end of a scenario's motion: certified, appended
-to the motion, measured. A planned motion with its contacts in time, as it is handed to the physics engine.
+The act at the end of a motion is certified and appended to it before, and measured afterwards.
 """
 
 from dataclasses import dataclass
@@ -9,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from manikin.balance.contact_forces import FrictionUse, friction_share, friction_use
+from manikin.balance.contact_forces import FrictionUse, friction_share
 from manikin.contact import ContactKind, ContactSchedule, FrictionModel
 from manikin.control import ControlSettings, ReturnSettings, SupportSettings
 from manikin.motion import Motion
@@ -32,7 +31,7 @@ from manikin.simulation.execution import BACK
 
 @dataclass(frozen=True)
 class ExecutionRequirements:
-    """What an executed motion must keep to count as a success.
+    """Limits that an executed motion must keep to count as a success.
 
     Attributes:
         com_rms_error: Root mean square distance of the CoM from its plan [m].
@@ -63,7 +62,7 @@ class ExecutionRequirements:
         return requirement_table([*_kept_standing(execution), *rest])
 
     def _followed(self, execution: Execution, seated: bool) -> list[Requirement | None]:
-        """Of a body that nothing disturbs."""
+        """Requirements of a body that nothing disturbs."""
         deepest = self.padding_compression if seated else self.penetration
         thinnest = float(execution.motion.time[int(np.argmin(execution.motion.margin))])
         pressed = execution.max_padding_compression_m > 0.0
@@ -82,7 +81,7 @@ class ExecutionRequirements:
         ]  # fmt: skip
 
     def _returned(self, execution: Execution) -> list[Requirement | None]:
-        """Of a body that was pushed: what it has to come back to."""
+        """Requirements of a body that was pushed: it has to come back to its plan."""
         push, end = execution.push, float(execution.motion.time[-1])
         if push is None:
             return []
@@ -95,7 +94,7 @@ class ExecutionRequirements:
 
 
 def _kept_standing(execution: Execution) -> list[Requirement]:
-    """The body does not fall, and nothing touches that should not."""
+    """Requirements of every execution: no fall, no unplanned touch."""
     touches = execution.counted_touches
     first = touches[0] if touches else None
     return [
@@ -109,7 +108,7 @@ def _kept_standing(execution: Execution) -> list[Requirement]:
 
 @dataclass(frozen=True, eq=False)
 class PlannedMotion:
-    """What is to be executed.
+    """Motion that is to be executed.
 
     Attributes:
         schedule: Contacts in time.
@@ -127,21 +126,14 @@ class PlannedMotion:
         return float(self.motion.time[-1])
 
 
-def use_of_friction(schedule: ContactSchedule, motion: Motion) -> dict[str, float | str]:
-    """Largest use of friction by the contact forces of a planned motion, for the run's summary."""
-    return friction_use(schedule, motion.time, motion.contact_names, motion.contact_force).summary()
-
-
 FORCE_ERROR = 0.05
 """Largest error of the mean force that was exerted, as a share of what is wanted."""
 
 
 def act_of(scenario: Scenario) -> Act | None:
     """The act of a scenario, or None."""
-    found = scenario.act
-    if found is None:
-        return None
-    return Act(ActKind(found.kind), found.on, found.direction, found.force_N)
+    act = scenario.act
+    return None if act is None else Act(ActKind(act.kind), act.on, act.direction, act.force_N)
 
 
 def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> PlannedMotion:
@@ -150,7 +142,6 @@ def append_act(context: RunContext, report: Report, planned: PlannedMotion) -> P
     The last posture is certified for the act first.
 
     Args:
-        context: Of the run.
         report: Takes the ``act`` block.
         planned: The motion to the place of the act.
     """
@@ -185,7 +176,6 @@ def measured_act_failure(
     """Add what was exerted to the report; a failure where it is too little or too much, or nothing.
 
     Args:
-        context: Of the run.
         report: Has the ``act`` block.
         planned: The motion, with its act or without one.
         executed: What the physics engine made of it.
@@ -194,17 +184,17 @@ def measured_act_failure(
     if act is None or acting is None:
         return None
     friction = context.scenario.explicit_supports().friction
-    found = measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
-    if found is None:
-        return StageFailure(
-            "execution", "the motion did not come to its act", acting.timing.end, act.obstacle
-        )
-    report.finish("act", report.summary["act"] | found.summary())
-    row = Requirement("mean_force_error_N", "error of the mean force", "N", abs(found.mean_force - act.force),
-                      "<=", FORCE_ERROR * act.force, acting.timing.end, act.obstacle)  # fmt: skip
+    result = measure_act(executed, acting.schedule, act, acting.timing, context.body.mass, friction)
+    if result is None:
+        reason = "the motion did not come to its act"
+        return StageFailure("execution", reason, acting.timing.end, act.obstacle)
+    report.finish("act", report.summary["act"] | result.summary())
+    error, largest = abs(result.mean_force - act.force), FORCE_ERROR * act.force
+    row = Requirement("mean_force_error_N", "error of the mean force", "N", error, "<=", largest,
+                      acting.timing.end, act.obstacle)  # fmt: skip
     report.require("act execution", RequirementTable((row,)))
     if not row.held:
-        reason = f"the mean force was {found.mean_force:.0f} N; wanted {act.force:g} N"
+        reason = f"the mean force was {result.mean_force:.0f} N; wanted {act.force:g} N"
         return StageFailure("execution", reason, acting.timing.end, act.obstacle)
     return None
 
@@ -243,7 +233,6 @@ def execute_motion(
     :mod:`manikin.control.plan_return`.
 
     Args:
-        context: Of the run.
         report: Takes the ``execution`` block, and the failure of a motion that broke a requirement.
         planned: What is executed.
         requirements: What the execution must keep.
@@ -287,7 +276,7 @@ def _summary_in_world(result: Execution, report: Report) -> dict[str, Any]:
 
 
 def _failure(schedule: ContactSchedule, result: Execution, table: RequirementTable) -> StageFailure | None:
-    """What the execution itself did not keep, or None."""
+    """Requirement that the execution itself broke, or None."""
     broken = table.first_broken
     if result.failure:
         reason, time = result.failure, float(result.failure_time_s or 0.0)

@@ -1,22 +1,26 @@
 """The recovery stage: a standing body is pushed and keeps its balance, in the physics engine."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
 
 from manikin.body import BodyModel
 from manikin.contact import ContactSchedule, Phase, Stance, StanceSequence
 from manikin.control.recovery import RecoverySettings
-from manikin.errors import InputError, ScenarioError
+from manikin.errors import ScenarioError
 from manikin.numerics.spatial import rotation_from_yaw
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.scenarios import Scenario
 from manikin.scenarios.sections.task_sections import PushSection, RecoverySection
 from manikin.simulation import (
+    DirectionSearch,
     Feet,
+    PushMap,
     PushTrials,
     Recovery,
     RecoveryTask,
+    equal_directions,
     feet_apart_posture,
     one_foot_posture,
     push_near_com,
@@ -30,7 +34,6 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     """Push the body of a scenario with a ``recovery`` section and measure what becomes of it.
 
     Args:
-        context: Of the run.
         report: Takes the ``push`` block, and the failure where the body does not stand in the end.
 
     Raises:
@@ -40,23 +43,21 @@ def recover_from_push(context: RunContext, report: Report) -> Recovery:
     section, push = _sections(scenario)
     force = push.force_N * rotation_from_yaw(math.radians(push.direction_deg))[:, 0]
     task, settings = _task(scenario, section, body), _settings(section)
-    try:
-        one = push_near_com(
+    with scenario.refusing(("push",)):
+        item = push_near_com(
             body, force, push.at_s, push.duration_s, frequency=push.frequency_hz or 0.0, q=task.q
         )
-    except InputError as error:
-        raise scenario.refused(("push",), error) from None
-    task = replace(task, pushes=(one,))
-    found = recover(
+    task = replace(task, pushes=(item,))
+    result = recover(
         body, task, settings, scene=context.scene, progress=lambda share: report.progress(STAGE, share)
     )
-    report.finish(STAGE, found.summary() | _bound(body, task, settings, found))
-    report.require(STAGE, found.requirements)
-    report.planned, report.proved = None, found.recovered
-    if found.failure:
-        report.fail(STAGE, found.failure, float(found.trace.motion.time[-1]), f"feet {section.feet}")
-    report.keep_motions(_schedule(found), None, found.trace.motion)
-    return found
+    report.finish(STAGE, result.summary() | _bound(body, task, settings, result))
+    report.require(STAGE, result.requirements)
+    report.planned, report.proved = None, result.recovered
+    if result.failure:
+        report.fail(STAGE, result.failure, float(result.trace.motion.time[-1]), f"feet {section.feet}")
+    report.keep_motions(_schedule(result), None, result.trace.motion)
+    return result
 
 
 def push_trials(scenario: Scenario) -> PushTrials:
@@ -70,6 +71,33 @@ def push_trials(scenario: Scenario) -> PushTrials:
     section, push = _sections(scenario)
     body = scenario.build_body()
     return PushTrials(body, _task(scenario, section, body), _settings(section), push.duration_s, push.at_s)
+
+
+def push_map_searches(
+    scenarios: Sequence[Scenario], directions: int, tolerance: float
+) -> list[tuple[PushMap, list[DirectionSearch]]]:
+    """Empty maps of the largest impulses held, each with the searches of its directions.
+
+    Args:
+        scenarios: One with a ``recovery`` section for each map.
+        directions: How many, all around.
+        tolerance: Of the impulses [N.s].
+
+    Raises:
+        InputError: If a number is not usable.
+    """
+    angles = equal_directions(directions)
+    maps = []
+    for scenario in scenarios:
+        trials, (section, push) = push_trials(scenario), _sections(scenario)
+        conditions = {
+            "body": scenario.file.body.model_dump(mode="json", exclude_none=True),
+            **section.model_dump(mode="json", exclude={"duration_s"}),
+            "duration_s": push.duration_s, "tolerance_Ns": tolerance,
+        }  # fmt: skip
+        searches = [DirectionSearch(trials, angle, tolerance) for angle in angles]
+        maps.append((PushMap.empty(conditions, angles, trials.bound(angles)), searches))
+    return maps
 
 
 def _sections(scenario: Scenario) -> tuple[RecoverySection, PushSection]:
@@ -86,15 +114,11 @@ def _task(scenario: Scenario, section: RecoverySection, body: BodyModel) -> Reco
     if section.support == "both":
         if section.feet_apart_m is None:
             return task
-        try:
+        with scenario.refusing(("recovery", "feet_apart_m")):
             return replace(task, q=feet_apart_posture(body, section.feet_apart_m))
-        except InputError as error:
-            raise scenario.refused(("recovery", "feet_apart_m"), error) from None
     foot = f"{section.support}_foot"
-    try:
+    with scenario.refusing(("recovery", "support")):
         return replace(task, q=one_foot_posture(body, foot), support=(foot,))
-    except InputError as error:
-        raise scenario.refused(("recovery", "support"), error) from None
 
 
 def _settings(section: RecoverySection) -> RecoverySettings:

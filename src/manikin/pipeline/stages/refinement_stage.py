@@ -1,7 +1,4 @@
-"""The whole-body stage by refinement: from postures at the changes of contact to a motion and its report.
-
-Also here. What the refinement begins with: contacts in time and a posture at each of their changes.
-"""
+"""Refinement stage: a motion of all joints through postures at the changes of contact."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +10,7 @@ from manikin.body import BodyModel
 from manikin.contact import ContactModel, ContactSchedule
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.stages.context import Report, RunContext
-from manikin.pipeline.stages.execution_stage import use_of_friction
+from manikin.pipeline.stages.whole_body_stage import certificate_summary, report_whole_body
 from manikin.planning.contacts import ContactPlan
 from manikin.planning.whole_body import KeyPostures, RefineResult, RefineScales, RefineSettings, refine_motion
 from manikin.planning.whole_body.refine_input import KeyPath
@@ -23,7 +20,7 @@ from manikin.scene import Scene
 
 @dataclass(frozen=True, eq=False)
 class KeyedContacts:
-    """What the refinement begins with.
+    """Initial guess of the refinement.
 
     Attributes:
         schedule: Contacts in time.
@@ -66,12 +63,11 @@ def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -
     """Refine the motion through key postures, at the scenario's pace.
 
     Args:
-        context: Of the run.
         report: Takes the ``wholebody`` block.
         keyed: Contacts with a posture at each change.
     """
     body, scene, padded = context.body, context.scene, context.padded
-    keyed = keyed.at_pace(context.scenario.pace).with_lifted_feet(body, scene, padded)
+    keyed = keyed.at_pace(context.scenario.file.wholebody.pace).with_lifted_feet(body, scene, padded)
     options = context.scenario.file.wholebody
     settings = RefineSettings(
         scales=RefineScales.of(body),
@@ -82,15 +78,8 @@ def refine_contacts(context: RunContext, report: Report, keyed: KeyedContacts) -
         body, scene, keyed.time, keyed.q, keyed.schedule, settings=settings,
         padded=padded, progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
-    passage = context.passage(result.schedule, result.motion).summary()
-    used = {"friction": use_of_friction(result.schedule, result.motion)}
-    block = refined_summary(result) | passage | used | {"seed_matters": context.plan is not None}
-    report.finish("wholebody", block)
-    report.require("wholebody", result.requirements)
-    report.planned = result.succeeded
-    if result.failure is not None:
-        report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
-    report.keep_motions(result.schedule, result.motion)
+    block = refined_summary(result) | {"seed_matters": context.plan is not None}
+    report_whole_body(context, report, result.schedule, result, block)
     return result
 
 
@@ -100,21 +89,12 @@ def refined_summary(result: RefineResult) -> dict[str, Any]:
     return {
         "method": "refine",
         "duration_s": result.after.duration_s,
-        "max_support_error_m": certificate.value("max_support_error_m"),
+        **certificate_summary(certificate),
         "max_meeting_error_m": None,
         "max_com_error_m": None,
-        "min_clearance_m": certificate.value("min_clearance_m"),
-        "closest_pair": list(certificate.closest_pair),
         "max_scuff_m": certificate.value("max_penetration_m"),
-        "max_joint_limit_violation_rad": certificate.value("max_joint_limit_violation_rad"),
-        "max_velocity_share": certificate.value("max_velocity_share"),
-        "max_torque_share": certificate.value("max_torque_share"),
-        "max_torque_joint": certificate["max_torque_share"].where,
-        "max_torque_at_s": certificate["max_torque_share"].time_s,
         "impacts": [],
         "min_margin": certificate.value("min_margin"),
-        "min_force_at_com_N": certificate.min_force_at_com_N,
-        "min_zmp_distance_m": certificate.min_zmp_distance_m,
         "swings": None,
         "refinement": {
             "min_contact_slack": result.contact_slack,
@@ -140,5 +120,5 @@ def refined_summary(result: RefineResult) -> dict[str, Any]:
 
 
 def _fall(before: float, after: float) -> float | None:
-    """How many times less there is after; None where nothing is left."""
+    """Ratio of the values before and after; None if nothing is left."""
     return before / after if after > 0.0 else None

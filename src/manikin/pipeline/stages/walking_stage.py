@@ -1,7 +1,7 @@
-"""The walking stage: ways over the floor, then the whole body along them.
+"""Walking stage: ways over the floor, then the whole body along them.
 
-Also here. A walk as a motion with its supports, forces and margins. A walk on footprints: the way over the
-floor first, then supports along it, for the stages that follow.
+A recorded walk follows the way with its supports, forces and margins. A planned walk puts footprints along
+it, for the stages that follow.
 """
 
 import math
@@ -19,13 +19,13 @@ from manikin.errors import BodyError, InputError
 from manikin.motion import Motion
 from manikin.numerics.signals import low_passed
 from manikin.numerics.spatial import FloatArray, PlanarTransform
-from manikin.pipeline.run_directory import BODY, WALK_PATHS
+from manikin.pipeline.run_directory import BODY, WALK_PATHS, other_motion
 from manikin.pipeline.stages.context import Report, RunContext
 from manikin.recordings.dynamics.recorded_dynamics import MOTION_CUTOFF
 from manikin.runtime.requirement import Requirement, RequirementTable, requirement_table
 from manikin.scenarios import Scenario
 from manikin.scenarios.planned import walk_before, walking_supports
-from manikin.scenarios.sections import StandSection, WalkingSection, WaypointSection
+from manikin.scenarios.sections import StandSection, WalkerSection, WalkingSection, WaypointSection
 from manikin.scenarios.sequence import flat_sequence
 from manikin.scenarios.validation import Path as KeyPath
 from manikin.walking import (
@@ -38,7 +38,6 @@ from manikin.walking import (
     Walk,
     Walker,
     WalkingPath,
-    WalkObjective,
     WalkObstacle,
     WalkRoute,
     Waypoint,
@@ -54,7 +53,7 @@ from manikin.walking.path.walk_obstacles import clearance
 from manikin.walking.path.walking_path import TOLERANCE
 
 FRICTION = 0.8
-"""Of the soles of one who walks."""
+"""Coefficient of friction of the soles of a walker."""
 
 
 def walked_motion(walk: Walk, height: float) -> tuple[ContactSchedule, Motion]:
@@ -120,7 +119,7 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
     path, bare = plan.route.legs[0], scenario.replaced(walking=None)
     rule = StepRule().scaled(context.body.stature or 1.75)
     height = context.scene.floor_height or 0.0
-    try:
+    with scenario.refusing(("walking",)):
         if stance is None:
             footprints = _along(path, rule, height, context)
             walked = walking_supports(footprints, bare)
@@ -130,15 +129,13 @@ def walk_on_footprints(context: RunContext, report: Report) -> RunContext | None
                 place_footprints(path, rule, first=first, height=height) for first in FEET
             ])  # fmt: skip
             walked = walk_before(footprints, bare)
-    except InputError as error:
-        raise scenario.refused(("walking",), error) from None
     report.finish(STAGE, path_block(plan) | {"steps": footprints.count})
     report.keep_scenario(walked)
     return replace(context, body=walked.build_body()).with_supports(walked)
 
 
 def _along(path: WalkingPath, rule: StepRule, height: float, context: RunContext) -> Footprints:
-    """By the rule, or where the feet of the library's walk stand."""
+    """Footprints along a path by the rule, or where the feet of the library's walk stand."""
     section = context.scenario.walking
     if section is None or section.footprints == "stepper":
         return place_footprints(path, rule, height=height)
@@ -201,7 +198,7 @@ OBJECTIVES = {
 
 @dataclass(frozen=True, eq=False)
 class PlannedWalks:
-    """Ways of all who walk in a scenario.
+    """Routes of all walkers of a scenario.
 
     Attributes:
         route: Of the scenario's body.
@@ -217,7 +214,7 @@ class PlannedWalks:
 
 
 def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
-    """Find the ways of all who walk in a scenario, and walk them; None where there is no way.
+    """Find the routes of all walkers of a scenario, and walk them; None where there is none.
 
     Args:
         context: Of a scenario with a ``walking`` section.
@@ -244,7 +241,8 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
     report.planned = True
     report.keep_motions(schedule, motion)
     for number, (name, route) in enumerate(plan.others.items()):
-        report.keep_other(name, *walked_motion(walk_along(route, context.body, height=height), height))
+        schedule, other = walked_motion(walk_along(route, context.body, height=height), height)
+        report.keep_motions(schedule, other, file=other_motion(name))
         report.progress(STAGE, 0.6 + 0.4 * (number + 1) / len(plan.others))
     report.progress(STAGE, 1.0)
     return motion
@@ -253,7 +251,7 @@ def walk_to_goal(context: RunContext, report: Report) -> Motion | None:
 def plan_walks(
     context: RunContext, start: FloatArray | None = None, goal: FloatArray | None = None
 ) -> PlannedWalks:
-    """Find a way for everyone, each around those before.
+    """Find a route for every walker, each around those before.
 
     Args:
         context: Of a scenario with a ``walking`` section.
@@ -264,29 +262,30 @@ def plan_walks(
         ScenarioError: If a way cannot be asked for: no floor, a start in an obstacle, a waypoint in vain.
     """
     scenario, section = context.scenario, _section(context.scenario)
-    try:
+    with scenario.refusing(("scene",)):
         standing = floor_plan(context.scene, context.body.stature or 2.0)
-    except InputError as error:
-        raise scenario.refused(("scene",), error) from None
     objective, radius = OBJECTIVES[section.weights], Walker().width / 2
     obstacles, others = list(standing), {}
+
+    def route_of(
+        key: KeyPath, who: WalkingSection | WalkerSection, begin: FloatArray, stops: list[Waypoint]
+    ) -> WalkRoute:
+        with scenario.refusing(key):
+            return walking_route(
+                begin, stops, objective, obstacles=obstacles, room=section.room_m,
+                max_speed=who.max_speed_m_s, wait=who.wait_s,
+            )  # fmt: skip
+
     for number, other in enumerate(section.others):
         key: KeyPath = ("walking", "others", number)
-        stops = [_waypoint(one) for one in other.via]
-        others[other.name] = _route(
-            scenario, key, place_of(other.start), stops, objective, obstacles, section.room_m,
-            other.max_speed_m_s, other.wait_s,
-        )  # fmt: skip
-        if others[other.name].succeeded:
-            obstacles.append(others[other.name].as_obstacle(other.name, radius))
+        other_route = route_of(key, other, place_of(other.start), [_waypoint(stop) for stop in other.via])
+        others[other.name] = other_route
+        if other_route.succeeded:
+            obstacles.append(other_route.as_obstacle(other.name, radius))
     began = clock.perf_counter()
     start = end_of(scenario, "start") if start is None else start
     goal = end_of(scenario, "goal") if goal is None else goal
-    stops = [*map(_waypoint, section.via), Waypoint(goal)]
-    route = _route(
-        scenario, ("walking",), start, stops, objective, obstacles, section.room_m, section.max_speed_m_s,
-        section.wait_s,
-    )  # fmt: skip
+    route = route_of(("walking",), section, start, [*map(_waypoint, section.via), Waypoint(goal)])
     return PlannedWalks(route, others, tuple(obstacles), clock.perf_counter() - began)
 
 
@@ -296,27 +295,8 @@ def _section(scenario: Scenario) -> WalkingSection:
     return scenario.walking
 
 
-def _route(
-    scenario: Scenario,
-    key: KeyPath,
-    start: FloatArray,
-    stops: list[Waypoint],
-    objective: WalkObjective,
-    obstacles: list[WalkObstacle],
-    room: float,
-    max_speed: float,
-    wait: float,
-) -> WalkRoute:
-    try:
-        return walking_route(
-            start, stops, objective, obstacles=obstacles, room=room, max_speed=max_speed, wait=wait
-        )
-    except InputError as error:
-        raise scenario.refused(key, error) from None
-
-
 def keep_paths(report: Report, plan: PlannedWalks) -> None:
-    """Keep the ways of all who walk among the files of the run: instants [s], x, y [m], headings [rad]."""
+    """Keep the routes of all walkers among the files of the run: instants [s], x, y [m], headings [rad]."""
     routes = {BODY: plan.route, **plan.others}
     report.keep(WALK_PATHS, {
         name: {
@@ -348,7 +328,7 @@ def _waypoint(section: WaypointSection) -> Waypoint:
 
 
 def path_block(plan: PlannedWalks) -> dict[str, Any]:
-    """What the summary says of the way itself."""
+    """Block of the summary about the route itself."""
     route, forward, left = plan.route, *np.abs(plan.route.velocity[:, :2]).max(axis=0)
     return {
         "duration_s": route.duration,
@@ -357,7 +337,8 @@ def path_block(plan: PlannedWalks) -> dict[str, Any]:
         "max_forward_mps": float(forward),
         "max_left_mps": float(left),
         "segments": [
-            {"kind": one.kind, "start_s": one.start, "end_s": one.end} for one in route.segments().segments
+            {"kind": item.kind, "start_s": item.start, "end_s": item.end}
+            for item in route.segments().segments
         ],
         "min_room_m": _room(plan),
         "others": {
@@ -383,7 +364,7 @@ def _room(plan: PlannedWalks) -> float | None:
 
 
 def _requirements(context: RunContext, plan: PlannedWalks, walk: Walk) -> RequirementTable:
-    """What a walk that is not executed keeps: its ends, its speed, its room, and feet that stand still."""
+    """Requirements of a walk that is not executed: its ends, speed, clearance, and feet that stand still."""
     section, route = _section(context.scenario), plan.route
     ends = np.abs(route.place[[0, -1]] - [end_of(context.scenario, end) for end in ("start", "goal")])
     ends[:, 2] = np.abs(np.angle(np.exp(1j * ends[:, 2])))

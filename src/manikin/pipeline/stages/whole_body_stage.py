@@ -1,7 +1,6 @@
-"""The whole-body stage: a motion of all joints that follows the centre of mass, and its report.
+"""Stages of the centre of mass and of the whole body that follows it.
 
-Also here. Between centre of mass and whole body: postures at the key instants, and other plans where one
-fails. The centroidal stage: a balanced trajectory of the centre of mass, and its report.
+Between them lie the postures at the key instants; where one fails, the centre of mass is planned again.
 """
 
 from dataclasses import asdict, dataclass, replace
@@ -14,7 +13,6 @@ from manikin.balance.contact_forces import friction_use
 from manikin.contact import ContactSchedule, StanceSequence
 from manikin.motion import Motion
 from manikin.pipeline.stages.context import Report, RunContext, place, reason_in_world, trajectory_in_world
-from manikin.pipeline.stages.execution_stage import use_of_friction
 from manikin.planning.com import (
     CentroidalResult,
     CentroidalTrajectory,
@@ -27,19 +25,21 @@ from manikin.planning.com.com_certificate import phase_times
 from manikin.planning.whole_body import (
     Eligibility,
     KeyPostures,
+    RefineResult,
     WholeBodyResult,
     continue_seated,
     find_eligible_plan,
     find_key_postures,
     plan_whole_body,
 )
+from manikin.planning.whole_body.certificate import MotionCertificate
 from manikin.planning.whole_body.point_mass_motion import point_mass_forces, point_mass_motion
 
 KEY_ROOM = 0.5
 """Share of the fit's distance from the ends of the joint ranges that key postures keep."""
 
 KEY_TOLERANCES = (1.0e-3, 2.0e-4)
-"""How exact key postures are [m]: as exact as the finished motion has to be; and more, where no motion is
+"""Tolerances of key postures [m]: as exact as the finished motion has to be; and more, where no motion is
 found although each posture was just within reach."""
 
 
@@ -87,23 +87,23 @@ def with_stricter_key_postures(
     if planned.trajectory is None:
         return None
     failure = report.failure
-    found = _tested(context, report, planned, KEY_TOLERANCES[1])
-    if found.failure is not None or found.trajectory is None or found.replans <= before.replans:
+    result = _tested(context, report, planned, KEY_TOLERANCES[1])
+    if result.failure is not None or result.trajectory is None or result.replans <= before.replans:
         report.failure = failure
         return None
     report.failure = None
-    return _reported(report, found)
+    return _reported(report, result)
 
 
 def _tested(context: RunContext, report: Report, planned: CentroidalResult, tolerance: float) -> Eligibility:
     """The plan, or another one where a key posture fails."""
     # The fit keeps its distance from the ends of the ranges: the key postures leave room for that,
     # if they can.
-    found = _eligible(context, report, planned, KEY_ROOM * context.settings.fit.joint_buffer, tolerance)
-    if found.failure is not None or (found.trajectory is None and found.replans > 0):
+    result = _eligible(context, report, planned, KEY_ROOM * context.settings.fit.joint_buffer, tolerance)
+    if result.failure is not None or (result.trajectory is None and result.replans > 0):
         report.failure = None  # of a seated part that did not fit another plan
-        found = _eligible(context, report, planned, 0.0, tolerance)
-    return found
+        result = _eligible(context, report, planned, 0.0, tolerance)
+    return result
 
 
 def _eligible(
@@ -122,7 +122,7 @@ def _eligible(
             padded=() if context.plan is None else context.padded,
         )  # fmt: skip
 
-    return find_eligible_plan(planned, realise, look, replan=not context.is_recorded)
+    return find_eligible_plan(planned, realise, look, replan=not isinstance(context.problem, KeyframeProblem))
 
 
 def _on_real_supports(
@@ -195,8 +195,6 @@ def report_centre_of_mass(report: Report, result: CentroidalResult, block: dict[
     """Take a plan into the report, with its trajectory.
 
     Args:
-        report: Of the run.
-        result: The plan.
         block: Its ``centroidal`` block.
     """
     report.finish("centroidal", block)
@@ -219,7 +217,7 @@ def centroidal_summary(result: CentroidalResult) -> dict[str, Any]:
         "margin_unit": result.problem.margin_unit,
         "friction": None if trajectory is None else _friction(trajectory),
         "limiting_phase": result.limiting_phase,
-        "limiting_contact": limiting_contact(result),
+        "limiting_contact": None if result.limiting is None else result.limiting.description,
         "min_force_at_com_N": least_force_at_com(result),
         "min_zmp_distance_m": None if result.certificate is None else result.certificate.min_zmp_distance,
         "feasibility_radius": result.feasibility_radius,
@@ -244,12 +242,6 @@ def least_force_at_com(result: CentroidalResult) -> float | None:
     return found.min_force
 
 
-def limiting_contact(result: CentroidalResult) -> str | None:
-    """Contact and limit behind the smallest margin, such as ``"left_foot: tipping over ..."``."""
-    limiting = result.limiting
-    return None if limiting is None else limiting.description
-
-
 FORCE_STEP = 0.02
 """Time between the samples at which the use of friction is measured [s]."""
 
@@ -265,7 +257,6 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
     """Plan all joints along a trajectory of the centre of mass; None where there is none.
 
     Args:
-        context: Of the run.
         report: Takes the ``wholebody`` block.
         plan: The trajectory with its key postures.
     """
@@ -279,16 +270,32 @@ def follow_centre_of_mass(context: RunContext, report: Report, plan: KeyedPlan) 
         padded=context.padded, key_postures=context.known_postures, waypoints=plan.postures,
         progress=lambda share: report.progress("wholebody", share),
     )  # fmt: skip
-    drawn = rng.bit_generator.state != unused
-    passage = context.passage(trajectory.schedule, result.motion).summary()
-    used = {"friction": use_of_friction(trajectory.schedule, result.motion)}
-    report.finish("wholebody", wholebody_summary(result) | passage | used | {"seed_matters": drawn})
+    block = wholebody_summary(result) | {"seed_matters": rng.bit_generator.state != unused}
+    report_whole_body(context, report, trajectory.schedule, result, block)
+    return result
+
+
+def report_whole_body(
+    context: RunContext, report: Report, schedule: ContactSchedule, result: WholeBodyResult | RefineResult,
+    block: dict[str, Any],
+) -> None:  # fmt: skip
+    """Take a motion of all joints into the report.
+
+    Args:
+        report: Takes the ``wholebody`` block.
+        schedule: Contacts of the motion in time.
+        block: What its method says of it.
+    """
+    passage = context.passage(schedule, result.motion).summary()
+    friction = friction_use(
+        schedule, result.motion.time, result.motion.contact_names, result.motion.contact_force
+    )
+    report.finish("wholebody", block | passage | {"friction": friction.summary()})
     report.require("wholebody", result.requirements)
     report.planned = result.succeeded
     if result.failure is not None:
         report.fail("wholebody", result.failure.reason, result.failure.time, result.failure.where)
-    report.keep_motions(trajectory.schedule, result.motion)
-    return result
+    report.keep_motions(schedule, result.motion)
 
 
 def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | None:
@@ -306,11 +313,19 @@ def move_point_mass(report: Report, centroidal: CentroidalResult) -> Motion | No
     return motion
 
 
-ERRORS = (
-    "max_support_error_m", "max_meeting_error_m", "max_com_error_m", "min_clearance_m", "max_scuff_m",
-    "max_joint_limit_violation_rad", "max_velocity_share", "max_torque_share",
-)  # fmt: skip
-"""Keys of the certificate that the summary has."""
+def certificate_summary(certificate: MotionCertificate) -> dict[str, Any]:
+    """Entries of the summary from a certificate of either method."""
+    same = (
+        "max_support_error_m", "min_clearance_m", "max_joint_limit_violation_rad", "max_velocity_share",
+        "max_torque_share",
+    )  # fmt: skip
+    return {key: certificate.value(key) for key in same} | {
+        "closest_pair": list(certificate.closest_pair),
+        "max_torque_joint": certificate["max_torque_share"].where,
+        "max_torque_at_s": certificate["max_torque_share"].time_s,
+        "min_force_at_com_N": certificate.min_force_at_com_N,
+        "min_zmp_distance_m": certificate.min_zmp_distance_m,
+    }
 
 
 def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
@@ -318,14 +333,10 @@ def wholebody_summary(result: WholeBodyResult) -> dict[str, Any]:
     certificate = result.certificate
     return {
         "method": "follow",
-        **{key: certificate.value(key) for key in ERRORS},
-        "closest_pair": list(certificate.closest_pair),
-        "max_torque_joint": certificate["max_torque_share"].where,
-        "max_torque_at_s": certificate["max_torque_share"].time_s,
+        **certificate_summary(certificate),
+        **{key: certificate.value(key) for key in ("max_meeting_error_m", "max_com_error_m", "max_scuff_m")},
         "impacts": [asdict(impact) for impact in certificate.impacts],
         "min_margin": float(result.motion.margin.min()),
-        "min_force_at_com_N": certificate.min_force_at_com_N,
-        "min_zmp_distance_m": certificate.min_zmp_distance_m,
         "swings": [{"effector": s.swing.effector, "method": s.method} for s in result.swings],
         "wall_s": result.wall_time,
     }

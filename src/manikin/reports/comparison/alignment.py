@@ -1,7 +1,4 @@
-"""Which phase of one run is which phase of another.
-
-Also here. Key instants and supports of two runs ([Qiu2012]_ Table 7.7).
-"""
+"""Alignment of the phases of two runs by their contacts, with their key instants ([Qiu2012]_ Table 7.7)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,8 +17,7 @@ class PhasePair:
     """One row of an alignment.
 
     Attributes:
-        first: Phase of the first run, or None when it has none like it.
-        second: Phase of the second run, or None.
+        first, second: Phase of each run, or None when it has none like that of the other.
     """
 
     first: int | None
@@ -75,8 +71,7 @@ class PhaseTime:
 
     Attributes:
         index: Of the phase.
-        start_s: [s].
-        end_s: [s].
+        start_s, end_s: Key instants [s].
     """
 
     index: int
@@ -90,9 +85,8 @@ class PhaseTime:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "phase": self.index, "start_s": self.start_s, "end_s": self.end_s, "duration_s": self.duration_s,
-        }  # fmt: skip
+        times = {"start_s": self.start_s, "end_s": self.end_s, "duration_s": self.duration_s}
+        return {"phase": self.index, **times}
 
 
 @dataclass(frozen=True)
@@ -101,8 +95,7 @@ class TimingRow:
 
     Attributes:
         supports: Effectors in contact.
-        first: In the first run, or None.
-        second: In the second run, or None.
+        first, second: In each run, or None.
     """
 
     supports: tuple[str, ...]
@@ -126,16 +119,15 @@ class TimingRow:
         }
 
 
+def matched(rows: Sequence[TimingRow]) -> list[tuple[PhaseTime, PhaseTime]]:
+    """Phases of both runs, where both have one."""
+    return [(row.first, row.second) for row in rows if row.first is not None and row.second is not None]
+
+
 def timing_rows(
     pairs: Sequence[PhasePair], first: ContactSchedule, second: ContactSchedule
 ) -> tuple[TimingRow, ...]:
-    """Key instants of aligned phases.
-
-    Args:
-        pairs: Alignment of the phases.
-        first: Schedule of the first run.
-        second: Schedule of the second run.
-    """
+    """Key instants of aligned phases of two schedules."""
     return tuple(
         TimingRow(_supports(pair, first, second), _time(first, pair.first), _time(second, pair.second))
         for pair in pairs

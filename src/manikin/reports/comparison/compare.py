@@ -1,11 +1,7 @@
-"""The comparison of two runs, and what cannot be compared.
-
-Also here. Centre of mass and margins of two runs, phase by phase. Joint angles of two runs at the key
-instants that both have.
-"""
+"""Comparison of two runs: timing, centre of mass, margins and joint angles, phase by phase."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +10,14 @@ from manikin.contact import Stance
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.comparison.alignment import PhasePair, PhaseTime, TimingRow, align_phases, timing_rows
+from manikin.reports.comparison.alignment import (
+    PhasePair,
+    PhaseTime,
+    TimingRow,
+    align_phases,
+    matched,
+    timing_rows,
+)
 from manikin.runtime.display import Displayed
 
 SAMPLES = 101
@@ -23,16 +26,13 @@ SAMPLES = 101
 
 def matched_times(rows: Sequence[TimingRow]) -> tuple[FloatArray, FloatArray]:
     """(n,) instants of both runs at the same share of each phase that both have [s]."""
-    share = np.linspace(0.0, 1.0, SAMPLES)
-    pairs = [(row.first, row.second) for row in rows if row.first is not None and row.second is not None]
-    first = [a.start_s + share * a.duration_s for a, _ in pairs]
-    second = [b.start_s + share * b.duration_s for _, b in pairs]
-    empty = np.zeros(0)
-    return np.concatenate([empty, *first]), np.concatenate([empty, *second])
+    share, empty = np.linspace(0.0, 1.0, SAMPLES), np.zeros(0)
+    times = [(a.start_s + share * a.duration_s, b.start_s + share * b.duration_s) for a, b in matched(rows)]
+    return np.concatenate([empty, *(a for a, _ in times)]), np.concatenate([empty, *(b for _, b in times)])
 
 
 def com_difference(rows: Sequence[TimingRow], first: ComTrack, second: ComTrack) -> dict[str, Any] | None:
-    """How two centres of mass differ; second less first, at equal shares of the matched phases.
+    """Difference of two centres of mass, second less first, at equal shares of the matched phases.
 
     Returns:
         The ``com`` block of the JSON; None when no phase matches.
@@ -127,10 +127,7 @@ class JointDifference:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {
-            "joint": self.joint, "first_deg": self.first_deg, "second_deg": self.second_deg,
-            "difference_deg": self.difference_deg,
-        }  # fmt: skip
+        return asdict(self) | {"difference_deg": self.difference_deg}
 
 
 @dataclass(frozen=True)
@@ -151,23 +148,18 @@ class PostureDifference:
 
     def as_dict(self) -> dict[str, Any]:
         """One entry of the ``postures`` block of the JSON."""
-        return {
-            "first_s": self.first_s, "second_s": self.second_s, "rms_deg": self.rms_deg,
-            "largest": [joint.as_dict() for joint in self.largest],
-        }  # fmt: skip
+        return asdict(self) | {"largest": [joint.as_dict() for joint in self.largest]}
 
 
 def key_instants(rows: Sequence[TimingRow]) -> list[tuple[float, float]]:
     """Key instants of both runs [s]: the start of each matched phase, and its end where the next differs."""
-    found: list[tuple[float, float]] = []
-    for row in rows:
-        if row.first is None or row.second is None:
-            continue
-        start = row.first.start_s, row.second.start_s
-        if not found or found[-1] != start:
-            found.append(start)
-        found.append((row.first.end_s, row.second.end_s))
-    return found
+    instants: list[tuple[float, float]] = []
+    for first, second in matched(rows):
+        start = first.start_s, second.start_s
+        if not instants or instants[-1] != start:
+            instants.append(start)
+        instants.append((first.end_s, second.end_s))
+    return instants
 
 
 def posture_differences(
@@ -177,8 +169,7 @@ def posture_differences(
 
     Args:
         rows: Aligned phases.
-        first: Motion of the first run.
-        second: Motion of the second run.
+        first, second: Motions of both runs.
     """
     common = [name for name in first.joint_names if name in second.joint_names]
     if not common:
@@ -190,11 +181,6 @@ def posture_differences(
         )
         for times in key_instants(rows)
     )
-
-
-def uncommon_joints(first: Motion, second: Motion) -> tuple[str, ...]:
-    """Joints that only one of the two bodies has."""
-    return tuple(sorted(set(first.joint_names) ^ set(second.joint_names)))
 
 
 def _angles(motion: Motion, places: list[int], time: float) -> FloatArray:
@@ -212,7 +198,7 @@ def _postures_difference(
 
 
 STAGES = ("point mass", "planned", "executed")
-"""What may be compared of each run: the CoM plan, the planned and the executed motion."""
+"""Stages that are compared: the CoM plan, the planned and the executed motion."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -220,8 +206,7 @@ class RunComparison(Displayed):
     """Two runs side by side; differences are second less first.
 
     Attributes:
-        first: The first run.
-        second: The second run.
+        first, second: The runs.
         pairs: Their phases, aligned by the effectors in contact; empty without schedules.
         rows: The same with key instants.
         postures_of: ``"planned"`` or ``"executed"``, whichever motion the postures are of, or None.
@@ -244,19 +229,19 @@ class RunComparison(Displayed):
 
     @property
     def names(self) -> tuple[str, str]:
-        """What to call the runs; numbered when their directories have the same name."""
+        """Names of the runs; numbered when their directories have the same name."""
         if self.first.label != self.second.label:
             return self.first.label, self.second.label
         return f"{self.first.label} (1)", f"{self.second.label} (2)"
 
     @property
     def durations(self) -> tuple[float | None, float | None]:
-        """From the first to the last key instant of each run [s]."""
+        """Time from the first to the last key instant of each run [s]."""
         return _duration(self.first), _duration(self.second)
 
     def as_dict(self) -> dict[str, Any]:
         """The JSON of ``manikin compare``."""
-        shared = shared_tracks(self)
+        shared = shared_tracks(*self.runs)
         return {
             "first": _run_block(self.first, self.names[0]),
             "second": _run_block(self.second, self.names[1]),
@@ -278,12 +263,7 @@ class RunComparison(Displayed):
 
 
 def compare_runs(first: RunRecord, second: RunRecord) -> RunComparison:
-    """Compare two runs as far as both got.
-
-    Args:
-        first: A run.
-        second: Another one, or the same.
-    """
+    """Compare two runs as far as both got."""
     pairs: tuple[PhasePair, ...] = ()
     rows: tuple[TimingRow, ...] = ()
     if first.schedule is not None and second.schedule is not None:
@@ -302,18 +282,14 @@ def compare_runs(first: RunRecord, second: RunRecord) -> RunComparison:
 
 def tracks_of(record: RunRecord) -> dict[str, ComTrack]:
     """CoM of a run by stage, see :data:`STAGES`."""
-    found = {} if record.plan is None else {"point mass": record.plan}
-    return {**found, **(record.tracks if record.motions else {})}
+    result = {} if record.plan is None else {"point mass": record.plan}
+    return {**result, **(record.tracks if record.motions else {})}
 
 
-def shared_tracks(comparison: RunComparison) -> dict[str, tuple[ComTrack, ComTrack]]:
+def shared_tracks(first: RunRecord, second: RunRecord) -> dict[str, tuple[ComTrack, ComTrack]]:
     """CoM of both runs for every stage that both reached."""
-    return _shared(comparison.first, comparison.second)
-
-
-def _shared(first: RunRecord, second: RunRecord) -> dict[str, tuple[ComTrack, ComTrack]]:
-    one, other = tracks_of(first), tracks_of(second)
-    return {stage: (one[stage], other[stage]) for stage in STAGES if stage in one and stage in other}
+    item, other = tracks_of(first), tracks_of(second)
+    return {stage: (item[stage], other[stage]) for stage in STAGES if stage in item and stage in other}
 
 
 def _stances(record: RunRecord) -> list[Stance]:
@@ -330,10 +306,10 @@ def _missing_stages(first: RunRecord, second: RunRecord) -> list[str]:
                 lines.append(f"the {place} run has no {_words(stage)}{why}")
     if not tracks_of(first) and not tracks_of(second):
         lines.append("neither run has a centre of mass")
-    shared = _shared(first, second)
-    for stage, (one, two) in shared.items():
-        if one.margin_unit != two.margin_unit:
-            lines.append(f"margins of the {_words(stage)} are in {one.margin_unit} and in {two.margin_unit}")
+    shared = shared_tracks(first, second)
+    for stage, (item, two) in shared.items():
+        if item.margin_unit != two.margin_unit:
+            lines.append(f"margins of the {_words(stage)} are in {item.margin_unit} and in {two.margin_unit}")
     return lines
 
 
@@ -352,7 +328,7 @@ def _missing_phases(first: RunRecord, second: RunRecord, rows: tuple[TimingRow, 
 
 
 def _missing_joints(first: RunRecord, second: RunRecord, which: str) -> list[str]:
-    names = uncommon_joints(first.motions[which], second.motions[which])
+    names = sorted(set(first.motions[which].joint_names) ^ set(second.motions[which].joint_names))
     return [f"joints of one body only: {', '.join(names)}"] if names else []
 
 
@@ -376,8 +352,7 @@ def _duration(record: RunRecord) -> float | None:
 
 
 def _duration_difference(first: RunRecord, second: RunRecord) -> float | None:
-    durations = _duration(first), _duration(second)
-    return None if durations[0] is None or durations[1] is None else durations[1] - durations[0]
+    return _difference(_duration(first), _duration(second))
 
 
 def _words(stage: str) -> str:

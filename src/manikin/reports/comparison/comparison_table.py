@@ -17,7 +17,7 @@ def report(comparison: RunComparison) -> Group:
     parts: list[RenderableType] = []
     if comparison.rows:
         parts.append(_timing_table(comparison))
-    if comparison.rows and shared_tracks(comparison):
+    if comparison.rows and shared_tracks(*comparison.runs):
         parts += [_com_table(comparison), _margin_table(comparison)]
     if comparison.postures:
         parts.append(_posture_table(comparison))
@@ -56,33 +56,33 @@ def _com_table(comparison: RunComparison) -> Table:
     table = _table("Centre of mass at equal shares of the matched phases [m]")
     for heading in ("stage", "RMS distance", "largest", "at [s]", "mean difference x", "y", "z"):
         table.add_column(escape(heading), justify="left" if heading == "stage" else "right")
-    for stage, tracks in shared_tracks(comparison).items():
-        found = com_difference(comparison.rows, *tracks)
-        if found is None:
+    for stage, tracks in shared_tracks(*comparison.runs).items():
+        result = com_difference(comparison.rows, *tracks)
+        if result is None:
             continue
         table.add_row(
-            stage, f"{found['rms_distance_m']:.4f}", f"{found['max_distance_m']:.4f}",
-            f"{found['max_at_first_s']:.2f} / {found['max_at_second_s']:.2f}",
-            *(f"{value:+z.4f}" for value in found["mean_difference_m"]),
+            stage, f"{result['rms_distance_m']:.4f}", f"{result['max_distance_m']:.4f}",
+            f"{result['max_at_first_s']:.2f} / {result['max_at_second_s']:.2f}",
+            *(f"{value:+z.4f}" for value in result["mean_difference_m"]),
         )  # fmt: skip
     return table
 
 
 def _margin_table(comparison: RunComparison) -> Table:
     table = _table(f"Smallest margins: {comparison.names[0]} / {comparison.names[1]} (difference)")
-    shared = shared_tracks(comparison)
-    found = [margin_difference(comparison.rows, *tracks) for tracks in shared.values()]
+    shared = shared_tracks(*comparison.runs)
+    result = [margin_difference(comparison.rows, *tracks) for tracks in shared.values()]
     table.add_column("phase")
-    for stage, margins in zip(shared, found, strict=True):
+    for stage, margins in zip(shared, result, strict=True):
         unit = margins["unit"] or f"{margins['first_unit']} / {margins['second_unit']}"
         table.add_column(escape(f"{stage} [{unit}]"), justify="right")
     for number, row in enumerate(comparison.rows):
-        phases = [margins["phases"][number] for margins in found]
-        cells = [_pair(one["first"], one["second"], one["difference"]) for one in phases]
+        phases = [margins["phases"][number] for margins in result]
+        cells = [_pair(item["first"], item["second"], item["difference"]) for item in phases]
         table.add_row(_phases(row.first, row.second), *cells)
     table.add_section()
     table.add_row(
-        "whole motion", *(_pair(m["min_first"], m["min_second"], m["min_difference"]) for m in found)
+        "whole motion", *(_pair(m["min_first"], m["min_second"], m["min_difference"]) for m in result)
     )
     return table
 
@@ -118,8 +118,8 @@ def _phase(phase: PhaseTime | None) -> tuple[str, str, str, str]:
 
 
 def _phases(first: PhaseTime | None, second: PhaseTime | None) -> str:
-    one, other = ("-" if phase is None else str(phase.index) for phase in (first, second))
-    return one if one == other else f"{one} / {other}"
+    item, other = ("-" if phase is None else str(phase.index) for phase in (first, second))
+    return item if item == other else f"{item} / {other}"
 
 
 def _number(value: float | None, form: str) -> str:

@@ -17,12 +17,7 @@ from manikin.reports.figures.compare_runs import (
     compare_timing_figure,
 )
 from manikin.reports.figures.contacts import ChoicePanel, contact_choice_figure, contacts_figure
-from manikin.reports.figures.effectors import (
-    effectors_figure,
-    flights_figure,
-    support_strip_figure,
-    tracking_figure,
-)
+from manikin.reports.figures.effectors import effectors_figure, flights_figure, tracking_figure
 from manikin.reports.figures.ergonomics import ergonomics_figure
 from manikin.reports.figures.ground import footprint_figure, zmp_figure
 from manikin.reports.figures.phase_statistics import phase_durations_figure, placements_figure
@@ -64,7 +59,6 @@ __all__ = [
     "published_lowest",
     "push_map_figure",
     "scene_figure",
-    "support_strip_figure",
     "timing_figure",
     "tracking_figure",
     "walking_paths_figure",

@@ -1,9 +1,4 @@
-"""Position, velocity and acceleration of the centre of mass in time.
-
-Also here. The path of the centre of mass on the three coordinate planes, with the supports. Lowest centres of
-mass of several motions, and the room below what they passed. How far the centre of mass is from what supports
-it, while it does. Ways of the centre of mass of several motions, from the side and from above.
-"""
+"""Centre of mass: in time and on the coordinate planes; of several motions its path, height and supports."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -33,6 +28,7 @@ from manikin.reports.figures.style import (
     name_groups,
     need,
     new_grid,
+    note,
     span_at_least,
 )
 from manikin.reports.figures.timeline import timeline
@@ -76,7 +72,6 @@ def planes_grid(title: str, spans: FloatArray) -> tuple[Figure, GridSpec]:
     """Figure with a panel for each view, all to one scale as far as that is legible.
 
     Args:
-        title: Of the figure.
         spans: (3,) what is shown along each axis [m].
     """
     widths = [max(float(view(spans)[0]), 0.3 * float(spans.max())) for view in VIEWS]
@@ -112,7 +107,7 @@ def mark_instants(labels: Labels, axes: Axes, view: View, places: FloatArray, co
 
 @dataclass(frozen=True)
 class LowestPoints:
-    """Of one group of motions.
+    """Lowest centres of mass of one group of motions.
 
     Attributes:
         group: Its name.
@@ -128,15 +123,15 @@ class LowestPoints:
 
     @classmethod
     def of(cls, group: GroupStatistics, overhead: float | None = None) -> "LowestPoints":
-        """Those of the passages of a group, or of its whole motions where none are known."""
+        """Lowest points of the passages of a group, or of its whole motions where none are known."""
         if not group.under:
-            return cls(group.group, tuple(one.com_lowest for one in group.whole.values()))
-        rooms = tuple(one.room for _, one in group.under if one.room is not None)
-        return cls(group.group, tuple(one.com_lowest for _, one in group.under), overhead, rooms)
+            return cls(group.group, tuple(item.com_lowest for item in group.whole.values()))
+        rooms = tuple(item.room for _, item in group.under if item.room is not None)
+        return cls(group.group, tuple(item.com_lowest for _, item in group.under), overhead, rooms)
 
 
 def published_lowest() -> tuple[LowestPoints, ...]:
-    """Those quoted for each beam in the thesis."""
+    """Lowest points quoted for each beam in the thesis."""
     known = published_heights()
     return tuple(LowestPoints(beam, (low,), known.beams[beam]) for beam, low in known.lowest.items())
 
@@ -151,17 +146,17 @@ def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = 
     Raises:
         FigureError: If there is no height.
     """
-    shown = need([one for one in groups if one.com], "a height of the centre of mass")
+    shown = need([item for item in groups if item.com], "a height of the centre of mass")
     figure, grid = new_grid(9.6, 4.4, "Lowest centre of mass", 1, 2, top=0.8, across=0.9)
     left, right = (figure.add_subplot(grid[column]) for column in range(2))
-    colours = group_colours(one.group for one in shown)
-    for number, one in enumerate(shown):
-        colour = colours[one.group]
-        _dots(left, number, one.com, colour)
-        if one.overhead is not None:
-            _dots(right, number, [one.overhead - low for low in one.com], colour)
-            if one.rooms:
-                right.plot([number + 0.25] * len(one.rooms), one.rooms, "_", color=COLOURS["ink"])
+    colours = group_colours(item.group for item in shown)
+    for number, item in enumerate(shown):
+        colour = colours[item.group]
+        _dots(left, number, item.com, colour)
+        if item.overhead is not None:
+            _dots(right, number, [item.overhead - low for low in item.com], colour)
+            if item.rooms:
+                right.plot([number + 0.25] * len(item.rooms), item.rooms, "_", color=COLOURS["ink"])
     if standing is not None:
         left.axhline(standing, color=COLOURS["soft"], linewidth=1.0, linestyle=(0, (5, 3)))
         left.annotate("standing", (0.0, standing), (2, 2), textcoords="offset points", fontsize=8,
@@ -169,10 +164,10 @@ def com_heights_figure(groups: Sequence[LowestPoints], standing: float | None = 
     dress(left, "height above the floor [m]", title="Lowest centre of mass")
     dress(right, "up to what is passed [m]", title="Room above it (dots) and the body (dashes)")
     for axes in (left, right):
-        name_groups(axes, [one.group for one in shown])
+        name_groups(axes, [item.group for item in shown])
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         axes.grid(False, axis="x")
-    if not any(one.overhead is not None for one in shown):
+    if not any(item.overhead is not None for item in shown):
         right.annotate("nothing overhead is known", (0.5, 0.5), xycoords="axes fraction", ha="center",
                        fontsize=9, color=COLOURS["soft"])  # fmt: skip
     return figure
@@ -182,8 +177,7 @@ def _dots(axes: Axes, number: int, values: Sequence[float], colour: str) -> None
     mean = sum(values) / len(values)
     axes.bar(number, mean, width=0.6, color=colour, alpha=0.35)
     axes.plot([number] * len(values), values, "o", color=colour, markersize=4)
-    axes.annotate(f"{mean:.2f}", (number, 0.0), (0, 3), textcoords="offset points", fontsize=7.5,
-                  ha="center")  # fmt: skip
+    note(axes, f"{mean:.2f}", (number, 0.0), fontsize=7.5)
 
 
 def com_distances_figure(
@@ -204,8 +198,8 @@ def com_distances_figure(
         FigureError: If nothing is known of any effector.
     """
     known = published or {}
-    found = [(clip, one) for clip in clips for one in support_distances(clip)]
-    effectors = need(sorted({*known, *(one.effector for _, one in found)}), "a support")
+    result = [(clip, item) for clip in clips for item in support_distances(clip)]
+    effectors = need(sorted({*known, *(item.effector for _, item in result)}), "a support")
     colours = group_colours(clip.group for clip in clips)
     groups = list(colours)
     figure, grid = new_grid(
@@ -215,15 +209,19 @@ def com_distances_figure(
     for row, effector in enumerate(effectors):
         axes = figure.add_subplot(grid[row, 0])
         most = figure.add_subplot(grid[row, 1], sharey=axes)
-        for clip, one in found:
-            if one.effector == effector:
-                axes.plot(one.time - one.time[0], one.distance, color=colours[clip.group], linewidth=1.0,
+        for clip, item in result:
+            if item.effector == effector:
+                axes.plot(item.time - item.time[0], item.distance, color=colours[clip.group], linewidth=1.0,
                           alpha=0.8)  # fmt: skip
         for number, group in enumerate(groups):
             each = [
-                max(float(one.distance.max()) for of, one in found if of is clip and one.effector == effector)
+                max(
+                    float(item.distance.max())
+                    for of, item in result
+                    if of is clip and item.effector == effector
+                )
                 for clip in clips
-                if clip.group == group and effector in {one.effector for of, one in found if of is clip}
+                if clip.group == group and effector in {item.effector for of, item in result if of is clip}
             ]
             most.plot([number] * len(each), each, "o", color=colours[group], markersize=4)
         if effector in known:
@@ -297,11 +295,11 @@ def _draw(side: Axes, above: Axes, clip: RecordedClip, origin: Origin, colour: s
     lowest = com[int(np.argmin(com[:, 2]))]
     side.plot(lowest[0], lowest[2], "v", color=colour, markeredgecolor=COLOURS["ink"], zorder=5)
     above.plot(lowest[0], lowest[1], "v", color=colour, markeredgecolor=COLOURS["ink"], zorder=5)
-    colours = colours_of(one.effector for one in clip.supports.supports)
-    for one in clip.supports.supports:
-        place = _seen(clip, origin, one.place[None])[0]
-        above.plot(place[0], place[1], "s", color=colours[one.effector], markersize=4, alpha=0.45, zorder=1)
-        side.plot(place[0], place[2], "|", color=colours[one.effector], markersize=7, alpha=0.7, zorder=1)
+    colours = colours_of(item.effector for item in clip.supports.supports)
+    for item in clip.supports.supports:
+        place = _seen(clip, origin, item.place[None])[0]
+        above.plot(place[0], place[1], "s", color=colours[item.effector], markersize=4, alpha=0.45, zorder=1)
+        side.plot(place[0], place[2], "|", color=colours[item.effector], markersize=7, alpha=0.7, zorder=1)
 
 
 def _seen(clip: RecordedClip, origin: Origin, places: FloatArray) -> FloatArray:
@@ -326,16 +324,9 @@ def com_figure(record: RunRecord) -> Figure:
     """
     tracks = need(record.tracks, "a motion of the centre of mass")
     shown = timeline(
-        record,
-        (14.0, 7.0),
-        "Centre of mass",
-        3,
-        len(QUANTITIES),
-        strip=0.14,
-        top=0.75,
-        between=0.22,
+        record, (14.0, 7.0), "Centre of mass", 3, len(QUANTITIES), strip=0.14, top=0.75, between=0.22,
         across=0.75,
-    )
+    )  # fmt: skip
     for column, (quantity, unit) in enumerate(QUANTITIES):
         shown.strip(column, quantity.capitalize(), named=column == 0)
         for row, axis in enumerate("xyz"):

@@ -1,8 +1,4 @@
-"""The centres of mass of two runs: in space, on the coordinate planes, in time.
-
-Also here. The margins of two runs against the phases they share. The postures of two runs at the key instants
-they share. The phases of two runs in time.
-"""
+"""Two runs in one figure: timing, centres of mass, margins, and postures at the key instants they share."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -29,11 +25,13 @@ from manikin.reports.figures.scene import (
 from manikin.reports.figures.style import (
     Labels,
     dress,
+    legend_above,
     legend_in_title,
     named_below,
     need,
     new_figure,
     new_grid,
+    note,
     support_colour,
     support_keys,
 )
@@ -48,7 +46,7 @@ def compare_margin_figure(comparison: RunComparison) -> Figure:
         FigureError: If no stage with the same unit of margin is there in both runs, or no phase matches.
     """
     rows = [row for row in comparison.rows if row.first is not None and row.second is not None]
-    need(rows, "a phase that both runs have")
+    need(rows, "a phase that both runs have", "two runs")
     first, second = tracks_of(comparison.first), tracks_of(comparison.second)
     stages = [
         stage for stage in STAGES
@@ -133,17 +131,16 @@ def compare_postures_figure(comparison: RunComparison) -> Figure:
             motion = run.motions[which]
             sample = int(np.argmin(np.abs(motion.time - time)))
             draw_moment(axes, run, motion, sample, view.moved(offset, 0.0), (low, high))
-            axes.annotate(f"{time:.2f} s", (offset + (left + right) / 2, high[2]), (0, 3),
-                          textcoords="offset points", ha="center", fontsize=8.5, color=colour)  # fmt: skip
+            middle = offset + (left + right) / 2
+            note(axes, f"{time:.2f} s", (middle, high[2]), fontsize=8.5, color=colour)
             if row:
                 worst = posture.largest[:2]
                 text = "\n".join(f"{readable(j.joint)} {j.difference_deg:+.1f}°" for j in worst)
-                axes.annotate(text, (offset + (left + right) / 2, low[2]), (0, -44), ha="center", va="bottom",
-                              textcoords="offset points", fontsize=6.5, color="#5A5F69")  # fmt: skip
+                note(axes, text, (middle, low[2]), -44, va="bottom", fontsize=6.5, color="#5A5F69")
         dress(axes, f"{name}\n{view.labels[1]}", "")
         frame_panels(axes, (left, right), (low[2], high[2]), offsets)
-    note = f"numbers along the axes: {view.labels[0]}; below: largest differences, second less first"
-    figure.text(0.01, 0.01, note, fontsize=7.5, color=COLOURS["soft"])
+    legend = f"numbers along the axes: {view.labels[0]}; below: largest differences, second less first"
+    figure.text(0.01, 0.01, legend, fontsize=7.5, color=COLOURS["soft"])
     return figure
 
 
@@ -184,11 +181,9 @@ def _draw_bars(axes: Axes, comparison: RunComparison) -> None:
                       fontsize=8, color="white", fontweight="bold")  # fmt: skip
             ends.append(phase.end_s)
         if row.first is not None and row.second is not None:
-            for upper, lower in (
-                (row.first.start_s, row.second.start_s),
-                (row.first.end_s, row.second.end_s),
-            ):
-                axes.plot([upper, lower], [0.74, 0.26], color=COLOURS["soft"], linewidth=0.8)
+            for name in ("start_s", "end_s"):
+                instants = getattr(row.first, name), getattr(row.second, name)
+                axes.plot(instants, [0.74, 0.26], color=COLOURS["soft"], linewidth=0.8)
     axes.set_yticks([1.0, 0.0], list(comparison.names))
     axes.set_ylim(-0.4, 1.4)
     axes.set_xlim(0.0, 1.01 * max(ends))
@@ -198,7 +193,7 @@ def _draw_bars(axes: Axes, comparison: RunComparison) -> None:
     keys = support_keys(len(row.supports) for row in comparison.rows)
     if any(row.first is None or row.second is None for row in comparison.rows):
         keys.append(Patch(facecolor=COLOURS["soft"], edgecolor="white", hatch="xx", label="no match"))
-    _legend(axes, keys)
+    legend_above(axes, keys)
 
 
 def _draw_durations(axes: Axes, rows: Sequence[TimingRow], names: tuple[str, str]) -> None:
@@ -208,8 +203,7 @@ def _draw_durations(axes: Axes, rows: Sequence[TimingRow], names: tuple[str, str
             if phase is None:
                 continue
             axes.bar(number + shift, phase.duration_s, width=0.38, color=colour, alpha=0.85)
-            axes.annotate(f"{phase.duration_s:.2f}", (number + shift, phase.duration_s), (0, 2),
-                          textcoords="offset points", ha="center", fontsize=7)  # fmt: skip
+            note(axes, f"{phase.duration_s:.2f}", (number + shift, phase.duration_s), 2, fontsize=7)
             longest = max(longest, phase.duration_s)
     dress(axes, "duration [s]")
     axes.set_xticks(range(len(rows)), [named_below(row.supports) for row in rows])
@@ -219,14 +213,7 @@ def _draw_durations(axes: Axes, rows: Sequence[TimingRow], names: tuple[str, str
     keys = [
         Patch(color=colour, alpha=0.85, label=name) for colour, name in zip(RUN_COLOURS, names, strict=True)
     ]
-    _legend(axes, keys)
-
-
-def _legend(axes: Axes, keys: list[Patch]) -> None:
-    axes.legend(
-        handles=keys, fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.1, ncols=len(keys),
-    )  # fmt: skip
+    legend_above(axes, keys)
 
 
 def compare_planes_figure(comparison: RunComparison) -> Figure:
@@ -276,10 +263,10 @@ def compare_scene_figure(comparison: RunComparison) -> Figure:
 
 def _tracks(comparison: RunComparison) -> dict[str, ComTrack]:
     """The planned CoM of each run."""
-    found = {}
+    result = {}
     for name, run in zip(comparison.names, comparison.runs, strict=True):
-        found[name] = next(iter(need(run.tracks, "a centre of mass of both runs").values()))
-    return found
+        result[name] = next(iter(need(run.tracks, "a centre of mass of both runs").values()))
+    return result
 
 
 def _styles(comparison: RunComparison) -> dict[str, dict[str, Any]]:

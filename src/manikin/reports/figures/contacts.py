@@ -1,8 +1,4 @@
-"""The contact strategy: one panel per phase.
-
-Also here. Which contacts were chosen: bodies in a scene side by side. Bodies and scenes as shaded solids in
-three dimensions.
-"""
+"""Contacts: those of each phase of a run, and those chosen for bodies shown as shaded solids in a scene."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -21,20 +17,20 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from manikin.body import BodyModel, Configuration
 from manikin.body.segments import segment_triangles
 from manikin.contact import Contact, ContactSchedule
-from manikin.errors import FigureError
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.figures.style import dress, need, new_figure, new_grid
+from manikin.reports.figures.style import dress, legend_in_title, need, new_figure, new_grid
 from manikin.reports.figures.views import (
     View,
     best_view,
     distinct_contacts,
     draw_contact,
     draw_obstacles,
+    finite_obstacles,
     panel_ticks,
 )
 from manikin.runtime.palette import COLOURS, colours_of, readable
-from manikin.scene import HalfSpace, Plane, Scene
+from manikin.scene import Scene
 
 MARGIN = 0.3
 """Room around the bodies [m]."""
@@ -78,8 +74,6 @@ def contact_choice_figure(
     Args:
         body: The body of all panels.
         scene: Its surroundings, as far as they are near.
-        panels: At least one.
-        title: Of the figure.
         elevation_deg: Height of the eye above the horizon [deg].
         azimuth_deg: Direction of the eye about the vertical [deg].
         columns: Panels in a row; all when omitted.
@@ -87,8 +81,7 @@ def contact_choice_figure(
     Raises:
         FigureError: If there is no panel.
     """
-    if not panels:
-        raise FigureError("contact choice figure has no panel; valid: at least one")
+    need(panels, "a panel", "at least one body")
     wide = columns or len(panels)
     rows = -(-len(panels) // wide)
     figure = new_figure(3.3 * wide, 3.9 * rows + 0.4, title)
@@ -162,13 +155,12 @@ def body_solids(body: BodyModel, q: FloatArray, marked: Iterable[str] = ()) -> l
     """Shapes of a body in one configuration.
 
     Args:
-        body: The body.
         q: (nq,) configuration.
         marked: Names of segments drawn in the executed motion's colour.
     """
     data = body.pinocchio.createData()
     pin.framesForwardKinematics(body.pinocchio, data, q)
-    found, wanted = [], set(marked)
+    result, wanted = [], set(marked)
     for segment in body.segments:
         triangles = segment_triangles(segment, rounds=10)
         if triangles is None:
@@ -177,25 +169,20 @@ def body_solids(body: BodyModel, q: FloatArray, marked: Iterable[str] = ()) -> l
         place = data.oMf[body.segment_frame(segment.name)]
         world = vertices @ place.rotation.T + place.translation
         colour = COLOURS["executed"] if segment.name in wanted else "#7F8FA6"
-        found.append(Solid(world[faces], colour))
-    return found
+        result.append(Solid(world[faces], colour))
+    return result
 
 
 def scene_solids(scene: Scene, low: FloatArray, high: FloatArray) -> list[Solid]:
     """Finite obstacles, those of them that are between two corners (3,) of a box [m]."""
-    found = []
-    for obstacle in scene:
-        if isinstance(obstacle.shape, (HalfSpace, Plane)):
-            continue
-        bounds = obstacle.bounds
-        if (bounds[1] < low).any() or (bounds[0] > high).any():
-            continue
+    result = []
+    for obstacle in finite_obstacles(scene, low, high):
         mesh = obstacle.to_trimesh()
         finer = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE)
         triangles = np.asarray(finer[0])[np.asarray(finer[1])]
         inside = ((triangles.max(axis=1) > low) & (triangles.min(axis=1) < high)).all(axis=1)
-        found.append(Solid(np.clip(triangles[inside], low, high), COLOURS["obstacle"], 0.55))
-    return found
+        result.append(Solid(np.clip(triangles[inside], low, high), COLOURS["obstacle"], 0.55))
+    return result
 
 
 def draw_solids(axes: Axes3D, solids: Iterable[Solid]) -> None:
@@ -330,14 +317,8 @@ def _legend(figure: Figure, schedule: ContactSchedule) -> None:
     axes = figure.axes[0]
     for name, colour in colours_of(schedule.sequence.effectors).items():
         axes.plot([], [], color=colour, linewidth=5, alpha=0.6, label=readable(name))
-    handles, labels = axes.get_legend_handles_labels()
-    handles += [Line2D([], [], color=COLOURS["ink"], linewidth=2.0), Patch(fill=False, linestyle="--")]
-    labels += ["centre of mass", "dashed or pale: left, or made next"]
-    figure.legend(
-        handles,
-        labels,
-        fontsize=8,
-        frameon=False,
-        loc="upper right",
-        ncols=max(2, int((figure.get_figwidth() - 3.5) / 1.35)),
-    )
+    keys = [
+        Line2D([], [], color=COLOURS["ink"], linewidth=2.0, label="centre of mass"),
+        Patch(fill=False, linestyle="--", label="dashed or pale: left, or made next"),
+    ]
+    legend_in_title(figure, axes, handles=keys, most=max(2, int((figure.get_figwidth() - 3.5) / 1.35)))

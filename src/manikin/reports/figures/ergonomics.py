@@ -13,7 +13,13 @@ from manikin.reports.figures.style import dress, legend_above, new_grid
 from manikin.runtime.palette import COLOURS, CYCLE, readable
 
 LEVEL_COLOURS = ("#DDEBDD", "#EFF3D2", "#FBEBC3", "#F6D2BB", "#EDB4B1")
-"""From nothing to do to change at once; RULA's four action levels begin at the second."""
+"""Colours of the action levels, the least urgent first; RULA's four levels begin at the second."""
+
+LEVELS = {
+    "RULA": ("acceptable", "investigate", "change soon", "change now"),
+    "REBA": ("negligible", "low", "medium", "high", "very high"),
+}
+"""Action levels, in a word."""
 
 SHOWN_JOINTS = 5
 """Joints whose shares are drawn, those with the largest peaks."""
@@ -26,7 +32,6 @@ def ergonomics_figure(found: Ergonomics, title: str = "Ergonomics") -> Figure:
 
     Args:
         found: Of a motion of more than one frame.
-        title: Of the figure.
 
     Raises:
         FigureError: If there is neither a score nor a torque to draw.
@@ -61,22 +66,9 @@ def _draw_scores(axes: Axes, one: Assessment, ends: Sequence[int], colours: Sequ
     axes.grid(visible=False)
     axes.set_ylim(0.5, ends[-1] + 0.5)
     axes.set_yticks(range(1, ends[-1] + 1, 1 if ends[-1] < 10 else 2))
-    _level_legend(axes, one, colours)
-
-
-def _level_legend(axes: Axes, one: Assessment, colours: Sequence[str]) -> None:
-    """Sides and action levels in one row above the panel."""
-    lines, names = axes.get_legend_handles_labels()
-    short = {
-        "RULA": ("acceptable", "investigate", "change soon", "change now"),
-        "REBA": ("negligible", "low", "medium", "high", "very high"),
-    }
-    bands = [Patch(color=colour) for colour in colours]
-    axes.legend(
-        [*lines, *bands], [*names, *short[one.method]], fontsize=8, frameon=False, loc="lower right",
-        bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, ncols=len(lines) + len(bands), handlelength=1.4,
-        columnspacing=1.2,
-    )  # fmt: skip
+    lines, _ = axes.get_legend_handles_labels()
+    levels = zip(colours, LEVELS[one.method], strict=True)
+    legend_above(axes, [*lines, *(Patch(color=colour, label=level) for colour, level in levels)])
 
 
 def _draw_shares(axes: Axes, found: Ergonomics, strength: JointStrength) -> None:

@@ -1,7 +1,4 @@
-"""Footprints, zero moment point and projected centre of mass seen from above.
-
-Also here. The zero moment point in the support polygons, and how far it stays inside.
-"""
+"""Seen from above: footprints, projected centre of mass, and zero moment point in its support polygons."""
 
 from typing import Any
 
@@ -20,6 +17,7 @@ from manikin.reports.figures.style import (
     Labels,
     dress,
     label_room,
+    legend_in_title,
     need,
     new_figure,
     support_colour,
@@ -32,10 +30,10 @@ from manikin.runtime.palette import COLOURS, colours_of, readable
 from manikin.scene import HalfSpace, Plane, Scene
 
 PLAN_HEIGHT = 5.1
-"""Of the view from above [inch]."""
+"""Height of the view from above [inch]."""
 
 DISTANCE_WIDTH = 7.4
-"""Of the panel over time [inch]."""
+"""Width of the panel over time [inch]."""
 
 EDGE = "#AEB4BE"
 """Colour of support polygons."""
@@ -68,12 +66,18 @@ def zmp_figure(record: RunRecord) -> Figure:
     shown.strip(1)
     axes = shown.panel(1, 1)
     axes.axhline(0.0, color=COLOURS["ink"], linewidth=0.9)
-    for kind, one in paths.items():
-        _draw_distance(axes, kind, one)
+    for kind, item in paths.items():
+        _draw_distance(axes, kind, item)
     shown.label(axes, "distance to the edge of the support polygon [mm]")
     _frame_distance(axes, list(paths.values()))
     axes.legend(fontsize=8, loc="upper left", framealpha=0.9, edgecolor="none")
-    _legend_of_plan(shown.figure, schedule)
+    shown_counts = sorted({min(max(len(phase.stance), 1), 3) for phase in schedule.sequence})
+    keys = [
+        *(Line2D([], [], color=support_colour(c), label=f"ZMP, {support_words(c)}") for c in shown_counts),
+        Line2D([], [], color=COLOURS["ink"], marker="*", linestyle="", label="change of phase"),
+        Line2D([], [], color=EDGE, linestyle=(0, (5, 3)), label="support polygon"),
+    ]
+    legend_in_title(shown.figure, handles=keys)
     return shown.figure
 
 
@@ -113,15 +117,6 @@ def _plan_width(schedule: ContactSchedule) -> float:
     """Width that the plan takes at its height [inch]."""
     low, high = _plan_box(schedule)
     return float(np.clip(PLAN_HEIGHT * (high - low)[0] / (high - low)[1], 2.0, 6.5))
-
-
-def _legend_of_plan(figure: Figure, schedule: ContactSchedule) -> None:
-    """A legend in one row at the height of the figure's title."""
-    shown = sorted({min(max(len(phase.stance), 1), 3) for phase in schedule.sequence})
-    handles = [Line2D([], [], color=support_colour(c), label=f"ZMP, {support_words(c)}") for c in shown]
-    handles.append(Line2D([], [], color=COLOURS["ink"], marker="*", linestyle="", label="change of phase"))
-    handles.append(Line2D([], [], color=EDGE, linestyle=(0, (5, 3)), label="support polygon"))
-    figure.legend(handles=handles, fontsize=8.5, frameon=False, loc="upper right", ncols=len(handles))
 
 
 def _draw_distance(axes: Axes, name: str, path: ZmpPath) -> None:
@@ -236,12 +231,6 @@ def _mark_ends(axes: Axes, com: np.ndarray) -> None:
     for point, text, marker in ((com[0], "start", "o"), (com[-1], "goal", "D")):
         axes.plot(point[0], point[1], marker, color=COLOURS["ink"], markersize=5, zorder=7)
         axes.annotate(
-            text,
-            point[:2],
-            (7, 4),
-            textcoords="offset points",
-            fontsize=8,
-            color=COLOURS["ink"],
-            zorder=8,
+            text, point[:2], (7, 4), textcoords="offset points", fontsize=8, color=COLOURS["ink"], zorder=8,
             path_effects=[white_edge()],
-        )
+        )  # fmt: skip

@@ -1,7 +1,4 @@
-"""How long the phases of several motions last, each and on average.
-
-Also here. Where several people put their feet and hands, seen from above.
-"""
+"""Phases and supports of several motions: durations, each and on average, and places seen from above."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -20,14 +17,17 @@ from manikin.reports.figures.style import (
     group_colours,
     group_keys,
     label_room,
+    legend_above,
+    legend_in_title,
     need,
     new_grid,
+    note,
     support_colour,
 )
 from manikin.runtime.palette import COLOURS, colours_of, readable
 
 SHARE = 0.5
-"""Of the places in an ellipse, were they normal."""
+"""Share of the places inside an ellipse, for a normal distribution."""
 
 FEWEST = 3
 """Places of which an ellipse is drawn: two make a line."""
@@ -42,8 +42,8 @@ def placements_figure(groups: Mapping[str, Sequence[SupportPlacement]]) -> Figur
     Raises:
         FigureError: If there is no placement.
     """
-    shown = need({name: found for name, found in groups.items() if found}, "a placement")
-    everywhere = np.vstack([one.places for found in shown.values() for one in found])
+    shown = need({name: result for name, result in groups.items() if result}, "a placement")
+    everywhere = np.vstack([item.places for result in shown.values() for item in result])
     low, high = everywhere.min(axis=0) - 0.25, everywhere.max(axis=0) + 0.25
     wide = 9.6
     panel = float(np.clip((wide - 0.9) * (high[1] - low[1]) / (high[0] - low[0]), 1.3, 5.0))
@@ -51,44 +51,40 @@ def placements_figure(groups: Mapping[str, Sequence[SupportPlacement]]) -> Figur
         wide, 0.9 + (panel + 0.7) * len(shown), f"Supports (crosses: means; ellipses: {SHARE:.0%})",
         len(shown), 1, between=0.7, top=0.8, bottom=0.5,
     )  # fmt: skip
-    colours = colours_of(one.effector for found in shown.values() for one in found)
-    for row, (name, found) in enumerate(shown.items()):
+    colours = colours_of(item.effector for result in shown.values() for item in result)
+    for row, (name, result) in enumerate(shown.items()):
         axes = figure.add_subplot(grid[row])
-        motions = len({clip for one in found for clip in one.clips})
+        motions = len({clip for item in result for clip in item.clips})
         dress(axes, "y [m]", "x [m]", f"{name}, {motions} motions")
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         axes.set_aspect("equal", adjustable="box", anchor="W")
         axes.plot(0.0, 0.0, "+", color=COLOURS["ink"], markersize=10, zorder=2)
-        _draw(axes, found, colours)
-    keys = [
+        _draw(axes, result, colours)
+    legend_in_title(figure, handles=[
         Line2D([], [], marker="o", linestyle="", color=colour, label=readable(effector))
         for effector, colour in colours.items()
-    ]
-    figure.legend(handles=keys, loc="upper right", ncols=len(keys), fontsize=8.5, frameon=False,
-                  borderaxespad=0.3)  # fmt: skip
+    ])  # fmt: skip
     return figure
 
 
 def _draw(axes: Axes, found: Sequence[SupportPlacement], colours: Mapping[str, str]) -> None:
-    for one in found:
-        colour = colours[one.effector]
-        axes.plot(*one.places.T, "o", color=colour, markersize=3.5, alpha=0.6, zorder=3)
-        axes.plot(*one.mean, "x", color=colour, markersize=6, zorder=5)
-        if len(one.places) >= FEWEST:
-            (long, short), turn = one.ellipse(SHARE)
-            ellipse = Ellipse(
-                (float(one.mean[0]), float(one.mean[1])), 2 * long, 2 * short, angle=float(np.degrees(turn)),
-                fill=False, edgecolor=colour, linewidth=1.2, zorder=4,
-            )  # fmt: skip
-            axes.add_patch(ellipse)
+    for item in found:
+        colour = colours[item.effector]
+        axes.plot(*item.places.T, "o", color=colour, markersize=3.5, alpha=0.6, zorder=3)
+        axes.plot(*item.mean, "x", color=colour, markersize=6, zorder=5)
+        if len(item.places) >= FEWEST:
+            (long, short), turn = item.ellipse(SHARE)
+            middle, angle = (float(item.mean[0]), float(item.mean[1])), float(np.degrees(turn))
+            look = {"fill": False, "edgecolor": colour, "linewidth": 1.2, "zorder": 4}
+            axes.add_patch(Ellipse(middle, 2 * long, 2 * short, angle=angle, **look))
     labels = Labels(axes)
-    for one in sorted(found, key=lambda each: -len(each.places)):
-        mean = (float(one.mean[0]), float(one.mean[1]))
-        labels.write(f"{one.number}", mean, (0.0, 6.0), ha="center", color=colours[one.effector], zorder=6)
+    for item in sorted(found, key=lambda each: -len(each.places)):
+        mean = (float(item.mean[0]), float(item.mean[1]))
+        labels.write(f"{item.number}", mean, (0.0, 6.0), ha="center", color=colours[item.effector], zorder=6)
 
 
 WIDTH = 0.8
-"""Of all bars of one phase, of the distance between two."""
+"""Width of all bars of one phase over the distance between phases."""
 
 BEYOND = 2.5
 """Height of the axes per largest mean, beyond which whiskers are cut off."""
@@ -107,9 +103,9 @@ def phase_durations_figure(sequences: Sequence[PhaseSequence], by: By = "number"
     Raises:
         FigureError: If there is no motion.
     """
-    motions = need([one for one in sequences if one.phases], "a motion with phases")
+    motions = need([item for item in sequences if item.phases], "a motion with phases")
     groups = by_group(motions)
-    names = [one.name for members in groups.values() for one in members]
+    names = [item.name for members in groups.values() for item in members]
     tall = 0.21 * len(names) + 0.12 * len(groups)
     figure, grid = new_grid(
         11.0, 5.2 + tall, "Durations of the phases", 2, 1, height_ratios=[tall, 3.3], top=0.75, between=0.85,
@@ -123,14 +119,14 @@ def phase_durations_figure(sequences: Sequence[PhaseSequence], by: By = "number"
 def _draw_motions(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]]) -> None:
     level, ticks, kinds = 0.0, {}, {}
     for group, members in groups.items():
-        for one in members:
-            begin = one.phases[0].start
-            for phase, kind, whole in zip(one.phases, one.kinds, one.whole, strict=True):
+        for item in members:
+            begin = item.phases[0].start
+            for phase, kind, whole in zip(item.phases, item.kinds, item.whole, strict=True):
                 colour = _colour(kind, len(phase.effectors))
                 kinds[kind] = colour
                 axes.barh(level, phase.duration, left=phase.start - begin, height=0.75, color=colour,
                           alpha=0.85 if whole else 0.3, edgecolor="white", linewidth=0.6)  # fmt: skip
-            ticks[level] = one.name
+            ticks[level] = item.name
             level -= 1.0
         axes.annotate(
             group, (1.0, level + len(members)), xycoords=("axes fraction", "data"), xytext=(-2, 0),
@@ -144,14 +140,14 @@ def _draw_motions(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]]) -> N
     axes.set_ylim(level + 1.0, 0.6)
     keys = [Patch(color=colour, alpha=0.85, label=kind) for kind, colour in kinds.items()]
     keys.append(Patch(color=COLOURS["soft"], alpha=0.3, label="cut off by the recording"))
-    _legend(axes, keys)
+    legend_above(axes, keys, most=7)
 
 
 def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By) -> None:
-    found = {group: phase_durations(members, by) for group, members in groups.items()}
-    names = _in_order([list(each) for each in found.values()])
-    width, colours = WIDTH / len(found), group_colours(found)
-    for number, (group, each) in enumerate(found.items()):
+    result = {group: phase_durations(members, by) for group, members in groups.items()}
+    names = _in_order([list(each) for each in result.values()])
+    width, colours = WIDTH / len(result), group_colours(result)
+    for number, (group, each) in enumerate(result.items()):
         for place, name in enumerate(names):
             if name not in each:
                 continue
@@ -159,17 +155,16 @@ def _draw_means(axes: Axes, groups: dict[str, tuple[PhaseSequence, ...]], by: By
             axes.bar(x, spread.mean, width=0.94 * width, color=colours[group], alpha=0.75)
             ends = [[spread.mean - spread.smallest], [spread.largest - spread.mean]]
             axes.errorbar(x, spread.mean, ends, color=COLOURS["ink"], linewidth=0.8, capsize=2)
-            axes.annotate(f"{spread.count}", (x, 0.0), (0, 2), textcoords="offset points", fontsize=6.5,
-                          ha="center", color="white", fontweight="bold")  # fmt: skip
+            note(axes, f"{spread.count}", (x, 0.0), 2, fontsize=6.5, color="white", fontweight="bold")
     dress(axes, "mean, least and largest [s]")
     axes.set_xticks(range(len(names)), [name.replace("+", "\n").replace("_", " ") for name in names])
     axes.grid(False, axis="x")
     axes.set_xlim(-0.6, len(names) - 0.4)
-    spreads = [spread for each in found.values() for spread in each.values()]
+    spreads = [spread for each in result.values() for spread in each.values()]
     if spreads:
         highest = max(spread.largest for spread in spreads)
         axes.set_ylim(0.0, min(1.06 * highest, BEYOND * max(spread.mean for spread in spreads)))
-    _legend(axes, group_keys(colours))
+    legend_above(axes, group_keys(colours), most=7)
 
 
 def _colour(kind: str, supports: int) -> str:
@@ -184,10 +179,3 @@ def _in_order(lists: Sequence[Sequence[str]]) -> list[str]:
             if name not in merged:
                 merged.insert(merged.index(before) + 1 if before in merged else 0, name)
     return merged
-
-
-def _legend(axes: Axes, keys: list[Patch]) -> None:
-    axes.legend(
-        handles=keys, fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.1, ncols=min(len(keys), 7), handlelength=1.2, columnspacing=1.2,
-    )  # fmt: skip

@@ -41,18 +41,18 @@ def push_map_figure(maps: Sequence[PushMap], soles: Sequence[FloatArray] = ()) -
     Raises:
         FigureError: If there is nothing to draw.
     """
-    if not any(np.any(np.isfinite(one.held)) for one in maps):
+    if not any(np.any(np.isfinite(item.held)) for item in maps):
         raise FigureError("this figure needs an impulse that was held; valid: a map with one")
-    common, names = told_apart([one.conditions for one in maps])
+    common, names = told_apart([item.conditions for item in maps])
     figure = new_figure(7.4, 7.9, "Largest impulse held, by direction of the push")
     axes = figure.add_subplot(projection="polar")
     axes.set_title(fill(common, 96), fontsize=8.5, color=COLOURS["soft"], pad=8)
-    top = 1.08 * max(float(np.nanmax([*one.held, *(one.bound or ())], initial=0.0)) for one in maps) or 1.0
+    top = 1.08 * max(float(np.nanmax([*item.held, *(item.bound or ())], initial=0.0)) for item in maps) or 1.0
     _dress(axes, top)
     _draw_soles(axes, soles, SOLES * top)
-    for number, (one, name) in enumerate(zip(maps, names, strict=True)):
-        _draw_curve(axes, one, name or "held", number)
-    if any(one.bound for one in maps):
+    for number, (item, name) in enumerate(zip(maps, names, strict=True)):
+        _draw_curve(axes, item, name or "held", number)
+    if any(item.bound for item in maps):
         axes.plot([], [], "--", linewidth=0.9, color=COLOURS["soft"], label=BOUND)
     if len(axes.get_legend_handles_labels()[1]) > 1:
         axes.legend(fontsize=8.5, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.06), ncols=2)

@@ -1,7 +1,4 @@
-"""The path of the centre of mass in the scene, with stick figures at the key instants.
-
-Also here. The postures at the key instants, side by side.
-"""
+"""A motion in its scene: path of the centre of mass with stick figures, and postures side by side."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -20,25 +17,27 @@ from manikin.motion import Motion
 from manikin.motion.motion import phases_of, segment_positions
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import ComTrack, RunRecord
-from manikin.reports.figures.style import dress, need, new_figure, new_grid, white_edge
+from manikin.reports.figures.style import dress, need, new_figure, new_grid, note, white_edge
 from manikin.reports.figures.views import (
     ALONG_X,
     ALONG_Y,
+    BOX_CORNERS,
     View,
     distinct_contacts,
     draw_body,
     draw_contact,
     draw_obstacles,
+    finite_obstacles,
     panel_ticks,
 )
 from manikin.runtime.palette import COLOURS, colours_of, side_colour
-from manikin.scene import Box, HalfSpace, Obstacle, Plane, Scene
+from manikin.scene import Box, Obstacle, Scene
 
 MOST = 9
-"""With more key instants than this some are left out, evenly."""
+"""Largest number of key instants drawn; of more some are left out, evenly."""
 
 GAP = 0.12
-"""Between two panels [m]."""
+"""Gap between two panels [m]."""
 
 
 def postures_figure(record: RunRecord) -> Figure:
@@ -77,8 +76,7 @@ def postures_figure(record: RunRecord) -> Figure:
             _draw_posture(axes, record, view.moved(offset, 0.0), name, sample, (low, high))
             if row == 0:
                 middle, top = offset + (left + right) / 2, high[2]
-                axes.annotate(f"{instant:.2f} s", (middle, top), (0, 4),
-                              textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
+                note(axes, f"{instant:.2f} s", (middle, top), 4, fontsize=9)
         horizontal, vertical = view.labels
         dress(axes, vertical, f"{horizontal}, seen {view.words}, each panel")
         frame_panels(axes, (left, right), (low[2], high[2]), offsets)
@@ -103,10 +101,6 @@ def draw_moment(
     """Draw the body among the obstacles at one sample of a motion, with its CoM.
 
     Args:
-        axes: Where to draw.
-        record: Of the run.
-        motion: One of its motions.
-        sample: Index of the sample.
         view: The plane that is seen, moved to the panel.
         box: Lower and upper corner of what is shown [m].
     """
@@ -213,16 +207,12 @@ def _draw_figures(
     sticks = _sticks(body)
     for number, places in enumerate(postures):
         end = number in (0, len(postures) - 1)
-        axes.add_collection3d(
-            Line3DCollection(
-                [[places[first], places[second]] for first, second in sticks],
-                colors=[_stick_colour(first, second) for first, second in sticks],
-                linewidths=2.6 if end else 1.4,
-                alpha=0.95 if end else 0.3 + 0.3 * number / len(postures),
-                capstyle="round",
-                zorder=6,
-            )
-        )
+        axes.add_collection3d(Line3DCollection(
+            [[places[first], places[second]] for first, second in sticks],
+            colors=[_stick_colour(first, second) for first, second in sticks],
+            linewidths=2.6 if end else 1.4, alpha=0.95 if end else 0.3 + 0.3 * number / len(postures),
+            capstyle="round", zorder=6,
+        ))  # fmt: skip
     return np.vstack([list(places.values()) for places in postures])
 
 
@@ -234,14 +224,11 @@ def _draw_legs(axes: Axes3D, track: ComTrack, schedule: ContactSchedule) -> None
     for place, phase in zip(track.at(middles), schedule.sequence, strict=True):
         if not len(phase.stance):
             continue
-        legs = Line3DCollection(
+        axes.add_collection3d(Line3DCollection(
             [[place, contact.position] for contact in phase.stance],
             colors=[colours[contact.effector] for contact in phase.stance],
-            linewidths=2.0 if len(phase.stance) < most else 0.8,
-            alpha=0.7,
-            zorder=6,
-        )
-        axes.add_collection3d(legs)
+            linewidths=2.0 if len(phase.stance) < most else 0.8, alpha=0.7, zorder=6,
+        ))  # fmt: skip
 
 
 def _label_heads(axes: Axes3D, body: BodyModel, motion: Motion, schedule: ContactSchedule | None) -> None:
@@ -281,36 +268,23 @@ def _stick_colour(start: str, end: str) -> str:
 def draw_scene(axes: Axes3D, scene: Scene) -> FloatArray:
     """Draw every finite obstacle; return the corners of their bounds."""
     corners = [np.zeros((0, 3))]
-    for obstacle in scene:
-        if isinstance(obstacle.shape, (HalfSpace, Plane)):
-            continue
-        faces = _box_faces(obstacle) if isinstance(obstacle.shape, Box) else _triangles(obstacle)
+    for obstacle in finite_obstacles(scene):
+        is_box = isinstance(obstacle.shape, Box)
+        faces = _box_faces(obstacle) if is_box else np.asarray(obstacle.to_trimesh().triangles)
         low, high = obstacle.bounds
-        axes.add_collection3d(
-            Poly3DCollection(
-                faces,
-                facecolor=COLOURS["obstacle"],
-                edgecolor="#8D94A0",
-                linewidths=0.6,
-                alpha=0.25,
-                zorder=2,
-            )
+        solid = Poly3DCollection(
+            faces, facecolor=COLOURS["obstacle"], edgecolor="#8D94A0", linewidths=0.6, alpha=0.25, zorder=2
         )
+        axes.add_collection3d(solid)
         axes.text(high[0], low[1], high[2], f" {obstacle.name}", fontsize=8, color="#666C77", zorder=3)
         corners.append(np.array([low, high]))
     return np.vstack(corners)
 
 
 def _box_faces(obstacle: Obstacle) -> list[FloatArray]:
-    half = obstacle.shape.size / 2  # type: ignore[union-attr]
-    signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
-    corners = obstacle.to_world(signs * half)
+    corners = obstacle.to_world(BOX_CORNERS * obstacle.shape.size / 2)  # type: ignore[union-attr]
     quads = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
     return [corners[list(quad)] for quad in quads]
-
-
-def _triangles(obstacle: Obstacle) -> FloatArray:
-    return np.asarray(obstacle.to_trimesh().triangles)
 
 
 def draw_soles(axes: Axes3D, schedule: ContactSchedule) -> FloatArray:

@@ -1,8 +1,4 @@
-"""The common look of the figures: colours, axes, phase bands.
-
-Also here. Texts on axes that leave out what would cover an earlier one. Colours of groups of motions, and the
-entries of a legend for them.
-"""
+"""The common look of the figures: colours, axes, legends, and texts that do not cover each other."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
@@ -18,6 +14,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Bbox, Transform
 
 from manikin.errors import FigureError
+from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
 from manikin.runtime.palette import COLOURS, readable
 
@@ -86,7 +83,7 @@ class Labels:
 COLOURS_OF_GROUPS = (
     "#6A51A3", "#D55E00", "#56B4E9", "#B59B00", "#8C564B", "#4D4D4D", "#E7298A", "#66A61E",
 )  # fmt: skip
-"""None is that of a foot; where there are more groups, colours come again."""
+"""Colours of groups, none of them that of a foot; they are repeated for more groups."""
 
 FITTING = 6.0
 """Characters of tick labels that stand side by side on an inch."""
@@ -101,14 +98,6 @@ def group_colours(groups: Iterable[str]) -> dict[str, str]:
 def group_keys(colours: dict[str, str]) -> list[Patch]:
     """Entries of a legend."""
     return [Patch(color=colour, alpha=0.75, label=group) for group, colour in colours.items()]
-
-
-def legend_below_title(figure: Figure, keys: Sequence[Artist]) -> None:
-    """A legend in one row below the figure's title, which long names do not reach."""
-    figure.legend(
-        handles=list(keys), loc="upper left", ncols=len(keys), fontsize=8.5, frameon=False, borderaxespad=0.0,
-        bbox_to_anchor=(0.01, 1.0 - 0.36 / figure.get_figheight()), handlelength=1.6, columnspacing=1.2,
-    )  # fmt: skip
 
 
 def name_groups(axes: Axes, groups: Sequence[str]) -> None:
@@ -142,34 +131,17 @@ def new_figure(width: float, height: float, title: str) -> Figure:
 
 
 def new_grid(
-    width: float,
-    height: float,
-    title: str,
-    rows: int,
-    columns: int,
-    *,
-    left: float = 0.65,
-    right: float = 0.15,
-    top: float = 0.5,
-    bottom: float = 0.5,
-    across: float = 0.6,
-    between: float = 0.3,
+    width: float, height: float, title: str, rows: int, columns: int, *, left: float = 0.65,
+    right: float = 0.15, top: float = 0.5, bottom: float = 0.5, across: float = 0.6, between: float = 0.3,
     **ratios: Any,
-) -> tuple[Figure, GridSpec]:
+) -> tuple[Figure, GridSpec]:  # fmt: skip
     """Figure of the given size [inch] whose grid has known margins, which takes half the time to draw.
 
     Args:
-        width: Of the figure [inch].
-        height: Of the figure [inch].
-        title: Of the figure.
-        rows: Of the grid.
-        columns: Of the grid.
-        left: Margin for labels [inch].
-        right: Margin [inch].
-        top: Margin for the title [inch].
-        bottom: Margin for labels [inch].
-        across: Gap between columns [inch].
-        between: Gap between rows [inch].
+        width, height, title: Of the figure; lengths in [inch].
+        rows, columns: Of the grid.
+        left, right, top, bottom: Margins for labels and title [inch].
+        across, between: Gaps between columns and between rows [inch].
         ratios: ``width_ratios``, ``height_ratios``.
     """
     figure = new_figure(width, height, title)
@@ -228,14 +200,14 @@ def named_below(effectors: Iterable[str]) -> str:
     return "\n".join(readable(name) for name in effectors) or "flight"
 
 
-def need(value: T | None, what: str) -> T:
-    """The value, or a refusal to draw.
+def need(value: T | None, what: str, of: str = "a run") -> T:
+    """The value, or a refusal to draw ``of`` something that lacks it.
 
     Raises:
         FigureError: If there is none.
     """
     if not value:
-        raise FigureError(f"this figure needs {what}, which the run does not have; valid: a run with it")
+        raise FigureError(f"this figure needs {what}, and there is none; valid: {of} with it")
     return value
 
 
@@ -257,25 +229,45 @@ def white_edge() -> withStroke:
     return withStroke(linewidth=2.5, foreground="white")
 
 
-def legend_above(axes: Axes) -> None:
-    """A legend in one row above the right end of the axes, where it hides nothing."""
+def legend_above(axes: Axes, handles: Sequence[Artist] = (), *, most: int = 99) -> None:
+    """A legend in rows of at most ``most`` entries above the right end of the axes, where it hides nothing.
+
+    Its entries are ``handles``, or else what the axes show.
+    """
+    known = list(handles) or axes.get_legend_handles_labels()[0]
     axes.legend(
-        fontsize=8,
-        frameon=False,
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.1,
-        ncols=len(axes.get_legend_handles_labels()[0]),
-        handlelength=1.6,
-        columnspacing=1.4,
-    )
-
-
-def legend_in_title(figure: Figure, *axes: Axes) -> None:
-    """A legend of ``axes`` in one row at the height of the figure's title."""
-    entries = [entry for one in axes for entry in zip(*one.get_legend_handles_labels(), strict=True)]
-    handles, labels = [handle for handle, _ in entries], [label for _, label in entries]
-    figure.legend(
-        handles, labels, fontsize=8.5, frameon=False, loc="upper right", ncols=len(labels), borderaxespad=0.3,
-        handlelength=1.6, columnspacing=1.2,
+        handles=known, fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.1, ncols=min(len(known), most), handlelength=1.4, columnspacing=1.2,
     )  # fmt: skip
+
+
+def legend_in_title(
+    figure: Figure, *axes: Axes, handles: Sequence[Artist] = (), most: int = 99, **style: Any
+) -> None:
+    """A legend at the height of the figure's title, in rows of at most ``most`` entries.
+
+    Its entries are what ``axes`` show, and then ``handles``.
+    """
+    known = [handle for item in axes for handle in item.get_legend_handles_labels()[0]] + list(handles)
+    look = {"loc": "upper right", "borderaxespad": 0.3, "handlelength": 1.6, "columnspacing": 1.2} | style
+    figure.legend(handles=known, fontsize=8.5, frameon=False, ncols=min(len(known), most), **look)
+
+
+def legend_below_title(figure: Figure, keys: Sequence[Artist]) -> None:
+    """A legend in one row below the figure's title, which long names do not reach."""
+    place = (0.01, 1.0 - 0.36 / figure.get_figheight())
+    legend_in_title(figure, handles=keys, loc="upper left", borderaxespad=0.0, bbox_to_anchor=place)
+
+
+def draw_heading(axes: Axes, place: Sequence[float] | FloatArray, length: float) -> None:
+    """Draw an arrow from x, y [m] along the heading [rad] of a place (3,), so long [m]."""
+    x, y, heading = (float(value) for value in place)
+    tip = x + length * float(np.cos(heading)), y + length * float(np.sin(heading))
+    arrow = {"arrowstyle": "-|>", "color": COLOURS["ink"], "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", tip, (x, y), arrowprops=arrow, zorder=5)
+
+
+def note(axes: Axes, text: str, place: tuple[float, float], up: float = 3.0, **style: Any) -> None:
+    """Write a text above the middle of a place, ``up`` points higher."""
+    look = {"ha": "center", "fontsize": 8, "textcoords": "offset points"} | style
+    axes.annotate(text, place, (0, up), **look)

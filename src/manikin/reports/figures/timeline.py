@@ -1,7 +1,4 @@
-"""Panels over time below a strip that shows which contacts are held.
-
-Also here. How long each phase lasts, and when the supports are really loaded. The stability margin in time.
-"""
+"""Figures over time below a strip of the contacts that are held: margin, and timing of the phases."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -23,10 +20,12 @@ from manikin.reports.figures.style import (
     dress,
     end_of,
     label_room,
+    legend_above,
     legend_in_title,
     named_below,
     need,
     new_grid,
+    note,
     support_colour,
     support_keys,
 )
@@ -71,8 +70,8 @@ def timing_figure(record: RunRecord) -> Figure:
             )
     axes.set_yticks(np.arange(len(record.effectors)) + 0.5, [readable(n) for n in record.effectors])
     axes.set_ylim(len(record.effectors), 0.0)
-    note = "planned supports (wide bars) and loaded contacts of the execution (narrow bars)"
-    dress(axes, "", "time [s]", note if executed is not None else "planned supports")
+    title = "planned supports (wide bars) and loaded contacts of the execution (narrow bars)"
+    dress(axes, "", "time [s]", title if executed is not None else "planned supports")
     axes.grid(False)
     return figure
 
@@ -88,8 +87,7 @@ def _draw_durations(axes: Axes, schedule: ContactSchedule) -> None:
             if bound is not None and bound < 3.0 * float(durations.max()):
                 axes.hlines(bound, number - 0.38, number + 0.38, color=COLOURS["ink"], linewidth=1.2,
                             linestyle=style, zorder=4)  # fmt: skip
-        axes.annotate(f"{duration:.2f}", (number, max(duration, least)), (0, 3), textcoords="offset points",
-                      ha="center", fontsize=8)  # fmt: skip
+        note(axes, f"{duration:.2f}", (number, max(duration, least)))
     named = [f"{n}\n{named_below(phase.stance.effectors)}" for n, phase in enumerate(schedule.sequence)]
     axes.set_xticks(range(len(durations)), named)
     dress(axes, "duration [s]", "", f"total {float(durations.sum()):.2f} s")
@@ -97,8 +95,7 @@ def _draw_durations(axes: Axes, schedule: ContactSchedule) -> None:
     axes.set_xlim(-0.6, len(durations) - 0.4)
     axes.set_ylim(0.0, 1.14 * max(float(durations.max()), max(p.min_duration for p in schedule.sequence)))
     axes.grid(False, axis="x")
-    axes.legend(handles=_keys(schedule), fontsize=8, frameon=False, loc="lower right",
-                bbox_to_anchor=(1.0, 1.0), ncols=6, borderaxespad=0.1)  # fmt: skip
+    legend_above(axes, _keys(schedule))
 
 
 def _keys(schedule: ContactSchedule) -> list[Patch | Line2D]:
@@ -114,8 +111,8 @@ def _keys(schedule: ContactSchedule) -> list[Patch | Line2D]:
 def _width(schedule: ContactSchedule) -> float:
     """Width of the figure [inch] at which the names below neighbouring bars keep apart."""
     effectors = schedule.sequence.effectors
-    one = _NAME_SIZE / 72.0 * (0.5 * max((len(name) for name in effectors), default=0) + 1.0)
-    return max(11.0, label_room(effectors) + len(schedule.sequence) * one)
+    item = _NAME_SIZE / 72.0 * (0.5 * max((len(name) for name in effectors), default=0) + 1.0)
+    return max(11.0, label_room(effectors) + len(schedule.sequence) * item)
 
 
 def _bars(schedule: ContactSchedule, name: str, end: float) -> list[tuple[float, float]]:
@@ -186,11 +183,11 @@ def margin_curves(record: RunRecord) -> dict[str, ComTrack]:
 def phase_minima(curve: ComTrack, phases: PhaseTable) -> list[int | None]:
     """Sample with the smallest margin of each phase, None where the curve has no sample."""
     inside = phases.phase_at(curve.time)
-    found: list[int | None] = []
+    result: list[int | None] = []
     for phase in range(len(phases)):
         samples = np.flatnonzero(inside == phase)
-        found.append(int(samples[np.argmin(curve.margin[samples])]) if len(samples) else None)
-    return found
+        result.append(int(samples[np.argmin(curve.margin[samples])]) if len(samples) else None)
+    return result
 
 
 def _zoom_ceiling(curves: dict[str, ComTrack], phases: PhaseTable) -> float | None:
@@ -230,9 +227,9 @@ def _mark_minima(
     axes: Axes, labels: Labels, curve: ComTrack, phases: PhaseTable, name: str, top: float | None
 ) -> None:
     """Mark the least margin of each phase, numbered where there is room, and ring the least of all."""
-    found = [index for index in phase_minima(curve, phases) if index is not None]
+    result = [index for index in phase_minima(curve, phases) if index is not None]
     offset = (0.0, -11.0 if name == "executed" else 4.0)
-    for index in sorted(found, key=lambda index: curve.margin[index]):
+    for index in sorted(result, key=lambda index: curve.margin[index]):
         time, margin = float(curve.time[index]), float(curve.margin[index])
         if top is not None and margin > top:
             continue
@@ -309,7 +306,6 @@ def timeline(
     Args:
         record: With phases.
         size: Width and height of the figure [inch].
-        title: Of the figure.
         panels: Rows of panels below the strip.
         columns: Of strips and panels.
         strip: Height of the strip for each effector, relative to that of a panel.

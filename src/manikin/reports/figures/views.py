@@ -1,6 +1,6 @@
 """Views of a scene along a world axis: projected contacts, obstacles and bodies."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
 
@@ -15,12 +15,14 @@ from manikin.contact import Contact, ContactSchedule, SolePart
 from manikin.numerics.polygon import convex_polygon
 from manikin.numerics.spatial import FloatArray
 from manikin.runtime.palette import COLOURS, side_colour
-from manikin.scene import Box, HalfSpace, Mesh, Plane, Scene
+from manikin.scene import Box, HalfSpace, Mesh, Obstacle, Plane, Scene
 
 _LINE = 1e-4
 """Projected areas below this are lines [m^2]."""
 _APART = 0.05
 """Contacts nearer to each other than this cannot be told apart [m]."""
+BOX_CORNERS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
+"""(8, 3) corners of a cube with an edge of 2 about the origin."""
 _CIRCLE = np.column_stack([np.cos(a := np.linspace(0.0, 2.0 * np.pi, 17)[:-1]), np.sin(a)])
 
 
@@ -59,7 +61,7 @@ class View:
 
     @property
     def words(self) -> str:
-        """Where the eye is."""
+        """Direction of the view, in words."""
         return {"xy": "from above", "xz": "along y", "yz": "along x"}[self.name]
 
 
@@ -95,15 +97,15 @@ def best_view(schedule: ContactSchedule) -> View:
 
 def distinct_contacts(schedule: ContactSchedule) -> list[Contact]:
     """Every contact once, in the order in which it is made; of a rolling foot the full sole."""
-    found: list[Contact] = []
+    result: list[Contact] = []
     for phase in schedule.sequence:
         for contact in phase.stance:
-            known = next((n for n, other in enumerate(found) if contact.same_place(other)), None)
+            known = next((n for n, other in enumerate(result) if contact.same_place(other)), None)
             if known is None:
-                found.append(contact)
-            elif found[known].part is not SolePart.FULL and contact.part is SolePart.FULL:
-                found[known] = contact
-    return found
+                result.append(contact)
+            elif result[known].part is not SolePart.FULL and contact.part is SolePart.FULL:
+                result[known] = contact
+    return result
 
 
 def draw_contact(axes: Axes, contact: Contact, view: View, colour: str, *, held: bool = True) -> None:
@@ -123,27 +125,30 @@ def draw_contact(axes: Axes, contact: Contact, view: View, colour: str, *, held:
         axes.plot(*place, "s", color=colour, markerfacecolor=face, markersize=6, zorder=2)
 
 
+def finite_obstacles(
+    scene: Scene, low: FloatArray | None = None, high: FloatArray | None = None
+) -> Iterator[Obstacle]:
+    """Obstacles that end somewhere; only those near the box between two corners (3,) [m] if it is given."""
+    for obstacle in scene:
+        if not isinstance(obstacle.shape, (HalfSpace, Plane)):
+            below, above = obstacle.bounds
+            if low is None or high is None or not (np.any(below > high) or np.any(above < low)):
+                yield obstacle
+
+
 def draw_obstacles(axes: Axes, scene: Scene, view: View, low: FloatArray, high: FloatArray) -> None:
     """Draw the outlines of the finite obstacles near the box from ``low`` to ``high``, and the floor.
 
     Args:
-        axes: To draw on.
         scene: Obstacles and floor.
-        view: Direction.
         low: (3,) lower corner of what is looked at [m].
         high: (3,) upper corner [m].
     """
     outlines = []
-    for obstacle in scene:
-        if isinstance(obstacle.shape, (HalfSpace, Plane)):
-            continue
-        below, above = obstacle.bounds
-        if np.any(below > high) or np.any(above < low):
-            continue
+    for obstacle in finite_obstacles(scene, low, high):
         shape = obstacle.shape
         if isinstance(shape, Box):
-            signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
-            points = obstacle.to_world(signs * shape.size / 2)
+            points = obstacle.to_world(BOX_CORNERS * shape.size / 2)
         elif isinstance(shape, Mesh):
             points = obstacle.to_world(shape.vertices)
         else:
@@ -167,10 +172,8 @@ def draw_body(axes: Axes, body: BodyModel, q: FloatArray, view: View) -> None:
     """Draw the silhouettes of a body's shapes, the farthest first.
 
     Args:
-        axes: To draw on.
         body: Who.
         q: (nq,) configuration.
-        view: Direction.
     """
     data = body.pinocchio.createData()
     pin.framesForwardKinematics(body.pinocchio, data, np.asarray(q))
@@ -224,8 +227,7 @@ def sections(values: np.ndarray) -> list[slice]:
 
 def _outline(shape: Shape, rotation: FloatArray, centre: FloatArray, view: View) -> FloatArray:
     if shape.kind is ShapeKind.BOX:
-        signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
-        return convex_polygon(view(centre + (signs * shape.size / 2) @ rotation.T))
+        return convex_polygon(view(centre + (BOX_CORNERS * shape.size / 2) @ rotation.T))
     radius = float(shape.size[0])
     half = shape.size[1] / 2 * rotation[:, 2] if shape.kind is ShapeKind.CAPSULE else np.zeros(3)
     ends = view(np.array([centre - half, centre + half]))

@@ -1,8 +1,4 @@
-"""Walking paths seen from above, with the body's heading along them.
-
-Also here. The ways of a walking run seen from above: who is where, when, and goes how. The holonomic zone
-around a start, seen from above, and the lengths of holonomic ends by category.
-"""
+"""Walking paths seen from above with the body's heading, and where they are holonomic."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,12 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
-from manikin.errors import FigureError
 from manikin.numerics.spatial import FloatArray
 from manikin.pipeline.run_directory import RunRecord
-from manikin.reports.figures.style import dress, legend_in_title, need, new_figure, new_grid
+from manikin.reports.figures.style import draw_heading, dress, legend_in_title, need, new_figure, new_grid
 from manikin.runtime.palette import COLOURS
 from manikin.walking import (
     HOLONOMIC,
@@ -60,43 +56,46 @@ def walk_paths_figure(record: RunRecord) -> Figure:
         _draw_way(axes, way)
         if len(walks) > 1:
             _write_times(axes, way, name)
-    for kind, colour in KINDS.items():
-        axes.plot([], [], color=colour, label=kind)
-    axes.plot([], [], color=COLOURS["soft"], linewidth=1.0, label="shoulders, and standing")
     places = np.vstack([way[:, 1:3] for way in walks.values()])
     low, high = places.min(axis=0) - BESIDE, places.max(axis=0) + BESIDE
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal", adjustable="box")
     dress(axes, "y [m]", "x [m]")
-    figure.legend(
-        *axes.get_legend_handles_labels(), loc="outside lower right", ncols=3, fontsize=8.5, frameon=False
-    )
+    keys = _kind_keys("shoulders, and standing", 1.0)
+    figure.legend(handles=keys, loc="outside lower right", ncols=3, fontsize=8.5, frameon=False)
     return figure
 
 
 def _draw_way(axes: Axes, way: FloatArray) -> None:
+    """Draw a way (n, 4), coloured by how the body goes along it."""
     time, place = way[:, 0], way[:, 1:]
     rate = (len(time) - 1) / float(time[-1] - time[0])
     labels = segment_path(ShoulderPaths.of_places(place, rate)).labels
-    colours = {HOLONOMIC: KINDS["holonomic"], NONHOLONOMIC: KINDS["nonholonomic"]}
-    lines = np.stack([place[:-1, :2], place[1:, :2]], axis=1)
-    axes.add_collection(
-        LineCollection(
-            list(lines),
-            colors=[colours.get(str(one), COLOURS["soft"]) for one in labels[:-1]],
-            linewidths=1.8,
-        )
-    )
+    kinds = {HOLONOMIC: KINDS["holonomic"], NONHOLONOMIC: KINDS["nonholonomic"]}
+    colours = [kinds.get(str(label), COLOURS["soft"]) for label in labels[:-1]]
     rows = np.searchsorted(time, np.arange(time[0], time[-1] + EVERY, EVERY)).clip(max=len(time) - 1)
-    half = Walker().width / 2
-    left = half * np.column_stack([-np.sin(place[rows, 2]), np.cos(place[rows, 2])])
-    bars = np.stack([place[rows, :2] + left, place[rows, :2] - left], axis=1)
-    axes.add_collection(LineCollection(list(bars), colors=COLOURS["soft"], linewidths=0.8, zorder=1.5))
-    tip = place[-1, :2] + 0.3 * np.array([np.cos(place[-1, 2]), np.sin(place[-1, 2])])
-    arrow = {"arrowstyle": "-|>", "color": COLOURS["ink"], "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", tuple(tip), tuple(place[-1, :2]), arrowprops=arrow, zorder=5)
+    _draw_places(axes, place, colours, place[rows], Walker().width / 2, (1.8, 0.8))
+    draw_heading(axes, place[-1], 0.3)
     axes.plot(*place[0, :2], "o", color=COLOURS["ink"], markersize=4, zorder=6)
+
+
+def _draw_places(
+    axes: Axes, place: FloatArray, colours: Sequence[str], shown: FloatArray, half: float,
+    widths: tuple[float, float],
+) -> None:  # fmt: skip
+    """Draw a line through places (n, 3) in n - 1 colours, and shoulders of a half width [m] at some."""
+    lines = np.stack([place[:-1, :2], place[1:, :2]], axis=1)
+    axes.add_collection(LineCollection(list(lines), colors=list(colours), linewidths=widths[0]))
+    left = half * np.column_stack([-np.sin(shown[:, 2]), np.cos(shown[:, 2])])
+    bars = np.stack([shown[:, :2] + left, shown[:, :2] - left], axis=1)
+    axes.add_collection(LineCollection(list(bars), colors=COLOURS["soft"], linewidths=widths[1], zorder=1.5))
+
+
+def _kind_keys(shoulders: str, width: float) -> list[Line2D]:
+    """Entries of a legend: how the body goes, and its shoulders."""
+    keys = [Line2D([], [], color=colour, label=kind) for kind, colour in KINDS.items()]
+    return [*keys, Line2D([], [], color=COLOURS["soft"], linewidth=width, label=shoulders)]
 
 
 def _write_times(axes: Axes, way: FloatArray, name: str) -> None:
@@ -128,10 +127,7 @@ def holonomic_zone_figure(zones: Mapping[str, HolonomicZone]) -> Figure:
         FigureError: If no goal counts.
     """
     shown = {name: zone for name, zone in zones.items() if np.any(zone.considered)}
-    if not shown:
-        raise FigureError(
-            "this figure needs goals around a start, and none counts; valid: goals aside and ahead"
-        )
+    need(shown, "a goal aside or ahead of a start that counts", "a zone")
     far = max(float(zone.distances[zone.considered].max()) for zone in shown.values()) + 0.15
     figure, grid = new_grid(
         0.8 + 4.3 * len(shown),
@@ -176,16 +172,15 @@ def holonomic_ends_figure(statistics: Mapping[str, CategoryStatistics]) -> Figur
     Raises:
         FigureError: If there is no category.
     """
-    if not statistics:
-        raise FigureError("this figure needs walks of a category, and there are none; valid: at least one")
+    need(statistics, "a walk of a category", "statistics")
     figure = new_figure(8.4, 5.2, "Holonomic ends of walks by category")
     places = np.arange(len(statistics))
     ends = {"from origin (PLO) [m]": "from_origin", "to goal (PLG) [m]": "to_goal"}
     for row, (label, name) in enumerate(ends.items()):
         axes = figure.add_subplot(2, 1, row + 1)
         for number, (kind, colour) in enumerate(_BARS.items()):
-            spreads = [getattr(one, name) for one in statistics.values()]
-            heights = [getattr(one, kind.replace(" ", "_")) for one in spreads]
+            spreads = [getattr(item, name) for item in statistics.values()]
+            heights = [getattr(item, kind.replace(" ", "_")) for item in spreads]
             axes.bar(places + 0.27 * (number - 1), heights, 0.25, color=colour, label=kind)
         axes.set_xticks(places, list(statistics))
         dress(axes, label)
@@ -194,9 +189,6 @@ def holonomic_ends_figure(statistics: Mapping[str, CategoryStatistics]) -> Figur
 
 
 KINDS = {"holonomic": COLOURS["executed"], "nonholonomic": COLOURS["planned"]}
-
-_HEADING_EVERY = 0.5
-"""Time between the bodies drawn along a path [s]."""
 
 _PANEL = 3.4
 """Width of a panel [inch]."""
@@ -212,14 +204,12 @@ def walking_paths_figure(groups: Mapping[str, Sequence[WalkingPath]], title: str
 
     Args:
         groups: Paths by the title of their panel.
-        title: Of the figure.
 
     Raises:
         FigureError: If there is no path.
     """
     shown = {name: paths for name, paths in groups.items() if paths}
-    if not shown:
-        raise FigureError("this figure needs a walking path, and there is none; valid: at least one")
+    need(shown, "a walking path", "a group")
     points = np.vstack([path.place[:, :2] for paths in shown.values() for path in paths])
     low, high = points.min(axis=0) - _BESIDE, points.max(axis=0) + _BESIDE
     columns = min(4, len(shown))
@@ -233,37 +223,21 @@ def walking_paths_figure(groups: Mapping[str, Sequence[WalkingPath]], title: str
             _draw_path(axes, path)
         for obstacle in paths[0].task.obstacles:
             draw_obstacle(axes, obstacle)
-        dress(
-            axes,
-            "y [m]" if number % columns == 0 else "",
-            "x [m]" if number // columns == rows - 1 else "",
-            name,
-        )
+        first, last = number % columns == 0, number // columns == rows - 1
+        dress(axes, "y [m]" if first else "", "x [m]" if last else "", name)
         axes.set_aspect("equal", adjustable="box")
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-    _legend(figure)
+    legend_in_title(figure, handles=_kind_keys("shoulders, half width", 0.8))
     return figure
 
 
 def _draw_path(axes: Axes, path: WalkingPath) -> None:
-    place = path.place
-    segments = np.stack([place[:-1, :2], place[1:, :2]], axis=1)
-    kinds = ["holonomic" if flag else "nonholonomic" for flag in path.holonomic[:-1]]
-    axes.add_collection(
-        LineCollection(list(segments), colors=[KINDS[kind] for kind in kinds], linewidths=1.3)
-    )
-    times = np.append(np.arange(0.0, path.duration, _HEADING_EVERY), path.duration)
+    colours = [KINDS["holonomic" if flag else "nonholonomic"] for flag in path.holonomic[:-1]]
+    times = np.append(np.arange(0.0, path.duration, EVERY), path.duration)
     half = path.task.walker.width / 4  # half size, so that neighbours do not hide each other
-    at = path.place_at(times)
-    across = half * np.column_stack([-np.sin(at[:, 2]), np.cos(at[:, 2])])
-    bars = np.stack([at[:, :2] - across, at[:, :2] + across], axis=1)
-    axes.add_collection(LineCollection(list(bars), colors=COLOURS["soft"], linewidths=0.6, zorder=1.5))
-    goal = path.task.goal
-    step = 0.28 * np.array([np.cos(goal[2]), np.sin(goal[2])])
-    arrow = {"arrowstyle": "-|>", "color": COLOURS["ink"], "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
-    tip, foot = (goal[:2] + step).tolist(), goal[:2].tolist()
-    axes.annotate("", (tip[0], tip[1]), (foot[0], foot[1]), arrowprops=arrow, zorder=5)
+    _draw_places(axes, path.place, colours, path.place_at(times), half, (1.3, 0.6))
+    draw_heading(axes, path.task.goal, 0.28)
     axes.plot(*path.task.start[:2], "o", color=COLOURS["ink"], markersize=3.5, zorder=6)
 
 
@@ -283,18 +257,3 @@ def draw_obstacle(axes: Axes, obstacle: WalkObstacle) -> None:
                 linestyle="--" if dashed else "-", linewidth=0.9, zorder=1,
             )
         )  # fmt: skip
-
-
-def _legend(figure: Figure) -> None:
-    axes = figure.axes[0]
-    for kind, colour in KINDS.items():
-        axes.plot([], [], color=colour, label=kind)
-    axes.plot([], [], color=COLOURS["soft"], linewidth=0.8, label="shoulders, half width")
-    figure.legend(
-        *axes.get_legend_handles_labels(),
-        loc="upper right",
-        ncols=3,
-        fontsize=8.5,
-        frameon=False,
-        borderaxespad=0.3,
-    )

@@ -10,9 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from manikin.errors import FigureError
-from manikin.numerics.spatial import FloatArray
-from manikin.reports.figures.style import dress, new_grid
+from manikin.reports.figures.style import draw_heading, dress, legend_in_title, need, new_grid
 from manikin.runtime.palette import COLOURS
 from manikin.walking.words import STRAIGHT, THESIS_WORDS, EqualPaths, WordPath, WordSlice
 
@@ -33,30 +31,25 @@ def words_figure(slices: Sequence[WordSlice]) -> Figure:
     other. On the right are paths to the marked goals, farthest inside the places of each word; points on
     them are switching points.
 
-    Args:
-        slices: One row of the figure each.
-
     Raises:
         FigureError: If there is no slice.
     """
-    if not slices:
-        raise FigureError("this figure needs a slice of words, and there is none; valid: at least one")
+    need(slices, "a slice of words", "a partition")
     figure, grid = new_grid(
         9.6, 0.9 + 5.6 * len(slices), "Words of the best paths, by final heading", len(slices), 2,
         width_ratios=[1.0, 1.25], top=0.8, between=0.75, across=0.7,
     )  # fmt: skip
-    shown = sorted({str(word) for one in slices for word in one.words.ravel()}, key=_order)
-    for row, one in enumerate(slices):
-        chosen = _representatives(one)
+    shown = sorted({str(word) for item in slices for word in item.words.ravel()}, key=_order)
+    for row, item in enumerate(slices):
+        chosen = _representatives(item)
         cells, ways = (figure.add_subplot(grid[row, column]) for column in range(2))
-        _draw_cells(cells, one, chosen)
+        _draw_cells(cells, item, chosen)
         for place in chosen:
-            _draw_path(ways, one.path(*place), _colour(str(one.words[place])))
+            _draw_path(ways, item.path(*place), _colour(str(item.words[place])))
         _dress_ways(ways, "A path to each cell")
     keys: list[Artist] = [Patch(facecolor=_colour(word), label=word) for word in shown]
     keys.append(Line2D([], [], color=COLOURS["ink"], linewidth=1.6, label="two best paths"))
-    figure.legend(handles=keys, loc="upper right", ncols=len(keys), fontsize=8.5, frameon=False,
-                  borderaxespad=0.3, handlelength=1.2, columnspacing=1.2)  # fmt: skip
+    legend_in_title(figure, handles=keys, handlelength=1.2)
     return figure
 
 
@@ -69,10 +62,7 @@ def equal_paths_figure(pairs: Sequence[EqualPaths]) -> Figure:
     Raises:
         FigureError: If there is no pair.
     """
-    if not pairs:
-        raise FigureError(
-            "this figure needs two paths of equal cost, and there are none; valid: at least one pair"
-        )
+    need(pairs, "a pair of paths of equal cost", "a partition")
     figure, grid = new_grid(
         9.6, 0.8 + 4.6 * len(pairs), "Two best paths to one goal", len(pairs), 2, width_ratios=[1.0, 1.25],
         top=0.75, between=0.75, across=0.7,
@@ -130,10 +120,7 @@ def _draw_path(axes: Axes, path: WordPath, colour: str) -> None:
     axes.plot(
         *(np.interp(at, along, states[:, column]) for column in range(2)), "o", color=colour, markersize=3.8
     )
-    x, y, heading = (float(value) for value in path.goal)
-    tip: FloatArray = np.array([x, y]) + 0.45 * np.array([np.cos(heading), np.sin(heading)])
-    arrow = {"arrowstyle": "-|>", "color": COLOURS["ink"], "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", (float(tip[0]), float(tip[1])), (x, y), arrowprops=arrow, zorder=5)
+    draw_heading(axes, path.goal, 0.45)
     axes.plot(*path.start[:2], "o", color=COLOURS["ink"], markersize=4, zorder=6)
 
 
@@ -144,7 +131,7 @@ def _dress_ways(axes: Axes, title: str) -> None:
 
 
 def _representatives(one: WordSlice) -> list[tuple[int, int]]:
-    """For each word the place farthest from all places of other words, and from the edge of the grid."""
+    """Place of each word that is farthest from places of other words and from the edge of the grid."""
     rows, columns = np.indices(one.grid.shape)
     places = np.column_stack([rows.ravel(), columns.ravel()])
     labels = one.words.ravel()

@@ -68,8 +68,6 @@ def write_figures(
     A figure that the run has no data for (no execution, no hand, a wall) is left out.
 
     Args:
-        record: A run.
-        folder: Existing folder.
         on_done: Told the share of figures done after each.
 
     Returns:
@@ -94,11 +92,11 @@ def write_comparison(
 
 def comparison_pictures(comparison: RunComparison) -> dict[str, bytes]:
     """PNG files of the figures of two runs that apply, by what they show."""
-    found = {}
+    result = {}
     for name, draw in COMPARISONS.items():
         with suppress(FigureError):
-            found[name.replace("_", " ")] = png_of(draw(comparison))
-    return found
+            result[name.replace("_", " ")] = png_of(draw(comparison))
+    return result
 
 
 def _write(

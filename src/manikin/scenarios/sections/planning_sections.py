@@ -1,9 +1,4 @@
-"""Sections of a scenario file: options of the centre-of-mass planner.
-
-Also here. Sections of a scenario file: constraints on the centre of mass. Section of a scenario file: how
-contacts are planned where no supports are given. Section of a scenario file: how the whole body's motion is
-found. Section of a scenario file: whose motion it is.
-"""
+"""Sections of a scenario file about its body and the options of its planners."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
@@ -31,18 +26,19 @@ from manikin.scenarios.validation import (
     Text,
     Vector3,
     Weights3,
+    optional,
+    preset,
     refuse,
+    required,
 )
 
 
 class HeightBandSection(Section):
     """Lower and upper bound of the CoM's height."""
 
-    lower: Text = Field(description="expression of the lowest height [m] in x, y, z of the CoM")
-    upper: Text = Field(description="expression of the greatest height [m] in x, y, z of the CoM")
-    frame: FrameSection | None = Field(
-        default=None, description="frame of the expressions' x and y (default: the world's)"
-    )
+    lower: Text = required("expression of the lowest height [m] in x, y, z of the CoM")
+    upper: Text = required("expression of the greatest height [m] in x, y, z of the CoM")
+    frame: FrameSection | None = optional("frame of the expressions' x and y (default: the world's)")
 
     def implied(self) -> dict[str, Any]:
         """The frame of the expressions."""
@@ -61,14 +57,13 @@ class HeightBandSection(Section):
 class ComConstraintSection(Section):
     """One constraint on the centre of mass: exactly one of the keys."""
 
-    height_band: HeightBandSection | None = Field(default=None, description="bounds of the CoM's height")
-    max_support_distance_m: Positive | None = Field(
-        default=None, description="largest distance from the CoM to every contact, hands included [m]"
+    height_band: HeightBandSection | None = optional("bounds of the CoM's height")
+    max_support_distance_m: Positive | None = optional(
+        "largest distance from the CoM to every contact, hands included [m]"
     )
-    overhead: Annotated[list[Text], Field(min_length=1)] | Literal["automatic"] | None = Field(
-        default=None,
-        description="keep the CoM low enough for the body to fold below overhead obstacles: 'automatic' for "
-        "all that hover over the way at least 0.3 m above the supports, or the names of those to pass below",
+    overhead: Annotated[list[Text], Field(min_length=1)] | Literal["automatic"] | None = optional(
+        "keep the CoM low enough for the body to fold below overhead obstacles: 'automatic' for "
+        "all that hover over the way at least 0.3 m above the supports, or the names of those to pass below"
     )
 
     @model_validator(mode="after")
@@ -82,54 +77,47 @@ class ComConstraintSection(Section):
 class ContactsSection(Section):
     """How contacts are planned where no supports are given."""
 
-    friction: Positive = Field(default=0.7, description="Coulomb coefficient of the soles")
-    sole: SoleSection = Field(
-        default=SoleSection(length_m=0.28, width_m=0.12), description="size of the soles"
+    friction: Positive = preset(0.7, "Coulomb coefficient of the soles")
+    sole: SoleSection = preset(SoleSection(length_m=0.28, width_m=0.12), "size of the soles")
+    stride_m: Positive = preset(0.36, "length of a step [m] of a body of 1.75 m, scaled to the actual one")
+    limbs: list[Text] | None = optional(
+        "names of the limbs that make contacts, hands as grasps (default: a human's feet, in "
+        "steps on surfaces that carry the whole sole; all limbs of other bodies)"
     )
-    stride_m: Positive = Field(
-        default=0.36, description="length of a step [m] of a body of 1.75 m, scaled to the actual one"
+    grasp_force_N: Positive = preset(400.0, "largest force of a grasp along each axis [N]")
+    forefoot_m: Positive | None = optional(
+        "length of the front of the soles that has to lie on a hold [m] (default: whole soles)"
     )
-    limbs: list[Text] | None = Field(
-        default=None,
-        description="names of the limbs that make contacts, hands as grasps (default: a human's feet, in "
-        "steps on surfaces that carry the whole sole; all limbs of other bodies)",
-    )
-    grasp_force_N: Positive = Field(default=400.0, description="largest force of a grasp along each axis [N]")
-    forefoot_m: Positive | None = Field(
-        default=None,
-        description="length of the front of the soles that has to lie on a hold [m] (default: whole soles)",
-    )
-    ranges: Literal["limits", "learnt"] = Field(
-        default="limits",
-        description="what bounds a human's hips and shoulders: the intervals of their hinges alone, or the "
+    ranges: Literal["limits", "learnt"] = preset(
+        "limits",
+        "what bounds a human's hips and shoulders: the intervals of their hinges alone, or the "
         "volumes learnt from recorded motion as well",
     )
-    attempts: Annotated[int, Field(strict=True, ge=1, le=20)] = Field(
-        default=3, description="guides that are tried before giving up"
+    attempts: Annotated[int, Field(strict=True, ge=1, le=20)] = preset(
+        3, "guides that are tried before giving up"
     )
 
 
 class WholebodySection(Section):
     """How the whole body's motion is found."""
 
-    method: Literal["follow", "refine"] = Field(
-        default="follow",
-        description="follow: contacts, swings and a planned centre of mass; refine: smooth the postures at "
+    method: Literal["follow", "refine"] = preset(
+        "follow",
+        "follow: contacts, swings and a planned centre of mass; refine: smooth the postures at "
         "the changes of contact into a motion that keeps to physics, with no centre of mass prescribed",
     )
-    pace: Positive = Field(
-        default=1.0,
-        description="refine: speed relative to that of the contact plan, or of the planned centre of mass; "
+    pace: Positive = preset(
+        1.0,
+        "refine: speed relative to that of the contact plan, or of the planned centre of mass; "
         "below 1 every phase lasts longer",
     )
-    speed_share: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = Field(
-        default=None,
-        description="refine: share of the joints' velocity limits up to which phases are shortened, as far "
-        "as balance, clearance and strength allow (default: phases last as long as they are given)",
+    speed_share: Annotated[float, Field(strict=True, gt=0.0, le=1.0)] | None = optional(
+        "refine: share of the joints' velocity limits up to which phases are shortened, as far "
+        "as balance, clearance and strength allow (default: phases last as long as they are given)"
     )
-    contact_variables: Annotated[bool, Field(strict=True)] = Field(
-        default=True,
-        description="refine: whether contacts are let go that the motion does not need and that are not "
+    contact_variables: Annotated[bool, Field(strict=True)] = preset(
+        True,
+        "refine: whether contacts are let go that the motion does not need and that are not "
         "made, else all of the sequence are held",
     )
 
@@ -158,33 +146,26 @@ _INSECT_KG = 2.0
 class LimbSection(Section):
     """A limb of a creature: where it ends and how it touches."""
 
-    tip: Text = Field(description="link that touches")
-    root: Text | None = Field(
-        default=None, description="first link of the limb (default: the one that the root carries)"
-    )
-    contact: Literal["point", "sole", "grasp"] = Field(default="point", description="how it touches")
-    position: Vector3 = Field(
-        default=(0.0, 0.0, 0.0), description="where it touches, in the frame of the tip [m]"
-    )
-    normal: Vector3 | None = Field(
-        default=None, description="normal of the contact, into the body, in the frame of the tip (default: "
+    tip: Text = required("link that touches")
+    root: Text | None = optional("first link of the limb (default: the one that the root carries)")
+    contact: Literal["point", "sole", "grasp"] = preset("point", "how it touches")
+    position: Vector3 = preset((0.0, 0.0, 0.0), "where it touches, in the frame of the tip [m]")
+    normal: Vector3 | None = optional(
+        "normal of the contact, into the body, in the frame of the tip (default: "
         "straight up in the standing posture)"
-    )  # fmt: skip
+    )
 
 
 class LoadSection(Section):
     """What the hands carry, during the whole motion or some of the phases of its supports."""
 
-    mass_kg: Positive = Field(description="mass of the load [kg], a point at the middle of the palms")
-    hand: Literal["left", "right", "both"] = Field(
-        default="both", description="which hand carries it; both carry half each"
+    mass_kg: Positive = required("mass of the load [kg], a point at the middle of the palms")
+    hand: Literal["left", "right", "both"] = preset("both", "which hand carries it; both carry half each")
+    from_phase: Annotated[int, Field(strict=True, ge=0)] | None = optional(
+        "phase of the supports that begins as it is taken up (default: the first)"
     )
-    from_phase: Annotated[int, Field(strict=True, ge=0)] | None = Field(
-        default=None,
-        description="phase of the supports that begins as it is taken up (default: the first)",
-    )
-    until_phase: Annotated[int, Field(strict=True, ge=0)] | None = Field(
-        default=None, description="phase of the supports that ends as it is set down (default: the last)"
+    until_phase: Annotated[int, Field(strict=True, ge=0)] | None = optional(
+        "phase of the supports that ends as it is set down (default: the last)"
     )
 
     @property
@@ -196,44 +177,31 @@ class LoadSection(Section):
 class BodySection(Section):
     """Whose motion it is."""
 
-    model: Literal["human", "kudoh", "point_mass", "insect", "urdf"] = Field(
-        default="human",
-        description="built-in body: a person; kudoh, the 15 segments of Kudoh (2002), 1.72 m and 70 kg; "
+    model: Literal["human", "kudoh", "point_mass", "insect", "urdf"] = preset(
+        "human",
+        "built-in body: a person; kudoh, the 15 segments of Kudoh (2002), 1.72 m and 70 kg; "
         "a point mass on massless feet, planned but not executed; an insect; or urdf, which goes without "
         "saying beside that key, for a creature from a file",
     )
-    stature_m: Positive = Field(default=1.75, description="standing height [m], of a human only")
-    mass_kg: Positive = Field(
-        default=79.0, description="body mass [kg] (an insect's default: 2); a creature has its file's own"
+    stature_m: Positive = preset(1.75, "standing height [m], of a human only")
+    mass_kg: Positive = preset(79.0, "body mass [kg] (an insect's default: 2); a creature has its file's own")
+    sex: Literal["male", "female"] = preset("male", "which anthropometric table, of a human only")
+    age: Annotated[Number, Field(ge=AGE_RANGE[0], le=AGE_RANGE[1])] = preset(
+        DEFAULT_AGE, "age [years], of a human only; its strength depends on it, nothing else"
     )
-    sex: Literal["male", "female"] = Field(
-        default="male", description="which anthropometric table, of a human only"
+    strength: Positive = preset(
+        1.0, "torque limits relative to a healthy adult of that sex, size and age, of a human only"
     )
-    age: Annotated[Number, Field(ge=AGE_RANGE[0], le=AGE_RANGE[1])] = Field(
-        default=DEFAULT_AGE,
-        description="age [years], of a human only; its strength depends on it, nothing else",
+    load: LoadSection | None = optional("load in the hands during the whole motion, of a human or kudoh")
+    further_contacts: list[Literal["knees", "elbows", "pelvis"]] | None = optional(
+        "what of a human may touch beside hands and feet, as limbs left_knee, right_knee, "
+        "left_elbow, right_elbow, pelvis"
     )
-    strength: Positive = Field(
-        default=1.0,
-        description="torque limits relative to a healthy adult of that sex, size and age, of a human only",
-    )
-    load: LoadSection | None = Field(
-        default=None, description="load in the hands during the whole motion, of a human or kudoh"
-    )
-    further_contacts: list[Literal["knees", "elbows", "pelvis"]] | None = Field(
-        default=None,
-        description="what of a human may touch beside hands and feet, as limbs left_knee, right_knee, "
-        "left_elbow, right_elbow, pelvis",
-    )
-    length_m: Positive = Field(default=0.4, description="length of the trunk [m], of an insect only")
-    urdf: Text | None = Field(
-        default=None, description="robot description of a creature, relative to this file's folder"
-    )
-    limbs: dict[str, LimbSection] | None = Field(default=None, description="limbs of a creature, by name")
-    standing_deg: dict[str, Number] | None = Field(
-        default=None, description="joint angles of a creature's standing posture [deg]"
-    )
-    sole: SoleSection | None = Field(default=None, description="size of a creature's soles")
+    length_m: Positive = preset(0.4, "length of the trunk [m], of an insect only")
+    urdf: Text | None = optional("robot description of a creature, relative to this file's folder")
+    limbs: dict[str, LimbSection] | None = optional("limbs of a creature, by name")
+    standing_deg: dict[str, Number] | None = optional("joint angles of a creature's standing posture [deg]")
+    sole: SoleSection | None = optional("size of a creature's soles")
 
     @model_validator(mode="before")
     @classmethod
@@ -277,53 +245,46 @@ FRICTION_MODEL_TEXT = (
 class WeightsSection(Section):
     """Weights of the planner's objectives; what is left out has the planner's default."""
 
-    margin: NonNegative | None = Field(default=None, description="of the smallest margin [1/(N.m)] or [1/N]")
-    smoothness: NonNegative | None = Field(default=None, description="of the mean squared derivatives")
-    duration: NonNegative | None = Field(default=None, description="of the duration [1/s]")
-    velocity: Weights3 | None = Field(
-        default=None,
-        description="along x, y, z of the task frame, x being the heading at the start [s^2/m^2]",
+    margin: NonNegative | None = optional("of the smallest margin [1/(N.m)] or [1/N]")
+    smoothness: NonNegative | None = optional("of the mean squared derivatives")
+    duration: NonNegative | None = optional("of the duration [1/s]")
+    velocity: Weights3 | None = optional(
+        "along x, y, z of the task frame, x being the heading at the start [s^2/m^2]"
     )
-    acceleration: Weights3 | None = Field(default=None, description="along the same axes [s^4/m^2]")
-    jerk: Weights3 | None = Field(default=None, description="along the same axes [s^6/m^2]")
+    acceleration: Weights3 | None = optional("along the same axes [s^4/m^2]")
+    jerk: Weights3 | None = optional("along the same axes [s^6/m^2]")
 
 
 class PlanningSection(Section):
     """Options of the centre-of-mass planner; what is left out has the planner's default."""
 
-    method: Literal["timing-free", "keyframes"] = Field(
-        default="timing-free",
-        description="durations as unknowns, or a smooth path through the key frames of a recording",
+    method: Literal["timing-free", "keyframes"] = preset(
+        "timing-free", "durations as unknowns, or a smooth path through the key frames of a recording"
     )
-    recording: Text | None = Field(
-        default=None,
-        description="keyframes: run directory or motion file of the same supports, relative to this file's "
-        "folder or else to the current one",
+    recording: Text | None = optional(
+        "keyframes: run directory or motion file of the same supports, relative to this file's "
+        "folder or else to the current one"
     )
-    recording_frame: FrameSection | None = Field(
-        default=None, description="keyframes: frame of the recording's coordinates (default: the world's)"
+    recording_frame: FrameSection | None = optional(
+        "keyframes: frame of the recording's coordinates (default: the world's)"
     )
-    control_points: Annotated[int, Field(strict=True, ge=4, le=1000)] | None = Field(
-        default=None, description="keyframes: of the B-spline (default: key frames plus 7)"
+    control_points: Annotated[int, Field(strict=True, ge=4, le=1000)] | None = optional(
+        "keyframes: of the B-spline (default: key frames plus 7)"
     )
-    degree: Annotated[int, Field(strict=True, ge=3, le=9)] | None = Field(
-        default=None, description="of the B-spline"
+    degree: Annotated[int, Field(strict=True, ge=3, le=9)] | None = optional("of the B-spline")
+    samples: Annotated[int, Field(strict=True, ge=2, le=200)] | None = optional(
+        "instants per phase at which balance is imposed, less one"
     )
-    samples: Annotated[int, Field(strict=True, ge=2, le=200)] | None = Field(
-        default=None, description="instants per phase at which balance is imposed, less one"
+    min_margin: NonNegative = preset(
+        0.0, "smallest stability margin allowed, moments about the CoM [N.m], or [N] in the force space"
     )
-    min_margin: NonNegative = Field(
-        default=0.0,
-        description="smallest stability margin allowed, moments about the CoM [N.m], or [N] in the force "
-        "space",
+    margin_space: Literal["wrench", "force"] = preset("wrench", "what the margin measures")
+    friction_model: FrictionModelName = preset("outer", FRICTION_MODEL_TEXT)
+    max_duration_s: Positive | None = optional("longest duration of the motion [s]")
+    zero_end_accelerations: Annotated[bool, Field(strict=True)] = preset(
+        False, "whether the CoM starts and ends without acceleration"
     )
-    margin_space: Literal["wrench", "force"] = Field(default="wrench", description="what the margin measures")
-    friction_model: FrictionModelName = Field(default="outer", description=FRICTION_MODEL_TEXT)
-    max_duration_s: Positive | None = Field(default=None, description="longest duration of the motion [s]")
-    zero_end_accelerations: Annotated[bool, Field(strict=True)] = Field(
-        default=False, description="whether the CoM starts and ends without acceleration"
-    )
-    weights: WeightsSection = Field(default=WeightsSection(), description="of the objectives")
+    weights: WeightsSection = preset(WeightsSection(), "of the objectives")
 
     def implied(self) -> dict[str, Any]:
         """The frame of a recording."""

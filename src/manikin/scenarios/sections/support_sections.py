@@ -1,8 +1,4 @@
-"""Section of a scenario file: the sequence of supports.
-
-Also here. Section of a scenario file: the contacts of one phase. Sections of a scenario or stance file: one
-contact.
-"""
+"""Sections of a scenario or stance file about contacts and the sequence of supports."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -16,7 +12,10 @@ from manikin.scenarios.validation import (
     Positive,
     Section,
     Vector3,
+    optional,
+    preset,
     refuse,
+    required,
     rule_error,
 )
 
@@ -31,51 +30,40 @@ _KIND_KEYS: dict[str, tuple[str, ...]] = {
 class SoleSection(Section):
     """A rectangular sole."""
 
-    length_m: Positive = Field(description="along the toes' direction [m]")
-    width_m: Positive = Field(description="across it [m]")
+    length_m: Positive = required("along the toes' direction [m]")
+    width_m: Positive = required("across it [m]")
 
 
 class ContactSection(Section):
     """One contact; what it leaves out comes from the section around it."""
 
-    kind: Literal["sole", "point", "grasp"] | None = Field(
-        default=None, description="default: sole for a foot, grasp for a hand"
+    kind: Literal["sole", "point", "grasp"] | None = optional("default: sole for a foot, grasp for a hand")
+    position: Annotated[Vector3, FrameMoves.POINT] = required(
+        "of the contact (centre of a sole) in the world [m]"
     )
-    position: Annotated[Vector3, FrameMoves.POINT] = Field(
-        description="of the contact (centre of a sole) in the world [m]"
+    yaw_deg: Annotated[Number, FrameMoves.HEADING] = preset(
+        0.0, "heading of the toes, or of the axes of a point's friction, counter-clockwise from world x [deg]"
     )
-    yaw_deg: Annotated[Number, FrameMoves.HEADING] = Field(
-        default=0.0,
-        description="heading of the toes, or of the axes of a point's friction, counter-clockwise from "
-        "world x [deg]",
+    normal: Annotated[Vector3 | None, FrameMoves.DIRECTION] = optional(
+        "surface normal, into the body (default up)"
     )
-    normal: Annotated[Vector3 | None, FrameMoves.DIRECTION] = Field(
-        default=None, description="surface normal, into the body (default up)"
+    rpy_deg: Annotated[Vector3 | None, FrameMoves.ORIENTATION] = optional(
+        "orientation of a grasping hand [deg]"
     )
-    rpy_deg: Annotated[Vector3 | None, FrameMoves.ORIENTATION] = Field(
-        default=None, description="orientation of a grasping hand [deg]"
+    sole: SoleSection | None = optional("size of this sole")
+    friction: Positive | None = optional("Coulomb coefficient")
+    normal_force_cap_N: Positive | None = optional("largest normal force of this contact [N]")
+    torsion_limit_Nm: Positive | None = optional("largest moment about the normal [N.m]")
+    settle_s: NonNegative | None = optional(
+        "time after the touch-down in which it may still slide to its place [s]"
     )
-    sole: SoleSection | None = Field(default=None, description="size of this sole")
-    friction: Positive | None = Field(default=None, description="Coulomb coefficient")
-    normal_force_cap_N: Positive | None = Field(
-        default=None, description="largest normal force of this contact [N]"
+    max_force_N: Positive | None = optional(
+        "grasp: largest force along each axis of the world, in a scenario of the task frame [N]"
     )
-    torsion_limit_Nm: Positive | None = Field(
-        default=None, description="largest moment about the normal [N.m]"
+    planning_max_force_N: Positive | None = optional(
+        "grasp: smaller limit that planning balances with (default: max_force_N)"
     )
-    settle_s: NonNegative | None = Field(
-        default=None, description="time after the touch-down in which it may still slide to its place [s]"
-    )
-    max_force_N: Positive | None = Field(
-        default=None,
-        description="grasp: largest force along each axis of the world, in a scenario of the task frame [N]",
-    )
-    planning_max_force_N: Positive | None = Field(
-        default=None, description="grasp: smaller limit that planning balances with (default: max_force_N)"
-    )
-    max_moment_Nm: NonNegative | None = Field(
-        default=None, description="grasp: largest moment per axis [N.m]"
-    )
+    max_moment_Nm: NonNegative | None = optional("grasp: largest moment per axis [N.m]")
 
     @field_validator("normal")
     @classmethod
@@ -121,34 +109,29 @@ ContactEntry = Annotated[
 """A contact, or the word ``same`` for the one of the phase before."""
 
 
+_MASSLESS = "contact of that foot of a point mass, or 'same'"
+
+
 class PhaseSection(Section):
     """The contacts of one phase and how long it may last; an effector left out is in the air."""
 
-    left_foot: ContactEntry | None = Field(default=None, description="contact of the left foot, or 'same'")
-    right_foot: ContactEntry | None = Field(default=None, description="contact of the right foot, or 'same'")
-    left_hand: ContactEntry | None = Field(default=None, description="contact of the left hand, or 'same'")
-    right_hand: ContactEntry | None = Field(default=None, description="contact of the right hand, or 'same'")
-    left_front_foot: ContactEntry | None = Field(
-        default=None, description="contact of that foot of a point mass, or 'same'"
+    left_foot: ContactEntry | None = optional("contact of the left foot, or 'same'")
+    right_foot: ContactEntry | None = optional("contact of the right foot, or 'same'")
+    left_hand: ContactEntry | None = optional("contact of the left hand, or 'same'")
+    right_hand: ContactEntry | None = optional("contact of the right hand, or 'same'")
+    left_front_foot: ContactEntry | None = optional(_MASSLESS)
+    right_front_foot: ContactEntry | None = optional(_MASSLESS)
+    left_hind_foot: ContactEntry | None = optional(_MASSLESS)
+    right_hind_foot: ContactEntry | None = optional(_MASSLESS)
+    buttocks: ContactEntry | None = optional("contact with a seat, or 'same'")
+    min_duration_s: Duration = preset(0.1, "shortest duration [s]")
+    max_duration_s: Duration | None = optional("longest duration [s]")
+    com_near: Annotated[Vector3 | None, FrameMoves.POINT] = optional(
+        "where the centre of mass should be when the phase begins [m]"
     )
-    right_front_foot: ContactEntry | None = Field(
-        default=None, description="contact of that foot of a point mass, or 'same'"
-    )
-    left_hind_foot: ContactEntry | None = Field(
-        default=None, description="contact of that foot of a point mass, or 'same'"
-    )
-    right_hind_foot: ContactEntry | None = Field(
-        default=None, description="contact of that foot of a point mass, or 'same'"
-    )
-    buttocks: ContactEntry | None = Field(default=None, description="contact with a seat, or 'same'")
-    min_duration_s: Duration = Field(default=0.1, description="shortest duration [s]")
-    max_duration_s: Duration | None = Field(default=None, description="longest duration [s]")
-    com_near: Annotated[Vector3 | None, FrameMoves.POINT] = Field(
-        default=None, description="where the centre of mass should be when the phase begins [m]"
-    )
-    com_within_m: Vector3 = Field(
-        default=(0.05, 0.05, 0.05),
-        description="how far it may be from there along x, y and z of the task frame, x being the heading "
+    com_within_m: Vector3 = preset(
+        (0.05, 0.05, 0.05),
+        "how far it may be from there along x, y and z of the task frame, x being the heading "
         "at the start [m]",
     )
 
@@ -170,39 +153,36 @@ class PhaseSection(Section):
 
     def entries(self) -> dict[str, "ContactSection | Literal['same']"]:
         """Contacts by effector, those in the air left out."""
-        found = {name: getattr(self, name) for name in (*EFFECTORS, *MASSLESS_FEET)}
-        return {name: entry for name, entry in found.items() if entry is not None}
+        result = {name: getattr(self, name) for name in (*EFFECTORS, *MASSLESS_FEET)}
+        return {name: entry for name, entry in result.items() if entry is not None}
 
 
 class SupportsSection(Section):
     """An explicit sequence of supports, with the defaults of its contacts."""
 
-    friction: Positive = Field(default=0.7, description="Coulomb coefficient of soles and points")
-    sole: SoleSection = Field(
-        default=SoleSection(length_m=0.28, width_m=0.12), description="size of the real soles"
+    friction: Positive = preset(0.7, "Coulomb coefficient of soles and points")
+    sole: SoleSection = preset(SoleSection(length_m=0.28, width_m=0.12), "size of the real soles")
+    planning_sole: SoleSection | None = optional(
+        "smaller soles that planning balances on, for robustness (default: the real ones)"
     )
-    planning_sole: SoleSection | None = Field(
-        default=None,
-        description="smaller soles that planning balances on, for robustness (default: the real ones)",
-    )
-    foot: Literal["flat", "rolling"] = Field(
-        default="flat",
-        description="whether a foot lands and leaves with its whole sole, or lands on its heel and leaves "
+    foot: Literal["flat", "rolling"] = preset(
+        "flat",
+        "whether a foot lands and leaves with its whole sole, or lands on its heel and leaves "
         "from its toes while another foot stands",
     )
-    planning_friction: Positive | None = Field(
-        default=None, description="smaller friction that planning balances with (default: the real one)"
+    planning_friction: Positive | None = optional(
+        "smaller friction that planning balances with (default: the real one)"
     )
-    normal_force_cap_N: Positive | None = Field(
-        default=None, description="largest sum of the normal forces of a stance [N] (default: 3 body weights)"
+    normal_force_cap_N: Positive | None = optional(
+        "largest sum of the normal forces of a stance [N] (default: 3 body weights)"
     )
-    contact_normal_force_cap_N: Positive | None = Field(
-        default=None, description="largest normal force of each sole or point that gives none itself [N]"
+    contact_normal_force_cap_N: Positive | None = optional(
+        "largest normal force of each sole or point that gives none itself [N]"
     )
-    planning_normal_force_cap_N: Positive | None = Field(
-        default=None, description="smaller cap that planning balances with (default: the real one)"
+    planning_normal_force_cap_N: Positive | None = optional(
+        "smaller cap that planning balances with (default: the real one)"
     )
-    phases: Annotated[list[PhaseSection], Field(min_length=1)] = Field(description="phases in order")
+    phases: Annotated[list[PhaseSection], Field(min_length=1)] = required("phases in order")
 
     @model_validator(mode="after")
     def _check(self) -> Self:

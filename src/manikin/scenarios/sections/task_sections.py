@@ -1,9 +1,4 @@
-"""Sections of a scenario file: from where to where.
-
-Also here. Section of a scenario file: a disturbance. Sections of a scenario file: the things in the scene.
-Sections of a scenario file: a walk over the floor, and who else walks there. Section of a scenario file: how
-a run of it should end. Section of a scenario file: a frame other than the world's.
-"""
+"""Sections of a scenario file about its task: ends, act, push, walk, scene and expected outcome."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -22,15 +17,18 @@ from manikin.scenarios.validation import (
     Text,
     Vector2,
     Vector3,
+    optional,
+    preset,
     refuse,
+    required,
     rule_error,
 )
 
 LARGEST_FORCE = 5000.0
-"""Some seven body weights, far beyond what can be held [N]; ``manikin.simulation.recover`` has the same."""
+"""Largest force of a push [N], some seven body weights; the same in ``manikin.simulation.push_force``."""
 
 LARGEST_FREQUENCY = 100.0
-"""Of a sine: ten of the physics' steps are left for each period [Hz]."""
+"""Largest frequency of a sine [Hz]: ten steps of the physics for each period."""
 
 Force = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGEST_FORCE)]
 
@@ -38,12 +36,10 @@ Force = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=LARGES
 class PushSection(Section):
     """A push on the trunk: of the thorax during an execution, near the centre of mass in a recovery."""
 
-    force_N: Force = Field(description="size [N]; of a sine its amplitude")
-    direction_deg: Number = Field(
-        description="of the force, counter-clockwise from the body's forward axis [deg]"
-    )
-    duration_s: Duration = Field(description="how long [s]")
-    at_s: NonNegative = Field(description="when it begins [s]")
+    force_N: Force = required("size [N]; of a sine its amplitude")
+    direction_deg: Number = required("of the force, counter-clockwise from the body's forward axis [deg]")
+    duration_s: Duration = required("how long [s]")
+    at_s: NonNegative = required("when it begins [s]")
     frequency_hz: Positive | None = Field(
         default=None,
         le=LARGEST_FREQUENCY,
@@ -54,42 +50,30 @@ class PushSection(Section):
 class RecoverySection(Section):
     """A body that stands, is pushed, and keeps its balance without a motion given beforehand."""
 
-    feet: Literal["held", "free"] = Field(
-        default="held",
-        description="held: welded to the ground, as in Kudoh (2002); free: in contact with friction",
+    feet: Literal["held", "free"] = preset(
+        "held", "held: welded to the ground, as in Kudoh (2002); free: in contact with friction"
     )
-    support: Literal["both", "left", "right"] = Field(
-        default="both", description="feet that the body stands on; beside a single one the other is raised"
+    support: Literal["both", "left", "right"] = preset(
+        "both", "feet that the body stands on; beside a single one the other is raised"
     )
-    feet_apart_m: Positive | None = Field(
-        default=None,
-        description="distance between the middles of both soles, sideways [m] (default: as the body stands)",
+    feet_apart_m: Positive | None = optional(
+        "distance between the middles of both soles, sideways [m] (default: as the body stands)"
     )
-    delay_s: NonNegative = Field(
-        default=0.2, description="from the beginning of the push until the body reacts [s]"
-    )
-    steps: Annotated[int, Field(ge=0, le=2)] = Field(
-        default=0, description="how many steps it may take, 0 to 2; free feet only"
-    )
-    ankle_stiffness: NonNegative = Field(
-        default=0.64,
-        description="stiffness of both ankles together before the body reacts, in m g h per radian "
+    delay_s: NonNegative = preset(0.2, "from the beginning of the push until the body reacts [s]")
+    steps: Annotated[int, Field(ge=0, le=2)] = preset(0, "how many steps it may take, 0 to 2; free feet only")
+    ankle_stiffness: NonNegative = preset(
+        0.64,
+        "stiffness of both ankles together before the body reacts, in m g h per radian "
         "(default: calf muscles at rest)",
     )
-    sole_inset_m: NonNegative = Field(
-        default=0.005, description="how far inside the edge of the soles the ZMP is kept [m]"
-    )
-    duration_s: Duration = Field(default=3.5, description="of the run [s]")
-    friction: Positive = Field(default=0.7, description="of the soles")
+    sole_inset_m: NonNegative = preset(0.005, "how far inside the edge of the soles the ZMP is kept [m]")
+    duration_s: Duration = preset(3.5, "of the run [s]")
+    friction: Positive = preset(0.7, "of the soles")
     locked: list[Literal["arms", "hips"]] = Field(
         default_factory=list, description="joints that hold the posture: arms; hips, with the trunk"
     )
-    posture_control_only: bool = Field(
-        default=False, description="whether the quadratic program is left out, for comparison"
-    )
-    strength: Positive = Field(
-        default=1.0, description="torque and speed limits relative to those of the body"
-    )
+    posture_control_only: bool = preset(False, "whether the quadratic program is left out, for comparison")
+    strength: Positive = preset(1.0, "torque and speed limits relative to those of the body")
 
 
 OBSTACLE_SHAPES = ("box", "cylinder", "capsule", "sphere", "plane", "half_space", "mesh")
@@ -98,48 +82,44 @@ OBSTACLE_SHAPES = ("box", "cylinder", "capsule", "sphere", "plane", "half_space"
 class RoundSection(Section):
     """A cylinder or capsule along its z axis."""
 
-    radius_m: Positive = Field(description="radius [m]")
-    length_m: Positive = Field(description="length [m]; of a capsule, without its round ends")
+    radius_m: Positive = required("radius [m]")
+    length_m: Positive = required("length [m]; of a capsule, without its round ends")
 
 
 class SphereSection(Section):
     """A sphere."""
 
-    radius_m: Positive = Field(description="radius [m]")
+    radius_m: Positive = required("radius [m]")
 
 
 class ObstacleSection(Section):
     """One thing in the scene: a name, one shape and a pose."""
 
-    name: Text = Field(description="unique name")
-    box: Size3 | None = Field(default=None, description="sizes along x, y, z [m]")
-    cylinder: RoundSection | None = Field(default=None, description="cylinder along z")
-    capsule: RoundSection | None = Field(default=None, description="capsule along z")
-    sphere: SphereSection | None = Field(default=None, description="sphere")
-    plane: Vector3 | None = Field(
-        default=None, description="normal of an infinite two-sided plane through position, turned by rpy_deg"
+    name: Text = required("unique name")
+    box: Size3 | None = optional("sizes along x, y, z [m]")
+    cylinder: RoundSection | None = optional("cylinder along z")
+    capsule: RoundSection | None = optional("capsule along z")
+    sphere: SphereSection | None = optional("sphere")
+    plane: Vector3 | None = optional(
+        "normal of an infinite two-sided plane through position, turned by rpy_deg"
     )
-    half_space: Vector3 | None = Field(
-        default=None, description="outward normal of a solid half-space at position, turned by rpy_deg"
+    half_space: Vector3 | None = optional(
+        "outward normal of a solid half-space at position, turned by rpy_deg"
     )
-    mesh: Text | None = Field(
-        default=None, description="STL, OBJ, PLY or DAE file, relative to this file's folder"
+    mesh: Text | None = optional("STL, OBJ, PLY or DAE file, relative to this file's folder")
+    scale: Positive | None = optional("factor on the mesh's coordinates (default 1)")
+    unit: Literal["m", "cm", "mm", "in"] | None = optional(
+        "unit of the mesh (default: a DAE file's own, else m)"
     )
-    scale: Positive | None = Field(default=None, description="factor on the mesh's coordinates (default 1)")
-    unit: Literal["m", "cm", "mm", "in"] | None = Field(
-        default=None, description="unit of the mesh (default: a DAE file's own, else m)"
+    convex: Literal["no", "hull", "parts"] | None = optional(
+        "replace the mesh, or each connected part, by its convex hull"
     )
-    convex: Literal["no", "hull", "parts"] | None = Field(
-        default=None, description="replace the mesh, or each connected part, by its convex hull"
+    padded: Annotated[bool, Field(strict=True)] = preset(
+        False, "whether any part of the body may lean on it, as on a seat"
     )
-    padded: Annotated[bool, Field(strict=True)] = Field(
-        default=False, description="whether any part of the body may lean on it, as on a seat"
-    )
-    position: Annotated[Vector3, FrameMoves.POINT] = Field(
-        default=(0.0, 0.0, 0.0), description="origin in the world [m]"
-    )
-    rpy_deg: Annotated[Vector3, FrameMoves.ORIENTATION] = Field(
-        default=(0.0, 0.0, 0.0), description="fixed-axis roll, pitch, yaw [deg]"
+    position: Annotated[Vector3, FrameMoves.POINT] = preset((0.0, 0.0, 0.0), "origin in the world [m]")
+    rpy_deg: Annotated[Vector3, FrameMoves.ORIENTATION] = preset(
+        (0.0, 0.0, 0.0), "fixed-axis roll, pitch, yaw [deg]"
     )
 
     @property
@@ -151,8 +131,8 @@ class ObstacleSection(Section):
     def _one_shape(self) -> Self:
         given = [name for name in OBSTACLE_SHAPES if getattr(self, name) is not None]
         if len(given) != 1:
-            found = f"has {' and '.join(given)}" if given else "has no shape"
-            raise refuse("", f"{found}; valid: exactly one of {', '.join(OBSTACLE_SHAPES)}")
+            result = f"has {' and '.join(given)}" if given else "has no shape"
+            raise refuse("", f"{result}; valid: exactly one of {', '.join(OBSTACLE_SHAPES)}")
         for key in ("scale", "unit", "convex"):
             if getattr(self, key) is not None and given[0] != "mesh":
                 raise refuse(key, f"is given for a {given[0]}; valid: only with mesh")
@@ -172,58 +152,57 @@ Speed = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0.1, le=4.0)
 class StandSection(Section):
     """Where a walker stands at the beginning."""
 
-    at: Annotated[Vector2, FrameMoves.POINT] = Field(description="x and y [m]")
-    heading_deg: Annotated[Number, FrameMoves.HEADING] = Field(default=0.0, description="where to face [deg]")
+    at: Annotated[Vector2, FrameMoves.POINT] = required("x and y [m]")
+    heading_deg: Annotated[Number, FrameMoves.HEADING] = preset(0.0, "where to face [deg]")
 
 
 class WaypointSection(StandSection):
     """Where a walker comes past, or stops."""
 
-    speed_m_s: NonNegative = Field(
-        default=0.0, description="with which it is passed, towards the place after it; 0 for a stop [m/s]"
+    speed_m_s: NonNegative = preset(
+        0.0, "with which it is passed, towards the place after it; 0 for a stop [m/s]"
     )
-    wait_s: NonNegative = Field(default=0.0, description="how long the walker stands there [s]")
+    wait_s: NonNegative = preset(0.0, "how long the walker stands there [s]")
 
 
 class WalkerSection(Section):
     """Somebody else who walks there, on a way that does not depend on whom the scenario is about."""
 
-    name: Name = Field(description="what messages and files call this walker")
-    start: StandSection = Field(description="where the walker stands at the beginning")
+    name: Name = required("what messages and files call this walker")
+    start: StandSection = required("where the walker stands at the beginning")
     via: list[WaypointSection] = Field(
         min_length=1, description="where the walker goes, in order; the last one is a stop"
     )
-    wait_s: NonNegative = Field(default=0.0, description="how long the walker stands at the start [s]")
-    max_speed_m_s: Speed = Field(default=1.6, description="limit of the speed over the floor [m/s]")
+    wait_s: NonNegative = preset(0.0, "how long the walker stands at the start [s]")
+    max_speed_m_s: Speed = preset(1.6, "limit of the speed over the floor [m/s]")
 
 
 class WalkingSection(Section):
     """A walk from start to goal of the task: path by optimal control, whole body from recorded walks."""
 
-    whole_body: Literal["recorded", "planned"] = Field(
-        default="recorded",
-        description="recorded: as recorded people walk, along the path; planned: on footprints along the "
+    whole_body: Literal["recorded", "planned"] = preset(
+        "recorded",
+        "recorded: as recorded people walk, along the path; planned: on footprints along the "
         "path, balanced and executed in the physics engine",
     )
-    footprints: Literal["stepper", "library"] = Field(
-        default="stepper",
-        description="of a planned walk from start to goal: stepper, by rules along the path; library, where "
+    footprints: Literal["stepper", "library"] = preset(
+        "stepper",
+        "of a planned walk from start to goal: stepper, by rules along the path; library, where "
         "recorded people's feet stand on the same path, and no faster than they go",
     )
-    start: StandSection | None = Field(
-        default=None,
-        description="with supports: where the body walks from, to the feet of their first phase; the plan "
-        "goes on from there",
+    start: StandSection | None = optional(
+        "with supports: where the body walks from, to the feet of their first phase; the plan "
+        "goes on from there"
     )
     via: list[WaypointSection] = Field(
         default_factory=list, description="where the way to the goal leads past, in order"
     )
-    wait_s: NonNegative = Field(default=0.0, description="how long the body stands at the start [s]")
-    max_speed_m_s: Speed = Field(default=1.6, description="limit of the speed over the floor [m/s]")
-    room_m: NonNegative = Field(default=0.05, description="distance to keep from obstacles and others [m]")
-    weights: Literal["prose", "literal", "recorded", "recorded-turns"] = Field(
-        default="prose",
-        description="weights of the criterion: as the text of Truong (2010) 5.5.1 has them, as its "
+    wait_s: NonNegative = preset(0.0, "how long the body stands at the start [s]")
+    max_speed_m_s: Speed = preset(1.6, "limit of the speed over the floor [m/s]")
+    room_m: NonNegative = preset(0.05, "distance to keep from obstacles and others [m]")
+    weights: Literal["prose", "literal", "recorded", "recorded-turns"] = preset(
+        "prose",
+        "weights of the criterion: as the text of Truong (2010) 5.5.1 has them, as its "
         "equations (5.5) and (5.8) read literally, or as identified from recorded walks, all or turns only",
     )
     others: list[WalkerSection] = Field(
@@ -253,11 +232,11 @@ class WalkingSection(Section):
 class ExpectSection(Section):
     """Success, or a failure with the stage in which it is expected and its reason."""
 
-    outcome: Literal["success", "failure"] = Field(description="how a run should end")
-    stage: Literal["walk", "contacts", "centroidal", "wholebody", "execution", "push"] | None = Field(
-        default=None, description="stage that should fail; a failure of another one is not as expected"
+    outcome: Literal["success", "failure"] = required("how a run should end")
+    stage: Literal["walk", "contacts", "centroidal", "wholebody", "execution", "push"] | None = optional(
+        "stage that should fail; a failure of another one is not as expected"
     )
-    because: Text | None = Field(default=None, description="why it is expected to fail")
+    because: Text | None = optional("why it is expected to fail")
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -281,11 +260,9 @@ Expectation = Annotated[
 class FrameSection(Section):
     """A frame in the world, as high as that."""
 
-    at: Annotated[Vector2, FrameMoves.POINT] = Field(
-        default=(0.0, 0.0), description="where its origin is, x and y [m]"
-    )
-    yaw_deg: Annotated[Number, FrameMoves.HEADING] = Field(
-        default=0.0, description="where its x axis points, counter-clockwise from world x [deg]"
+    at: Annotated[Vector2, FrameMoves.POINT] = preset((0.0, 0.0), "where its origin is, x and y [m]")
+    yaw_deg: Annotated[Number, FrameMoves.HEADING] = preset(
+        0.0, "where its x axis points, counter-clockwise from world x [deg]"
     )
 
     def transform_to_world(self) -> PlanarTransform:
@@ -296,25 +273,19 @@ class FrameSection(Section):
 class StateSection(Section):
     """Where the body starts or ends."""
 
-    com: Annotated[Vector3 | None, FrameMoves.POINT] = Field(default=None, description="centre of mass [m]")
-    velocity_m_s: Annotated[Vector3 | None, FrameMoves.DIRECTION] = Field(
-        default=None, description="of the centre of mass when the body sits down at the goal (default: free)"
+    com: Annotated[Vector3 | None, FrameMoves.POINT] = optional("centre of mass [m]")
+    velocity_m_s: Annotated[Vector3 | None, FrameMoves.DIRECTION] = optional(
+        "of the centre of mass when the body sits down at the goal (default: free)"
     )
-    at: Annotated[Vector2 | None, FrameMoves.POINT] = Field(
-        default=None, description="where to stand, x and y [m]"
+    at: Annotated[Vector2 | None, FrameMoves.POINT] = optional("where to stand, x and y [m]")
+    heading_deg: Annotated[Number | None, FrameMoves.HEADING] = optional("where to face [deg]")
+    height_m: Number | None = optional(
+        "height of the surface to stand or sit on there [m] (default: the lowest one on "
+        "which the posture exists)"
     )
-    heading_deg: Annotated[Number | None, FrameMoves.HEADING] = Field(
-        default=None, description="where to face [deg]"
-    )
-    height_m: Number | None = Field(
-        default=None,
-        description="height of the surface to stand or sit on there [m] (default: the lowest one on "
-        "which the posture exists)",
-    )
-    posture: Literal["standing", "seated", "crouched", "climbing"] | None = Field(
-        default=None,
-        description="how the body is at rest there (default: standing); climbing: on what its limbs "
-        "hold, as high as if it stood on that height",
+    posture: Literal["standing", "seated", "crouched", "climbing"] | None = optional(
+        "how the body is at rest there (default: standing); climbing: on what its limbs "
+        "hold, as high as if it stood on that height"
     )
 
     @model_validator(mode="after")
@@ -331,14 +302,14 @@ class StateSection(Section):
 class ActSection(Section):
     """What the hands do to an object where the way ends."""
 
-    kind: Literal["push", "pull"] = Field(description="press with the palms, or hold on and draw")
-    on: Text = Field(description="name of an obstacle; it does not move")
-    direction: Annotated[Vector3, FrameMoves.DIRECTION] = Field(
-        description="where the force on the object points; level"
+    kind: Literal["push", "pull"] = required("press with the palms, or hold on and draw")
+    on: Text = required("name of an obstacle; it does not move")
+    direction: Annotated[Vector3, FrameMoves.DIRECTION] = required(
+        "where the force on the object points; level"
     )
-    force_N: Positive = Field(description="force on the object [N]")
-    ramp_s: Positive = Field(default=1.0, description="time in which the force rises from none [s]")
-    hold_s: NonNegative = Field(default=2.0, description="time for which it is held then [s]")
+    force_N: Positive = required("force on the object [N]")
+    ramp_s: Positive = preset(1.0, "time in which the force rises from none [s]")
+    hold_s: NonNegative = preset(2.0, "time for which it is held then [s]")
 
     @field_validator("direction")
     @classmethod
@@ -351,12 +322,12 @@ class ActSection(Section):
 class TaskSection(Section):
     """From where to where, and what is done there."""
 
-    start: StateSection = Field(description="state at the beginning, at rest")
-    goal: StateSection = Field(
-        description="state at the end, at rest; found, and may be left out, with an act and no supports"
+    start: StateSection = required("state at the beginning, at rest")
+    goal: StateSection = required(
+        "state at the end, at rest; found, and may be left out, with an act and no supports"
     )
-    act: ActSection | None = Field(
-        default=None, description="what the hands do to an object at the end; where to stand for it is found"
+    act: ActSection | None = optional(
+        "what the hands do to an object at the end; where to stand for it is found"
     )
 
     @model_validator(mode="before")

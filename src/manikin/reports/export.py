@@ -1,16 +1,11 @@
-"""Choosing a motion and a format, and writing the file.
+"""Motions for other programs: BVH and CSV files.
 
-The writers themselves are imported when they are needed, so that a wrong option is
-refused at once.
+A CSV file has one row per sample, units in the header.
 
-Also here. Motions as comma-separated values, one row per sample, units in the header. Motions at another
-sampling rate. Motions as Biovision hierarchy (BVH) files, for animation programs.
-
-BVH has y up and no unit; programs take it for centimetres.  Ours: x to the body's left, y
-up, z forward, centimetres, degrees, ``(X, Y, Z) = 100 (y, z, x)``, which is a rotation of
-our world (x forward, y left, z up) and no mirror image.  Every joint has three rotation
-channels: the segment's hinges in their order, then the axes it does not have, at zero.
-A BVH rotation is the product of its channels from left to right, like our hinges.
+BVH has y up and no unit; programs take it for centimetres. Ours: x to the body's left, y up, z forward,
+centimetres, degrees, ``(X, Y, Z) = 100 (y, z, x)``, a rotation of our world (x forward, y left, z up) and no
+mirror image. Every joint has three rotation channels: the segment's hinges in their order, then the axes it
+does not have, at zero. A BVH rotation is the product of its channels from left to right, like our hinges.
 """
 
 from __future__ import annotations
@@ -30,7 +25,7 @@ from manikin.body.segments import end_of
 from manikin.errors import InputError, MotionFileError
 from manikin.motion import Motion
 from manikin.numerics.spatial import FloatArray, finite_number
-from manikin.runtime.files import write_result
+from manikin.runtime.files import columns_csv, write_result
 
 if TYPE_CHECKING:
     from manikin.motion.file import MotionFile
@@ -44,14 +39,6 @@ def to_csv(motion: Motion) -> str:
 
     Numbers have 9 significant digits; the separator is a comma, the decimal sign a point.
     """
-    columns = _columns(motion)
-    text = StringIO()
-    text.write(",".join(columns) + "\n")
-    np.savetxt(text, np.column_stack(list(columns.values())), fmt="%.9g", delimiter=",")
-    return text.getvalue()
-
-
-def _columns(motion: Motion) -> dict[str, np.ndarray]:
     columns: dict[str, np.ndarray] = {"time [s]": motion.time}
     for index, axis in enumerate(_AXES):
         columns[f"pelvis_{axis} [m]"] = motion.q[:, index]
@@ -68,7 +55,7 @@ def _columns(motion: Motion) -> dict[str, np.ndarray]:
             columns[f"{name}_force_{axis} [N]"] = motion.contact_force[:, number, index]
         for index, axis in enumerate(_AXES):
             columns[f"{name}_moment_{axis} [N.m]"] = motion.contact_force[:, number, 3 + index]
-    return columns
+    return columns_csv(columns, 9)
 
 
 def resample(motion: Motion, rate: float | None) -> Motion:
@@ -79,7 +66,6 @@ def resample(motion: Motion, rate: float | None) -> Motion:
     are returned exactly.
 
     Args:
-        motion: The motion.
         rate: Samples per second [Hz], or None to leave it as it is.
 
     Raises:
@@ -161,7 +147,7 @@ def to_bvh(body: BodyModel, motion: Motion) -> str:
 
     Args:
         body: Who moves.
-        motion: Evenly sampled; see :func:`manikin.reports.export.write`.
+        motion: Evenly sampled; see :func:`resample`.
 
     Raises:
         MotionFileError: If the motion is not the body's, or is not evenly sampled.
@@ -304,14 +290,9 @@ def pick_motion(content: MotionFile, which: str | None = None) -> tuple[str, Mot
 
 
 def export_motion(
-    content: MotionFile,
-    source: str | Path,
-    format_name: str,
-    *,
-    out: str | Path | None = None,
-    which: str | None = None,
-    rate: float | None = None,
-) -> Path:
+    content: MotionFile, source: str | Path, format_name: str, *, out: str | Path | None = None,
+    which: str | None = None, rate: float | None = None,
+) -> Path:  # fmt: skip
     """Write a motion in another format, atomically.
 
     Args:
@@ -333,21 +314,8 @@ def export_motion(
     _, motion = pick_motion(content, which)
     folder = Path(source) if Path(source).is_dir() else Path(source).parent
     path = Path(out) if out is not None else folder / f"motion.{format_name}"
-    text = _text(content, motion, format_name, rate, source)
-    return write_result(path, text)
-
-
-def _text(
-    content: MotionFile, motion: Motion, format_name: str, rate: float | None, source: str | Path
-) -> str:
-    pass
-
     if format_name == "csv":
-        pass
-
-        return to_csv(resample(motion, rate))
-    pass
-
+        return write_result(path, to_csv(resample(motion, rate)))
     if content.body is None:
         raise MotionFileError(f"{source}: holds no body; valid: a motion file with a body for bvh")
-    return to_bvh(content.body, resample(motion, BVH_RATE if rate is None else rate))
+    return write_result(path, to_bvh(content.body, resample(motion, BVH_RATE if rate is None else rate)))

@@ -1,0 +1,137 @@
+"""``manikin run``: plan a scenario, execute it in the physics engine and report; or all built-in ones."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from manikin.cli.console import (
+    DONE,
+    FAILED,
+    FiguresOption,
+    JobsOption,
+    JsonOption,
+    LoadHandOption,
+    OutOption,
+    SexOption,
+    directory_of,
+    print_json,
+    refuse,
+    run_job,
+)
+from manikin.runtime.progress import Interruption
+
+ALL = "all"
+"""In place of a scenario: every built-in one with its variants."""
+
+RESULTS = "results.json"
+"""Results of ``manikin run all --out DIR``, in DIR."""
+
+
+def run(
+    context: typer.Context,
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME|FILE.yaml|all",
+            help="Built-in scenario or scenario file; NAME@V is its variant V; all: every one of them.",
+        ),
+    ],
+    out: OutOption = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed; default: the scenario's.")] = None,
+    json: JsonOption = False,
+    stature: Annotated[
+        float | None, typer.Option(metavar="M", min=1.4, max=2.1, help="Other stature, 1.4 to 2.1 m.")
+    ] = None,
+    mass: Annotated[
+        float | None, typer.Option(metavar="KG", min=35.0, max=160.0, help="Other mass, 35 to 160 kg.")
+    ] = None,
+    sex: SexOption = None,
+    age: Annotated[float | None, typer.Option(metavar="YEARS", help="Other age, 18 to 90 years.")] = None,
+    strength: Annotated[
+        float | None, typer.Option(metavar="X", help="Torque limits over those of a healthy adult.")
+    ] = None,
+    load_kg: Annotated[
+        float | None, typer.Option(metavar="KG", help="Load in the hands during the whole motion.")
+    ] = None,
+    load_hand: LoadHandOption = None,
+    variant: Annotated[
+        str | None, typer.Option(metavar="V", help="One of the scenario's variants; also NAME@V.")
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Set one value, such as supports.friction=0.5 or scene.roof.position.2=1.4; repeatable.",
+        ),
+    ] = None,
+    moved: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y YAW_DEG", help="Move the scenario's origin to X Y [m], turned [deg]."),
+    ] = None,
+    figures: FiguresOption = True,
+    jobs: JobsOption = None,
+) -> int:
+    """Plan a scenario, execute it in the physics engine and report: proved, planned or failed."""
+    body = {"stature_m": stature, "mass_kg": mass, "sex": sex, "age": age, "strength": strength}
+    if scenario == ALL:
+        refuse(variant is not None, "--variant", "every variant is run")
+        refuse(bool(overrides), "--set", "it belongs to one scenario")
+        refuse(moved is not None, "--moved", "it belongs to one scenario")
+        refuse(load_kg is not None or load_hand is not None, "--load-kg", "it belongs to one scenario")
+        return _run_all(out, seed, body, context.obj, draw=figures, workers=jobs, json=json)
+    refuse(jobs is not None, "--jobs", "it is for 'manikin run all'")
+    refuse(load_hand is not None and load_kg is None, "--load-hand", "it needs --load-kg")
+    load = None if load_kg is None else {"mass_kg": load_kg, "hand": load_hand or "both"}
+    from manikin.scenarios import load_scenario
+
+    job = load_scenario(scenario, variant, overrides or ()).with_body(**body, load=load)
+    if seed is not None:
+        job = job.with_seed(seed)
+    if moved is not None:
+        job = job.moved(*moved)
+    outcome = run_job(job, directory_of(out, job.name, json=json), context.obj, draw=figures)
+    if json:
+        print_json(outcome.summary)
+    else:
+        outcome.print()
+    return outcome.status
+
+
+def _run_all(
+    out: Path | None, seed: int | None, body: dict[str, Any], interruption: Interruption, *, draw: bool,
+    workers: int | None, json: bool,
+) -> int:  # fmt: skip
+    from manikin.pipeline import batch
+    from manikin.reports.summary_table import counts_line, text_table, verdict_line
+    from manikin.runtime.files import make_directory, write_result
+    from manikin.scenarios import list_scenarios, load_scenario
+
+    # A value that is not usable is refused once, and not once per run.
+    any_job = load_scenario(next(iter(list_scenarios()))).with_body(**body)
+    if seed is not None:
+        any_job.with_seed(seed)
+    given = {"seed": seed} | {key.partition("_")[0]: value for key, value in body.items()}
+    words = [word for name, value in given.items() if value is not None for word in (f"--{name}", str(value))]
+    directory = out if out is not None else None if json else Path("runs")
+    runs = batch.built_in_jobs(statures=body["stature_m"] is not None)
+    if directory is not None:
+        make_directory(directory)
+
+    def report(entry: dict[str, Any], done: int) -> None:
+        interruption.check()
+        word = "as expected" if entry["as_expected"] else "NOT as expected"
+        typer.echo(f"[{done}/{len(runs)}] {verdict_line(entry)}, {word}, {entry['wall_s']:.1f} s", err=True)
+
+    options = batch.RunOptions(directory, draw and directory is not None, tuple(words))
+    results = {"stature_m": body["stature_m"], "seed": seed}
+    results |= batch.run_jobs(runs, options.command, workers=workers, report=report)
+    if directory is not None:
+        write_result(directory / RESULTS, results)
+    if json:
+        print_json(results)
+    else:
+        typer.echo(text_table(results))
+        typer.echo(counts_line(results))
+    return FAILED if results["not_as_expected"] else DONE
