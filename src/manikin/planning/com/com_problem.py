@@ -296,7 +296,7 @@ class CentroidalProblem:
                 values[name] = finite_number(getattr(self, name), f"centroidal {name} [{unit}]", above=0.0)
         for end in ("start", "goal"):
             for name, unit in (("com", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2")):
-                vector = getattr(self, f"{end}_{name}")
+                vector: Any = getattr(self, f"{end}_{name}")
                 if vector is not None or name == "com":
                     text = f"centroidal {end}_{name} [{unit}]"
                     values[f"{end}_{name}"] = frozen_array(vector, text, (3,))
